@@ -1,0 +1,21 @@
+# Every option of Dermis, with defaults that suit both a checkout of its own and an engine's add_subdirectory.
+
+option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" ON)
+option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_WARNINGS_AS_ERRORS "Stop at the first compiler warning" OFF)
+set(DERMIS_SANITIZE "" CACHE STRING "Sanitizers to build Dermis with: address, thread, or empty for none")
+set_property(CACHE DERMIS_SANITIZE PROPERTY STRINGS "" address thread)
+
+if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_BUILD_VULKAN AND DERMIS_BUILD_GLTF))
+  message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_BUILD_VULKAN and DERMIS_BUILD_GLTF")
+endif()
+if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_SAMPLES)
+  message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_SAMPLES: the tests use its device and its models")
+endif()
+
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()

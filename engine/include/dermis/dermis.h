@@ -1,0 +1,15 @@
+// All of dermis::core: what needs no Vulkan.
+#pragma once
+
+#include "dermis/accuracy.h"
+#include "dermis/dual_quat.h"
+#include "dermis/glm.h"
+#include "dermis/mesh.h"
+#include "dermis/method.h"
+#include "dermis/pack.h"
+#include "dermis/plan.h"
+#include "dermis/reference.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+#include "dermis/validate.h"
+#include "dermis/version.h"

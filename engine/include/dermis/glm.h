@@ -1,0 +1,29 @@
+// Between the plain arrays of the interface and GLM.
+#pragma once
+
+#include <glm/mat4x3.hpp>
+#include <glm/mat4x4.hpp>
+
+#include "dermis/types.h"
+
+namespace dermis {
+
+/// The upper three rows of a GLM matrix (its last row must be 0 0 0 1).
+inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
+  JointMatrix result;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) result.m[row][column] = matrix[column][row];
+  }
+  return result;
+}
+
+/// Four columns of three.
+inline glm::mat4x3 toGlm(const JointMatrix& matrix) {
+  glm::mat4x3 result(1.0f);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) result[column][row] = matrix.m[row][column];
+  }
+  return result;
+}
+
+}  // namespace dermis

@@ -1,0 +1,53 @@
+// A mesh as the kernels read it: one relocatable blob, made once at import.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "dermis/result.h"
+
+namespace dermis {
+
+/// Where a packed mesh may stand in the engine's mesh buffer: a multiple of this many bytes.
+inline constexpr std::uint32_t packedMeshAlignment = 16;
+
+/// A packed mesh owns a blob of little-endian 32-bit words. It is relocatable (offsets count from
+/// its start) and versioned, so that an asset cooker can store it. The order of vertices is that of
+/// the mesh.
+///
+/// The same bytes go into the mesh buffer on the GPU, at a multiple of `packedMeshAlignment`.
+class PackedMesh {
+ public:
+  /// A packed mesh from stored bytes, which are copied. O(bytes): checks the length, the version,
+  /// the checksum and every index, so that no stored blob can make a kernel read outside its mesh
+  /// or palette. Fails with `invalidData` or `unsupportedVersion`.
+  static Result<PackedMesh> fromBytes(std::span<const std::byte> bytes);
+
+  /// The blob; its size is a multiple of `packedMeshAlignment`.
+  std::span<const std::byte> bytes() const { return std::as_bytes(std::span(words_)); }
+
+  std::uint32_t vertexCount() const;
+  /// The fewest joints that a palette for this mesh may have: its largest joint index + 1.
+  std::uint32_t requiredJoints() const;
+  /// The largest number of influences of one vertex.
+  std::uint32_t maxInfluences() const;
+  bool hasNormals() const;
+
+ private:
+  friend Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
+  PackedMesh() = default;
+  std::vector<std::uint32_t> words_;
+};
+
+/// Packs a mesh for palettes of `jointCount` joints. Per vertex: weights of one joint added up,
+/// zero weights dropped, the pivot chosen (the strongest influence, the lowest joint index on a
+/// tie) and stored first, the rest by falling weight; weights normalised in double precision,
+/// rounded to float32 so that their sum is as near to 1 as float allows. O(vertices × influences).
+/// Fails with `invalidMesh` where `validate` reports a problem that is `refusedByPack`, with that
+/// finding's sentence, and with `limitExceeded` above 2^32 words.
+Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
+
+}  // namespace dermis

@@ -1,0 +1,51 @@
+// The CPU reference: the right answer, in double precision. It starts from the same mesh views and
+// float32 joint matrices as the GPU and shares no code with packing or the kernels. Made to be
+// right and readable, not fast.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "dermis/method.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace dermis::reference {
+
+using Double3 = std::array<double, 3>;
+
+/// What the accuracy of a float32 result depends on, per vertex (accuracy.h turns it into bounds).
+struct Conditioning {
+  double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
+                        ///< value of joint j
+  double distance = 0;  ///< |p|, from the origin of the bind pose
+  double rigidShortcut =
+      0;  ///< by how much a joint that kernels take for rigid stretches, at most 4e-6
+  double normalAlignment =
+      1;  ///< |adjᵀ(M) n| / σ_max², M the blended 3×3; 1 where normals are only rotated
+  bool normalRotatedOnly =
+      true;  ///< dual quaternions with rigid joints: the normal passes through no 3×3
+  bool signAmbiguous =
+      false;  ///< |dot| with the pivot below 1e-5: the sign of an influence is arbitrary
+  bool degenerate =
+      false;  ///< a joint of rank ≤ 1, or not finite: a result is only asked to be finite
+};
+
+struct SkinnedMesh {
+  std::vector<Double3> positions;
+  std::vector<Double3> normals;  ///< Empty where the mesh has none.
+  std::vector<Conditioning> conditioning;
+};
+
+/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix).
+/// Influences are normalised over all sets together; a vertex without weight stays in bind pose.
+/// Positions and normals are in the palette's space. Formulas: Kavan et al. 2007, section 4, for
+/// dual quaternions; two-phase scale and shear by polar decomposition, without a threshold; normals
+/// by the adjugate transpose of the blended 3×3. Fails with `invalidMesh` where the mesh, with that
+/// many joints, would be refused by `pack`.
+Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method);
+
+}  // namespace dermis::reference

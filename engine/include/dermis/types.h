@@ -1,0 +1,20 @@
+// Plain data that crosses the interface: float arrays, so that no GLM_FORCE_* setting of an engine
+// changes their layout. glm.h converts.
+#pragma once
+
+#include <cstdint>
+
+namespace dermis {
+
+/// An affine transform as a row-major 3×4 matrix: `m[row][column]`, column 3 the translation.
+/// Columns are vectors: a point p becomes m * (p, 1). 48 bytes; an array of these is what the GPU
+/// reads.
+struct JointMatrix {
+  float m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+};
+static_assert(sizeof(JointMatrix) == 48);
+
+/// The most joints that one palette may hold: joint indices are stored in 16 bits.
+inline constexpr std::uint32_t maxPaletteJoints = 65536;
+
+}  // namespace dermis

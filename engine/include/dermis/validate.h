@@ -1,0 +1,91 @@
+// What can be wrong with a mesh, found once, at import.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "dermis/result.h"
+
+namespace dermis {
+
+/// Kinds of problem. Those up to `jointOutOfRange` make `pack` refuse the mesh; the rest are dealt
+/// with and counted.
+enum class Problem : std::uint8_t {
+  // The views make no sense: `repair` cannot help.
+  emptyMesh,        ///< no vertices, or no positions
+  noInfluenceSets,  ///< nothing to skin by
+  countMismatch,    ///< an attribute's count is not the vertex count
+  strideTooSmall,   ///< an attribute's stride is less than its element
+  wrongFormat,      ///< a component type or number that the attribute may not have
+  // Values that `pack` refuses and `repair` mends.
+  nonFinitePosition,
+  nonFiniteNormal,
+  nonFiniteTangent,
+  nonFiniteWeight,  ///< NaN or infinite
+  negativeWeight,
+  jointOutOfRange,  ///< with a weight that is not 0
+  // Dealt with by `pack`.
+  weightsNotNormalized,  ///< they do not sum to 1: normalised over all sets together
+  duplicateJoint,        ///< the same joint twice in one vertex: the weights are added up
+  vertexWithoutWeight,   ///< stays in bind pose
+};
+
+/// One kind of problem in one mesh.
+struct Finding {
+  Problem problem = Problem::emptyMesh;
+  std::uint64_t count = 0;        ///< Vertices that have it; 1 for what concerns the views.
+  std::uint32_t firstVertex = 0;  ///< The first of them.
+  std::string message;  ///< A sentence with the first place: "mesh 'Fox', vertex 17: joint 31 is
+                        ///< outside …".
+};
+
+struct MeshReport {
+  std::vector<Finding> findings;  ///< At most one a kind, in the order of `Problem`.
+
+  /// Whether `pack` takes the mesh.
+  bool packable() const;
+  /// Whether the views make sense, so that `repair` can mend what is wrong.
+  bool repairable() const;
+  const Finding* find(Problem problem) const;
+};
+
+/// True for the kinds that make `pack` refuse the mesh.
+bool refusedByPack(Problem problem);
+
+/// A short name for a kind, as in reports: "joint out of range".
+const char* problemName(Problem problem);
+
+/// Looks at every vertex: O(vertices × influences). `jointCount` is the number of joints of the
+/// palettes that the mesh will be skinned with, at most `maxPaletteJoints`. Sums of weights count
+/// as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of the official
+/// glTF validator), or when the stored integers sum to 255 or 65535 exactly.
+MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
+
+/// A copy of a mesh with its bad values mended. Owns its memory.
+class RepairedMesh {
+ public:
+  /// The mended mesh: float32 attributes, one influence set of uint32 joints and float32 weights.
+  /// Valid as long as this object lives and is not moved from.
+  MeshView view() const;
+  /// What was found before: every finding that `refusedByPack` has been mended.
+  const MeshReport& report() const { return report_; }
+
+ private:
+  friend Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
+
+  std::string name_;
+  std::uint32_t vertexCount_ = 0;
+  std::vector<float> positions_, normals_, tangents_, weights_;
+  std::vector<std::uint32_t> joints_;
+  std::vector<InfluenceSet> sets_;
+  MeshReport report_;
+};
+
+/// Mends what `validate` finds: influences with a weight that is negative or not finite, or a joint
+/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal or
+/// tangent that is not finite becomes 0. Fails with `invalidMesh` where the views make no sense.
+Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
+
+}  // namespace dermis

@@ -1,0 +1,95 @@
+#include "decompose.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace dermis::reference {
+namespace {
+
+/// Rotates columns a and b of both matrices so that those of `work` become orthogonal. Golub and
+/// Van Loan, "Matrix Computations", section 8.6.3.
+bool orthogonalize(glm::dmat3& work, glm::dmat3& right, int a, int b) {
+  const double alpha = glm::dot(work[a], work[a]);
+  const double beta = glm::dot(work[b], work[b]);
+  const double gamma = glm::dot(work[a], work[b]);
+  if (std::abs(gamma) <= 1e-17 * std::sqrt(alpha * beta) || gamma == 0) return false;
+  const double zeta = (beta - alpha) / (2 * gamma);
+  const double tangent = std::copysign(1.0, zeta) / (std::abs(zeta) + std::sqrt(1 + zeta * zeta));
+  const double cosine = 1 / std::sqrt(1 + tangent * tangent);
+  const double sine = cosine * tangent;
+  for (glm::dmat3* matrix : {&work, &right}) {
+    const glm::dvec3 first = (*matrix)[a], second = (*matrix)[b];
+    (*matrix)[a] = cosine * first - sine * second;
+    (*matrix)[b] = sine * first + cosine * second;
+  }
+  return true;
+}
+
+glm::dvec3 anyPerpendicular(const glm::dvec3& v) {
+  const glm::dvec3 axis = std::abs(v.x) <= std::abs(v.y) && std::abs(v.x) <= std::abs(v.z)
+                              ? glm::dvec3(1, 0, 0)
+                          : std::abs(v.y) <= std::abs(v.z) ? glm::dvec3(0, 1, 0)
+                                                           : glm::dvec3(0, 0, 1);
+  return glm::normalize(glm::cross(v, axis));
+}
+
+}  // namespace
+
+SingularValues singularValues(const glm::dmat3& matrix) {
+  glm::dmat3 work = matrix, right(1.0);
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    bool rotated = orthogonalize(work, right, 0, 1);
+    rotated |= orthogonalize(work, right, 0, 2);
+    rotated |= orthogonalize(work, right, 1, 2);
+    if (!rotated) break;
+  }
+  std::array<int, 3> order{0, 1, 2};
+  const glm::dvec3 lengths(glm::length(work[0]), glm::length(work[1]), glm::length(work[2]));
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return lengths[a] > lengths[b]; });
+
+  SingularValues result{glm::dmat3(1.0), glm::dvec3(0.0), glm::dmat3(1.0)};
+  for (int i = 0; i < 3; ++i) {
+    result.values[i] = lengths[order[static_cast<std::size_t>(i)]];
+    result.right[i] = right[order[static_cast<std::size_t>(i)]];
+  }
+  // Left vectors that the matrix does not determine are completed to an orthonormal set.
+  const double tiny = 1e-300;
+  if (result.values[0] > tiny) {
+    result.left[0] = work[order[0]] / result.values[0];
+    result.left[1] = result.values[1] > 1e-14 * result.values[0] ? work[order[1]] / result.values[1]
+                                                                 : anyPerpendicular(result.left[0]);
+    result.left[2] = result.values[2] > 1e-14 * result.values[0]
+                         ? work[order[2]] / result.values[2]
+                         : glm::cross(result.left[0], result.left[1]);
+  }
+  return result;
+}
+
+PolarParts polarParts(const glm::dmat3& matrix) {
+  const SingularValues svd = singularValues(matrix);
+  PolarParts parts;
+  parts.largest = svd.values[0];
+  parts.distanceFromRotation = std::max(std::abs(svd.values[0] - 1), std::abs(svd.values[2] - 1));
+  parts.degenerate = svd.values[1] <= 1e-5 * svd.values[0] || svd.values[0] == 0;
+
+  const double determinant = glm::determinant(matrix);
+  const bool singular = svd.values[2] <= 1e-6 * svd.values[0];
+  // Float32 cannot tell a mirror this thin from none.
+  parts.degenerate |=
+      determinant < 0 && svd.values[1] * svd.values[2] <= 1e-5 * svd.values[0] * svd.values[0];
+  const bool mirrored = determinant < 0 && !singular;
+
+  glm::dmat3 left = mirrored ? -svd.left : svd.left;
+  // Where the matrix is singular the last axis may point either way: take the one that makes a
+  // rotation.
+  if (glm::determinant(left) * glm::determinant(svd.right) < 0) left[2] = -left[2];
+  parts.rotation = left * glm::transpose(svd.right);
+  parts.scaleShear = glm::transpose(parts.rotation) * matrix;
+  return parts;
+}
+
+}  // namespace dermis::reference

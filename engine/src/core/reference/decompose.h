@@ -1,0 +1,35 @@
+// Singular values and the polar decomposition of a 3×3 matrix, in double precision, for the
+// reference.
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+namespace dermis::reference {
+
+struct SingularValues {
+  glm::dmat3 left;    ///< orthonormal columns
+  glm::dvec3 values;  ///< falling, not negative
+  glm::dmat3 right;   ///< orthonormal columns; matrix = left · diag(values) · rightᵀ
+};
+
+/// One-sided Jacobi: small singular values come out as exact as large ones. The matrix must be
+/// finite.
+SingularValues singularValues(const glm::dmat3& matrix);
+
+struct PolarParts {
+  glm::dmat3 rotation;    ///< det +1
+  glm::dmat3 scaleShear;  ///< symmetric; matrix = rotation · scaleShear
+  double largest = 0;     ///< the largest singular value
+  double distanceFromRotation =
+      0;  ///< the largest |singular value - 1|: how far it moves a point at distance 1
+  bool degenerate =
+      false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of rounding
+};
+
+/// TRUTHS of the decomposition: with a negative determinant the rotation is that of −matrix, and
+/// the sign goes into the scale part. Of rank 2 (smallest singular value below 1e-6 of the
+/// largest): the rotation of the same side, det +1.
+PolarParts polarParts(const glm::dmat3& matrix);
+
+}  // namespace dermis::reference

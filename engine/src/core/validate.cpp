@@ -1,0 +1,287 @@
+#include "dermis/validate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "attribute.h"
+#include "dermis/types.h"
+
+namespace dermis {
+namespace {
+
+constexpr std::size_t problemCount = static_cast<std::size_t>(Problem::vertexWithoutWeight) + 1;
+
+/// Collects at most one finding a kind; the sentence is made for its first place only.
+class Findings {
+ public:
+  explicit Findings(std::string_view meshName) : prefix_("mesh '" + std::string(meshName) + "'") {}
+
+  void addView(Problem problem, const std::string& text) {
+    Finding& finding = findings_[static_cast<std::size_t>(problem)];
+    if (finding.count++ == 0) finding.message = prefix_ + ": " + text;
+  }
+
+  template <typename MakeText>
+  void addVertex(Problem problem, std::uint32_t vertex, MakeText&& makeText) {
+    Finding& finding = findings_[static_cast<std::size_t>(problem)];
+    // Several influences of one vertex may have the same problem: it counts once.
+    if (finding.count != 0 && lastVertex_[static_cast<std::size_t>(problem)] == vertex) return;
+    lastVertex_[static_cast<std::size_t>(problem)] = vertex;
+    if (finding.count++ == 0) {
+      finding.firstVertex = vertex;
+      finding.message = prefix_ + ", vertex " + std::to_string(vertex) + ": " + makeText();
+    }
+  }
+
+  MeshReport take() {
+    MeshReport report;
+    for (std::size_t kind = 0; kind < problemCount; ++kind) {
+      if (findings_[kind].count == 0) continue;
+      findings_[kind].problem = static_cast<Problem>(kind);
+      report.findings.push_back(std::move(findings_[kind]));
+    }
+    return report;
+  }
+
+ private:
+  std::string prefix_;
+  std::array<Finding, problemCount> findings_{};
+  std::array<std::uint32_t, problemCount> lastVertex_{};
+};
+
+struct AttributeRule {
+  const char* name;
+  std::uint32_t components;  ///< 0: any number
+  bool (*allows)(ComponentType);
+};
+
+bool isFloat(ComponentType type) {
+  return type == ComponentType::float32;
+}
+bool isJointType(ComponentType type) {
+  return type == ComponentType::uint8 || type == ComponentType::uint16 ||
+         type == ComponentType::uint32;
+}
+bool isWeightType(ComponentType type) {
+  return type == ComponentType::float32 || type == ComponentType::unorm8 ||
+         type == ComponentType::unorm16;
+}
+
+bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32_t vertexCount,
+               Findings& findings) {
+  const std::string name = rule.name;
+  if (!rule.allows(view.type) || view.components == 0 ||
+      (rule.components != 0 && view.components != rule.components)) {
+    findings.addView(
+        Problem::wrongFormat,
+        name + " have a component type or number of components that they may not have");
+    return false;
+  }
+  if (view.count != vertexCount) {
+    findings.addView(Problem::countMismatch, "there are " + std::to_string(view.count) + " " +
+                                                 name + " for " + std::to_string(vertexCount) +
+                                                 " vertices");
+    return false;
+  }
+  const std::uint64_t size = std::uint64_t{view.components} * componentSize(view.type);
+  if (view.stride < size) {
+    findings.addView(Problem::strideTooSmall, "the stride of the " + name + " is " +
+                                                  std::to_string(view.stride) +
+                                                  " bytes, an element has " + std::to_string(size));
+    return false;
+  }
+  return true;
+}
+
+bool checkViews(const MeshView& mesh, Findings& findings) {
+  if (mesh.vertexCount == 0) {
+    findings.addView(Problem::emptyMesh, "it has no vertices");
+    return false;
+  }
+  if (!mesh.positions) {
+    findings.addView(Problem::emptyMesh, "it has no positions");
+    return false;
+  }
+  bool good = checkView(mesh.positions, {"positions", 3, isFloat}, mesh.vertexCount, findings);
+  if (mesh.normals)
+    good &= checkView(mesh.normals, {"normals", 3, isFloat}, mesh.vertexCount, findings);
+  if (mesh.tangents)
+    good &= checkView(mesh.tangents, {"tangents", 4, isFloat}, mesh.vertexCount, findings);
+  if (mesh.influenceSets.empty()) {
+    findings.addView(Problem::noInfluenceSets, "it has no joints and weights");
+    return false;
+  }
+  for (const InfluenceSet& set : mesh.influenceSets) {
+    if (!set.joints || !set.weights) {
+      findings.addView(Problem::noInfluenceSets,
+                       "an influence set lacks its joints or its weights");
+      return false;
+    }
+    good &= checkView(set.joints, {"joints", 0, isJointType}, mesh.vertexCount, findings);
+    good &= checkView(set.weights, {"weights", 0, isWeightType}, mesh.vertexCount, findings);
+    if (set.joints.components != set.weights.components) {
+      findings.addView(Problem::wrongFormat,
+                       "an influence set has " + std::to_string(set.joints.components) +
+                           " joints but " + std::to_string(set.weights.components) +
+                           " weights a vertex");
+      good = false;
+    }
+  }
+  return good;
+}
+
+bool isFiniteElement(const AttributeView& view, std::uint32_t vertex) {
+  for (std::uint32_t component = 0; component < view.components; ++component) {
+    if (!std::isfinite(loadComponent<float>(view, vertex, component))) return false;
+  }
+  return true;
+}
+
+void checkAttribute(const AttributeView& view, Problem problem, const char* name,
+                    std::uint32_t vertex, Findings& findings) {
+  if (!view || isFiniteElement(view, vertex)) return;
+  findings.addVertex(problem, vertex,
+                     [&] { return std::string("the ") + name + " is not finite"; });
+}
+
+/// What the weights of a vertex must sum to for each way of storing them.
+double allowedDeviation(const MeshView& mesh, std::uint32_t usedWeights) {
+  const bool anyFloat =
+      std::any_of(mesh.influenceSets.begin(), mesh.influenceSets.end(),
+                  [](const InfluenceSet& set) { return isFloat(set.weights.type); });
+  // Integers are summed exactly in double, so that a quarter of the smallest step tells whether
+  // they sum to 1.
+  return anyFloat ? 2e-7 * usedWeights : 0.25 / 65535.0;
+}
+
+void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32_t vertex,
+                     std::vector<std::uint32_t>& used, Findings& findings) {
+  used.clear();
+  double sum = 0;
+  std::uint32_t usedWeights = 0;
+  bool good = true;
+  for (const InfluenceSet& set : mesh.influenceSets) {
+    for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
+      const double weight = loadNumber(set.weights, vertex, slot);
+      if (weight == 0) continue;
+      const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
+      if (!std::isfinite(weight)) {
+        findings.addVertex(Problem::nonFiniteWeight, vertex, [&] {
+          return "the weight of joint " + std::to_string(joint) + " is not finite";
+        });
+        good = false;
+        continue;
+      }
+      if (weight < 0) {
+        findings.addVertex(Problem::negativeWeight, vertex, [&] {
+          return "the weight of joint " + std::to_string(joint) + " is negative";
+        });
+        good = false;
+        continue;
+      }
+      if (joint >= jointCount) {
+        findings.addVertex(Problem::jointOutOfRange, vertex, [&] {
+          return "joint " + std::to_string(joint) + " is outside the palette of " +
+                 std::to_string(jointCount);
+        });
+        good = false;
+        continue;
+      }
+      sum += weight;
+      ++usedWeights;
+      used.push_back(joint);
+    }
+  }
+  if (usedWeights == 0) {
+    findings.addVertex(Problem::vertexWithoutWeight, vertex,
+                       [] { return std::string("no joint has weight; it stays in bind pose"); });
+    return;
+  }
+  if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
+    findings.addVertex(Problem::weightsNotNormalized, vertex,
+                       [&] { return "the weights sum to " + std::to_string(sum) + ", not to 1"; });
+  }
+  std::sort(used.begin(), used.end());
+  const auto twice = std::adjacent_find(used.begin(), used.end());
+  if (twice != used.end()) {
+    findings.addVertex(Problem::duplicateJoint, vertex,
+                       [&] { return "joint " + std::to_string(*twice) + " has weight twice"; });
+  }
+}
+
+}  // namespace
+
+bool refusedByPack(Problem problem) {
+  return problem <= Problem::jointOutOfRange;
+}
+
+const char* problemName(Problem problem) {
+  switch (problem) {
+    case Problem::emptyMesh:
+      return "empty mesh";
+    case Problem::noInfluenceSets:
+      return "no joints and weights";
+    case Problem::countMismatch:
+      return "counts disagree";
+    case Problem::strideTooSmall:
+      return "stride too small";
+    case Problem::wrongFormat:
+      return "wrong format";
+    case Problem::nonFinitePosition:
+      return "position not finite";
+    case Problem::nonFiniteNormal:
+      return "normal not finite";
+    case Problem::nonFiniteTangent:
+      return "tangent not finite";
+    case Problem::nonFiniteWeight:
+      return "weight not finite";
+    case Problem::negativeWeight:
+      return "negative weight";
+    case Problem::jointOutOfRange:
+      return "joint out of range";
+    case Problem::weightsNotNormalized:
+      return "weights do not sum to 1";
+    case Problem::duplicateJoint:
+      return "joint twice in a vertex";
+    case Problem::vertexWithoutWeight:
+      return "vertex without weight";
+  }
+  return "unknown";
+}
+
+bool MeshReport::packable() const {
+  return std::none_of(findings.begin(), findings.end(),
+                      [](const Finding& finding) { return refusedByPack(finding.problem); });
+}
+
+bool MeshReport::repairable() const {
+  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.problem <= Problem::wrongFormat;
+  });
+}
+
+const Finding* MeshReport::find(Problem problem) const {
+  for (const Finding& finding : findings) {
+    if (finding.problem == problem) return &finding;
+  }
+  return nullptr;
+}
+
+MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
+  Findings findings(mesh.name);
+  if (!checkViews(mesh, findings)) return findings.take();
+
+  const std::uint32_t joints = std::min(jointCount, maxPaletteJoints);
+  std::vector<std::uint32_t> used;
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
+    checkAttribute(mesh.positions, Problem::nonFinitePosition, "position", vertex, findings);
+    checkAttribute(mesh.normals, Problem::nonFiniteNormal, "normal", vertex, findings);
+    checkAttribute(mesh.tangents, Problem::nonFiniteTangent, "tangent", vertex, findings);
+    checkInfluences(mesh, joints, vertex, used, findings);
+  }
+  return findings.take();
+}
+
+}  // namespace dermis
