@@ -1,0 +1,39 @@
+// Compiled modules on disk, one file an entry.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/result.h"
+
+namespace dermis {
+
+using CacheKey = std::array<std::uint64_t, 2>;
+
+struct CacheLookup {
+  std::vector<std::uint32_t> words;  ///< The module; empty where there is none to use.
+  std::string problem;               ///< What was wrong with the entry; empty where nothing was.
+};
+
+class Cache {
+ public:
+  explicit Cache(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// The module stored under `key`. An entry that is damaged, or that another version of Dermis
+  /// wrote, is deleted, and `problem` says so.
+  CacheLookup load(const CacheKey& key) const;
+
+  /// Makes the folder where it is missing. Fails with `ioError`.
+  Result<void> store(const CacheKey& key, std::span<const std::uint32_t> words) const;
+
+ private:
+  std::filesystem::path pathOf(const CacheKey& key) const;
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace dermis

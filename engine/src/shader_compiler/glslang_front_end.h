@@ -1,0 +1,31 @@
+// GLSL to SPIR-V, as glslang writes it: neither optimised nor validated.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dermis/result.h"
+#include "dermis/shader_compiler.h"
+#include "shader_compiler/include_resolver.h"
+
+namespace dermis {
+
+/// Holds glslang's process-wide tables; the last one that is released frees them. Thread-safe.
+std::shared_ptr<void> acquireGlslang();
+
+struct FrontEndOutput {
+  std::vector<std::uint32_t> words;
+  std::set<std::string> includedFiles;
+};
+
+/// Needs glslang acquired. Fails with `shaderError`, "FILE:LINE: text".
+Result<FrontEndOutput> translateToSpirv(const ShaderSource& source, bool debugInfo,
+                                        IncludeResolver& resolver);
+
+/// The version of everything whose change may change what `translateToSpirv` writes.
+std::string frontEndVersion();
+
+}  // namespace dermis

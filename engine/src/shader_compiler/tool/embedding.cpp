@@ -1,0 +1,53 @@
+#include "shader_compiler/tool/embedding.h"
+
+#include <array>
+#include <cstdio>
+
+namespace dermis::tool {
+namespace {
+
+constexpr std::size_t wordsPerLine = 8;
+
+std::string hexadecimal(std::uint32_t word) {
+  std::array<char, 16> text;
+  const int length = std::snprintf(text.data(), text.size(), "0x%08xu,", word);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::string arrayOf(const EmbeddedModule& module) {
+  std::string text = "constexpr std::uint32_t " + module.name + "_words[] = {";
+  for (std::size_t index = 0; index < module.words.size(); ++index) {
+    text += index % wordsPerLine == 0 ? "\n    " : " ";
+    text += hexadecimal(module.words[index]);
+  }
+  return text + "\n};\n";
+}
+
+}  // namespace
+
+std::string embeddingHeader(const std::string& cppNamespace,
+                            const std::vector<EmbeddedModule>& modules) {
+  std::string text =
+      "// Made by dermis_embed_shaders.\n#pragma once\n\n#include <cstdint>\n#include <span>\n\n"
+      "namespace " +
+      cppNamespace + " {\n\n";
+  for (const EmbeddedModule& module : modules) {
+    text += "extern const std::span<const std::uint32_t> " + module.name + "_spirv;\n";
+  }
+  return text + "\n}  // namespace " + cppNamespace + "\n";
+}
+
+std::string embeddingSource(const std::string& cppNamespace, const std::string& headerName,
+                            const std::vector<EmbeddedModule>& modules) {
+  std::string text = "// Made by dermis_embed_shaders.\n#include \"" + headerName +
+                     "\"\n\nnamespace " + cppNamespace + " {\nnamespace {\n\n";
+  for (const EmbeddedModule& module : modules) text += arrayOf(module) + "\n";
+  text += "}  // namespace\n\n";
+  for (const EmbeddedModule& module : modules) {
+    text += "constinit const std::span<const std::uint32_t> " + module.name + "_spirv{" +
+            module.name + "_words};\n";
+  }
+  return text + "\n}  // namespace " + cppNamespace + "\n";
+}
+
+}  // namespace dermis::tool

@@ -1,0 +1,23 @@
+// SPIR-V modules as C++ source.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace dermis::tool {
+
+struct EmbeddedModule {
+  std::string name;  ///< A C++ identifier: the symbol is NAME_spirv.
+  std::vector<std::uint32_t> words;
+};
+
+/// Declares `extern const std::span<const std::uint32_t> NAME_spirv` for each module.
+std::string embeddingHeader(const std::string& cppNamespace,
+                            const std::vector<EmbeddedModule>& modules);
+
+/// Defines them, constant-initialised: usable before main, and from many threads.
+std::string embeddingSource(const std::string& cppNamespace, const std::string& headerName,
+                            const std::vector<EmbeddedModule>& modules);
+
+}  // namespace dermis::tool
