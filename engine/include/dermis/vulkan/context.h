@@ -1,0 +1,90 @@
+// Dermis on one Vulkan device that the engine lends: pipelines, bindings, and the recording of
+// batches.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <vulkan/vulkan_core.h>
+
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/vulkan/bindings.h"
+
+namespace dermis::vulkan {
+
+/// The engine's device, and what was enabled on it. Dermis uses nothing that is not said here, and
+/// owns none of it.
+struct DeviceDescription {
+  VkInstance instance = VK_NULL_HANDLE;
+  VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
+  VkDevice device = VK_NULL_HANDLE;
+  /// The loader's entry point, or a layer's: everything else is found through it. Dermis links no
+  /// loader.
+  PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
+  /// The lower of the API version that the instance was created with and that of the device; at
+  /// least Vulkan 1.1.
+  std::uint32_t apiVersion = VK_API_VERSION_1_1;
+  /// Names of the device extensions that were enabled. Used where present: VK_KHR_push_descriptor.
+  /// Instance extensions that work on the device may be named too: VK_EXT_debug_utils, for names
+  /// and labels.
+  std::span<const char* const> enabledExtensions;
+  /// Every pipeline is built with it, where given; the engine stores and loads it.
+  VkPipelineCache pipelineCache = VK_NULL_HANDLE;
+  /// Used for every object that Dermis creates, where given; must outlive the Context.
+  const VkAllocationCallbacks* allocator = nullptr;
+};
+
+/// What Dermis has on a device: shader modules, layouts, pipelines. Immutable but for `prepare`;
+/// every member function may be called from any thread at any time, `record` with a command buffer
+/// of its own. Destroy it when the GPU has finished with what it recorded, before the device.
+///
+/// Nothing here submits, waits, maps, or allocates device memory.
+class Context {
+ public:
+  /// Looks up entry points and limits, creates shader modules and layouts; no pipeline yet.
+  /// Fails with `invalidArgument` (a handle is missing), `missingEntryPoint`, `missingFeature`
+  /// (Vulkan below 1.1, too few storage buffers a stage) or `vulkanError`.
+  static Result<Context> create(const DeviceDescription& description);
+
+  ~Context();
+  Context(Context&&) noexcept;
+  Context& operator=(Context&&) noexcept;
+
+  /// The limits that `plan` has to keep to.
+  const DeviceLimits& limits() const;
+
+  /// How to cut up the work on this device.
+  Tuning tuning() const;
+
+  /// Builds the pipelines of these variants; those that exist are skipped. May take long: call it
+  /// from a loading thread. Where it fails (`vulkanError`), what was built before stays built.
+  Result<void> prepare(std::span<const Variant> variants);
+
+  /// Makes the descriptor sets for a set of buffers. Fails with `invalidArgument` (misaligned, or
+  /// larger than a storage buffer range where that is not allowed) or `vulkanError`.
+  Result<Bindings> createBindings(const BatchBuffers& buffers) const;
+
+  /// Records the dispatches of a plan, and a barrier between the palette and the skin kernel.
+  /// O(dispatches). Call it outside a render pass, on a command buffer of a queue with compute.
+  /// Afterwards the compute pipeline, descriptor set 0 of compute and push constants are undefined;
+  /// the graphics state is as it was.
+  ///
+  /// The engine puts barriers before and after (scope.h), sees to it that the tables of this very
+  /// plan stand in the tables buffer when the GPU gets there, and keeps the bindings until the GPU
+  /// is done.
+  ///
+  /// Fails with `notPrepared` where a variant of the plan has no pipeline, and with
+  /// `invalidArgument` where a buffer is smaller than the plan needs; nothing is recorded then.
+  Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
+                      const Bindings& bindings) const;
+
+ private:
+  Context();
+  friend class Bindings;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,23 @@
+// The kernels as data, for an engine that issues the dispatches of a plan with its own RHI. Needs
+// no Vulkan device.
+//
+// Descriptor set 0 of every kernel has four storage buffers; binding numbers, records and push
+// constants are in shaders/abi.h, which compiles as C++.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "dermis/plan.h"
+
+namespace dermis::vulkan {
+
+/// SPIR-V 1.3, entry point "main". The memory is static.
+std::span<const std::uint32_t> kernelSpirv(Kernel kernel);
+
+/// The values of specialisation constants 0 to 4 for a variant, 4 bytes each, in the order of their
+/// ids.
+std::array<std::uint32_t, 5> specializationConstants(const Variant& variant);
+
+}  // namespace dermis::vulkan

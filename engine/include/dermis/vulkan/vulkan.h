@@ -1,0 +1,7 @@
+// All of dermis::vulkan.
+#pragma once
+
+#include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/scope.h"

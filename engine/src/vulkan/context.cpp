@@ -1,0 +1,126 @@
+#include "dermis/vulkan/context.h"
+
+#include <array>
+#include <string>
+
+#include "abi.h"
+#include "vulkan/state.h"
+#include "vulkan/vulkan_error.h"
+
+namespace dermis::vulkan {
+namespace {
+
+Error missingHandle(const char* name) {
+  return {ErrorCode::invalidArgument, std::string("DeviceDescription::") + name + " is null"};
+}
+
+Result<void> checkDescription(const DeviceDescription& description) {
+  if (description.instance == VK_NULL_HANDLE) return missingHandle("instance");
+  if (description.physicalDevice == VK_NULL_HANDLE) return missingHandle("physicalDevice");
+  if (description.device == VK_NULL_HANDLE) return missingHandle("device");
+  if (description.getInstanceProcAddr == nullptr) return missingHandle("getInstanceProcAddr");
+  if (description.apiVersion < VK_API_VERSION_1_1) {
+    return Error{ErrorCode::missingFeature,
+                 "Dermis needs Vulkan 1.1, the engine enabled " +
+                     std::to_string(VK_API_VERSION_MAJOR(description.apiVersion)) + "." +
+                     std::to_string(VK_API_VERSION_MINOR(description.apiVersion))};
+  }
+  return {};
+}
+
+}  // namespace
+
+Context::State::~State() {
+  pipelines.reset();
+  if (table.destroyPipelineLayout != nullptr)
+    table.destroyPipelineLayout(device, pipelineLayout, allocator);
+  if (table.destroyDescriptorSetLayout != nullptr)
+    table.destroyDescriptorSetLayout(device, setLayout, allocator);
+}
+
+Result<void> Context::State::createLayouts() {
+  std::array<VkDescriptorSetLayoutBinding, abi::BINDING_COUNT> bindings{};
+  for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {
+    bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
+                         nullptr};
+  }
+  VkDescriptorSetLayoutCreateInfo setInfo{};
+  setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+  if (pushesDescriptors()) setInfo.flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR;
+  setInfo.bindingCount = static_cast<std::uint32_t>(bindings.size());
+  setInfo.pBindings = bindings.data();
+  if (const VkResult result =
+          table.createDescriptorSetLayout(device, &setInfo, allocator, &setLayout);
+      result != VK_SUCCESS) {
+    return vulkanError("vkCreateDescriptorSetLayout", result);
+  }
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, abi::PUSH_WORDS * 4};
+  VkPipelineLayoutCreateInfo layoutInfo{};
+  layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+  layoutInfo.setLayoutCount = 1;
+  layoutInfo.pSetLayouts = &setLayout;
+  layoutInfo.pushConstantRangeCount = 1;
+  layoutInfo.pPushConstantRanges = &range;
+  if (const VkResult result =
+          table.createPipelineLayout(device, &layoutInfo, allocator, &pipelineLayout);
+      result != VK_SUCCESS) {
+    return vulkanError("vkCreatePipelineLayout", result);
+  }
+  return {};
+}
+
+Context::Context() = default;
+Context::~Context() = default;
+Context::Context(Context&&) noexcept = default;
+Context& Context::operator=(Context&&) noexcept = default;
+
+Result<Context> Context::create(const DeviceDescription& description) {
+  if (Result<void> good = checkDescription(description); !good) return good.error();
+  Result<DispatchTable> table = loadDispatchTable(description);
+  if (!table) return table.error();
+
+  Context context;
+  context.state_ = std::make_unique<State>(description);
+  State& state = *context.state_;
+  state.table = *table;
+
+  VkPhysicalDeviceProperties properties{};
+  state.table.getPhysicalDeviceProperties(description.physicalDevice, &properties);
+  state.deviceType = properties.deviceType;
+  // Whole words: NVIDIA says 2^32 - 1.
+  state.limits.maxStorageBufferRange = properties.limits.maxStorageBufferRange & ~3u;
+  state.limits.minStorageBufferOffsetAlignment =
+      static_cast<std::uint32_t>(properties.limits.minStorageBufferOffsetAlignment);
+  state.limits.maxWorkgroupCountX = properties.limits.maxComputeWorkGroupCount[0];
+  state.limits.maxWorkgroupCountY = properties.limits.maxComputeWorkGroupCount[1];
+  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT) {
+    return Error{ErrorCode::missingFeature,
+                 std::string("device '") + properties.deviceName + "' allows " +
+                     std::to_string(properties.limits.maxPerStageDescriptorStorageBuffers) +
+                     " storage buffers a stage, Dermis needs " +
+                     std::to_string(abi::BINDING_COUNT)};
+  }
+
+  if (Result<void> good = state.createLayouts(); !good) return good.error();
+  state.pipelines = std::make_unique<Pipelines>(state.table, description);
+  if (Result<void> good = state.pipelines->create(); !good) return good.error();
+  return context;
+}
+
+const DeviceLimits& Context::limits() const {
+  return state_->limits;
+}
+
+Tuning Context::tuning() const {
+  return {};
+}
+
+Result<void> Context::prepare(std::span<const Variant> variants) {
+  for (const Variant& variant : variants) {
+    if (Result<void> built = state_->pipelines->build(variant, state_->pipelineLayout); !built)
+      return built;
+  }
+  return {};
+}
+
+}  // namespace dermis::vulkan

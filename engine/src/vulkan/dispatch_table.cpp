@@ -1,0 +1,88 @@
+#include "vulkan/dispatch_table.h"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+namespace dermis::vulkan {
+namespace {
+
+class Loader {
+ public:
+  explicit Loader(const DeviceDescription& description) : description_(description) {
+    instanceFunction("vkGetDeviceProcAddr", getDeviceProcAddr_);
+  }
+
+  template <typename Function>
+  void instanceFunction(const char* name, Function& function) {
+    function =
+        reinterpret_cast<Function>(description_.getInstanceProcAddr(description_.instance, name));
+    if (function == nullptr) missing(name);
+  }
+
+  template <typename Function>
+  void deviceFunction(const char* name, Function& function) {
+    if (getDeviceProcAddr_ == nullptr) return;
+    function = reinterpret_cast<Function>(getDeviceProcAddr_(description_.device, name));
+    if (function == nullptr) missing(name);
+  }
+
+  bool isEnabled(std::string_view extension) const {
+    return std::any_of(description_.enabledExtensions.begin(), description_.enabledExtensions.end(),
+                       [&](const char* name) { return name != nullptr && extension == name; });
+  }
+
+  const std::string& firstMissing() const { return firstMissing_; }
+
+ private:
+  void missing(const char* name) {
+    if (firstMissing_.empty()) firstMissing_ = name;
+  }
+
+  const DeviceDescription& description_;
+  PFN_vkGetDeviceProcAddr getDeviceProcAddr_ = nullptr;
+  std::string firstMissing_;
+};
+
+}  // namespace
+
+Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
+  DispatchTable table;
+  Loader loader(description);
+  loader.instanceFunction("vkGetPhysicalDeviceProperties", table.getPhysicalDeviceProperties);
+
+  loader.deviceFunction("vkCreateShaderModule", table.createShaderModule);
+  loader.deviceFunction("vkDestroyShaderModule", table.destroyShaderModule);
+  loader.deviceFunction("vkCreateDescriptorSetLayout", table.createDescriptorSetLayout);
+  loader.deviceFunction("vkDestroyDescriptorSetLayout", table.destroyDescriptorSetLayout);
+  loader.deviceFunction("vkCreatePipelineLayout", table.createPipelineLayout);
+  loader.deviceFunction("vkDestroyPipelineLayout", table.destroyPipelineLayout);
+  loader.deviceFunction("vkCreateComputePipelines", table.createComputePipelines);
+  loader.deviceFunction("vkDestroyPipeline", table.destroyPipeline);
+  loader.deviceFunction("vkCreateDescriptorPool", table.createDescriptorPool);
+  loader.deviceFunction("vkDestroyDescriptorPool", table.destroyDescriptorPool);
+  loader.deviceFunction("vkAllocateDescriptorSets", table.allocateDescriptorSets);
+  loader.deviceFunction("vkUpdateDescriptorSets", table.updateDescriptorSets);
+  loader.deviceFunction("vkCmdBindPipeline", table.cmdBindPipeline);
+  loader.deviceFunction("vkCmdBindDescriptorSets", table.cmdBindDescriptorSets);
+  loader.deviceFunction("vkCmdPushConstants", table.cmdPushConstants);
+  loader.deviceFunction("vkCmdPipelineBarrier", table.cmdPipelineBarrier);
+  loader.deviceFunction("vkCmdDispatch", table.cmdDispatch);
+
+  if (loader.isEnabled(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME)) {
+    loader.deviceFunction("vkCmdPushDescriptorSetKHR", table.cmdPushDescriptorSet);
+  }
+  if (loader.isEnabled(VK_EXT_DEBUG_UTILS_EXTENSION_NAME)) {
+    loader.deviceFunction("vkSetDebugUtilsObjectNameEXT", table.setDebugUtilsObjectName);
+    loader.deviceFunction("vkCmdBeginDebugUtilsLabelEXT", table.cmdBeginDebugUtilsLabel);
+    loader.deviceFunction("vkCmdEndDebugUtilsLabelEXT", table.cmdEndDebugUtilsLabel);
+  }
+  if (!loader.firstMissing().empty()) {
+    return Error{
+        ErrorCode::missingEntryPoint,
+        "the driver has no entry point '" + loader.firstMissing() + "' for what was enabled"};
+  }
+  return table;
+}
+
+}  // namespace dermis::vulkan

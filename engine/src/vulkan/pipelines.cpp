@@ -1,0 +1,87 @@
+#include "vulkan/pipelines.h"
+
+#include <array>
+#include <string>
+
+#include "dermis/vulkan/kernels.h"
+#include "vulkan/vulkan_error.h"
+
+namespace dermis::vulkan {
+
+Pipelines::~Pipelines() {
+  for (const auto& [key, pipeline] : pipelines_)
+    table_.destroyPipeline(device_, pipeline, allocator_);
+  table_.destroyShaderModule(device_, paletteModule_, allocator_);
+  table_.destroyShaderModule(device_, skinModule_, allocator_);
+}
+
+Result<void> Pipelines::create() {
+  for (const auto& [kernel, module] :
+       {std::pair{Kernel::palette, &paletteModule_}, {Kernel::skin, &skinModule_}}) {
+    const std::span<const std::uint32_t> spirv = kernelSpirv(kernel);
+    VkShaderModuleCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+    info.codeSize = spirv.size_bytes();
+    info.pCode = spirv.data();
+    if (const VkResult result = table_.createShaderModule(device_, &info, allocator_, module);
+        result != VK_SUCCESS) {
+      return vulkanError("vkCreateShaderModule", result);
+    }
+  }
+  return {};
+}
+
+Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
+  if (find(variant) != VK_NULL_HANDLE) return {};
+
+  const auto constants = specializationConstants(variant);
+  std::array<VkSpecializationMapEntry, constants.size()> entries{};
+  for (std::uint32_t id = 0; id < entries.size(); ++id) entries[id] = {id, id * 4, 4};
+  VkSpecializationInfo specialization{};
+  specialization.mapEntryCount = static_cast<std::uint32_t>(entries.size());
+  specialization.pMapEntries = entries.data();
+  specialization.dataSize = sizeof(constants);
+  specialization.pData = constants.data();
+
+  VkComputePipelineCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = moduleOf(variant.kernel);
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialization;
+  info.layout = layout;
+
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  // Not under the lock: a compile takes long, and `record` must not wait for it.
+  if (const VkResult result =
+          table_.createComputePipelines(device_, cache_, 1, &info, allocator_, &pipeline);
+      result != VK_SUCCESS) {
+    return vulkanError("vkCreateComputePipelines", result);
+  }
+  if (table_.setDebugUtilsObjectName != nullptr) {
+    const std::string name = variant.kernel == Kernel::palette
+                                 ? std::string("dermis palette")
+                                 : "dermis skin " + std::string(methodName(variant.method));
+    VkDebugUtilsObjectNameInfoEXT nameInfo{};
+    nameInfo.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
+    nameInfo.objectType = VK_OBJECT_TYPE_PIPELINE;
+    nameInfo.objectHandle = reinterpret_cast<std::uint64_t>(pipeline);
+    nameInfo.pObjectName = name.c_str();
+    table_.setDebugUtilsObjectName(device_, &nameInfo);
+  }
+
+  const std::unique_lock lock(mutex_);
+  if (!pipelines_.try_emplace(variant.key(), pipeline).second) {
+    table_.destroyPipeline(device_, pipeline, allocator_);  // another thread was faster
+  }
+  return {};
+}
+
+VkPipeline Pipelines::find(const Variant& variant) const {
+  const std::shared_lock lock(mutex_);
+  const auto entry = pipelines_.find(variant.key());
+  return entry == pipelines_.end() ? VK_NULL_HANDLE : entry->second;
+}
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,75 @@
+#include "dermis/vulkan/scope.h"
+
+namespace dermis::vulkan {
+namespace {
+
+constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+
+Scope scopeOf(Consumer consumer) {
+  switch (consumer) {
+    case Consumer::vertexInput:
+      return {VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT};
+    case Consumer::vertexShader:
+      return {VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::compute:
+      return {compute, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::accelerationStructureBuild:
+      // The build reads its geometry as shader reads (VK_KHR_acceleration_structure).
+      return {VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::transfer:
+      return {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT};
+    case Consumer::hostRead:
+      return {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT};
+  }
+  return {};
+}
+
+}  // namespace
+
+Dependency inputScope(Producer producer) {
+  const Scope reads{compute, VK_ACCESS_SHADER_READ_BIT};
+  const Scope writes{compute, VK_ACCESS_SHADER_WRITE_BIT};
+  switch (producer) {
+    case Producer::hostWrite:
+      return {{VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_WRITE_BIT}, reads};
+    case Producer::transferWrite:
+      return {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}, reads};
+    case Producer::computeWrite:
+      return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, reads};
+    // Reading before writing needs no memory made visible: an execution dependency.
+    case Producer::vertexInput:
+      return {{VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, 0}, {compute, 0}};
+    case Producer::previousRecord:
+      return {writes, {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}};
+  }
+  return {};
+}
+
+Dependency outputScope(Consumer consumer, QueueTransfer transfer) {
+  Dependency dependency{{compute, VK_ACCESS_SHADER_WRITE_BIT}, scopeOf(consumer)};
+  if (transfer == QueueTransfer::release)
+    dependency.destination = {VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0};
+  if (transfer == QueueTransfer::acquire)
+    dependency.source = {VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, 0};
+  return dependency;
+}
+
+VkBufferMemoryBarrier outputBarrier(Consumer consumer, VkBuffer buffer, VkDeviceSize offset,
+                                    VkDeviceSize size, QueueTransfer transfer,
+                                    std::uint32_t sourceFamily, std::uint32_t destinationFamily) {
+  const Dependency dependency = outputScope(consumer, transfer);
+  VkBufferMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  barrier.srcQueueFamilyIndex =
+      transfer == QueueTransfer::none ? VK_QUEUE_FAMILY_IGNORED : sourceFamily;
+  barrier.dstQueueFamilyIndex =
+      transfer == QueueTransfer::none ? VK_QUEUE_FAMILY_IGNORED : destinationFamily;
+  barrier.buffer = buffer;
+  barrier.offset = offset;
+  barrier.size = size;
+  return barrier;
+}
+
+}  // namespace dermis::vulkan

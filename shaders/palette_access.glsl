@@ -1,0 +1,20 @@
+// How the palette is read. Dual quaternions: a status unit, then rotation and dual part of each joint, then the
+// scale/shear parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
+
+layout(set = 0, binding = BINDING_PALETTES, std430) readonly buffer Palettes { uvec4 palettes[]; };
+
+vec4 paletteUnit(uint unit) { return uintBitsToFloat(palettes[unit]); }
+
+bool paletteIsTwoPhase(uint palette) { return palettes[palette][STATUS_TWO_PHASE] != 0u; }
+
+vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
+vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }
+
+ScaleShear paletteScaleShear(uint palette, uint jointCount, uint joint) {
+  uint unit = palette + 1u + jointCount * 2u + joint * 2u;
+  vec4 first = paletteUnit(unit);
+  vec4 second = paletteUnit(unit + 1u);
+  return ScaleShear(first.xyz, vec3(first.w, second.xy));
+}
+
+vec4 paletteRow(uint palette, uint joint, uint row) { return paletteUnit(palette + joint * 3u + row); }

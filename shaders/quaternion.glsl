@@ -1,0 +1,35 @@
+// Quaternions are x y z w, Hamilton's. Needs exact.glsl.
+
+// The unit quaternion of a rotation given by its rows, by the largest of the four squared components (Shepperd 1978).
+vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
+  precise float x = 1.0 + r0.x - r1.y - r2.z;
+  precise float y = 1.0 - r0.x + r1.y - r2.z;
+  precise float z = 1.0 - r0.x - r1.y + r2.z;
+  precise float w = 1.0 + r0.x + r1.y + r2.z;
+  precise vec4 q;
+  if (w >= x && w >= y && w >= z) {
+    q = vec4(r2.y - r1.z, r0.z - r2.x, r1.x - r0.y, w);
+  } else if (x >= y && x >= z) {
+    q = vec4(x, r0.y + r1.x, r0.z + r2.x, r2.y - r1.z);
+  } else if (y >= z) {
+    q = vec4(r0.y + r1.x, y, r1.z + r2.y, r0.z - r2.x);
+  } else {
+    q = vec4(r0.z + r2.x, r1.z + r2.y, z, r1.x - r0.y);
+  }
+  precise vec4 unit = q * inversesqrt(dot4(q, q));
+  return unit;
+}
+
+// v turned by a quaternion of any length but 0, whose squared length is given: v + 2 r × (r × v + w v) / |q|².
+vec3 rotateBy(vec4 q, float squaredLength, vec3 v) {
+  precise vec3 inner = cross3(q.xyz, v) + q.w * v;
+  precise vec3 turned = v + cross3(q.xyz, inner) * (2.0 / squaredLength);
+  return turned;
+}
+
+// The dual part of a rigid transform: ½ (0, t) q.
+vec4 dualPart(vec4 q, vec3 t) {
+  precise vec3 vector = 0.5 * (q.w * t + cross3(t, q.xyz));
+  precise float scalar = -0.5 * dot3(t, q.xyz);
+  return vec4(vector, scalar);
+}
