@@ -1,0 +1,192 @@
+// glTF 2.0 files as meshes, skeletons and clips, and the sampling of poses.
+//
+// What the specification forbids and the parser underneath lets through is caught here, with one
+// sentence that names the accessor, node or skin at fault. A file can cause an error, never a
+// crash, a hang, or an allocation larger than its own bytes justify.
+//
+// Threads: every function may be called from any thread; a `Model` that nobody changes may be read
+// by many at once.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace dermis::gltf {
+
+inline constexpr std::uint32_t none = 0xffffffffu;  ///< An index that points at nothing.
+
+/// A node's own transform, either translation, rotation and scale, or a matrix. All are finite.
+struct Node {
+  std::string name;
+  std::uint32_t parent = none;
+  std::uint32_t mesh = none;
+  std::uint32_t skin = none;  ///< Only where there is a mesh too.
+  std::array<double, 3> translation{0, 0, 0};
+  std::array<double, 4> rotation{0, 0, 0, 1};  ///< x y z w, of unit length
+  std::array<double, 3> scale{1, 1, 1};
+  /// Column-major, as in the file; used instead of the three above. A node that a clip moves has
+  /// none: it has been taken apart into the three, with a note.
+  std::optional<std::array<double, 16>> matrix;
+  /// One a morph target where the node overrides its mesh's, or empty.
+  std::vector<float> morphWeights;
+};
+
+struct Skin {
+  std::string name;
+  /// Node indices, none twice, at most `maxPaletteJoints`; a vertex's joint index counts in this
+  /// list.
+  std::vector<std::uint32_t> joints;
+  /// One a joint, finite; identities where the file has none.
+  std::vector<JointMatrix> inverseBindMatrices;
+};
+
+enum class AlphaMode : std::uint8_t { opaque, mask, blend };
+
+/// The factors of a material; what the file leaves out has the default of glTF 2.0. Textures are
+/// not read.
+struct Material {
+  std::string name;
+  std::array<float, 4> baseColor{1, 1, 1, 1};  ///< Linear red, green, blue, and alpha.
+  float metallic = 1;
+  float roughness = 1;
+  std::array<float, 3> emissive{0, 0, 0};
+  AlphaMode alphaMode = AlphaMode::opaque;
+  float alphaCutoff = 0.5f;
+  bool doubleSided = false;
+};
+
+/// Displacements of one morph target, 3 floats a vertex; an absent attribute is empty. Read, not
+/// yet skinned.
+struct MorphTarget {
+  std::vector<float> positions, normals, tangents;
+};
+
+/// One primitive of a mesh, decoded: float32 attributes whatever the file stores (normalised
+/// integers divided by their largest value), influences in as many sets as the file has. Vertices
+/// stand in the order of the accessors. Values are as the file has them, NaN included, and joint
+/// indices may lie outside the skin: `validate` looks at both.
+struct Primitive {
+  std::string name;  ///< "mesh 'Fox' primitive 0", for messages
+  std::uint32_t vertexCount = 0;
+  std::vector<float> positions;               ///< 3 a vertex
+  std::vector<float> normals;                 ///< 3 a vertex, or empty
+  std::vector<float> tangents;                ///< 4 a vertex, or empty
+  std::vector<std::vector<float>> texcoords;  ///< For each TEXCOORD_n: 2 a vertex
+  std::vector<float> colors;  ///< 4 a vertex (COLOR_0; alpha 1 where the file has none), or empty
+  std::vector<std::uint32_t> joints;  ///< `influencesPerVertex` a vertex: all JOINTS_n side by side
+  std::vector<float> weights;         ///< likewise, from WEIGHTS_n
+  /// 4 × the number of sets; 0 where the primitive has none: it stays in bind pose, its positions
+  /// as they are in the file.
+  std::uint32_t influencesPerVertex = 0;
+  /// 3 indices a triangle; strips and fans are unrolled; empty for points and lines.
+  std::vector<std::uint32_t> triangles;
+  std::vector<MorphTarget> morphTargets;
+  std::uint32_t material = none;  ///< In `Model::materials`.
+
+  /// A view of the arrays above; valid while this object lives and is neither moved nor changed.
+  /// `set` is filled and must live as long; without influences the view has no set.
+  MeshView view(InfluenceSet& set) const;
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<Primitive> primitives;
+  std::vector<float> morphWeights;  ///< One a morph target, or empty: all 0.
+};
+
+enum class Interpolation : std::uint8_t { step, linear, cubicSpline };
+enum class ChannelPath : std::uint8_t { translation, rotation, scale, weights };
+
+/// One animated property of one node. A clip has at most one for a node and a path.
+struct Channel {
+  std::uint32_t node = none;
+  ChannelPath path = ChannelPath::translation;
+  Interpolation interpolation = Interpolation::linear;
+  std::uint32_t components = 3;  ///< Values a key: 3, 4, or the number of morph targets.
+  std::vector<float> times;      ///< Seconds: strictly rising, finite, not negative, not empty.
+  /// `components` a key, finite; for cubicSpline in-tangent, value, out-tangent: 3 × components.
+  /// Rotations are of unit length (the values; tangents are as in the file).
+  std::vector<float> values;
+};
+
+struct Clip {
+  std::string name;
+  double duration = 0;  ///< Seconds: the latest key.
+  std::vector<Channel> channels;
+};
+
+/// One skinned primitive of the default scene, in the order in which `dermis skin` writes them: by
+/// ascending node index, then primitive index. Where several nodes use one mesh with different
+/// skins each stands for itself. All indices are valid.
+struct SkinnedPrimitive {
+  std::uint32_t node = none;
+  std::uint32_t mesh = none;
+  std::uint32_t primitive = none;
+  std::uint32_t skin = none;
+};
+
+/// A file. Every index in it is in range or `none`; the nodes are trees.
+struct Model {
+  std::vector<Node> nodes;
+  std::vector<std::uint32_t> nodeOrder;  ///< All nodes, parents before their children.
+  std::vector<Mesh> meshes;
+  std::vector<Skin> skins;
+  std::vector<Material> materials;
+  std::vector<Clip> clips;
+  std::vector<SkinnedPrimitive> skinnedPrimitives;
+  /// What was mended or left out, a sentence each ("12 rotation keys … have been normalised").
+  std::vector<std::string> notes;
+};
+
+/// Reads a .gltf or .glb file (told apart by their first bytes) and every buffer that it names:
+/// data URIs and files beside it; nothing outside the file's folder is opened. Images are not read.
+/// Meshes that no skinned node of the default scene uses are left undecoded (no primitives). The
+/// default scene is `scene`; scene 0 where the file does not say; all root nodes where it has no
+/// scenes. Fails with
+/// - `ioError`: the file, or one that it names, cannot be read or lies outside the folder;
+/// - `invalidData`: a broken file; the sentence names the accessor, node, skin … at fault;
+/// - `unsupportedFeature`: a required extension that is not known (mesh compression, for one), or
+///   glTF 1.0;
+/// - `limitExceeded`: it asks for more memory than a file of its size justifies.
+Result<Model> load(const std::filesystem::path& path);
+
+/// The same from memory; `folder` is where the file's relative URIs are looked up, empty for
+/// nowhere. Nothing refers to `bytes` afterwards.
+Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder);
+
+/// The clip of that number or, where there is none of that number, the first of that name.
+std::optional<std::uint32_t> findClip(const Model& model, std::string_view numberOrName);
+
+/// Row-major 3×4 in double precision: `[row][column]`, column 3 the translation.
+using GlobalTransform = std::array<std::array<double, 4>, 3>;
+
+/// The global transform of every node at a time in seconds, clamped to each channel's keys. `clip`
+/// is `none` for the rest pose, and so is a clip that does not exist. At a key the key's value;
+/// between keys as glTF 2.0, appendix C, says: slerp along the shorter arc for LINEAR rotations,
+/// tangents scaled by the key distance for CUBICSPLINE. Rotations are normalised after
+/// interpolation. A time that is not a number counts as one before the first key.
+std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time);
+
+/// The palette of one skin: joint global transform × inverse bind matrix for each joint, computed
+/// in double precision and rounded once to float32. The skinned node's own transform has no effect
+/// (glTF 2.0, 3.7.3.3). `globals` is what `nodeGlobals` returned: work that several skins share.
+/// Empty where the skin does not exist or `globals` is too short.
+std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
+                                 std::span<const GlobalTransform> globals);
+
+/// Both in one, for a model with one skin.
+std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin, std::uint32_t clip,
+                                 double time);
+
+}  // namespace dermis::gltf

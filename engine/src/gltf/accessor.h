@@ -1,0 +1,81 @@
+// Accessors: what a file's arrays of numbers are made of, checked and decoded.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gltf/buffers.h"
+#include "gltf/document.h"
+
+namespace dermis::gltf {
+
+/// How an accessor stores its elements; for the sentences that say which are allowed.
+struct Format {
+  int componentType = 0;  ///< TINYGLTF_COMPONENT_TYPE_*
+  bool normalized = false;
+  bool operator==(const Format&) const = default;
+};
+
+/// A file opened for reading: its structure, its bytes, and what it has cost so far.
+class Source {
+ public:
+  /// Checks every bufferView and accessor against the buffers. `fileBytes`: how large the file
+  /// itself is, which with its buffers bounds what may be allocated. Throws `Failure`.
+  Source(Document document, std::vector<Buffer> buffers, std::size_t fileBytes);
+
+  const tinygltf::Model& content() const { return document_.content; }
+  bool quantized() const { return document_.quantized; }
+
+  /// Fails unless the accessor has this type (TINYGLTF_TYPE_*) and one of these formats. `where`
+  /// says what it is for: "mesh 2 primitive 0 POSITION".
+  void require(int accessor, int type, std::span<const Format> formats,
+               const std::string& where) const;
+
+  /// Fails unless elements begin at multiples of 4 bytes, as vertex attributes must.
+  void requireAttributeAlignment(int accessor, const std::string& where) const;
+
+  /// Fails where the accessor's bufferView has a byteStride, which only vertex attributes may have.
+  void requireNoStride(int accessor, const std::string& where) const;
+
+  /// Elements of the accessor.
+  std::uint32_t count(int accessor) const;
+  /// Components of an element: 3 for VEC3.
+  std::uint32_t components(int accessor) const;
+  /// Neither a bufferView nor sparse values: all zeros.
+  bool hasNoData(int accessor) const;
+
+  /// All components of all elements as float32: integers as they are or, where normalized, divided
+  /// by their largest value (signed ones clamped to −1 from below: glTF 2.0, 3.6.2.2).
+  std::vector<float> floats(int accessor);
+  /// The same for unsigned integers that are not normalized.
+  std::vector<std::uint32_t> integers(int accessor);
+
+  /// Counts an allocation against what the file's size justifies. Throws `Failure` with
+  /// `limitExceeded`.
+  void spend(std::uint64_t bytes, const std::string& where);
+
+ private:
+  void checkViews() const;
+  void checkAccessors() const;
+  void checkSparse(std::size_t index) const;
+  void checkRange(int view, std::uint64_t byteOffset, std::uint64_t bytes, std::uint64_t alignment,
+                  const std::string& where) const;
+  const std::byte* viewData(int view) const;
+  std::uint64_t strideOf(const tinygltf::Accessor& accessor) const;
+  void spendOnAccessor(int accessor);
+  std::vector<std::uint32_t> sparseIndices(int accessor);
+  template <typename Value, typename Read>
+  std::vector<Value> decode(int accessor, Read read);
+
+  Document document_;
+  std::vector<Buffer> buffers_;
+  std::uint64_t budget_ = 0;      ///< Bytes that may still be allocated for what stands in the file
+  std::uint64_t zeroBudget_ = 0;  ///< and for accessors that have no bytes in it.
+};
+
+/// The name of a component type and normalisation: "normalized unsigned byte".
+std::string formatName(Format format);
+
+}  // namespace dermis::gltf

@@ -1,0 +1,283 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "gltf/failure.h"
+#include "gltf/reader.h"
+
+namespace dermis::gltf {
+namespace {
+
+constexpr Format float32{TINYGLTF_COMPONENT_TYPE_FLOAT, false};
+constexpr Format timeFormats[] = {float32};
+constexpr Format vectorFormats[] = {float32};
+constexpr Format rotationFormats[] = {float32,
+                                      {TINYGLTF_COMPONENT_TYPE_BYTE, true},
+                                      {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, true},
+                                      {TINYGLTF_COMPONENT_TYPE_SHORT, true},
+                                      {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, true}};
+
+std::optional<ChannelPath> pathOf(std::string_view name) {
+  if (name == "translation") return ChannelPath::translation;
+  if (name == "rotation") return ChannelPath::rotation;
+  if (name == "scale") return ChannelPath::scale;
+  if (name == "weights") return ChannelPath::weights;
+  return std::nullopt;
+}
+
+Interpolation interpolationOf(const std::string& name) {
+  if (name == "STEP") return Interpolation::step;
+  if (name == "CUBICSPLINE") return Interpolation::cubicSpline;
+  return Interpolation::linear;
+}
+
+// What the channels of all clips have in common to say.
+struct Tally {
+  std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
+};
+
+std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
+  switch (channel.path) {
+    case ChannelPath::translation:
+    case ChannelPath::scale:
+      return 3;
+    case ChannelPath::rotation:
+      return 4;
+    case ChannelPath::weights:
+      break;
+  }
+  const int mesh = source.content().nodes[channel.node].mesh;
+  if (mesh < 0)
+    failInvalid(where, ": node ", channel.node, " has no mesh whose weights could move");
+  const auto& primitives = source.content().meshes[static_cast<std::size_t>(mesh)].primitives;
+  if (primitives[0].targets.empty()) {
+    failInvalid(where, ": mesh ", mesh, " of node ", channel.node, " has no morph targets");
+  }
+  return static_cast<std::uint32_t>(primitives[0].targets.size());
+}
+
+std::vector<float> readTimes(Source& source, int accessor, const std::string& where) {
+  const std::string place = where + " input";
+  source.require(accessor, TINYGLTF_TYPE_SCALAR, timeFormats, place);
+  source.requireNoStride(accessor, place);
+  std::vector<float> times = source.floats(accessor);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const std::string key =
+        join(place, ": key ", i, " of accessor ", accessor, " is at ", times[i]);
+    if (!std::isfinite(times[i])) failInvalid(key, ", which is not finite");
+    if (times[i] < 0) failInvalid(key, " seconds, which is negative");
+    if (i > 0 && times[i] <= times[i - 1]) {
+      failInvalid(key, " seconds after ", times[i - 1], ": times must rise");
+    }
+  }
+  return times;
+}
+
+std::vector<float> readValues(Source& source, int accessor, const Channel& channel,
+                              const std::string& where) {
+  const std::string place = where + " output";
+  switch (channel.path) {
+    case ChannelPath::translation:
+    case ChannelPath::scale:
+      source.require(accessor, TINYGLTF_TYPE_VEC3, vectorFormats, place);
+      break;
+    case ChannelPath::rotation:
+      source.require(accessor, TINYGLTF_TYPE_VEC4, rotationFormats, place);
+      break;
+    case ChannelPath::weights:
+      source.require(accessor, TINYGLTF_TYPE_SCALAR, rotationFormats, place);
+      break;
+  }
+  source.requireNoStride(accessor, place);
+  const std::uint64_t perKey = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
+  const std::uint64_t perElement = channel.path == ChannelPath::weights ? channel.components : 1;
+  const std::uint64_t wanted = channel.times.size() * perKey * perElement;
+  if (source.count(accessor) != wanted) {
+    failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor), " elements where ",
+                wanted, " belong to ", channel.times.size(), " keys");
+  }
+  std::vector<float> values = source.floats(accessor);
+  const auto bad =
+      std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
+  if (bad != values.end()) {
+    const auto element =
+        static_cast<std::size_t>(bad - values.begin()) / source.components(accessor);
+    failInvalid(place, ": element ", element, " of accessor ", accessor, " is not finite");
+  }
+  return values;
+}
+
+// Integers cannot hit unit length exactly: the tolerance is what their rounding explains.
+double unitLengthTolerance(const Source& source, int accessor) {
+  switch (source.content().accessors[static_cast<std::size_t>(accessor)].componentType) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return 1.0 / 127;
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return 1.0 / 32767;
+    default:
+      return 1e-5;
+  }
+}
+
+// Returns how many keys were farther from unit length than the tolerance.
+std::size_t normalizeRotations(Channel& channel, double tolerance) {
+  const bool spline = channel.interpolation == Interpolation::cubicSpline;
+  const std::size_t stride = spline ? 12 : 4;
+  std::size_t count = 0;
+  for (std::size_t offset = spline ? 4 : 0; offset < channel.values.size(); offset += stride) {
+    std::array<double, 4> key;
+    std::copy_n(channel.values.begin() + static_cast<std::ptrdiff_t>(offset), 4, key.begin());
+    if (normalizeQuaternion(key) > tolerance) ++count;
+    for (std::size_t i = 0; i < 4; ++i) channel.values[offset + i] = static_cast<float>(key[i]);
+  }
+  return count;
+}
+
+// The channel, or nothing where it is left out.
+std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
+                                   const tinygltf::AnimationChannel& from, const std::string& where,
+                                   Model& model, Tally& tally) {
+  const std::optional<ChannelPath> path = pathOf(from.target_path);
+  if (!path) {
+    ++tally.unknownPaths;
+    return std::nullopt;
+  }
+  const tinygltf::AnimationSampler& sampler =
+      animation.samplers[static_cast<std::size_t>(from.sampler)];
+  Channel channel;
+  channel.node = indexOf(from.target_node);
+  channel.path = *path;
+  channel.interpolation = interpolationOf(sampler.interpolation);
+  channel.components = componentsOf(source, channel, where);
+  if (source.hasNoData(sampler.input) && source.count(sampler.input) > 1) {
+    model.notes.push_back(
+        join(where, ": its times, accessor ", sampler.input, ", have no data; it is left out"));
+    return std::nullopt;
+  }
+  channel.times = readTimes(source, sampler.input, where);
+  if (channel.interpolation == Interpolation::cubicSpline && channel.times.size() < 2) {
+    failInvalid(where, ": a CUBICSPLINE needs at least two keys");
+  }
+  channel.values = readValues(source, sampler.output, channel, where);
+  if (channel.path == ChannelPath::rotation) {
+    const double tolerance = unitLengthTolerance(source, sampler.output);
+    const std::size_t normalized = normalizeRotations(channel, tolerance);
+    tally.normalizedKeys += normalized;
+    tally.channelsWithNormalizedKeys += normalized > 0 ? 1 : 0;
+  }
+  return channel;
+}
+
+double column(const std::array<double, 16>& matrix, std::size_t index, std::size_t row) {
+  return matrix[4 * index + row];
+}
+
+// The rotation of an orthonormal matrix (columns divided by `scale`), by the largest of the four
+// components: Shepperd, "Quaternion from rotation matrix", 1978.
+std::array<double, 4> rotationOf(const std::array<double, 16>& matrix,
+                                 const std::array<double, 3>& scale) {
+  double m[3][3];
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      m[row][i] = scale[i] != 0 ? column(matrix, i, row) / scale[i] : 0;
+    }
+  }
+  const double trace = m[0][0] + m[1][1] + m[2][2];
+  std::array<double, 4> q;
+  if (trace > 0) {
+    q = {m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1], 1 + trace};
+  } else {
+    const std::size_t a = m[0][0] > m[1][1] && m[0][0] > m[2][2] ? 0 : m[1][1] > m[2][2] ? 1 : 2;
+    const std::size_t b = (a + 1) % 3, c = (a + 2) % 3;
+    q[a] = 1 + m[a][a] - m[b][b] - m[c][c];
+    q[b] = m[a][b] + m[b][a];
+    q[c] = m[a][c] + m[c][a];
+    q[3] = m[c][b] - m[b][c];
+  }
+  normalizeQuaternion(q);
+  return q;
+}
+
+// Takes a node's matrix apart, for a channel to replace a part of it: the specification forbids
+// such a node, three.js does this. The sign of a mirrored matrix goes into the x scale, as there.
+void decompose(Node& node) {
+  const std::array<double, 16> matrix = *node.matrix;
+  node.matrix.reset();
+  for (std::size_t i = 0; i < 3; ++i) {
+    node.scale[i] = std::hypot(column(matrix, i, 0), column(matrix, i, 1), column(matrix, i, 2));
+    node.translation[i] = column(matrix, 3, i);
+  }
+  const auto minor = [&](std::size_t row, std::size_t next) {
+    return column(matrix, 1, row) * column(matrix, 2, next) -
+           column(matrix, 1, next) * column(matrix, 2, row);
+  };
+  const double determinant = column(matrix, 0, 0) * minor(1, 2) +
+                             column(matrix, 0, 1) * minor(2, 0) +
+                             column(matrix, 0, 2) * minor(0, 1);
+  if (determinant < 0) node.scale[0] = -node.scale[0];
+  node.rotation = rotationOf(matrix, node.scale);
+}
+
+void decomposeTarget(Model& model, const Channel& channel, const std::string& where) {
+  Node& node = model.nodes[channel.node];
+  if (!node.matrix || channel.path == ChannelPath::weights) return;
+  decompose(node);
+  model.notes.push_back(join(where, ": node ", channel.node,
+                             " has a matrix, which has been taken apart for the animation"));
+}
+
+Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t index, Model& model,
+              Tally& tally) {
+  Clip clip;
+  clip.name = animation.name;
+  std::set<std::pair<std::uint32_t, ChannelPath>> targets;
+  for (std::size_t i = 0; i < animation.channels.size(); ++i) {
+    const std::string where = join("animation ", index, " channel ", i);
+    auto channel = readChannel(source, animation, animation.channels[i], where, model, tally);
+    if (!channel) continue;
+    if (!targets.emplace(channel->node, channel->path).second) {
+      failInvalid(where, ": it moves what another channel moves, the ",
+                  animation.channels[i].target_path, " of node ", channel->node);
+    }
+    decomposeTarget(model, *channel, where);
+    clip.duration = std::max(clip.duration, static_cast<double>(channel->times.back()));
+    clip.channels.push_back(std::move(*channel));
+  }
+  return clip;
+}
+
+}  // namespace
+
+void readAnimations(Source& source, Model& model) {
+  Tally tally;
+  const auto& animations = source.content().animations;
+  for (std::size_t i = 0; i < animations.size(); ++i) {
+    model.clips.push_back(readClip(source, animations[i], i, model, tally));
+  }
+  if (tally.normalizedKeys > 0) {
+    model.notes.push_back(join(counted(tally.normalizedKeys, "rotation key"), " in ",
+                               counted(tally.channelsWithNormalizedKeys, "channel"),
+                               " not of unit length, normalised"));
+  }
+  if (tally.unknownPaths > 0) {
+    model.notes.push_back(join(counted(tally.unknownPaths, "animation channel"),
+                               " with a target that is not known, left out"));
+  }
+}
+
+std::optional<std::uint32_t> findClip(const Model& model, std::string_view numberOrName) {
+  std::uint32_t number = 0;
+  const char* end = numberOrName.data() + numberOrName.size();
+  const auto [stop, error] = std::from_chars(numberOrName.data(), end, number);
+  if (error == std::errc() && stop == end && number < model.clips.size()) return number;
+  for (std::uint32_t i = 0; i < model.clips.size(); ++i) {
+    if (model.clips[i].name == numberOrName) return i;
+  }
+  return std::nullopt;
+}
+
+}  // namespace dermis::gltf

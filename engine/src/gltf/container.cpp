@@ -1,0 +1,83 @@
+#include "gltf/container.h"
+
+#include <cstdint>
+#include <cstring>
+
+#include "gltf/failure.h"
+
+namespace dermis::gltf {
+namespace {
+
+constexpr std::size_t headerSize = 12;
+constexpr std::size_t chunkHeaderSize = 8;
+constexpr std::uint32_t magicNumber = 0x46546c67;  // "glTF"
+constexpr std::uint32_t jsonChunk = 0x4e4f534a;    // "JSON"
+constexpr std::uint32_t binaryChunk = 0x004e4942;  // "BIN"
+
+std::uint32_t readWord(std::span<const std::byte> bytes, std::size_t offset) {
+  std::uint32_t word = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    word |= std::to_integer<std::uint32_t>(bytes[offset + i]) << (8 * i);
+  }
+  return word;
+}
+
+std::string_view asText(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void checkHeader(std::span<const std::byte> bytes) {
+  if (bytes.size() < headerSize) {
+    failInvalid("the GLB header is cut off: ", bytes.size(), " bytes where it has ", headerSize);
+  }
+  const std::uint32_t version = readWord(bytes, 4);
+  if (version != 2) {
+    fail(ErrorCode::unsupportedFeature,
+         join("the GLB header says version ", version, ", and only version 2 is known"));
+  }
+  const std::uint32_t length = readWord(bytes, 8);
+  if (length != bytes.size()) {
+    failInvalid("the GLB header says ", length, " bytes, the file has ", bytes.size());
+  }
+}
+
+}  // namespace
+
+Container openContainer(std::span<const std::byte> bytes) {
+  if (bytes.empty()) failInvalid("the file is empty");
+  if (bytes.size() < 4 || readWord(bytes, 0) != magicNumber) return {asText(bytes), std::nullopt};
+
+  checkHeader(bytes);
+  Container container;
+  std::size_t offset = headerSize;
+  for (std::size_t chunk = 0; offset < bytes.size(); ++chunk) {
+    if (bytes.size() - offset < chunkHeaderSize) {
+      failInvalid("the header of GLB chunk ", chunk, " at byte ", offset, " is cut off");
+    }
+    const std::uint32_t length = readWord(bytes, offset);
+    const std::uint32_t type = readWord(bytes, offset + 4);
+    offset += chunkHeaderSize;
+    if (length > bytes.size() - offset) {
+      failInvalid("GLB chunk ", chunk, " at byte ", offset - chunkHeaderSize, " says ", length,
+                  " bytes, ", bytes.size() - offset, " are left in the file");
+    }
+    if (length % 4 != 0) {
+      failInvalid("the length of GLB chunk ", chunk, ", ", length, ", is not a multiple of 4");
+    }
+    const auto content = bytes.subspan(offset, length);
+    if (chunk == 0 && type != jsonChunk) failInvalid("the first GLB chunk is not JSON");
+    if (chunk != 0 && type == jsonChunk)
+      failInvalid("GLB chunk ", chunk, " is a second JSON chunk");
+    if (chunk > 1 && type == binaryChunk) {
+      failInvalid("GLB chunk ", chunk, " is binary data, which only the second chunk may be");
+    }
+    if (chunk == 0) container.json = asText(content);
+    if (chunk == 1 && type == binaryChunk) container.binaryChunk = content;
+    // Chunks of other types belong to extensions and are passed over, as the specification asks.
+    offset += length;
+  }
+  if (container.json.data() == nullptr) failInvalid("the GLB file has no JSON chunk");
+  return container;
+}
+
+}  // namespace dermis::gltf

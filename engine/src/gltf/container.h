@@ -1,0 +1,21 @@
+// The outermost layer of a file: a GLB container, or JSON text alone.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace dermis::gltf {
+
+/// Views of the file's bytes.
+struct Container {
+  std::string_view json;
+  std::optional<std::span<const std::byte>> binaryChunk;  ///< Of a GLB file that has one.
+};
+
+/// Takes the file apart: GLB where it begins with the magic, otherwise all of it is JSON. Throws
+/// `Failure` where a GLB header or chunk disagrees with the number of bytes there are.
+Container openContainer(std::span<const std::byte> bytes);
+
+}  // namespace dermis::gltf

@@ -1,0 +1,184 @@
+#include "gltf/document.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "gltf/failure.h"
+
+namespace dermis::gltf {
+namespace {
+
+using nlohmann::json;
+
+// Looks at brackets alone, outside strings: whether they match is the parser's business.
+void checkNesting(std::string_view text) {
+  std::uint32_t depth = 0;
+  bool inString = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char character = text[i];
+    if (inString) {
+      if (character == '\\') ++i;
+      if (character == '"') inString = false;
+    } else if (character == '"') {
+      inString = true;
+    } else if (character == '[' || character == '{') {
+      if (++depth > deepestNesting) {
+        failInvalid("the JSON text is nested deeper than ", deepestNesting, " levels at byte ", i);
+      }
+    } else if ((character == ']' || character == '}') && depth > 0) {
+      --depth;
+    }
+  }
+}
+
+json parseJson(std::string_view text) {
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& error) {
+    failInvalid("the JSON text is broken at byte ", error.byte);
+  } catch (const json::out_of_range&) {
+    failInvalid("the JSON text has a number that is too large");
+  }
+}
+
+void checkVersion(const json& root) {
+  const auto asset = root.find("asset");
+  if (asset == root.end() || !asset->is_object()) {
+    failInvalid("the JSON text has no object 'asset': this is not a glTF 2.0 file");
+  }
+  const auto version = asset->find("version");
+  if (version == asset->end() || !version->is_string()) failInvalid("asset: no version is given");
+  const auto& text = version->get_ref<const std::string&>();
+  if (text.substr(0, 2) != "2.") {
+    fail(ErrorCode::unsupportedFeature,
+         join("glTF version ", inQuotes(text), " is not supported: only version 2.0 is"));
+  }
+  const auto least = asset->find("minVersion");
+  if (least != asset->end() && *least != "2.0") {
+    fail(ErrorCode::unsupportedFeature,
+         join("the file needs glTF version ",
+              least->is_string() ? inQuotes(least->get_ref<const std::string&>()) : "?",
+              ": only version 2.0 is supported"));
+  }
+}
+
+// Extensions that change how a surface looks, not where it is: a file that requires them can be
+// skinned without.
+bool concernsOnlyAppearance(std::string_view extension) {
+  constexpr std::array<std::string_view, 8> prefixes = {
+      "KHR_materials_", "KHR_texture_", "EXT_texture_",   "MSFT_texture_",
+      "KHR_lights_",    "EXT_lights_",  "EXT_materials_", "KHR_xmp"};
+  return std::any_of(prefixes.begin(), prefixes.end(),
+                     [&](std::string_view prefix) { return extension.starts_with(prefix); });
+}
+
+std::vector<std::string> extensionNames(const json& root, const char* property) {
+  std::vector<std::string> names;
+  const auto list = root.find(property);
+  if (list == root.end()) return names;
+  if (!list->is_array()) failInvalid(property, " is not an array");
+  for (const json& name : *list) {
+    if (!name.is_string()) failInvalid(property, " holds something that is not a name");
+    names.push_back(name.get<std::string>());
+  }
+  return names;
+}
+
+bool usesQuantization(const json& root) {
+  constexpr std::string_view quantization = "KHR_mesh_quantization";
+  const auto used = extensionNames(root, "extensionsUsed");
+  const auto required = extensionNames(root, "extensionsRequired");
+  for (const std::string& name : required) {
+    if (name == quantization || concernsOnlyAppearance(name)) continue;
+    fail(ErrorCode::unsupportedFeature,
+         join("the file requires the extension ", inQuotes(name), ", which is not supported"));
+  }
+  return std::find(used.begin(), used.end(), quantization) != used.end() ||
+         std::find(required.begin(), required.end(), quantization) != required.end();
+}
+
+std::vector<BufferDescription> takeBuffers(json& root) {
+  std::vector<BufferDescription> buffers;
+  const auto list = root.find("buffers");
+  if (list == root.end()) return buffers;
+  for (json& buffer : *list) {
+    BufferDescription description;
+    description.byteLength = buffer["byteLength"].get<std::uint64_t>();
+    if (buffer.contains("uri")) {
+      description.uri = std::move(buffer["uri"].get_ref<std::string&>());
+    }
+    buffers.push_back(std::move(description));
+  }
+  return buffers;
+}
+
+// Nothing of these is read, so nobody has to parse them. The recursion is bounded by
+// `deepestNesting`.
+void eraseExtensions(json& value) {
+  if (value.is_object()) {
+    value.erase("extensions");
+    value.erase("extras");
+  }
+  if (value.is_structured()) {
+    for (json& child : value) eraseExtensions(child);
+  }
+}
+
+void moveIndices(json& root) {
+  const auto meshes = root.find("meshes");
+  if (meshes == root.end()) return;
+  for (json& mesh : *meshes) {
+    for (json& primitive : mesh["primitives"]) {
+      primitive["attributes"].erase(indicesAttribute);
+      const auto indices = primitive.find("indices");
+      if (indices == primitive.end()) continue;
+      primitive["attributes"][indicesAttribute] = *indices;
+      primitive.erase(indices);
+    }
+  }
+}
+
+tinygltf::Model parseContent(json root) {
+  constexpr std::array kept = {"asset",     "scene",       "scenes", "nodes",      "meshes",
+                               "accessors", "bufferViews", "skins",  "animations", "materials"};
+  json lean = json::object();
+  for (const char* section : kept) {
+    if (root.contains(section)) lean[section] = std::move(root[section]);
+  }
+  eraseExtensions(lean);
+  moveIndices(lean);
+
+  const std::string text = lean.dump();
+  if (text.size() > std::numeric_limits<unsigned int>::max()) {
+    fail(ErrorCode::limitExceeded, "the JSON text is longer than 4 GiB");
+  }
+  tinygltf::TinyGLTF parser;
+  tinygltf::Model content;
+  std::string error, warning;
+  if (!parser.LoadASCIIFromString(&content, &error, &warning, text.data(),
+                                  static_cast<unsigned int>(text.size()), "")) {
+    std::replace(error.begin(), error.end(), '\n', ' ');
+    failInvalid("the file cannot be read: ", error);
+  }
+  return content;
+}
+
+}  // namespace
+
+Document parseDocument(std::string_view text) {
+  checkNesting(text);
+  json root = parseJson(text);
+  if (!root.is_object()) failInvalid("the JSON text is not an object");
+  checkVersion(root);
+
+  Document document;
+  document.quantized = usesQuantization(root);
+  checkReferences(root);
+  document.buffers = takeBuffers(root);
+  document.content = parseContent(std::move(root));
+  return document;
+}
+
+}  // namespace dermis::gltf

@@ -1,0 +1,51 @@
+// How this module reports trouble to itself: a `Failure` is thrown, and `loadFromMemory` turns it
+// into a `Result`. None leaves the module.
+#pragma once
+
+#include <concepts>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "dermis/result.h"
+
+namespace dermis::gltf {
+
+struct Failure {
+  Error error;
+};
+
+inline std::string textOf(std::string_view text) {
+  return std::string(text);
+}
+std::string textOf(double number);
+template <std::integral Integer>
+std::string textOf(Integer number) {
+  return std::to_string(number);
+}
+
+/// The parts one after another, numbers in decimal.
+template <typename... Parts>
+std::string join(const Parts&... parts) {
+  std::string text;
+  (text.append(textOf(parts)), ...);
+  return text;
+}
+
+/// "1 node", "2 nodes".
+inline std::string counted(std::size_t count, std::string_view what) {
+  return join(count, " ", what, count == 1 ? "" : "s");
+}
+
+/// A name from a file for a message: in quotes, shortened, on one line whatever the file holds.
+std::string inQuotes(std::string_view name);
+
+[[noreturn]] void fail(ErrorCode code, std::string message);
+
+/// Fails with `invalidData` and the sentence made of the parts.
+template <typename... Parts>
+[[noreturn]] void failInvalid(const Parts&... parts) {
+  fail(ErrorCode::invalidData, join(parts...));
+}
+
+}  // namespace dermis::gltf

@@ -1,0 +1,97 @@
+#include "gltf/interpolate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gltf/reader.h"
+
+namespace dermis::gltf {
+namespace {
+
+// Where the parts of a key lie in `Channel::values`.
+enum class Part : std::size_t { inTangent, value, outTangent };
+
+const float* keyPart(const Channel& channel, std::size_t key, Part part) {
+  const std::size_t width = channel.components;
+  if (channel.interpolation != Interpolation::cubicSpline) return &channel.values[key * width];
+  return &channel.values[(3 * key + static_cast<std::size_t>(part)) * width];
+}
+
+// glTF 2.0, appendix C.4: along the shorter arc. Where the two are so close that the angle is lost
+// in rounding, linear.
+void slerp(const float* from, const float* to, double fraction, std::span<double> value) {
+  double cosine = 0;
+  for (std::size_t i = 0; i < 4; ++i) cosine += double{from[i]} * double{to[i]};
+  const double direction = cosine < 0 ? -1 : 1;
+  const double squaredSine = 1 - cosine * cosine;
+  double fromShare = 1 - fraction;
+  double toShare = fraction;
+  if (squaredSine > std::numeric_limits<double>::epsilon()) {
+    const double sine = std::sqrt(squaredSine);
+    const double angle = std::atan2(sine, cosine * direction);
+    fromShare = std::sin(fromShare * angle) / sine;
+    toShare = std::sin(toShare * angle) / sine;
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    value[i] = fromShare * double{from[i]} + direction * toShare * double{to[i]};
+  }
+}
+
+// glTF 2.0, appendix C.5: a Hermite spline whose tangents are scaled by the distance of the keys.
+void cubicSpline(const Channel& channel, std::size_t key, double distance, double t,
+                 std::span<double> value) {
+  const float* from = keyPart(channel, key, Part::value);
+  const float* leaving = keyPart(channel, key, Part::outTangent);
+  const float* arriving = keyPart(channel, key + 1, Part::inTangent);
+  const float* to = keyPart(channel, key + 1, Part::value);
+  const double t2 = t * t;
+  const double t3 = t2 * t;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    value[i] = (2 * t3 - 3 * t2 + 1) * double{from[i]} +
+               distance * (t3 - 2 * t2 + t) * double{leaving[i]} +
+               (3 * t2 - 2 * t3) * double{to[i]} + distance * (t3 - t2) * double{arriving[i]};
+  }
+}
+
+void between(const Channel& channel, std::size_t key, double time, std::span<double> value) {
+  const double distance = double{channel.times[key + 1]} - double{channel.times[key]};
+  const double fraction = (time - double{channel.times[key]}) / distance;
+  const float* from = keyPart(channel, key, Part::value);
+  const float* to = keyPart(channel, key + 1, Part::value);
+  if (channel.interpolation == Interpolation::cubicSpline) {
+    cubicSpline(channel, key, distance, fraction, value);
+  } else if (channel.path == ChannelPath::rotation) {
+    slerp(from, to, fraction, value);
+  } else {
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      value[i] = (1 - fraction) * double{from[i]} + fraction * double{to[i]};
+    }
+  }
+}
+
+}  // namespace
+
+void interpolate(const Channel& channel, double time, std::span<double> value) {
+  // The last key that is not after the time; the first key where all are.
+  const auto after = std::upper_bound(channel.times.begin(), channel.times.end(), time,
+                                      [](double at, float key) { return !(at >= double{key}); });
+  const auto next = static_cast<std::size_t>(after - channel.times.begin());
+  const std::size_t key = next == 0 ? 0 : next - 1;
+  const bool hold = next == 0 || next == channel.times.size() ||
+                    channel.interpolation == Interpolation::step ||
+                    time == double{channel.times[key]};
+  if (hold) {
+    std::copy_n(keyPart(channel, key, Part::value), value.size(), value.begin());
+  } else {
+    between(channel, key, time, value);
+  }
+  if (channel.path == ChannelPath::rotation) {
+    std::array<double, 4> rotation;
+    std::copy_n(value.begin(), 4, rotation.begin());
+    normalizeQuaternion(rotation);
+    std::copy_n(rotation.begin(), 4, value.begin());
+  }
+}
+
+}  // namespace dermis::gltf

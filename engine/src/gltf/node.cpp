@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <cmath>
+
+#include "gltf/failure.h"
+#include "gltf/reader.h"
+
+namespace dermis::gltf {
+namespace {
+
+// Decimal numbers in a JSON text are not exact; only what is farther from unit length than this is
+// worth a note.
+constexpr double unitLengthTolerance = 1e-5;
+
+void checkMatrix(const std::array<double, 16>& matrix, std::size_t index) {
+  constexpr double tolerance = 1e-5;
+  const bool affine = std::abs(matrix[3]) <= tolerance && std::abs(matrix[7]) <= tolerance &&
+                      std::abs(matrix[11]) <= tolerance && std::abs(matrix[15] - 1) <= tolerance;
+  if (!affine) failInvalid("node ", index, ": the fourth row of its matrix is not 0 0 0 1");
+}
+
+// Returns whether the rotation had to be normalised.
+bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node) {
+  if (!source.matrix.empty()) {
+    std::copy(source.matrix.begin(), source.matrix.end(), node.matrix.emplace().begin());
+    checkMatrix(*node.matrix, index);
+    return false;
+  }
+  std::copy(source.translation.begin(), source.translation.end(), node.translation.begin());
+  std::copy(source.rotation.begin(), source.rotation.end(), node.rotation.begin());
+  std::copy(source.scale.begin(), source.scale.end(), node.scale.begin());
+  return normalizeQuaternion(node.rotation) > unitLengthTolerance;
+}
+
+void readParents(const tinygltf::Model& content, Model& model) {
+  for (std::size_t parent = 0; parent < content.nodes.size(); ++parent) {
+    for (const int childIndex : content.nodes[parent].children) {
+      Node& child = model.nodes[static_cast<std::size_t>(childIndex)];
+      if (child.parent != none) {
+        failInvalid("node ", childIndex, ": it is a child of both node ", child.parent,
+                    " and node ", parent);
+      }
+      child.parent = static_cast<std::uint32_t>(parent);
+    }
+  }
+}
+
+// Roots first, then their children, and so on. What is left over hangs in a cycle, for no node has
+// two parents.
+void orderNodes(const tinygltf::Model& content, Model& model) {
+  model.nodeOrder.reserve(model.nodes.size());
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    if (model.nodes[i].parent == none) model.nodeOrder.push_back(i);
+  }
+  for (std::size_t i = 0; i < model.nodeOrder.size(); ++i) {
+    for (const int child : content.nodes[model.nodeOrder[i]].children) {
+      model.nodeOrder.push_back(static_cast<std::uint32_t>(child));
+    }
+  }
+  if (model.nodeOrder.size() == model.nodes.size()) return;
+  std::vector<bool> reached(model.nodes.size(), false);
+  for (const std::uint32_t node : model.nodeOrder) reached[node] = true;
+  const auto first = std::find(reached.begin(), reached.end(), false);
+  failInvalid("node ", first - reached.begin(), ": it is part of, or below, a cycle of nodes");
+}
+
+}  // namespace
+
+double normalizeQuaternion(std::array<double, 4>& quaternion) {
+  double square = 0;
+  for (const double component : quaternion) square += component * component;
+  const double length = std::sqrt(square);
+  if (!(length > 0) || !std::isfinite(length)) {
+    quaternion = {0, 0, 0, 1};
+    return 1;
+  }
+  for (double& component : quaternion) component /= length;
+  return std::abs(length - 1);
+}
+
+void readNodes(const Source& source, Model& model) {
+  const tinygltf::Model& content = source.content();
+  model.nodes.resize(content.nodes.size());
+  std::size_t normalized = 0;
+  for (std::size_t i = 0; i < content.nodes.size(); ++i) {
+    const tinygltf::Node& from = content.nodes[i];
+    Node& node = model.nodes[i];
+    node.name = from.name;
+    node.mesh = indexOf(from.mesh);
+    node.skin = indexOf(from.skin);
+    node.morphWeights.assign(from.weights.size(), 0);
+    std::transform(from.weights.begin(), from.weights.end(), node.morphWeights.begin(),
+                   [](double weight) { return static_cast<float>(weight); });
+    if (readTransform(from, i, node)) ++normalized;
+  }
+  readParents(content, model);
+  orderNodes(content, model);
+  if (normalized > 0) {
+    model.notes.push_back(
+        join(counted(normalized, "node rotation"), " not of unit length, normalised"));
+  }
+}
+
+}  // namespace dermis::gltf

@@ -1,0 +1,113 @@
+#include "dermis/gltf.h"
+#include "gltf/interpolate.h"
+
+namespace dermis::gltf {
+namespace {
+
+// A node's own transform with a clip's values in it.
+struct LocalTransform {
+  std::array<double, 3> translation;
+  std::array<double, 4> rotation;
+  std::array<double, 3> scale;
+};
+
+GlobalTransform fromMatrix(const std::array<double, 16>& columns) {
+  GlobalTransform transform;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      transform[row][column] = columns[column * 4 + row];
+    }
+  }
+  return transform;
+}
+
+// Translation × rotation × scale, the rotation of unit length.
+GlobalTransform compose(const LocalTransform& local) {
+  const auto [x, y, z, w] = local.rotation;
+  const auto& s = local.scale;
+  const auto& t = local.translation;
+  return {{{(1 - 2 * (y * y + z * z)) * s[0], 2 * (x * y - w * z) * s[1],
+            2 * (x * z + w * y) * s[2], t[0]},
+           {2 * (x * y + w * z) * s[0], (1 - 2 * (x * x + z * z)) * s[1],
+            2 * (y * z - w * x) * s[2], t[1]},
+           {2 * (x * z - w * y) * s[0], 2 * (y * z + w * x) * s[1],
+            (1 - 2 * (x * x + y * y)) * s[2], t[2]}}};
+}
+
+// left × right, both affine; `Right` has [row][column] of any floating-point type.
+template <typename Right>
+GlobalTransform multiply(const GlobalTransform& left, const Right& right) {
+  GlobalTransform product;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double sum = column == 3 ? left[row][3] : 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        sum += left[row][i] * static_cast<double>(right[i][column]);
+      }
+      product[row][column] = sum;
+    }
+  }
+  return product;
+}
+
+void applyChannel(const Channel& channel, double time, LocalTransform& local) {
+  switch (channel.path) {
+    case ChannelPath::translation:
+      interpolate(channel, time, local.translation);
+      break;
+    case ChannelPath::rotation:
+      interpolate(channel, time, local.rotation);
+      break;
+    case ChannelPath::scale:
+      interpolate(channel, time, local.scale);
+      break;
+    case ChannelPath::weights:
+      break;  // Morph targets are not skinned yet.
+  }
+}
+
+}  // namespace
+
+std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time) {
+  std::vector<LocalTransform> locals;
+  locals.reserve(model.nodes.size());
+  for (const Node& node : model.nodes) {
+    locals.push_back({node.translation, node.rotation, node.scale});
+  }
+  if (clip < model.clips.size()) {
+    for (const Channel& channel : model.clips[clip].channels) {
+      applyChannel(channel, time, locals[channel.node]);
+    }
+  }
+  std::vector<GlobalTransform> globals(model.nodes.size());
+  for (const std::uint32_t index : model.nodeOrder) {
+    const Node& node = model.nodes[index];
+    const GlobalTransform local = node.matrix ? fromMatrix(*node.matrix) : compose(locals[index]);
+    globals[index] = node.parent == none ? local : multiply(globals[node.parent], local);
+  }
+  return globals;
+}
+
+std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
+                                 std::span<const GlobalTransform> globals) {
+  if (skin >= model.skins.size() || globals.size() < model.nodes.size()) return {};
+  const Skin& from = model.skins[skin];
+  std::vector<JointMatrix> matrices(from.joints.size());
+  for (std::size_t i = 0; i < from.joints.size(); ++i) {
+    const GlobalTransform product =
+        multiply(globals[from.joints[i]], from.inverseBindMatrices[i].m);
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 4; ++column) {
+        matrices[i].m[row][column] = static_cast<float>(product[row][column]);
+      }
+    }
+  }
+  return matrices;
+}
+
+std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin, std::uint32_t clip,
+                                 double time) {
+  return palette(model, skin, nodeGlobals(model, clip, time));
+}
+
+}  // namespace dermis::gltf

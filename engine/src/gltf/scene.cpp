@@ -1,0 +1,92 @@
+#include <algorithm>
+
+#include "gltf/failure.h"
+#include "gltf/reader.h"
+
+namespace dermis::gltf {
+namespace {
+
+// The roots of the default scene: `scene`, or scene 0 where the file does not say (as three.js
+// does), or all root nodes where it has no scenes.
+std::vector<std::uint32_t> sceneRoots(const tinygltf::Model& content, Model& model) {
+  std::vector<std::uint32_t> roots;
+  if (content.scenes.empty()) {
+    for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+      if (model.nodes[i].parent == none) roots.push_back(i);
+    }
+    if (!roots.empty()) model.notes.push_back("the file has no scene: all its nodes are taken");
+    return roots;
+  }
+  const auto scene = static_cast<std::size_t>(std::max(content.defaultScene, 0));
+  for (const int root : content.scenes[scene].nodes) roots.push_back(indexOf(root));
+  return roots;
+}
+
+void checkScenes(const tinygltf::Model& content, const Model& model) {
+  for (std::size_t i = 0; i < content.scenes.size(); ++i) {
+    for (const int node : content.scenes[i].nodes) {
+      const std::uint32_t parent = model.nodes[static_cast<std::size_t>(node)].parent;
+      if (parent == none) continue;
+      failInvalid("scene ", i, ": node ", node, " is not a root, but a child of node ", parent);
+    }
+  }
+}
+
+std::vector<bool> reachableNodes(const Model& model, const std::vector<std::uint32_t>& roots) {
+  std::vector<bool> reachable(model.nodes.size(), false);
+  for (const std::uint32_t root : roots) reachable[root] = true;
+  for (const std::uint32_t node : model.nodeOrder) {
+    const std::uint32_t parent = model.nodes[node].parent;
+    if (parent != none && reachable[parent]) reachable[node] = true;
+  }
+  return reachable;
+}
+
+void readMesh(Source& source, Model& model, std::uint32_t index) {
+  Mesh& mesh = model.meshes[index];
+  if (!mesh.primitives.empty()) return;
+  const auto count = source.content().meshes[index].primitives.size();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    mesh.primitives.push_back(readPrimitive(source, index, i, model.notes));
+  }
+}
+
+void addNote(Model& model, std::size_t count, const char* what, const char* rest) {
+  if (count > 0) model.notes.push_back(join(counted(count, what), rest));
+}
+
+}  // namespace
+
+void readScene(Source& source, Model& model) {
+  const tinygltf::Model& content = source.content();
+  for (const tinygltf::Mesh& from : content.meshes) {
+    Mesh& mesh = model.meshes.emplace_back();
+    mesh.name = from.name;
+    for (const double weight : from.weights) {
+      mesh.morphWeights.push_back(static_cast<float>(weight));
+    }
+  }
+
+  checkScenes(content, model);
+  const std::vector<bool> reachable = reachableNodes(model, sceneRoots(content, model));
+  std::size_t outside = 0, notSkinned = 0, inBindPose = 0;
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    const Node& node = model.nodes[i];
+    if (node.mesh == none) continue;
+    if (!reachable[i]) ++outside;
+    if (reachable[i] && node.skin == none) ++notSkinned;
+    if (!reachable[i] || node.skin == none) continue;
+    readMesh(source, model, node.mesh);
+    const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
+    for (std::uint32_t j = 0; j < primitives.size(); ++j) {
+      if (primitives[j].vertexCount == 0) continue;
+      if (primitives[j].influencesPerVertex == 0) ++inBindPose;
+      model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
+    }
+  }
+  addNote(model, outside, "node", " with a mesh outside the default scene left out");
+  addNote(model, notSkinned, "node", " with a mesh but no skin left out");
+  addNote(model, inBindPose, "primitive", " of a skinned node without joints, left in bind pose");
+}
+
+}  // namespace dermis::gltf

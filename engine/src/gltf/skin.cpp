@@ -1,0 +1,92 @@
+#include <algorithm>
+#include <cmath>
+
+#include "gltf/failure.h"
+#include "gltf/reader.h"
+
+namespace dermis::gltf {
+namespace {
+
+constexpr Format matrixFormat[] = {{TINYGLTF_COMPONENT_TYPE_FLOAT, false}};
+
+// Column-major, as the file has it, to our rows.
+JointMatrix toJointMatrix(const float* columns, const std::string& where) {
+  // The specification wants the fourth row exact; exporters that invert in float32 leave dust in
+  // it.
+  constexpr float tolerance = 1e-5f;
+  JointMatrix matrix;
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      const float value = columns[column * 4 + row];
+      if (!std::isfinite(value)) failInvalid(where, " holds a number that is not finite");
+      if (row < 3) {
+        matrix.m[row][column] = value;
+      } else if (std::abs(value - (column == 3 ? 1.0f : 0.0f)) > tolerance) {
+        failInvalid(where, ": its fourth row is not 0 0 0 1");
+      }
+    }
+  }
+  return matrix;
+}
+
+std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, std::size_t joints,
+                                                 const std::string& where) {
+  if (accessor < 0) {
+    source.spend(joints * sizeof(JointMatrix), where);
+    return std::vector<JointMatrix>(joints);
+  }
+  const std::string place = where + " inverseBindMatrices";
+  source.require(accessor, TINYGLTF_TYPE_MAT4, matrixFormat, place);
+  source.requireNoStride(accessor, place);
+  if (source.count(accessor) < joints) {
+    failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor), " matrices for ",
+                joints, " joints");
+  }
+  // An accessor of zeros: no matrix in it would pass.
+  if (source.hasNoData(accessor)) return std::vector<JointMatrix>(joints);
+  const std::vector<float> floats = source.floats(accessor);
+  source.spend(joints * sizeof(JointMatrix), where);
+  std::vector<JointMatrix> matrices(joints);
+  for (std::size_t i = 0; i < joints; ++i) {
+    matrices[i] = toJointMatrix(floats.data() + i * 16, join(where, ": inverse bind matrix ", i));
+  }
+  return matrices;
+}
+
+// The root above each node.
+std::vector<std::uint32_t> findRoots(const Model& model) {
+  std::vector<std::uint32_t> roots(model.nodes.size());
+  for (const std::uint32_t node : model.nodeOrder) {
+    const std::uint32_t parent = model.nodes[node].parent;
+    roots[node] = parent == none ? node : roots[parent];
+  }
+  return roots;
+}
+
+}  // namespace
+
+void readSkins(Source& source, Model& model) {
+  const tinygltf::Model& content = source.content();
+  const std::vector<std::uint32_t> roots = findRoots(model);
+  for (std::size_t i = 0; i < content.skins.size(); ++i) {
+    const tinygltf::Skin& from = content.skins[i];
+    const std::string where = join("skin ", i);
+    if (from.joints.size() > maxPaletteJoints) {
+      fail(ErrorCode::limitExceeded, join(where, ": it has ", from.joints.size(),
+                                          " joints, and a palette holds ", maxPaletteJoints));
+    }
+    Skin skin;
+    skin.name = from.name;
+    std::transform(from.joints.begin(), from.joints.end(), std::back_inserter(skin.joints),
+                   indexOf);
+    skin.inverseBindMatrices =
+        readInverseBindMatrices(source, from.inverseBindMatrices, skin.joints.size(), where);
+    const bool oneRoot = std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {
+      return roots[joint] == roots[skin.joints[0]];
+    });
+    if (!oneRoot) model.notes.push_back(join(where, ": its joints have no common root"));
+    model.skins.push_back(std::move(skin));
+  }
+}
+
+}  // namespace dermis::gltf
