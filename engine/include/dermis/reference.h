@@ -22,8 +22,7 @@ struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
                         ///< value of joint j
   double distance = 0;  ///< |p|, from the origin of the bind pose
-  double rigidShortcut =
-      0;  ///< by how much a joint that kernels take for rigid stretches, at most 4e-6
+  double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels take for rigid as they are
   double normalAlignment =
       1;  ///< |adjᵀ(M) n| / σ_max², M the blended 3×3; 1 where normals are only rotated
   bool normalRotatedOnly =

@@ -42,7 +42,7 @@ double share(double error, double bound) {
 double positionBound(Method method, const reference::Conditioning& conditioning) {
   if (method == Method::linear) return 6 * floatRounding * conditioning.scale;
   return 24 * floatRounding * conditioning.scale +
-         conditioning.rigidShortcut * conditioning.distance;
+         std::min(4e-6, conditioning.rigidShortcut) * conditioning.distance;
 }
 
 double normalBound(Method method, const reference::Conditioning& conditioning) {

@@ -262,8 +262,7 @@ void conditionOf(std::span<const Joint> joints, std::span<const Influence> influ
     largest = std::max(largest, joint.largest);
     conditioning.degenerate |= joint.degenerate;
     if (joint.rigidForKernels) {
-      conditioning.rigidShortcut =
-          std::max(conditioning.rigidShortcut, std::min(4e-6, joint.distanceFromRotation));
+      conditioning.rigidShortcut = std::max(conditioning.rigidShortcut, joint.distanceFromRotation);
     }
   }
   conditioning.scale = translation + largest * length;
