@@ -1,0 +1,44 @@
+#!/bin/sh
+# Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). Does nothing, and needs no
+# rights, where all of it is there. On another system it lists what is needed and ends with an error.
+set -eu
+
+packages="
+cmake ninja-build g++
+libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
+glslang-dev glslang-tools spirv-tools
+libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev
+libcli11-dev libfmt-dev
+libgtest-dev libbenchmark-dev
+"
+
+if ! command -v dpkg-query >/dev/null 2>&1; then
+  echo "install-deps: this is not Debian; Dermis needs the equivalents of these packages:" >&2
+  for package in $packages; do echo "  $package" >&2; done
+  exit 1
+fi
+
+missing=
+for package in $packages; do
+  state=$(dpkg-query -W -f='${db:Status-Abbrev}' "$package" 2>/dev/null || true)
+  case $state in
+    ii*) ;;
+    *) missing="$missing $package" ;;
+  esac
+done
+[ -n "$missing" ] || exit 0
+
+if [ "$(id -u)" -eq 0 ]; then
+  as_root=
+elif command -v sudo >/dev/null 2>&1; then
+  as_root=sudo
+else
+  echo "install-deps: run as root, or install sudo; these packages are missing:$missing" >&2
+  exit 1
+fi
+
+echo "install-deps: installing$missing"
+export DEBIAN_FRONTEND=noninteractive
+$as_root apt-get update -q
+# shellcheck disable=SC2086 # a list of words
+$as_root apt-get install -y -q --no-install-recommends $missing

@@ -1,0 +1,115 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct InfoOptions {
+  std::string model;
+  bool json = false;
+};
+
+Json describePart(const Scene& scene, const ScenePart& part) {
+  const gltf::Primitive& primitive = *part.primitive;
+  Json json;
+  json["name"] = part.name;
+  json["node"] = part.source.node;
+  json["skin"] = part.source.skin;
+  json["vertices"] = primitive.vertexCount;
+  json["triangles"] = primitive.triangles.size() / 3;
+  json["normals"] = !primitive.normals.empty();
+  json["tangents"] = !primitive.tangents.empty();
+  json["morphTargets"] = primitive.morphTargets.size();
+  json["influencesStored"] = primitive.influencesPerVertex;
+  json["influencesUsed"] = part.packed ? part.packed->maxInfluences() : 0;
+  json["jointsUsed"] = part.packed ? part.packed->requiredJoints() : 0;
+  json["joints"] = scene.model.skins[part.source.skin].joints.size();
+  json["packedBytes"] = part.packed ? part.packed->bytes().size() : 0;
+  json["problems"] = Json::array();
+  for (const Finding& finding : part.report.findings) {
+    json["problems"].push_back({{"kind", problemName(finding.problem)},
+                                {"vertices", finding.count},
+                                {"firstVertex", finding.firstVertex},
+                                {"repaired", refusedByPack(finding.problem)},
+                                {"message", finding.message}});
+  }
+  return json;
+}
+
+Json describe(const Scene& scene) {
+  Json json;
+  json["meshes"] = Json::array();
+  for (const std::unique_ptr<ScenePart>& part : scene.parts)
+    json["meshes"].push_back(describePart(scene, *part));
+  json["skins"] = Json::array();
+  for (const gltf::Skin& skin : scene.model.skins) {
+    json["skins"].push_back({{"name", skin.name}, {"joints", skin.joints.size()}});
+  }
+  json["clips"] = Json::array();
+  for (const gltf::Clip& clip : scene.model.clips) {
+    json["clips"].push_back(
+        {{"name", clip.name}, {"seconds", clip.duration}, {"channels", clip.channels.size()}});
+  }
+  json["warnings"] = scene.warnings;
+  json["notes"] = scene.notes;
+  return json;
+}
+
+void printText(const Json& json) {
+  const auto text = [](const Json& value) { return value.get<std::string>(); };
+  fmt::print("{} skinned primitives, {} skins, {} clips\n", json["meshes"].size(),
+             json["skins"].size(), json["clips"].size());
+  for (const Json& mesh : json["meshes"]) {
+    fmt::print("mesh   {}\n", text(mesh["name"]));
+    fmt::print(
+        "       {} vertices, {} triangles, {}{}influences: up to {} of {} stored, skin {} with {} "
+        "joints\n",
+        mesh["vertices"].get<int>(), mesh["triangles"].get<int>(),
+        mesh["normals"].get<bool>() ? "normals, " : "",
+        mesh["tangents"].get<bool>() ? "tangents, " : "", mesh["influencesUsed"].get<int>(),
+        mesh["influencesStored"].get<int>(), mesh["skin"].get<int>(), mesh["joints"].get<int>());
+    for (const Json& problem : mesh["problems"]) {
+      fmt::print("       {} ({} vertices): {}\n", text(problem["kind"]),
+                 problem["vertices"].get<int>(), text(problem["message"]));
+    }
+  }
+  std::size_t number = 0;
+  for (const Json& clip : json["clips"]) {
+    fmt::print("clip   {} '{}': {:.3f} s, {} channels\n", number++, text(clip["name"]),
+               clip["seconds"].get<double>(), clip["channels"].get<int>());
+  }
+  for (const Json& note : json["notes"]) fmt::print("note   {}\n", text(note));
+}
+
+ExitStatus info(const InfoOptions& options) {
+  const Result<Scene> scene = loadScene(options.model, false);
+  if (!scene) return reportModelError(scene.error());
+  const Json json = describe(*scene);
+  if (options.json) {
+    // Names come from a file: what is not UTF-8 in them is replaced.
+    fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+  } else {
+    printText(json);
+  }
+  return ExitStatus::done;
+}
+
+}  // namespace
+
+Run addInfo(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("info", "Meshes, skins, influences, clips, and every problem found");
+  const auto options = std::make_shared<InfoOptions>();
+  command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
+  command->add_flag("--json", options->json, "As JSON");
+  return [options] { return info(*options); };
+}
+
+}  // namespace dermis::cli

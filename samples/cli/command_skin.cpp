@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <regex>
+
+#include "batch_runner.h"
+#include "commands.h"
+#include "dermis/reference.h"
+#include "mesh_output.h"
+#include "progress.h"
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+namespace {
+
+struct SkinOptions {
+  std::string model;
+  std::string output;
+  std::optional<std::string> animation;
+  double time = 0;
+  std::optional<std::uint32_t> frames;
+  double framesPerSecond = 30;
+  std::string method = std::string(methodName(Method::dualQuaternion));
+  std::string device = "auto";
+  bool strict = false;
+};
+
+/// Positions and, where a mesh has them, normals of every part; parts without influences are left
+/// as they are.
+using SkinParts = std::function<Result<std::vector<samples::SkinnedVertices>>(
+    const std::vector<std::vector<JointMatrix>>& palettes)>;
+
+samples::SkinnedVertices bindPose(const ScenePart& part) {
+  return {part.primitive->positions, part.primitive->normals, {}};
+}
+
+std::vector<float> toFloats(const std::vector<reference::Double3>& vectors) {
+  std::vector<float> floats;
+  floats.reserve(vectors.size() * 3);
+  for (const reference::Double3& vector : vectors) {
+    for (const double value : vector) floats.push_back(static_cast<float>(value));
+  }
+  return floats;
+}
+
+SkinParts referenceSkinner(const Scene& scene, Method method) {
+  return [&scene, method](const std::vector<std::vector<JointMatrix>>& palettes)
+             -> Result<std::vector<samples::SkinnedVertices>> {
+    std::vector<samples::SkinnedVertices> all;
+    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
+      if (!part->hasInfluences) {
+        all.push_back(bindPose(*part));
+        continue;
+      }
+      const Result<reference::SkinnedMesh> skinned =
+          reference::skin(part->view(), palettes[part->source.skin], method);
+      if (!skinned) return skinned.error();
+      all.push_back({toFloats(skinned->positions), toFloats(skinned->normals), {}});
+    }
+    return all;
+  };
+}
+
+SkinParts deviceSkinner(const Scene& scene, Method method, samples::Device& device,
+                        vulkan::Context& context) {
+  return [&scene, method, &device, &context](const std::vector<std::vector<JointMatrix>>& palettes)
+             -> Result<std::vector<samples::SkinnedVertices>> {
+    std::vector<samples::SkinRequest> requests;
+    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
+      if (part->hasInfluences)
+        requests.push_back({&*part->packed, palettes[part->source.skin], true, method});
+    }
+    Result<samples::BatchResult> result = samples::runBatch(device, context, requests);
+    if (!result) return result.error();
+    std::vector<samples::SkinnedVertices> all;
+    std::size_t next = 0;
+    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
+      all.push_back(part->hasInfluences ? std::move(result->instances[next++]) : bindPose(*part));
+    }
+    return all;
+  };
+}
+
+OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> skinned) {
+  OutputMesh whole;
+  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+    OutputMesh part;
+    part.positions = std::move(skinned[index].positions);
+    part.triangles = scene.parts[index]->primitive->triangles;
+    part.normals = skinned[index].normals.empty() ? computeNormals(part.positions, part.triangles)
+                                                  : std::move(skinned[index].normals);
+    append(whole, part);
+  }
+  return whole;
+}
+
+/// The name of a frame: %d or %0Nd in the pattern replaced by its number, or nothing where there is
+/// no such pattern.
+std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
+  static const std::regex place("%0([1-9][0-9]?)d");
+  std::smatch match;
+  if (!std::regex_search(pattern, match, place)) return std::nullopt;
+  return match.prefix().str() + fmt::format("{:0{}}", frame, std::stoi(match[1].str())) +
+         match.suffix().str();
+}
+
+ExitStatus checkUsage(const SkinOptions& options) {
+  if (!options.output.ends_with(".ply")) {
+    return reportError(ExitStatus::wrongUsage,
+                       fmt::format("OUT must end in .ply, not be '{}'", options.output));
+  }
+  if (!methodFromName(options.method)) {
+    return reportError(ExitStatus::wrongUsage,
+                       fmt::format("there is no method '{}'; there are linear and dual_quaternion",
+                                   options.method));
+  }
+  if (!std::isfinite(options.time))
+    return reportError(ExitStatus::wrongUsage, "--time must be a number of seconds");
+  if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond)) {
+    return reportError(ExitStatus::wrongUsage, "--fps must be a number above 0");
+  }
+  const bool pattern = frameName(options.output, 0).has_value();
+  if (options.frames && *options.frames == 0)
+    return reportError(ExitStatus::wrongUsage, "--frames must be at least 1");
+  if (options.frames && !pattern) {
+    return reportError(ExitStatus::wrongUsage,
+                       "--frames needs a place for the number in OUT, such as pose%04d.ply");
+  }
+  if (!options.frames && pattern) {
+    return reportError(ExitStatus::wrongUsage,
+                       "OUT has a place for a number; --frames says how many there are");
+  }
+  return ExitStatus::done;
+}
+
+ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint32_t clip,
+                      const SkinParts& skinParts) {
+  const std::uint32_t count = options.frames.value_or(1);
+  Progress progress("skinning", count);
+  for (std::uint32_t frame = 0; frame < count; ++frame) {
+    const double time = options.time + frame / options.framesPerSecond;
+    Result<std::vector<samples::SkinnedVertices>> skinned =
+        skinParts(scenePalettes(scene, clip, time));
+    if (!skinned) return reportDeviceError(skinned.error());
+    const std::string name = frameName(options.output, frame).value_or(options.output);
+    if (Result<void> written = writePly(name, assemble(scene, std::move(*skinned))); !written) {
+      return reportError(ExitStatus::stopped, written.error().message);
+    }
+    progress.step();
+  }
+  return ExitStatus::done;
+}
+
+ExitStatus skin(const SkinOptions& options) {
+  if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  const Result<Scene> scene = loadScene(options.model, options.strict);
+  if (!scene) return reportModelError(scene.error());
+  for (const std::string& warning : scene->warnings) reportWarning(warning);
+  for (const std::string& note : scene->notes) reportNote(note);
+  if (scene->parts.empty()) {
+    return reportError(ExitStatus::badInput,
+                       fmt::format("{} has no skinned mesh in its scene", options.model));
+  }
+  const Result<std::uint32_t> clip = chooseClip(scene->model, options.animation);
+  if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
+  const Method method = *methodFromName(options.method);
+
+  if (options.device == "cpu")
+    return writePoses(options, *scene, *clip, referenceSkinner(*scene, method));
+  samples::DeviceOptions deviceOptions;
+  deviceOptions.device = options.device;
+  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(deviceOptions);
+  if (!device) return reportDeviceError(device.error());
+  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
+  if (!context) return reportDeviceError(context.error());
+  return writePoses(options, *scene, *clip, deviceSkinner(*scene, method, **device, *context));
+}
+
+}  // namespace
+
+Run addSkin(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("skin", "Skin a model and write one pose, or many");
+  const auto options = std::make_shared<SkinOptions>();
+  command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "The file to write: .ply; with --frames, a name with %04d in it")
+      ->required();
+  command->add_option("--animation", options->animation,
+                      "A clip's number or name, or none for the rest pose [the first]");
+  command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");
+  command->add_option("--frames", options->frames, "Write this many poses, from --time on");
+  command->add_option("--fps", options->framesPerSecond, "Poses a second [30]");
+  command->add_option("--method", options->method, "linear or dual_quaternion [dual_quaternion]");
+  command->add_option("--device", options->device,
+                      "auto, cpu (the reference), a number of 'dermis devices', or part of a name");
+  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  return [options] { return skin(*options); };
+}
+
+}  // namespace dermis::cli

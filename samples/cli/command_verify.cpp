@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "commands.h"
+#include "progress.h"
+#include "verification_report.h"
+
+namespace dermis::cli {
+namespace {
+
+struct VerifyOptions {
+  std::vector<std::string> models;
+  std::string device = "auto";
+  std::string json;
+  std::string junit;
+  bool strict = false;
+};
+
+/// Fills `verification`; what it returns is a failure of the device.
+Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
+                         ModelVerification& verification) {
+  const std::vector<PoseToVerify> poses = posesToVerify(scene.model);
+  Progress progress(verification.model, poses.size());
+  for (const PoseToVerify& pose : poses) {
+    Result<std::vector<VerifiedCase>> cases = verifyPose(device, context, scene, pose);
+    if (!cases) return cases.error();
+    verification.cases.insert(verification.cases.end(), std::make_move_iterator(cases->begin()),
+                              std::make_move_iterator(cases->end()));
+    progress.step();
+  }
+  return {};
+}
+
+/// Why there is nothing to verify in a model, or empty.
+std::string nothingToVerify(const Scene& scene) {
+  for (const std::unique_ptr<ScenePart>& part : scene.parts) {
+    if (part->hasInfluences) return {};
+  }
+  return "it has no skinned mesh with joints and weights in its scene";
+}
+
+ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
+                        const std::vector<ModelVerification>& models) {
+  if (!options.json.empty()) {
+    if (Result<void> written = writeJsonReport(options.json, device, models); !written) {
+      return reportError(ExitStatus::stopped, written.error().message);
+    }
+  }
+  if (!options.junit.empty()) {
+    if (Result<void> written = writeJunitReport(options.junit, models); !written) {
+      return reportError(ExitStatus::stopped, written.error().message);
+    }
+  }
+  return ExitStatus::done;
+}
+
+ExitStatus verify(const VerifyOptions& options) {
+  if (options.device == "cpu") {
+    return reportError(ExitStatus::wrongUsage,
+                       "--device cpu is the reference itself, and would be compared with itself; "
+                       "name a Vulkan device");
+  }
+  samples::DeviceOptions deviceOptions;
+  deviceOptions.device = options.device;
+  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(deviceOptions);
+  if (!device) return reportDeviceError(device.error());
+  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
+  if (!context) return reportDeviceError(context.error());
+
+  ExitStatus status = ExitStatus::done;
+  std::vector<ModelVerification> models;
+  for (const std::string& model : options.models) {
+    models.push_back({model, {}, {}});
+    Result<Scene> scene = loadScene(model, options.strict);
+    if (!scene) models.back().error = scene.error().message;
+    if (scene) {
+      for (const std::string& warning : scene->warnings) reportWarning(warning);
+      if (const std::string nothing = nothingToVerify(*scene); !nothing.empty()) {
+        models.back().error = fmt::format("{}: {}", model, nothing);
+      }
+    }
+    if (!models.back().error.empty()) {
+      status = reportError(ExitStatus::badInput, models.back().error);
+      continue;
+    }
+    if (Result<void> verified = verifyModel(**device, *context, *scene, models.back()); !verified) {
+      return reportDeviceError(verified.error());
+    }
+    if (models.back().failures() != 0 && status == ExitStatus::done)
+      status = ExitStatus::verificationFailed;
+  }
+  fmt::print("device  {}\n", (*device)->info().name);
+  printReport(models);
+  if (const ExitStatus written = writeReports(options, (*device)->info().name, models);
+      written != ExitStatus::done) {
+    return written;
+  }
+  return status;
+}
+
+}  // namespace
+
+Run addVerify(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "verify", "Skin with every method and variant on the device, and compare with the reference");
+  const auto options = std::make_shared<VerifyOptions>();
+  command->add_option("MODEL", options->models, "A .gltf or .glb file, or several")->required();
+  command->add_option("--device", options->device,
+                      "auto, a number of 'dermis devices', or part of a name");
+  command->add_option("--json", options->json, "Write every case with its errors");
+  command->add_option("--junit", options->junit, "Write the same as JUnit XML, for CI");
+  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  return [options] { return verify(*options); };
+}
+
+}  // namespace dermis::cli

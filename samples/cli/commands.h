@@ -1,0 +1,20 @@
+// The subcommands. Each adds itself to the command line; what it returns is the exit status of the
+// program.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+
+#include "exit_status.h"
+
+namespace dermis::cli {
+
+using Run = std::function<ExitStatus()>;
+
+Run addDevices(CLI::App& app);
+Run addInfo(CLI::App& app);
+Run addSkin(CLI::App& app);
+Run addVerify(CLI::App& app);
+
+}  // namespace dermis::cli

@@ -1,0 +1,25 @@
+// How far long work has come, on a terminal and nowhere else.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace dermis::cli {
+
+class Progress {
+ public:
+  Progress(std::string what, std::size_t total);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void step();
+
+ private:
+  std::string what_;
+  std::size_t total_;
+  std::size_t done_ = 0;
+  bool visible_;
+};
+
+}  // namespace dermis::cli

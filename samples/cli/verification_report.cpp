@@ -1,0 +1,168 @@
+#include "verification_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace dermis::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Text as XML 1.0 takes it: markup escaped, control characters and what is not ASCII replaced,
+/// since names come from files.
+std::string xmlText(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c >= 0x20 && c < 0x7f ? c : '?';
+    }
+  }
+  return escaped;
+}
+
+Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (!file) return Error{ErrorCode::ioError, fmt::format("{} cannot be written", path.string())};
+  return {};
+}
+
+struct Summary {
+  std::set<std::string> poses, variants;
+  std::uint64_t vertices = 0, onlyFinite = 0;
+  double worstPosition = 0, worstNormal = 0;
+  std::size_t failures = 0;
+};
+
+Json describe(const VerifiedCase& verified) {
+  const Comparison& comparison = verified.comparison;
+  Json json;
+  json["mesh"] = verified.part;
+  json["method"] = verified.method;
+  json["pose"] = verified.pose;
+  json["variant"] = verified.variant;
+  json["passed"] = verified.passed();
+  if (!verified.passed()) json["failure"] = verified.failure();
+  json["vertices"] = comparison.compared;
+  json["onlyFinite"] = comparison.onlyFinite;
+  json["failures"] = comparison.failures;
+  json["worstPositionOfBound"] = comparison.worstPosition;
+  json["worstNormalOfBound"] = comparison.worstNormal;
+  json["largestPositionError"] = comparison.largestPositionError;
+  json["differingFloats"] = verified.differingFloats;
+  json["nonRigidJoints"] = verified.status.nonRigidJoints;
+  return json;
+}
+
+}  // namespace
+
+std::size_t ModelVerification::failures() const {
+  return static_cast<std::size_t>(std::count_if(
+      cases.begin(), cases.end(), [](const VerifiedCase& verified) { return !verified.passed(); }));
+}
+
+void printReport(const std::vector<ModelVerification>& models) {
+  for (const ModelVerification& model : models) {
+    if (!model.error.empty()) continue;  // said on standard error
+    std::map<std::string, Summary> byMethod;
+    for (const VerifiedCase& verified : model.cases) {
+      Summary& summary = byMethod[verified.method];
+      summary.poses.insert(verified.pose);
+      summary.variants.insert(verified.variant);
+      summary.vertices += verified.comparison.compared;
+      summary.onlyFinite += verified.comparison.onlyFinite;
+      summary.worstPosition = std::max(summary.worstPosition, verified.comparison.worstPosition);
+      summary.worstNormal = std::max(summary.worstNormal, verified.comparison.worstNormal);
+      if (!verified.passed()) ++summary.failures;
+    }
+    for (const auto& [method, summary] : byMethod) {
+      fmt::print(
+          "{}  {}  {}: {} poses, {} variants, {} vertices compared; worst position {:.2f} of its "
+          "bound, normal {:.2f}\n",
+          summary.failures == 0 ? "passed" : "FAILED", model.model, method, summary.poses.size(),
+          summary.variants.size(), summary.vertices, summary.worstPosition, summary.worstNormal);
+    }
+    for (const VerifiedCase& verified : model.cases) {
+      if (!verified.passed()) {
+        fmt::print("  {}, {}, {}, {}: {}\n", verified.part, verified.method, verified.pose,
+                   verified.variant, verified.failure());
+      }
+    }
+  }
+}
+
+Result<void> writeJsonReport(const std::filesystem::path& path, const std::string& device,
+                             const std::vector<ModelVerification>& models) {
+  Json json;
+  json["device"] = device;
+  json["passed"] = std::all_of(models.begin(), models.end(), [](const ModelVerification& model) {
+    return model.error.empty() && model.failures() == 0;
+  });
+  json["models"] = Json::array();
+  for (const ModelVerification& model : models) {
+    Json entry;
+    entry["model"] = model.model;
+    if (!model.error.empty()) entry["error"] = model.error;
+    entry["failures"] = model.failures();
+    entry["cases"] = Json::array();
+    for (const VerifiedCase& verified : model.cases) entry["cases"].push_back(describe(verified));
+    json["models"].push_back(std::move(entry));
+  }
+  return writeText(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Result<void> writeJunitReport(const std::filesystem::path& path,
+                              const std::vector<ModelVerification>& models) {
+  std::string suites;
+  std::size_t tests = 0, failures = 0, errors = 0;
+  for (const ModelVerification& model : models) {
+    const std::size_t modelErrors = model.error.empty() ? 0 : 1;
+    suites += fmt::format("  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\">\n",
+                          xmlText(model.model), model.cases.size() + modelErrors, model.failures(),
+                          modelErrors);
+    if (modelErrors != 0) {
+      suites += fmt::format(
+          "    <testcase classname=\"dermis.verify\" name=\"load\"><error "
+          "message=\"{}\"/></testcase>\n",
+          xmlText(model.error));
+    }
+    for (const VerifiedCase& verified : model.cases) {
+      suites += fmt::format("    <testcase classname=\"dermis.verify.{}\" name=\"{}, {}, {}\"",
+                            xmlText(verified.method), xmlText(verified.part),
+                            xmlText(verified.pose), xmlText(verified.variant));
+      suites += verified.passed() ? std::string("/>\n")
+                                  : fmt::format("><failure message=\"{}\"/></testcase>\n",
+                                                xmlText(verified.failure()));
+    }
+    suites += "  </testsuite>\n";
+    tests += model.cases.size() + modelErrors;
+    failures += model.failures();
+    errors += modelErrors;
+  }
+  return writeText(
+      path,
+      fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"dermis verify\" "
+                  "tests=\"{}\" failures=\"{}\" errors=\"{}\">\n{}</testsuites>\n",
+                  tests, failures, errors, suites));
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,98 @@
+// A Vulkan device without a window, for the samples and tests: what an engine brings along itself.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "dermis/result.h"
+#include "dermis/vulkan/context.h"
+#include "vulkan_functions.h"
+#include "vulkan_loader.h"
+
+namespace dermis::samples {
+
+struct DeviceInfo {
+  std::string name;
+  std::string type;  ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other"
+  std::uint32_t apiVersion = 0;
+  std::uint64_t maxStorageBufferRange = 0;
+  std::uint32_t maxWorkgroupCount = 0;
+  std::uint32_t storageBuffersPerStage = 0;
+  bool pushDescriptors = false;
+  std::string unusable;  ///< why Dermis cannot run on it; empty where it can
+};
+
+struct DeviceOptions {
+  /// "auto": the best that is usable, GPUs before CPUs; a number: that of `listDevices`; otherwise
+  /// a part of a name, whatever its case.
+  std::string device = "auto";
+  bool validation = false;      ///< with the Khronos layer, core and synchronisation checks; fails
+                                ///< where there is none
+  bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor where the device has it
+};
+
+/// Fails with `missingFeature` where there is no loader, or no instance can be made.
+Result<std::vector<DeviceInfo>> listDevices();
+
+class Device {
+ public:
+  /// Fails with `missingFeature`: no loader, no device of that name, no compute queue, no
+  /// validation layer.
+  static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  /// What Dermis is told about it; valid as long as this object lives.
+  vulkan::DeviceDescription description() const;
+
+  const DeviceInfo& info() const { return info_; }
+  const VulkanFunctions& functions() const { return functions_; }
+  VkDevice handle() const { return device_; }
+  VkQueue queue() const { return queue_; }
+  std::uint32_t queueFamily() const { return queueFamily_; }
+
+  /// The memory type that has all of `required` and, if there is one, all of `preferred` too.
+  Result<std::uint32_t> memoryType(std::uint32_t allowedTypes, VkMemoryPropertyFlags required,
+                                   VkMemoryPropertyFlags preferred) const;
+
+  VkCommandBuffer allocateCommandBuffer();
+  void freeCommandBuffer(VkCommandBuffer commandBuffer);
+
+  /// Submits and waits. Fails with `vulkanError`.
+  Result<void> submitAndWait(VkCommandBuffer commandBuffer);
+
+  /// What the validation layer said so far, and forgets it.
+  std::vector<std::string> takeValidationMessages();
+
+ private:
+  Device() = default;
+  Result<void> createInstance(bool validation);
+  Result<void> choose(const std::string& wanted);
+  Result<void> createDevice(bool pushDescriptors);
+
+  static VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
+                                                  VkDebugUtilsMessageTypeFlagsEXT types,
+                                                  const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                                  void* user);
+  friend Result<std::vector<DeviceInfo>> listDevices();
+
+  std::shared_ptr<VulkanLoader> loader_;
+  VulkanFunctions functions_;
+  DeviceInfo info_;
+  VkInstance instance_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkPhysicalDevice physicalDevice_ = VK_NULL_HANDLE;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  std::uint32_t queueFamily_ = 0;
+  VkCommandPool commandPool_ = VK_NULL_HANDLE;
+  std::vector<const char*> enabledExtensions_;
+  std::mutex messagesMutex_;
+  std::vector<std::string> messages_;
+};
+
+}  // namespace dermis::samples

@@ -1,0 +1,50 @@
+// The Vulkan functions that the samples and tests call, loaded at run time so that a program starts
+// on a machine without a Vulkan loader. An engine has its own; dermis::vulkan does not use this.
+#pragma once
+
+#include <vulkan/vulkan_core.h>
+
+#define DERMIS_SAMPLE_INSTANCE_FUNCTIONS(X) \
+  X(DestroyInstance)                        \
+  X(EnumeratePhysicalDevices)               \
+  X(GetPhysicalDeviceProperties)            \
+  X(GetPhysicalDeviceMemoryProperties)      \
+  X(GetPhysicalDeviceQueueFamilyProperties) \
+  X(EnumerateDeviceExtensionProperties)     \
+  X(CreateDevice)                           \
+  X(GetDeviceProcAddr)
+
+#define DERMIS_SAMPLE_DEVICE_FUNCTIONS(X) \
+  X(DestroyDevice)                        \
+  X(GetDeviceQueue)                       \
+  X(CreateBuffer)                         \
+  X(DestroyBuffer)                        \
+  X(GetBufferMemoryRequirements)          \
+  X(AllocateMemory)                       \
+  X(FreeMemory)                           \
+  X(BindBufferMemory)                     \
+  X(MapMemory)                            \
+  X(CreateCommandPool)                    \
+  X(DestroyCommandPool)                   \
+  X(AllocateCommandBuffers)               \
+  X(FreeCommandBuffers)                   \
+  X(BeginCommandBuffer)                   \
+  X(EndCommandBuffer)                     \
+  X(CmdPipelineBarrier)                   \
+  X(CmdFillBuffer)                        \
+  X(QueueSubmit)                          \
+  X(CreateFence)                          \
+  X(DestroyFence)                         \
+  X(WaitForFences)                        \
+  X(DeviceWaitIdle)
+
+namespace dermis::samples {
+
+struct VulkanFunctions {
+#define DERMIS_DECLARE(name) PFN_vk##name name = nullptr;
+  DERMIS_SAMPLE_INSTANCE_FUNCTIONS(DERMIS_DECLARE)
+  DERMIS_SAMPLE_DEVICE_FUNCTIONS(DERMIS_DECLARE)
+#undef DERMIS_DECLARE
+};
+
+}  // namespace dermis::samples

@@ -1,0 +1,41 @@
+#include "mesh.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+namespace dermis::models {
+
+std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,
+                                                     const std::vector<std::uint32_t>& indices) {
+  std::vector<std::vector<std::uint32_t>> neighbours(vertexCount);
+  for (std::size_t corner = 0; corner < indices.size(); corner += 3) {
+    for (std::size_t side = 0; side < 3; ++side) {
+      const std::uint32_t from = indices[corner + side];
+      const std::uint32_t to = indices[corner + (side + 1) % 3];
+      neighbours[from].push_back(to);
+      neighbours[to].push_back(from);
+    }
+  }
+  for (auto& list : neighbours) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  return neighbours;
+}
+
+std::vector<Vec3> smoothNormals(const std::vector<Vec3>& positions,
+                                const std::vector<std::uint32_t>& indices) {
+  std::vector<Vec3> normals(positions.size(), Vec3(0.0));
+  for (std::size_t first = 0; first < indices.size(); first += 3) {
+    const Vec3& a = positions[indices[first]];
+    // Its length is twice the area.
+    const Vec3 across =
+        glm::cross(positions[indices[first + 1]] - a, positions[indices[first + 2]] - a);
+    for (std::size_t corner = first; corner < first + 3; ++corner)
+      normals[indices[corner]] += across;
+  }
+  for (Vec3& normal : normals) normal = unit(normal);
+  return normals;
+}
+
+}  // namespace dermis::models

@@ -1,0 +1,36 @@
+// The geometry of a sample model, and what tests ask of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "maths.h"
+
+namespace dermis::models {
+
+// Up to four influences; unused ones are joint 0 with weight 0. The weights are multiples of
+// 1/65536 and sum to exactly 1, also as floats.
+struct Influences {
+  std::array<std::uint16_t, 4> joints{};
+  std::array<float, 4> weights{};
+};
+
+struct Mesh {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;
+  std::vector<Vec3> colours;  // linear red, green, blue, 0 to 1
+  std::vector<Influences> influences;
+  std::vector<std::uint32_t> indices;  // triangles, counter-clockwise seen from outside
+};
+
+// For each vertex, its neighbours along triangle edges, in ascending order.
+std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,
+                                                     const std::vector<std::uint32_t>& indices);
+
+// Unit normals of the vertices: the mean of the triangles about each, weighted by area.
+std::vector<Vec3> smoothNormals(const std::vector<Vec3>& positions,
+                                const std::vector<std::uint32_t>& indices);
+
+}  // namespace dermis::models

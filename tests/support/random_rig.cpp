@@ -1,0 +1,86 @@
+#include "random_rig.h"
+
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+
+namespace dermis::test {
+namespace {
+
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+  double between(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(engine_);
+  }
+  std::uint32_t below(std::uint32_t count) {
+    return std::uniform_int_distribution<std::uint32_t>(0, count - 1)(engine_);
+  }
+  glm::dvec3 direction() {
+    std::normal_distribution<double> normal;
+    return glm::normalize(glm::dvec3(normal(engine_), normal(engine_), normal(engine_)));
+  }
+  glm::dquat rotation() {
+    std::normal_distribution<double> normal;
+    return glm::normalize(
+        glm::dquat(normal(engine_), normal(engine_), normal(engine_), normal(engine_)));
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+glm::dmat3 diagonal(double x, double y, double z) {
+  return glm::dmat3(glm::dvec3(x, 0, 0), glm::dvec3(0, y, 0), glm::dvec3(0, 0, z));
+}
+
+glm::dmat3 scaleShear(Random& random, Rigidity rigidity) {
+  if (rigidity == Rigidity::rigid) return glm::dmat3(1.0);
+  if (rigidity == Rigidity::uniformScale) return glm::dmat3(random.between(0.5, 100));
+  const glm::dmat3 frame = glm::mat3_cast(random.rotation());
+  const glm::dmat3 stretch =
+      diagonal(random.between(0.5, 2), random.between(0.5, 2), random.between(0.5, 2));
+  const glm::dmat3 symmetric = frame * stretch * glm::transpose(frame);
+  return rigidity == Rigidity::mirrored ? symmetric * -1.0 : symmetric;
+}
+
+}  // namespace
+
+OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
+                     std::uint32_t influences, bool normals) {
+  Random random(seed);
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = influences;
+  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+    const glm::dvec3 normal = random.direction();
+    for (int i = 0; i < 3; ++i) mesh.positions.push_back(static_cast<float>(random.between(-1, 1)));
+    if (normals) {
+      for (int i = 0; i < 3; ++i) mesh.normals.push_back(static_cast<float>(normal[i]));
+    }
+    const std::uint32_t used = random.below(50) == 0 ? 0 : 1 + random.below(influences);
+    for (std::uint32_t slot = 0; slot < influences; ++slot) {
+      mesh.joints.push_back(random.below(jointCount));
+      mesh.weights.push_back(slot < used ? static_cast<float>(random.between(0.01, 1)) : 0.0f);
+    }
+  }
+  return mesh;
+}
+
+std::vector<JointMatrix> randomPose(std::uint32_t seed, std::uint32_t jointCount, Rigidity rigidity,
+                                    double reach) {
+  Random random(seed);
+  std::vector<JointMatrix> pose(jointCount);
+  for (JointMatrix& matrix : pose) {
+    const glm::dmat3 linear = glm::mat3_cast(random.rotation()) * scaleShear(random, rigidity);
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column)
+        matrix.m[row][column] = static_cast<float>(linear[column][row]);
+      matrix.m[row][3] = static_cast<float>(random.between(-reach, reach));
+    }
+  }
+  return pose;
+}
+
+}  // namespace dermis::test

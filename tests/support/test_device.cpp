@@ -1,0 +1,66 @@
+#include "test_device.h"
+
+#include <array>
+#include <cstdlib>
+
+namespace dermis::test {
+namespace {
+
+struct Attempt {
+  bool tried = false;
+  std::string reason;
+  TestDevice device;
+};
+
+void tryToCreate(bool pushDescriptors, Attempt& attempt) {
+  samples::DeviceOptions options;
+  options.validation = true;
+  options.pushDescriptors = pushDescriptors;
+  const char* wanted = std::getenv("DERMIS_TEST_DEVICE");
+  if (wanted != nullptr) options.device = wanted;
+  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(options);
+  if (!device) {
+    attempt.reason = device.error().message;
+    return;
+  }
+  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
+  if (!context) {
+    attempt.reason = context.error().message;
+    return;
+  }
+  attempt.device.context.emplace(std::move(*context));
+  attempt.device.device = std::move(*device);
+}
+
+}  // namespace
+
+TestDevice* testDevice(bool pushDescriptors, std::string& reason) {
+  static std::array<Attempt, 2> attempts;
+  Attempt& attempt = attempts[pushDescriptors ? 1 : 0];
+  if (!attempt.tried) {
+    attempt.tried = true;
+    tryToCreate(pushDescriptors, attempt);
+  }
+  reason = attempt.reason;
+  return attempt.device.device ? &attempt.device : nullptr;
+}
+
+bool isContinuousIntegration() {
+  return std::getenv("CI") != nullptr;
+}
+
+void DeviceTest::useDevice(bool pushDescriptors) {
+  std::string reason;
+  device_ = testDevice(pushDescriptors, reason);
+  if (device_ != nullptr) return;
+  if (isContinuousIntegration())
+    FAIL() << "CI needs a Vulkan device and the validation layer: " << reason;
+  GTEST_SKIP() << reason;
+}
+
+void DeviceTest::TearDown() {
+  if (device_ == nullptr) return;
+  for (const std::string& message : device().takeValidationMessages()) ADD_FAILURE() << message;
+}
+
+}  // namespace dermis::test

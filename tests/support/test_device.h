@@ -1,0 +1,42 @@
+// The Vulkan device of the GPU tests, with the validation layer on. Without a device or the layer a
+// test skips and says why; where the environment variable CI is set it fails instead, so that no
+// missing package looks green.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dermis/vulkan/context.h"
+#include "device.h"
+
+namespace dermis::test {
+
+struct TestDevice {
+  std::unique_ptr<samples::Device> device;
+  std::optional<vulkan::Context> context;
+};
+
+/// The device of this process, made once for each choice; null where there is none, and then
+/// `reason` says why.
+TestDevice* testDevice(bool pushDescriptors, std::string& reason);
+
+/// Whether a missing device must fail.
+bool isContinuousIntegration();
+
+/// A test on the device. After each test the validation layer must have been silent.
+class DeviceTest : public ::testing::Test {
+ protected:
+  void SetUp() override { useDevice(true); }
+  void TearDown() override;
+  void useDevice(bool pushDescriptors);
+
+  samples::Device& device() { return *device_->device; }
+  vulkan::Context& context() { return *device_->context; }
+
+  TestDevice* device_ = nullptr;
+};
+
+}  // namespace dermis::test
