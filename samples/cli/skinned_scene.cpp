@@ -11,9 +11,10 @@ std::string quoted(const std::string& name) {
 
 /// What `validate` puts behind "mesh": the mesh's name, and which of its primitives it is where
 /// there are several.
-std::string meshName(const gltf::Mesh& mesh, std::uint32_t primitive) {
-  return mesh.primitives.size() == 1 ? mesh.name
-                                     : fmt::format("{}' primitive '{}", mesh.name, primitive);
+std::string meshName(const gltf::Model& model, const gltf::SkinnedPrimitive& source) {
+  const gltf::Mesh& mesh = model.meshes[source.mesh];
+  const std::string name = mesh.name.empty() ? fmt::format("number {}", source.mesh) : mesh.name;
+  return mesh.primitives.size() == 1 ? name : fmt::format("{}' primitive '{}", name, source.primitive);
 }
 
 std::string counted(const Finding& finding) {
@@ -26,8 +27,7 @@ std::string counted(const Finding& finding) {
 
 Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
   Result<gltf::Model> loaded = gltf::load(path);
-  if (!loaded)
-    return Error{loaded.error().code, fmt::format("{}: {}", path.string(), loaded.error().message)};
+  if (!loaded) return loaded.error();
 
   Scene scene;
   scene.model = std::move(*loaded);
@@ -50,7 +50,7 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
     }
 
     part.original_ = part.primitive->view(part.set_);
-    part.meshName_ = meshName(model.meshes[source.mesh], source.primitive);
+    part.meshName_ = meshName(model, source);
     part.original_.name = part.meshName_;
     const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
     part.report = validate(part.original_, jointCount);

@@ -218,9 +218,10 @@ Result<void> Device::choose(const std::string& wanted) {
   std::size_t best = infos.size();
   for (std::size_t index = 0; index < infos.size(); ++index) {
     const bool matches =
-        wanted == "auto" ||
-        (isNumber ? index == number
-                  : lowerCase(infos[index].name).find(lowerCase(wanted)) != std::string::npos);
+        !wanted.empty() &&
+        (wanted == "auto" ||
+         (isNumber ? index == number
+                   : lowerCase(infos[index].name).find(lowerCase(wanted)) != std::string::npos));
     if (!matches) continue;
     const bool better = best == infos.size() ||
                         (infos[index].unusable.empty() && !infos[best].unusable.empty()) ||

@@ -82,7 +82,7 @@ struct Primitive {
   std::vector<float> positions;               ///< 3 a vertex
   std::vector<float> normals;                 ///< 3 a vertex, or empty
   std::vector<float> tangents;                ///< 4 a vertex, or empty
-  std::vector<std::vector<float>> texcoords;  ///< For each TEXCOORD_n: 2 a vertex
+  std::vector<std::vector<float>> texcoords;  ///< TEXCOORD_0, 1, …: 2 a vertex
   std::vector<float> colors;  ///< 4 a vertex (COLOR_0; alpha 1 where the file has none), or empty
   std::vector<std::uint32_t> joints;  ///< `influencesPerVertex` a vertex: all JOINTS_n side by side
   std::vector<float> weights;         ///< likewise, from WEIGHTS_n

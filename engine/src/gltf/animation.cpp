@@ -58,20 +58,24 @@ std::uint32_t componentsOf(const Source& source, const Channel& channel, const s
   return static_cast<std::uint32_t>(primitives[0].targets.size());
 }
 
+void checkTimes(const std::vector<float>& times, int accessor, const std::string& where) {
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const float before = i > 0 ? times[i - 1] : -1;
+    if (std::isfinite(times[i]) && times[i] >= 0 && times[i] > before) continue;
+    const std::string key =
+        join(where, ": key ", i, " of accessor ", accessor, " is at ", times[i]);
+    if (!std::isfinite(times[i])) failInvalid(key, ", which is not finite");
+    if (times[i] < 0) failInvalid(key, " seconds, which is negative");
+    failInvalid(key, " seconds after ", before, ": times must rise");
+  }
+}
+
 std::vector<float> readTimes(Source& source, int accessor, const std::string& where) {
   const std::string place = where + " input";
   source.require(accessor, TINYGLTF_TYPE_SCALAR, timeFormats, place);
   source.requireNoStride(accessor, place);
   std::vector<float> times = source.floats(accessor);
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    const std::string key =
-        join(place, ": key ", i, " of accessor ", accessor, " is at ", times[i]);
-    if (!std::isfinite(times[i])) failInvalid(key, ", which is not finite");
-    if (times[i] < 0) failInvalid(key, " seconds, which is negative");
-    if (i > 0 && times[i] <= times[i - 1]) {
-      failInvalid(key, " seconds after ", times[i - 1], ": times must rise");
-    }
-  }
+  checkTimes(times, accessor, place);
   return times;
 }
 

@@ -92,8 +92,6 @@ class PrimitiveCheck {
     const std::uint32_t weights = countSets(primitive_.attributes, "WEIGHTS_", where_);
     if (joints > weights) failInvalid(where_, ": JOINTS_", weights, " has no WEIGHTS_", weights);
     if (weights > joints) failInvalid(where_, ": WEIGHTS_", joints, " has no JOINTS_", joints);
-    countSets(primitive_.attributes, "TEXCOORD_", where_);
-    countSets(primitive_.attributes, "COLOR_", where_);
   }
 
   void checkAttribute(const std::string& name, int accessor) const {
@@ -193,6 +191,17 @@ std::vector<float> readColors(Source& source, int accessor, const std::string& w
 
 std::vector<float> readOptional(Source& source, int accessor) {
   return accessor < 0 ? std::vector<float>() : source.floats(accessor);
+}
+
+// Sets from 0 up to the first that is missing.
+std::vector<std::vector<float>> readTexcoords(Source& source,
+                                              const std::map<std::string, int>& attributes) {
+  std::vector<std::vector<float>> sets;
+  for (;;) {
+    const int accessor = findAttribute(attributes, join("TEXCOORD_", sets.size()));
+    if (accessor < 0) return sets;
+    sets.push_back(source.floats(accessor));
+  }
 }
 
 MorphTarget readTarget(Source& source, const std::map<std::string, int>& attributes) {
@@ -298,10 +307,7 @@ Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t p
   primitive.positions = source.floats(positions);
   primitive.normals = readOptional(source, findAttribute(from.attributes, "NORMAL"));
   primitive.tangents = readOptional(source, findAttribute(from.attributes, "TANGENT"));
-  const std::uint32_t texcoordSets = countSets(from.attributes, "TEXCOORD_", where);
-  for (std::uint32_t i = 0; i < texcoordSets; ++i) {
-    primitive.texcoords.push_back(source.floats(from.attributes.at(join("TEXCOORD_", i))));
-  }
+  primitive.texcoords = readTexcoords(source, from.attributes);
   primitive.colors = readColors(source, findAttribute(from.attributes, "COLOR_0"), where);
   readInfluences(source, from.attributes, where, primitive);
   primitive.triangles = readTriangles(source, from, primitive.vertexCount, where, notes);

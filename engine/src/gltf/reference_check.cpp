@@ -22,6 +22,11 @@ using nlohmann::json;
 // Beyond this a JSON number need not be the integer that was written.
 constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
 
+// "{}," is three bytes in a file, and hundreds in the structs that are made of it: so the number of
+// things has a limit, far beyond real files. tinygltf's materials are the largest.
+constexpr std::size_t mostOfAKind = 262'144;
+constexpr std::size_t mostMaterials = 16'384;
+
 class ReferenceCheck {
  public:
   explicit ReferenceCheck(json& root) : root_(root) {}
@@ -57,6 +62,11 @@ class ReferenceCheck {
       const auto section = root_.find(name);
       if (section == root_.end()) continue;
       if (!section->is_array()) failInvalid(inQuotes(name), " is not an array");
+      const std::size_t most = std::string_view(name) == "materials" ? mostMaterials : mostOfAKind;
+      if (section->size() > most) {
+        fail(ErrorCode::limitExceeded, join("the file has ", section->size(), " ", name,
+                                            ", and at most ", most, " are read"));
+      }
       for (std::size_t i = 0; i < section->size(); ++i) {
         if (!(*section)[i].is_object()) failInvalid(kindOf(name), " ", i, " is not an object");
       }

@@ -1,0 +1,120 @@
+#include "skinned_crowd.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+using namespace dermis;
+
+namespace embed {
+namespace {
+
+/// Says who is skinned by which pose, and to where: as often as that changes.
+Result<void> planCrowd(Crowd& crowd) {
+  const std::uint64_t poseSize = crowd.jointCount * sizeof(JointMatrix);
+  const std::uint64_t instanceSize = crowd.mesh.vertexCount() * sizeof(SkinnedVertex);
+  crowd.palettes.resize(instanceCount);
+  crowd.jobs.resize(instanceCount);
+  for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
+    Palette& palette = crowd.palettes[instance];
+    palette.jointCount = crowd.jointCount;
+    palette.matrixOffset = instance * poseSize;
+
+    const std::uint64_t firstVertex = instance * instanceSize;
+    Job& job = crowd.jobs[instance];
+    job.mesh = &crowd.mesh;
+    job.palette = instance;
+    job.method = Method::dualQuaternion;
+    job.positions = {firstVertex + offsetof(SkinnedVertex, position), sizeof(SkinnedVertex)};
+    job.normals = {firstVertex + offsetof(SkinnedVertex, normal), sizeof(SkinnedVertex)};
+  }
+  Batch batch;
+  batch.palettes = crowd.palettes;
+  batch.jobs = crowd.jobs;
+  batch.meshesSize = crowd.mesh.bytes().size();
+  batch.matricesSize = instanceCount * poseSize;
+  batch.outputSize = instanceCount * instanceSize;
+  return plan(batch, crowd.context.limits(), crowd.context.tuning(), crowd.plan);
+}
+
+/// The engine makes its buffers as large, and for what use, as the plan says.
+Result<void> makeBuffer(samples::Device& engine, const Plan& plan, BufferRole role,
+                        samples::MappedBuffer& buffer) {
+  const BufferRequirement needs = plan.buffer(role);
+  const VkBufferUsageFlags ownUsage =
+      role == BufferRole::output ? VK_BUFFER_USAGE_VERTEX_BUFFER_BIT : 0;
+  Result<samples::MappedBuffer> made =
+      samples::MappedBuffer::create(engine, needs.size, needs.usage | ownUsage);
+  if (!made) return made.error();
+  buffer = std::move(*made);
+  return {};
+}
+
+void recordBarrier(const samples::Device& engine, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency) {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  engine.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
+                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
+                                        0, nullptr);
+}
+
+}  // namespace
+
+// [set-up]
+Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t jointCount) {
+  // Lends Dermis a VkDevice and says what is enabled on it. Nothing else is made or used.
+  Result<vulkan::Context> context = vulkan::Context::create(engine.description());
+  if (!context) return context.error();
+  Result<PackedMesh> packed = pack(mesh, jointCount);
+  if (!packed) return packed.error();
+  Crowd crowd{std::move(*context), std::move(*packed), jointCount, {}, {}, {}, {}, {}, {}};
+
+  // The plan of the largest batch there will be: which pipelines to build, what buffers to make.
+  if (Result<void> done = planCrowd(crowd); !done) return done.error();
+  if (Result<void> done = crowd.context.prepare(crowd.plan.variants()); !done) return done.error();
+
+  for (const auto& [role, buffer] :
+       {std::pair{BufferRole::meshes, &crowd.meshes}, {BufferRole::output, &crowd.output}}) {
+    if (Result<void> done = makeBuffer(engine, crowd.plan, role, *buffer); !done)
+      return done.error();
+  }
+  std::ranges::copy(crowd.mesh.bytes(), crowd.meshes.bytes().begin());
+
+  for (Frame& frame : crowd.frames) {
+    for (const auto& [role, buffer] : {std::pair{BufferRole::matrices, &frame.matrices},
+                                       {BufferRole::tables, &frame.tables},
+                                       {BufferRole::palettes, &frame.palettes}}) {
+      if (Result<void> done = makeBuffer(engine, crowd.plan, role, *buffer); !done)
+        return done.error();
+    }
+    Result<vulkan::Bindings> bindings = crowd.context.createBindings(
+        {crowd.meshes.range(), frame.matrices.range(), frame.tables.range(), frame.palettes.range(),
+         crowd.output.range()});
+    if (!bindings) return bindings.error();
+    frame.bindings = std::move(*bindings);
+  }
+  return crowd;
+}
+// [/set-up]
+
+// [frame]
+Result<void> skinFrame(const samples::Device& engine, Crowd& crowd, Frame& frame,
+                       std::span<const JointMatrix> matrices, VkCommandBuffer commandBuffer) {
+  std::ranges::copy(std::as_bytes(matrices), frame.matrices.bytes().begin());
+  if (Result<void> done = planCrowd(crowd); !done) return done;
+  if (Result<void> done = writeTables(crowd.plan, frame.tables.bytes()); !done) return done;
+
+  // The barriers at the edges are the engine's: only it knows what stands before and after.
+  recordBarrier(engine, commandBuffer, vulkan::inputScope(vulkan::Producer::previousRecord));
+  if (Result<void> done = crowd.context.record(commandBuffer, crowd.plan, frame.bindings); !done)
+    return done;
+  // This program reads the vertices back; one that draws them says Consumer::vertexInput.
+  recordBarrier(engine, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+  return {};
+}
+// [/frame]
+
+}  // namespace embed

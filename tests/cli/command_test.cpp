@@ -1,0 +1,293 @@
+// The command line's contract: exit statuses, one line an error, what is written.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "ply.h"
+#include "run_command.h"
+#include "test_data.h"
+#include "test_device.h"
+
+namespace dermis::test {
+namespace {
+
+const std::string figure = std::string(DERMIS_SAMPLE_MODELS) + "/figure.glb";
+const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+
+CommandResult dermis(std::vector<std::string> arguments,
+                     const std::vector<std::string>& environment = {}) {
+  arguments.insert(arguments.begin(), DERMIS_COMMAND);
+  return runCommand(arguments, environment);
+}
+
+std::string outFile(const std::string& name) {
+  return ::testing::TempDir() + "command_" + name;
+}
+
+void expectOneErrorLine(const CommandResult& result) {
+  std::size_t errors = 0;
+  std::istringstream lines(result.errors);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("dermis: error: ")) {
+      ++errors;
+    } else {
+      EXPECT_TRUE(line.starts_with("dermis: warning: ") || line.starts_with("dermis: note: "))
+          << line;
+    }
+  }
+  EXPECT_EQ(errors, 1u) << result.errors;
+}
+
+/// Skips, or fails in CI, without a device.
+#define REQUIRE_DEVICE()                                 \
+  do {                                                   \
+    std::string reason;                                  \
+    if (testDevice(true, reason) == nullptr) {           \
+      ASSERT_FALSE(isContinuousIntegration()) << reason; \
+      GTEST_SKIP() << reason;                            \
+    }                                                    \
+  } while (false)
+
+TEST(CommandTest, WrongUsageEndsWithTwo) {
+  const std::string out = outFile("usage.ply");
+  const std::vector<std::vector<std::string>> wrong{
+      {},
+      {"fly"},
+      {"skin", bar},
+      {"skin", bar, "-o", outFile("usage.stl")},
+      {"skin", bar, "-o", out, "--method", "cubic", "--device", "cpu"},
+      {"skin", bar, "-o", out, "--time", "nan", "--device", "cpu"},
+      {"skin", bar, "-o", out, "--time", "soon", "--device", "cpu"},
+      {"skin", bar, "-o", out, "--animation", "no such clip", "--device", "cpu"},
+      {"skin", bar, "-o", out, "--animation", "7", "--device", "cpu"},
+      {"skin", bar, "-o", out, "--frames", "2", "--device", "cpu"},
+      {"skin", bar, "-o", outFile("usage%04d.ply"), "--device", "cpu"},
+      {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "0", "--device", "cpu"},
+      {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "2", "--fps", "0", "--device",
+       "cpu"},
+      {"verify"},
+      {"verify", bar, "--device", "cpu"},
+      {"info", bar, "--yaml"},
+  };
+  for (const std::vector<std::string>& arguments : wrong) {
+    const CommandResult result = dermis(arguments);
+    SCOPED_TRACE(::testing::PrintToString(arguments));
+    EXPECT_EQ(result.status, 2);
+    expectOneErrorLine(result);
+    EXPECT_TRUE(result.output.empty());
+  }
+}
+
+TEST(CommandTest, BadInputEndsWithThree) {
+  const std::string broken = outFile("broken.glb");
+  std::ofstream(broken, std::ios::binary) << "glTF is not what this is";
+  const std::string noSkin = outFile("noskin.gltf");
+  std::ofstream(noSkin) << R"({"asset": {"version": "2.0"}})";
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"info", outFile("does not exist.glb")},
+           {"info", broken},
+           {"skin", broken, "-o", outFile("bad.ply"), "--device", "cpu"},
+           {"skin", noSkin, "-o", outFile("bad.ply"), "--device", "cpu"}}) {
+    const CommandResult result = dermis(arguments);
+    SCOPED_TRACE(::testing::PrintToString(arguments));
+    EXPECT_EQ(result.status, 3);
+    expectOneErrorLine(result);
+  }
+  EXPECT_EQ(dermis({"info", noSkin}).status, 0);
+}
+
+TEST(CommandTest, WithoutAVulkanDriverOnlyTheReferenceWorks) {
+  const std::vector<std::string> noDriver{"VK_DRIVER_FILES=/nonexistent.json",
+                                          "VK_ICD_FILENAMES=/nonexistent.json"};
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"devices"}, {"verify", bar}, {"skin", bar, "-o", outFile("none.ply")}}) {
+    const CommandResult result = dermis(arguments, noDriver);
+    SCOPED_TRACE(::testing::PrintToString(arguments));
+    EXPECT_EQ(result.status, 4);
+    expectOneErrorLine(result);
+  }
+  EXPECT_EQ(dermis({"skin", bar, "-o", outFile("none.ply"), "--device", "cpu"}, noDriver).status,
+            0);
+  EXPECT_EQ(dermis({"info", bar}, noDriver).status, 0);
+}
+
+TEST(CommandTest, AnUnknownDeviceEndsWithFour) {
+  REQUIRE_DEVICE();
+  for (const char* device : {"no such device", "99", ""}) {
+    const CommandResult result =
+        dermis({"skin", bar, "-o", outFile("device.ply"), "--device", device});
+    EXPECT_EQ(result.status, 4) << device;
+    expectOneErrorLine(result);
+  }
+}
+
+TEST(CommandTest, AnOutputThatCannotBeWrittenEndsWithFive) {
+  const CommandResult result =
+      dermis({"skin", bar, "-o", "/nonexistent/folder/out.ply", "--device", "cpu"});
+  EXPECT_EQ(result.status, 5);
+  expectOneErrorLine(result);
+  REQUIRE_DEVICE();
+  EXPECT_EQ(dermis({"verify", bar, "--json", "/nonexistent/folder/out.json"}).status, 5);
+  EXPECT_EQ(dermis({"verify", bar, "--junit", "/nonexistent/folder/out.xml"}).status, 5);
+}
+
+TEST(CommandTest, SkinWritesOnePose) {
+  const std::string out = outFile("pose.ply");
+  const CommandResult result = dermis(
+      {"skin", figure, "-o", out, "--animation", "walk", "--time", "0.25", "--device", "cpu"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(result.output.empty()) << result.output;
+  const std::optional<Ply> ply = readPly(out);
+  ASSERT_TRUE(ply.has_value());
+  EXPECT_GE(ply->positions.size(), 5000u);
+  EXPECT_GE(ply->faces.size(), 5000u);
+  for (const std::array<std::int32_t, 3>& face : ply->faces) {
+    for (const std::int32_t index : face)
+      ASSERT_TRUE(index >= 0 && index < static_cast<int>(ply->positions.size()));
+  }
+  for (const std::array<float, 3>& normal : ply->normals) {
+    ASSERT_NEAR(std::hypot(normal[0], normal[1], normal[2]), 1.0f, 1e-5f);
+  }
+}
+
+TEST(CommandTest, AnAnimationsNumberGoesBeforeItsName) {
+  const std::string byNumber = outFile("number.ply"), byName = outFile("name.ply"),
+                    rest = outFile("rest.ply");
+  EXPECT_EQ(dermis({"skin", figure, "-o", byNumber, "--time", "0.2", "--animation", "0", "--device",
+                    "cpu"})
+                .status,
+            0);
+  EXPECT_EQ(dermis({"skin", figure, "-o", byName, "--time", "0.2", "--device", "cpu"}).status, 0);
+  EXPECT_EQ(dermis({"skin", figure, "-o", rest, "--time", "0.2", "--animation", "none", "--device",
+                    "cpu"})
+                .status,
+            0);
+  EXPECT_EQ(readPly(byNumber)->positions, readPly(byName)->positions)
+      << "animation 0 is the default";
+  EXPECT_NE(readPly(byNumber)->positions, readPly(rest)->positions);
+}
+
+TEST(CommandTest, FramesAreNumberedPosesFromTimeOn) {
+  const std::string pattern = outFile("frame_%03d.ply");
+  EXPECT_EQ(dermis({"skin", bar, "-o", pattern, "--frames", "3", "--fps", "4", "--time", "0.25",
+                    "--device", "cpu"})
+                .status,
+            0);
+  const std::string single = outFile("single.ply");
+  EXPECT_EQ(dermis({"skin", bar, "-o", single, "--time", "0.75", "--device", "cpu"}).status, 0);
+  ASSERT_TRUE(readPly(outFile("frame_000.ply")) && readPly(outFile("frame_002.ply")));
+  EXPECT_EQ(readPly(outFile("frame_002.ply"))->positions, readPly(single)->positions);
+  EXPECT_FALSE(std::filesystem::exists(outFile("frame_003.ply")));
+}
+
+TEST(CommandTest, StrictRefusesWhatIsRepairedOtherwise) {
+  const std::optional<std::filesystem::path> data = testDataFolder();
+  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  const std::string wasp = (*data / "models/QuaterniusWasp/Wasp.glb").string();
+  const CommandResult lenient =
+      dermis({"skin", wasp, "-o", outFile("wasp.ply"), "--device", "cpu"});
+  EXPECT_EQ(lenient.status, 0);
+  EXPECT_NE(lenient.errors.find("dermis: warning: mesh 'Wasp"), std::string::npos)
+      << lenient.errors;
+  const CommandResult strict =
+      dermis({"skin", wasp, "-o", outFile("wasp.ply"), "--device", "cpu", "--strict"});
+  EXPECT_EQ(strict.status, 3);
+  expectOneErrorLine(strict);
+}
+
+TEST(CommandTest, InfoListsMeshesAndClips) {
+  const CommandResult text = dermis({"info", figure});
+  EXPECT_EQ(text.status, 0);
+  EXPECT_NE(text.output.find("'walk'"), std::string::npos) << text.output;
+  const CommandResult json = dermis({"info", figure, "--json"});
+  EXPECT_EQ(json.status, 0);
+  const nlohmann::json parsed = nlohmann::json::parse(json.output);
+  EXPECT_GE(parsed["meshes"][0]["vertices"].get<int>(), 5000);
+  EXPECT_GE(parsed["skins"][0]["joints"].get<int>(), 20);
+}
+
+TEST(CommandTest, DevicesListsTheDevice) {
+  REQUIRE_DEVICE();
+  const CommandResult result = dermis({"devices"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_TRUE(result.output.starts_with("0  ")) << result.output;
+}
+
+TEST(CommandTest, VerifyReportsEveryCase) {
+  REQUIRE_DEVICE();
+  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
+  const CommandResult result = dermis({"verify", bar, figure, "--json", json, "--junit", junit});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  std::ifstream file(json);
+  const nlohmann::json parsed = nlohmann::json::parse(file);
+  EXPECT_TRUE(parsed["passed"].get<bool>());
+  EXPECT_EQ(parsed["models"].size(), 2u);
+  std::ifstream xml(junit);
+  const std::string text((std::istreambuf_iterator<char>(xml)), std::istreambuf_iterator<char>());
+  EXPECT_NE(text.find("failures=\"0\" errors=\"0\""), std::string::npos);
+  EXPECT_NE(text.find("classname=\"dermis.verify.dual_quaternion\""), std::string::npos);
+}
+
+TEST(CommandTest, VerifyGoesOnAfterABadModel) {
+  REQUIRE_DEVICE();
+  const CommandResult result = dermis({"verify", outFile("does not exist.glb"), bar});
+  EXPECT_EQ(result.status, 3);
+  expectOneErrorLine(result);
+  EXPECT_NE(result.output.find("passed  " + bar), std::string::npos) << result.output;
+}
+
+TEST(CommandTest, RealModelsVerify) {
+  REQUIRE_DEVICE();
+  const std::optional<std::filesystem::path> data = testDataFolder();
+  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  std::vector<std::string> arguments{"verify"};
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(*data / "models")) {
+    const std::string path = entry.path().string();
+    if (!path.ends_with(".gltf") && !path.ends_with(".glb")) continue;
+    if (path.find("/negative_") != std::string::npos) continue;
+    // Only what has something to verify: `info` says so.
+    const CommandResult info = dermis({"info", path, "--json"});
+    ASSERT_EQ(info.status, 0) << path << ": " << info.errors;
+    const nlohmann::json meshes = nlohmann::json::parse(info.output)["meshes"];
+    if (std::any_of(meshes.begin(), meshes.end(),
+                    [](const nlohmann::json& mesh) { return mesh["influencesUsed"] != 0; })) {
+      arguments.push_back(path);
+    }
+  }
+  EXPECT_GE(arguments.size(), 30u);
+  const CommandResult result = dermis(arguments);
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+}
+
+// Every file that is broken on purpose: status 3 with one sentence, or accepted (the importer's
+// tests give the reasons).
+TEST(CommandTest, BrokenModelsAreRefusedWithOneSentence) {
+  const std::optional<std::filesystem::path> data = testDataFolder();
+  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  std::size_t files = 0, refused = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(*data / "models")) {
+    const std::string path = entry.path().string();
+    if (!path.ends_with(".gltf") && !path.ends_with(".glb")) continue;
+    if (path.find("/negative_") == std::string::npos) continue;
+    SCOPED_TRACE(path);
+    ++files;
+    for (const CommandResult& result :
+         {dermis({"info", path}),
+          dermis({"skin", path, "-o", outFile("negative.ply"), "--device", "cpu"})}) {
+      EXPECT_TRUE(result.status == 0 || result.status == 3)
+          << result.status << " " << result.errors;
+      if (result.status == 3) expectOneErrorLine(result);
+    }
+    refused += static_cast<std::size_t>(dermis({"info", path}).status == 3);
+  }
+  EXPECT_GE(files, 25u);
+  EXPECT_GE(refused, 12u);
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,168 @@
+#include "mock_vulkan.h"
+
+namespace dermis::test {
+namespace {
+
+MockVulkan* mock = nullptr;
+std::uint64_t nextHandle = 1;
+
+template <typename Handle>
+VkResult create(const char* function, const char* kind, const VkAllocationCallbacks* allocator,
+                Handle* handle) {
+  if (mock->failing == function && mock->failAfter-- <= 0) return mock->failure;
+  if (allocator != mock->allocator) mock->wrongAllocator = true;
+  *handle = reinterpret_cast<Handle>(nextHandle++);
+  ++mock->alive[kind];
+  return VK_SUCCESS;
+}
+
+template <typename Handle>
+void destroy(const char* kind, const VkAllocationCallbacks* allocator, Handle handle) {
+  if (handle == VK_NULL_HANDLE) return;
+  if (allocator != mock->allocator) mock->wrongAllocator = true;
+  --mock->alive[kind];
+}
+
+#define MOCK_CREATE(name, Info, Handle)                                                            \
+  VkResult VKAPI_CALL create##name(VkDevice, const Info*, const VkAllocationCallbacks* allocator,  \
+                                   Handle* handle) {                                               \
+    return create("vkCreate" #name, #name, allocator, handle);                                     \
+  }                                                                                                \
+  void VKAPI_CALL destroy##name(VkDevice, Handle handle, const VkAllocationCallbacks* allocator) { \
+    destroy(#name, allocator, handle);                                                             \
+  }
+MOCK_CREATE(ShaderModule, VkShaderModuleCreateInfo, VkShaderModule)
+MOCK_CREATE(DescriptorSetLayout, VkDescriptorSetLayoutCreateInfo, VkDescriptorSetLayout)
+MOCK_CREATE(PipelineLayout, VkPipelineLayoutCreateInfo, VkPipelineLayout)
+MOCK_CREATE(DescriptorPool, VkDescriptorPoolCreateInfo, VkDescriptorPool)
+
+VkResult VKAPI_CALL createComputePipelines(VkDevice, VkPipelineCache, std::uint32_t,
+                                           const VkComputePipelineCreateInfo*,
+                                           const VkAllocationCallbacks* allocator,
+                                           VkPipeline* pipeline) {
+  return create("vkCreateComputePipelines", "Pipeline", allocator, pipeline);
+}
+void VKAPI_CALL destroyPipeline(VkDevice, VkPipeline pipeline,
+                                const VkAllocationCallbacks* allocator) {
+  destroy("Pipeline", allocator, pipeline);
+}
+VkResult VKAPI_CALL allocateDescriptorSets(VkDevice, const VkDescriptorSetAllocateInfo* info,
+                                           VkDescriptorSet* sets) {
+  if (mock->failing == "vkAllocateDescriptorSets") return mock->failure;
+  for (std::uint32_t i = 0; i < info->descriptorSetCount; ++i)
+    sets[i] = reinterpret_cast<VkDescriptorSet>(nextHandle++);
+  return VK_SUCCESS;
+}
+void VKAPI_CALL updateDescriptorSets(VkDevice, std::uint32_t, const VkWriteDescriptorSet*,
+                                     std::uint32_t, const VkCopyDescriptorSet*) {}
+
+void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
+                                            VkPhysicalDeviceProperties* properties) {
+  *properties = {};
+  properties->apiVersion = VK_API_VERSION_1_1;
+  properties->limits = mock->limits;
+}
+
+void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline) {
+  mock->commands.push_back(point == VK_PIPELINE_BIND_POINT_COMPUTE ? "bind pipeline"
+                                                                   : "bind graphics pipeline");
+}
+void VKAPI_CALL cmdBindDescriptorSets(VkCommandBuffer, VkPipelineBindPoint, VkPipelineLayout,
+                                      std::uint32_t, std::uint32_t, const VkDescriptorSet*,
+                                      std::uint32_t, const std::uint32_t*) {
+  mock->commands.push_back("bind sets");
+}
+void VKAPI_CALL cmdPushDescriptorSet(VkCommandBuffer, VkPipelineBindPoint, VkPipelineLayout,
+                                     std::uint32_t, std::uint32_t, const VkWriteDescriptorSet*) {
+  mock->commands.push_back("push descriptors");
+}
+void VKAPI_CALL cmdPushConstants(VkCommandBuffer, VkPipelineLayout, VkShaderStageFlags,
+                                 std::uint32_t, std::uint32_t, const void*) {
+  mock->commands.push_back("push constants");
+}
+void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags, VkPipelineStageFlags,
+                                   VkDependencyFlags, std::uint32_t memoryCount,
+                                   const VkMemoryBarrier* memory, std::uint32_t bufferCount,
+                                   const VkBufferMemoryBarrier* buffers, std::uint32_t,
+                                   const VkImageMemoryBarrier*) {
+  mock->commands.push_back("barrier");
+  mock->memoryBarriers.insert(mock->memoryBarriers.end(), memory, memory + memoryCount);
+  mock->bufferBarriers.insert(mock->bufferBarriers.end(), buffers, buffers + bufferCount);
+}
+void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t, std::uint32_t, std::uint32_t) {
+  mock->commands.push_back("dispatch");
+}
+
+PFN_vkVoidFunction find(const char* name) {
+  mock->requested.insert(name);
+  if (mock->missing.contains(name)) return nullptr;
+  static const std::map<std::string, PFN_vkVoidFunction> functions{
+#define MOCK_FUNCTION(vulkanName, function) \
+  {vulkanName, reinterpret_cast<PFN_vkVoidFunction>(function)}
+      MOCK_FUNCTION("vkGetPhysicalDeviceProperties", getPhysicalDeviceProperties),
+      MOCK_FUNCTION("vkCreateShaderModule", createShaderModule),
+      MOCK_FUNCTION("vkDestroyShaderModule", destroyShaderModule),
+      MOCK_FUNCTION("vkCreateDescriptorSetLayout", createDescriptorSetLayout),
+      MOCK_FUNCTION("vkDestroyDescriptorSetLayout", destroyDescriptorSetLayout),
+      MOCK_FUNCTION("vkCreatePipelineLayout", createPipelineLayout),
+      MOCK_FUNCTION("vkDestroyPipelineLayout", destroyPipelineLayout),
+      MOCK_FUNCTION("vkCreateDescriptorPool", createDescriptorPool),
+      MOCK_FUNCTION("vkDestroyDescriptorPool", destroyDescriptorPool),
+      MOCK_FUNCTION("vkCreateComputePipelines", createComputePipelines),
+      MOCK_FUNCTION("vkDestroyPipeline", destroyPipeline),
+      MOCK_FUNCTION("vkAllocateDescriptorSets", allocateDescriptorSets),
+      MOCK_FUNCTION("vkUpdateDescriptorSets", updateDescriptorSets),
+      MOCK_FUNCTION("vkCmdBindPipeline", cmdBindPipeline),
+      MOCK_FUNCTION("vkCmdBindDescriptorSets", cmdBindDescriptorSets),
+      MOCK_FUNCTION("vkCmdPushDescriptorSetKHR", cmdPushDescriptorSet),
+      MOCK_FUNCTION("vkCmdPushConstants", cmdPushConstants),
+      MOCK_FUNCTION("vkCmdPipelineBarrier", cmdPipelineBarrier),
+      MOCK_FUNCTION("vkCmdDispatch", cmdDispatch),
+  };
+  const auto found = functions.find(name);
+  return found == functions.end() ? nullptr : found->second;
+}
+
+PFN_vkVoidFunction VKAPI_CALL getDeviceProcAddr(VkDevice, const char* name) {
+  return find(name);
+}
+
+PFN_vkVoidFunction VKAPI_CALL getInstanceProcAddr(VkInstance, const char* name) {
+  if (std::string(name) == "vkGetDeviceProcAddr" && !mock->missing.contains(name)) {
+    return reinterpret_cast<PFN_vkVoidFunction>(getDeviceProcAddr);
+  }
+  return find(name);
+}
+
+}  // namespace
+
+MockVulkan::MockVulkan() {
+  mock = this;
+  limits.maxStorageBufferRange = 1 << 27;
+  limits.minStorageBufferOffsetAlignment = 256;
+  limits.maxComputeWorkGroupCount[0] = limits.maxComputeWorkGroupCount[1] = 65535;
+  limits.maxPerStageDescriptorStorageBuffers = 4;
+}
+
+MockVulkan::~MockVulkan() {
+  mock = nullptr;
+}
+
+vulkan::DeviceDescription MockVulkan::description() const {
+  vulkan::DeviceDescription description;
+  description.instance = reinterpret_cast<VkInstance>(std::uintptr_t{16});
+  description.physicalDevice = reinterpret_cast<VkPhysicalDevice>(std::uintptr_t{32});
+  description.device = reinterpret_cast<VkDevice>(std::uintptr_t{48});
+  description.getInstanceProcAddr = getInstanceProcAddr;
+  description.enabledExtensions = extensions;
+  description.allocator = allocator;
+  return description;
+}
+
+int MockVulkan::aliveObjects() const {
+  int count = 0;
+  for (const auto& [kind, number] : alive) count += number;
+  return count;
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,55 @@
+#include "run_command.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+namespace dermis::test {
+namespace {
+
+std::string readAll(std::FILE* file) {
+  std::rewind(file);
+  std::string text;
+  char buffer[4096];
+  for (std::size_t count = 0; (count = std::fread(buffer, 1, sizeof(buffer), file)) > 0;)
+    text.append(buffer, count);
+  std::fclose(file);
+  return text;
+}
+
+[[noreturn]] void execute(const std::vector<std::string>& command,
+                          const std::vector<std::string>& environment, int output, int errors) {
+  dup2(output, STDOUT_FILENO);
+  dup2(errors, STDERR_FILENO);
+  for (const std::string& variable : environment) {
+    const std::size_t equals = variable.find('=');
+    if (equals == std::string::npos) {
+      unsetenv(variable.c_str());
+    } else {
+      setenv(variable.substr(0, equals).c_str(), variable.substr(equals + 1).c_str(), 1);
+    }
+  }
+  std::vector<char*> arguments;
+  for (const std::string& argument : command)
+    arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.push_back(nullptr);
+  execv(arguments[0], arguments.data());
+  _exit(127);
+}
+
+}  // namespace
+
+CommandResult runCommand(const std::vector<std::string>& command,
+                         const std::vector<std::string>& environment) {
+  std::FILE* output = std::tmpfile();
+  std::FILE* errors = std::tmpfile();
+  const pid_t child = fork();
+  if (child == 0) execute(command, environment, fileno(output), fileno(errors));
+  int status = 0;
+  waitpid(child, &status, 0);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readAll(output), readAll(errors)};
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,163 @@
+// Where the bytes come from: data URIs, and files beside the glTF file and nowhere else.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "gltf_builder.h"
+
+namespace dermis::test {
+namespace {
+
+// A folder that goes away with the test.
+class GltfBuffer : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        std::filesystem::temp_directory_path() / ("dermis-gltf-buffer-" + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_ / "inside" / "deeper");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void write(const std::string& name, const std::vector<std::byte>& bytes) const {
+    std::ofstream stream(folder_ / name, std::ios::binary);
+    stream.write(reinterpret_cast<const char*>(bytes.data()),
+                 static_cast<std::streamsize>(bytes.size()));
+  }
+
+  std::filesystem::path folder_;
+};
+
+FileBuilder withUri(const std::string& uri) {
+  FileBuilder file = skinnedTriangle();
+  file.json["buffers"] = {{{"byteLength", file.binary.size()}, {"uri", uri}}};
+  return file;
+}
+
+TEST_F(GltfBuffer, ReadsFilesInsideTheFolder) {
+  const auto bytes = skinnedTriangle().binary;
+  write("inside/plain.bin", bytes);
+  write("inside/with space.bin", bytes);
+  write("inside/gr\xc3\xbcn.bin", bytes);
+  write("inside/deeper/below.bin", bytes);
+  write("inside/a:b.bin", bytes);
+  for (const char* uri : {"plain.bin", "./plain.bin", "with%20space.bin", "with space.bin",
+                          "gr%C3%BCn.bin", "gr\xc3\xbcn.bin", "deeper/below.bin", "./a:b.bin"}) {
+    EXPECT_EQ(loaded(withUri(uri).load(folder_ / "inside")).skinnedPrimitives.size(), 1u) << uri;
+  }
+}
+
+TEST_F(GltfBuffer, OpensNothingOutsideTheFolder) {
+  const auto bytes = skinnedTriangle().binary;
+  write("outside.bin", bytes);
+  const std::string absolute = (folder_ / "outside.bin").string();
+  for (const std::string& uri :
+       {std::string("../outside.bin"), std::string("%2e%2e/outside.bin"),
+        std::string("%2e%2e%2foutside.bin"), std::string("deeper/../../outside.bin"),
+        std::string("..\\outside.bin"), absolute, "%2f" + absolute.substr(1), std::string(""),
+        std::string("plain.bin%00")}) {
+    expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
+                "outside the file's folder");
+  }
+  for (const char* uri : {"file:///etc/passwd", "http://example.com/a.bin", "C:/a.bin"}) {
+    expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
+                "is not a file beside this one");
+  }
+}
+
+TEST_F(GltfBuffer, NamesAFileThatIsMissing) {
+  expectError(withUri("missing.bin").load(folder_), ErrorCode::ioError,
+              "buffer 0: there is no file");
+  expectError(withUri("missing.bin").load(folder_), ErrorCode::ioError, "missing.bin");
+  expectError(withUri("inside").load(folder_), ErrorCode::ioError, "buffer 0: there is no file");
+  expectError(withUri("missing.bin").load(), ErrorCode::ioError, "without a folder");
+  expectError(withUri("a%2").load(folder_), ErrorCode::invalidData, "a '%' without two digits");
+}
+
+TEST_F(GltfBuffer, RefusesAFileThatIsTooShort) {
+  auto bytes = skinnedTriangle().binary;
+  bytes.pop_back();
+  write("short.bin", bytes);
+  expectError(withUri("short.bin").load(folder_), ErrorCode::invalidData, "buffer 0: byteLength");
+  // One that is longer is read as far as the byteLength goes.
+  bytes.resize(bytes.size() + 1000);
+  write("long.bin", bytes);
+  loaded(withUri("long.bin").load(folder_));
+}
+
+TEST_F(GltfBuffer, LoadsAPathAndItsSideFiles) {
+  const FileBuilder file = withUri("side.bin");
+  write("side.bin", file.binary);
+  write("model.gltf", bytesOf(file.text()));
+  EXPECT_EQ(loaded(gltf::load(folder_ / "model.gltf")).skinnedPrimitives.size(), 1u);
+
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_);
+  EXPECT_EQ(loaded(gltf::load("model.gltf")).skinnedPrimitives.size(), 1u);
+  std::filesystem::current_path(before);
+
+  expectError(gltf::load(folder_ / "absent.gltf"), ErrorCode::ioError, "absent.gltf");
+  expectError(gltf::load(folder_), ErrorCode::ioError, "cannot be opened");
+  write("broken.gltf", bytesOf("{"));
+  expectError(gltf::load(folder_ / "broken.gltf"), ErrorCode::invalidData, "'broken.gltf': ");
+}
+
+TEST_F(GltfBuffer, ReadsDataUris) {
+  const FileBuilder file = skinnedTriangle();
+  const std::string base64 = encodeBase64(file.binary);
+  std::string percent;
+  for (const std::byte byte : file.binary) {
+    const char* digits = "0123456789abcdef";
+    const auto value = std::to_integer<unsigned>(byte);
+    percent += {'%', digits[value >> 4], digits[value & 15]};
+  }
+  for (const std::string& uri :
+       {"data:application/octet-stream;base64," + base64,
+        "data:application/gltf-buffer;base64," + base64, "data:;base64," + base64,
+        "data:text/plain;charset=utf-8;base64," + base64, "data:," + percent}) {
+    EXPECT_EQ(firstPrimitive(loaded(withUri(uri))).positions[3], 1.0f) << uri.substr(0, 40);
+  }
+}
+
+TEST_F(GltfBuffer, RefusesBrokenDataUris) {
+  expectInvalid(withUri("data:application/octet-stream;base64"), "has no comma");
+  expectInvalid(withUri("data:;base64,AAAA*AAA"), "character 4 of its data URI is not base64");
+  expectInvalid(withUri("data:;base64,AAAA==AA"), "is not base64");
+  expectInvalid(withUri("data:;base64,AAAAA"), "is cut off");
+  expectInvalid(withUri("data:;base64,AAAA"), "bytes, 3 are there");
+  expectInvalid(withUri("data:,%zz"), "a '%' without two digits");
+}
+
+TEST_F(GltfBuffer, TellsWhenABufferIsNowhere) {
+  FileBuilder file = skinnedTriangle();
+  file.json["buffers"] = {{{"byteLength", file.binary.size()}}};
+  expectInvalid(file, "buffer 0: it has no uri, and the file has no binary chunk for it");
+}
+
+TEST_F(GltfBuffer, RefusesABinaryChunkThatIsTooShort) {
+  FileBuilder file = skinnedTriangle();
+  auto bytes = file.glb();
+  const std::string length = "\"byteLength\":" + std::to_string(file.binary.size()) + "}]";
+  const std::string longer = "\"byteLength\":" + std::to_string(file.binary.size() + 3) + "}]";
+  ASSERT_EQ(length.size(), longer.size());
+  const auto found =
+      std::search(bytes.begin(), bytes.end(), length.begin(), length.end(),
+                  [](std::byte a, char b) { return a == static_cast<std::byte>(b); });
+  ASSERT_NE(found, bytes.end());
+  std::transform(longer.begin(), longer.end(), found,
+                 [](char character) { return static_cast<std::byte>(character); });
+  expectError(gltf::loadFromMemory(bytes, {}), ErrorCode::invalidData, "buffer 0: byteLength");
+}
+
+TEST_F(GltfBuffer, RefusesBadDescriptions) {
+  FileBuilder file = withUri("x.bin");
+  file.json["buffers"][0]["uri"] = 4;
+  expectInvalid(file, "buffer 0: uri is not a text");
+  file.json["buffers"][0].erase("byteLength");
+  expectInvalid(file, "buffer 0: it has no byteLength");
+  file.json["buffers"][0]["byteLength"] = 0;
+  expectInvalid(file, "buffer 0: byteLength is 0");
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,383 @@
+// Primitives: influences, triangles, the formats each attribute may have.
+#include "gltf_builder.h"
+
+namespace dermis::test {
+namespace {
+
+using Floats = std::vector<float>;
+using Indices = std::vector<std::uint32_t>;
+
+TEST(GltfPrimitive, ReadsInfluences) {
+  const gltf::Primitive primitive = firstPrimitive(loaded(skinnedTriangle()));
+  EXPECT_EQ(primitive.vertexCount, 3u);
+  EXPECT_EQ(primitive.influencesPerVertex, 4u);
+  EXPECT_EQ(primitive.joints, (Indices{0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}));
+  EXPECT_EQ(primitive.weights, (Floats{1, 0, 0, 0, 1, 0, 0, 0, 0.25f, 0.75f, 0, 0}));
+  EXPECT_EQ(primitive.name, "mesh 0 primitive 0");
+}
+
+TEST(GltfPrimitive, NamesItselfByItsMesh) {
+  FileBuilder file = skinnedTriangle();
+  file.json["meshes"][0]["name"] = "Fox";
+  EXPECT_EQ(firstPrimitive(loaded(file)).name, "mesh 'Fox' primitive 0");
+}
+
+TEST(GltfPrimitive, ReadsNormalizedWeights) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["WEIGHTS_0"] = file.add<std::uint8_t>(
+      {255, 0, 0, 0, 51, 204, 0, 0, 1, 254, 0, 0}, "VEC4", unsignedByteType, true);
+  EXPECT_EQ(firstPrimitive(loaded(file)).weights,
+            (Floats{1, 0, 0, 0, 0.2f, 0.8f, 0, 0, 1 / 255.0f, 254 / 255.0f, 0, 0}));
+  file.attributes()["WEIGHTS_0"] = file.add<std::uint16_t>(
+      {65535, 0, 0, 0, 0, 65535, 0, 0, 1, 65534, 0, 0}, "VEC4", unsignedShortType, true);
+  EXPECT_EQ(firstPrimitive(loaded(file)).weights,
+            (Floats{1, 0, 0, 0, 0, 1, 0, 0, 1 / 65535.0f, 65534 / 65535.0f, 0, 0}));
+}
+
+TEST(GltfPrimitive, ReadsAnyNumberOfSets) {
+  FileBuilder file = skinnedTriangle();
+  for (int set = 1; set < 12; ++set) {
+    const auto joint = static_cast<std::uint16_t>(set);
+    const auto weight = static_cast<float>(set);
+    file.attributes()["JOINTS_" + std::to_string(set)] =
+        file.add(std::vector<std::uint16_t>(12, joint), "VEC4", unsignedShortType);
+    file.attributes()["WEIGHTS_" + std::to_string(set)] =
+        file.addFloats(Floats(12, weight), "VEC4");
+  }
+  const gltf::Primitive primitive = firstPrimitive(loaded(file));
+  ASSERT_EQ(primitive.influencesPerVertex, 48u);
+  ASSERT_EQ(primitive.joints.size(), 144u);
+  for (std::size_t vertex = 0; vertex < 3; ++vertex) {
+    for (std::size_t slot = 4; slot < 48; ++slot) {
+      EXPECT_EQ(primitive.joints[vertex * 48 + slot], slot / 4);
+      EXPECT_EQ(primitive.weights[vertex * 48 + slot], static_cast<float>(slot / 4));
+    }
+  }
+  EXPECT_EQ(primitive.weights[2 * 48 + 1], 0.75f);
+}
+
+TEST(GltfPrimitive, ViewsItself) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["NORMAL"] = file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  file.attributes()["TANGENT"] = file.addFloats({1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, -1}, "VEC4");
+  const gltf::Primitive primitive = firstPrimitive(loaded(file));
+  InfluenceSet set;
+  const MeshView view = primitive.view(set);
+  EXPECT_EQ(view.name, primitive.name);
+  EXPECT_EQ(view.vertexCount, 3u);
+  EXPECT_EQ(view.positions.data, primitive.positions.data());
+  EXPECT_EQ(view.normals.components, 3u);
+  EXPECT_EQ(view.tangents.components, 4u);
+  EXPECT_EQ(view.tangents.stride, 16u);
+  ASSERT_EQ(view.influenceSets.size(), 1u);
+  EXPECT_EQ(view.influenceSets[0].joints.type, ComponentType::uint32);
+  EXPECT_EQ(view.influenceSets[0].joints.components, 4u);
+  EXPECT_EQ(view.influenceSets[0].joints.stride, 16u);
+  EXPECT_EQ(view.influenceSets[0].weights.data, primitive.weights.data());
+}
+
+TEST(GltfPrimitive, KeepsAPrimitiveWithoutJoints) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes().erase("JOINTS_0");
+  file.attributes().erase("WEIGHTS_0");
+  const gltf::Model model = loaded(file);
+  EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
+  const gltf::Primitive primitive = firstPrimitive(model);
+  EXPECT_EQ(primitive.influencesPerVertex, 0u);
+  InfluenceSet set;
+  EXPECT_TRUE(primitive.view(set).influenceSets.empty());
+  ASSERT_EQ(model.notes.size(), 1u);
+  EXPECT_EQ(model.notes[0], "1 primitive of a skinned node without joints, left in bind pose");
+}
+
+TEST(GltfPrimitive, LeavesOutAPrimitiveWithoutPositions) {
+  FileBuilder file = skinnedTriangle();
+  const Json whole = file.primitive();
+  file.attributes().erase("POSITION");
+  file.json["meshes"][0]["primitives"].push_back(whole);
+  const gltf::Model model = loaded(file);
+  ASSERT_EQ(model.skinnedPrimitives.size(), 1u);
+  EXPECT_EQ(model.skinnedPrimitives[0].primitive, 1u);
+  ASSERT_EQ(model.notes.size(), 1u);
+  EXPECT_NE(model.notes[0].find("mesh 0 primitive 0: it has no positions"), std::string::npos);
+}
+
+// Five vertices, no indices, one mode after another.
+FileBuilder fiveVertices(int mode) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes() = {{"POSITION", file.addFloats(Floats(15), "VEC3")}};
+  file.primitive()["mode"] = mode;
+  return file;
+}
+
+TEST(GltfPrimitive, UnrollsStripsAndFans) {
+  // glTF 2.0, 3.7.2.1: every second triangle of a strip is turned round.
+  EXPECT_EQ(firstPrimitive(loaded(fiveVertices(5))).triangles,
+            (Indices{0, 1, 2, 1, 3, 2, 2, 3, 4}));
+  EXPECT_EQ(firstPrimitive(loaded(fiveVertices(6))).triangles,
+            (Indices{1, 2, 0, 2, 3, 0, 3, 4, 0}));
+}
+
+TEST(GltfPrimitive, MakesNoTrianglesOfPointsAndLines) {
+  for (const int mode : {0, 1, 2, 3}) {
+    const gltf::Primitive primitive = firstPrimitive(loaded(fiveVertices(mode)));
+    EXPECT_EQ(primitive.vertexCount, 5u);
+    EXPECT_TRUE(primitive.triangles.empty());
+  }
+}
+
+TEST(GltfPrimitive, LeavesOutIndicesThatMakeNoTriangle) {
+  const gltf::Model model = loaded(fiveVertices(4));
+  EXPECT_EQ(firstPrimitive(model).triangles, (Indices{0, 1, 2}));
+  EXPECT_NE(model.notes.at(0).find("the last 2 indices"), std::string::npos);
+}
+
+TEST(GltfPrimitive, ReadsIndicesOfEveryType) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["indices"] =
+      file.add<std::uint8_t>({2, 1, 0, 0, 1, 2}, "SCALAR", unsignedByteType);
+  EXPECT_EQ(firstPrimitive(loaded(file)).triangles, (Indices{2, 1, 0, 0, 1, 2}));
+  file.primitive()["indices"] = file.add<std::uint16_t>({2, 1, 0}, "SCALAR", unsignedShortType);
+  EXPECT_EQ(firstPrimitive(loaded(file)).triangles, (Indices{2, 1, 0}));
+  file.primitive()["indices"] = file.add<std::uint32_t>({1, 1, 0}, "SCALAR", unsignedIntType);
+  EXPECT_EQ(firstPrimitive(loaded(file)).triangles, (Indices{1, 1, 0}));
+  file.primitive()["mode"] = 5;
+  file.primitive()["indices"] = file.add<std::uint32_t>({2, 1}, "SCALAR", unsignedIntType);
+  EXPECT_TRUE(firstPrimitive(loaded(file)).triangles.empty());
+}
+
+TEST(GltfPrimitive, RefusesBadIndices) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["indices"] = file.add<std::uint8_t>({2, 1, 3}, "SCALAR", unsignedByteType);
+  expectInvalid(file, "mesh 0 primitive 0: index 2 of accessor 3 is 3, and there are 3 vertices");
+  // The largest value restarts a strip in some interfaces, and is forbidden here.
+  file.primitive()["indices"] = file.add<std::uint8_t>({0, 255, 1}, "SCALAR", unsignedByteType);
+  expectInvalid(file, "is 255, and there are 3 vertices");
+  file.primitive()["indices"] = file.addFloats({0, 1, 2}, "SCALAR");
+  expectInvalid(file, "indices: accessor 5 is SCALAR of float where SCALAR of unsigned byte");
+  file.primitive()["indices"] = 0;
+  expectInvalid(file, "indices: accessor 0 is VEC3 of float");
+  file.primitive()["indices"] = 77;
+  expectInvalid(file, "mesh 0 primitive 0: indices is 77");
+  const std::size_t indices = file.add<std::uint32_t>({0, 1, 2}, "SCALAR", unsignedIntType);
+  file.json["bufferViews"].back()["byteStride"] = 4;
+  file.primitive()["indices"] = indices;
+  expectInvalid(file, "indices: bufferView 6 of accessor 6 has a byteStride of 4");
+}
+
+TEST(GltfPrimitive, ReadsTexcoordsColorsAndMaterial) {
+  FileBuilder file = skinnedTriangle();
+  file.json["materials"] = {{{"name", "plain"}},
+                            {{"pbrMetallicRoughness",
+                              {{"baseColorFactor", {0.5, 0.25, 0.125, 1}},
+                               {"metallicFactor", 0.5},
+                               {"roughnessFactor", 0.25}}},
+                             {"emissiveFactor", {1, 0, 0.5}},
+                             {"alphaMode", "MASK"},
+                             {"alphaCutoff", 0.75},
+                             {"doubleSided", true}}};
+  file.primitive()["material"] = 1;
+  file.attributes()["TEXCOORD_0"] = file.addFloats({0, 1, 2, 3, 4, 5}, "VEC2");
+  file.attributes()["TEXCOORD_1"] =
+      file.add<std::uint16_t>({0, 65535, 0, 0, 65535, 0}, "VEC2", unsignedShortType, true);
+  file.attributes()["COLOR_0"] = file.addFloats({1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3");
+  const gltf::Model model = loaded(file);
+  const gltf::Primitive primitive = firstPrimitive(model);
+  ASSERT_EQ(primitive.texcoords.size(), 2u);
+  EXPECT_EQ(primitive.texcoords[0], (Floats{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(primitive.texcoords[1], (Floats{0, 1, 0, 0, 1, 0}));
+  EXPECT_EQ(primitive.colors, (Floats{1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1}));
+  EXPECT_EQ(primitive.material, 1u);
+  ASSERT_EQ(model.materials.size(), 2u);
+  EXPECT_EQ(model.materials[0].name, "plain");
+  EXPECT_EQ(model.materials[0].metallic, 1.0f);
+  EXPECT_EQ(model.materials[0].alphaMode, gltf::AlphaMode::opaque);
+  EXPECT_EQ(model.materials[1].baseColor, (std::array<float, 4>{0.5f, 0.25f, 0.125f, 1}));
+  EXPECT_EQ(model.materials[1].roughness, 0.25f);
+  EXPECT_EQ(model.materials[1].emissive, (std::array<float, 3>{1, 0, 0.5f}));
+  EXPECT_EQ(model.materials[1].alphaMode, gltf::AlphaMode::mask);
+  EXPECT_EQ(model.materials[1].alphaCutoff, 0.75f);
+  EXPECT_TRUE(model.materials[1].doubleSided);
+
+  file.attributes()["COLOR_0"] = file.add<std::uint8_t>({255, 0, 51, 204, 0, 0, 0, 0, 1, 2, 3, 4},
+                                                        "VEC4", unsignedByteType, true);
+  EXPECT_EQ(firstPrimitive(loaded(file)).colors[3], 0.8f);
+}
+
+// A gap in what does not concern skinning is no reason to refuse a file.
+TEST(GltfPrimitive, ReadsTexcoordsUpToAGap) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["TEXCOORD_0"] = file.addFloats({0, 1, 2, 3, 4, 5}, "VEC2");
+  file.attributes()["TEXCOORD_2"] = file.attributes()["TEXCOORD_0"];
+  EXPECT_EQ(firstPrimitive(loaded(file)).texcoords.size(), 1u);
+}
+
+TEST(GltfPrimitive, RefusesBadMaterials) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["material"] = 0;
+  expectInvalid(file, "mesh 0 primitive 0: material is 0, and the file has 0 materials");
+  file.json["materials"] = {{{"emissiveFactor", {1, 2}}}};
+  expectInvalid(file, "material 0: emissiveFactor is not an array of 3 numbers");
+  file.json["materials"] = {{{"alphaMode", "SOME"}}};
+  expectInvalid(file, "material 0: alphaMode is 'SOME'");
+  file.json["materials"] = {{{"pbrMetallicRoughness", 3}}};
+  expectInvalid(file, "material 0: pbrMetallicRoughness is not an object");
+}
+
+TEST(GltfPrimitive, ReadsMorphTargets) {
+  FileBuilder file = skinnedTriangle();
+  file.json["meshes"][0]["weights"] = {0.25, 0.5};
+  file.json["nodes"][0]["weights"] = {1, 0};
+  file.primitive()["targets"] = {
+      {{"POSITION", file.addFloats({1, 2, 3, 4, 5, 6, 7, 8, 9}, "VEC3")}},
+      {{"NORMAL", file.addFloats(Floats(9, 1.0f), "VEC3")},
+       {"TANGENT", file.addFloats(Floats(9, 2.0f), "VEC3")}}};
+  const gltf::Model model = loaded(file);
+  const gltf::Primitive primitive = firstPrimitive(model);
+  ASSERT_EQ(primitive.morphTargets.size(), 2u);
+  EXPECT_EQ(primitive.morphTargets[0].positions, (Floats{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_TRUE(primitive.morphTargets[0].normals.empty());
+  EXPECT_EQ(primitive.morphTargets[1].normals, Floats(9, 1.0f));
+  EXPECT_EQ(primitive.morphTargets[1].tangents, Floats(9, 2.0f));
+  EXPECT_EQ(model.meshes[0].morphWeights, (Floats{0.25f, 0.5f}));
+  EXPECT_EQ(model.nodes[0].morphWeights, (Floats{1, 0}));
+}
+
+TEST(GltfPrimitive, RefusesBadMorphTargets) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["targets"] = {{{"POSITION", file.addFloats(Floats(6), "VEC3")}}};
+  expectInvalid(file, "morph target 0 POSITION: accessor 3 has 2 elements where");
+  file.primitive()["targets"] = {{{"POSITION", 2}}};
+  expectInvalid(file, "morph target 0 POSITION: accessor 2 is VEC4");
+  file.primitive()["targets"] = {{{"POSITION", 99}}};
+  expectInvalid(file, "targets: 'POSITION' is 99");
+  file.primitive()["targets"] = {{{"POSITION", 0}}};
+  file.json["nodes"][0]["weights"] = {1, 2};
+  expectInvalid(file, "node 0: it has 2 weights for 1 morph targets");
+  file.json["nodes"][0].erase("weights");
+  file.json["meshes"][0]["weights"] = {1, 2, 3};
+  expectInvalid(file, "mesh 0: it has 3 weights for 1 morph targets");
+  file.json["meshes"][0].erase("weights");
+  Json second = file.primitive();
+  second.erase("targets");
+  file.json["meshes"][0]["primitives"].push_back(second);
+  expectInvalid(file, "mesh 0 primitive 1: it has 0 morph targets, primitive 0 has 1");
+}
+
+TEST(GltfPrimitive, ReadsQuantizedMeshes) {
+  FileBuilder file = skinnedTriangle();
+  const std::size_t positions =
+      file.add<std::int16_t>({1, -2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0}, "VEC4", shortType);
+  file.json["accessors"][positions]["type"] = "VEC3";
+  file.json["accessors"][positions]["count"] = 3;
+  file.json["bufferViews"].back()["byteStride"] = 8;
+  const std::size_t normals =
+      file.add<std::int8_t>({0, 0, 127, 0, 0, -127, 0, 0, 127, 0, 0, 0}, "VEC4", byteType, true);
+  file.json["accessors"][normals]["type"] = "VEC3";
+  file.json["bufferViews"].back()["byteStride"] = 4;
+  file.attributes()["POSITION"] = positions;
+  file.attributes()["NORMAL"] = normals;
+  file.attributes()["TANGENT"] = file.add<std::int8_t>(
+      {127, 0, 0, 127, 127, 0, 0, 127, 127, 0, 0, -127}, "VEC4", byteType, true);
+  expectInvalid(file, "NORMAL: accessor 4 is VEC3 of normalized byte where VEC3 of float must be");
+  file.json["extensionsUsed"] = {"KHR_mesh_quantization"};
+  file.json["extensionsRequired"] = {"KHR_mesh_quantization"};
+  const gltf::Primitive primitive = firstPrimitive(loaded(file));
+  EXPECT_EQ(primitive.positions, (Floats{1, -2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ(primitive.normals, (Floats{0, 0, 1, 0, -1, 0, 1, 0, 0}));
+  EXPECT_EQ(primitive.tangents.back(), -1.0f);
+}
+
+TEST(GltfPrimitive, RefusesFormatsThatAnAttributeMayNotHave) {
+  const auto expectFormat = [](const char* attribute, auto values, const char* type,
+                               int componentType, bool normalized, const std::string& text) {
+    FileBuilder file = skinnedTriangle();
+    file.attributes()[attribute] = file.add(values, type, componentType, normalized);
+    expectInvalid(file, std::string("mesh 0 primitive 0 ") + attribute + ": accessor 3 is " + text);
+  };
+  expectFormat("POSITION", Floats(12), "VEC4", floatType, false, "VEC4 of float where VEC3");
+  expectFormat("POSITION", std::vector<std::uint32_t>(9), "VEC3", unsignedIntType, false,
+               "VEC3 of unsigned int where VEC3 of float");
+  expectFormat("NORMAL", Floats(6), "VEC2", floatType, false, "VEC2 of float where VEC3");
+  expectFormat("TANGENT", Floats(9), "VEC3", floatType, false, "VEC3 of float where VEC4");
+  expectFormat("TEXCOORD_0", Floats(9), "VEC3", floatType, false, "VEC3 of float where VEC2");
+  expectFormat("COLOR_0", Floats(6), "VEC2", floatType, false, "VEC2 of float where VEC4");
+  expectFormat("JOINTS_0", Floats(12), "VEC4", floatType, false,
+               "VEC4 of float where VEC4 of unsigned byte or unsigned short must be");
+  expectFormat("JOINTS_0", std::vector<std::uint8_t>(12), "VEC4", unsignedByteType, true,
+               "VEC4 of normalized unsigned byte where VEC4 of unsigned byte");
+  expectFormat("JOINTS_0", std::vector<std::uint32_t>(12), "VEC4", unsignedIntType, false,
+               "VEC4 of unsigned int where");
+  expectFormat("JOINTS_0", std::vector<std::uint16_t>(9), "VEC3", unsignedShortType, false,
+               "VEC3 of unsigned short where VEC4");
+  expectFormat("WEIGHTS_0", std::vector<std::uint8_t>(12), "VEC4", unsignedByteType, false,
+               "VEC4 of unsigned byte where VEC4 of float or normalized unsigned byte");
+  expectFormat("WEIGHTS_0", std::vector<std::int16_t>(12), "VEC4", shortType, true,
+               "VEC4 of normalized short where");
+  expectFormat("WEIGHTS_0", Floats(9), "VEC3", floatType, false, "VEC3 of float where VEC4");
+}
+
+TEST(GltfPrimitive, RefusesJointsWithoutWeightsAndTheReverse) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes().erase("WEIGHTS_0");
+  expectInvalid(file, "mesh 0 primitive 0: JOINTS_0 has no WEIGHTS_0");
+  file = skinnedTriangle();
+  file.attributes().erase("JOINTS_0");
+  expectInvalid(file, "mesh 0 primitive 0: WEIGHTS_0 has no JOINTS_0");
+  file = skinnedTriangle();
+  file.attributes()["JOINTS_1"] = file.attributes()["JOINTS_0"];
+  expectInvalid(file, "mesh 0 primitive 0: JOINTS_1 has no WEIGHTS_1");
+  file = skinnedTriangle();
+  file.attributes()["JOINTS_2"] = file.attributes()["JOINTS_0"];
+  file.attributes()["WEIGHTS_2"] = file.attributes()["WEIGHTS_0"];
+  expectInvalid(file, "it has 2 sets of JOINTS_n, but no JOINTS_1");
+  for (const char* name : {"JOINTS_01", "JOINTS_", "JOINTS_x", "JOINTS_99999999999999"}) {
+    file = skinnedTriangle();
+    file.attributes()[name] = 1;
+    expectInvalid(file, std::string("there is no attribute '") + name + "'");
+  }
+}
+
+TEST(GltfPrimitive, RefusesCountsThatDisagree) {
+  FileBuilder file = skinnedTriangle();
+  file.accessor("WEIGHTS_0")["count"] = 2;
+  expectInvalid(file, "WEIGHTS_0: accessor 2 has 2 elements where JOINTS_0 has 3");
+  // An attribute of an application counts too.
+  file = skinnedTriangle();
+  file.attributes()["_LEVEL"] = file.addFloats({1, 2}, "SCALAR");
+  expectInvalid(file, "_LEVEL: accessor 3 has 2 elements");
+}
+
+TEST(GltfPrimitive, RefusesBadDescriptions) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["POSITION"] = 12;
+  expectInvalid(file, "mesh 0 primitive 0 attributes: 'POSITION' is 12, and the file has 3");
+  file.primitive().erase("attributes");
+  expectInvalid(file, "mesh 0 primitive 0: it has no attributes");
+  file.primitive() = 3;
+  expectInvalid(file, "mesh 0 primitive 0 is not an object");
+  file.json["meshes"][0]["primitives"] = Json::array();
+  expectInvalid(file, "mesh 0: primitives is an empty array");
+  file.json["meshes"][0].erase("primitives");
+  expectInvalid(file, "mesh 0: it has no primitives");
+  file = skinnedTriangle();
+  file.primitive()["mode"] = 7;
+  expectInvalid(file, "mesh 0 primitive 0: mode is none of 0 to 6");
+  file = skinnedTriangle();
+  file.json["meshes"][0]["name"] = 4;
+  expectInvalid(file, "mesh 0: its name is not a text");
+}
+
+// Whether a joint exists is a matter of each vertex, which `validate` looks at.
+TEST(GltfPrimitive, KeepsValuesThatValidateLooksAt) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["JOINTS_0"] =
+      file.add(std::vector<std::uint16_t>(12, 60000), "VEC4", unsignedShortType);
+  file.attributes()["WEIGHTS_0"] = file.addFloats(Floats(12, -1.0f), "VEC4");
+  const gltf::Primitive primitive = firstPrimitive(loaded(file));
+  EXPECT_EQ(primitive.joints[0], 60000u);
+  EXPECT_EQ(primitive.weights[0], -1.0f);
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,304 @@
+// Nodes, scenes and skins: what is skinned by what, and where the joints are at rest.
+#include <cmath>
+#include <limits>
+
+#include "gltf_builder.h"
+
+namespace dermis::test {
+namespace {
+
+using gltf::GlobalTransform;
+using gltf::nodeGlobals;
+using gltf::none;
+
+std::array<double, 3> translationOf(const GlobalTransform& transform) {
+  return {transform[0][3], transform[1][3], transform[2][3]};
+}
+
+void expectTransform(const GlobalTransform& actual, const GlobalTransform& expected) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      EXPECT_NEAR(actual[row][column], expected[row][column], 1e-15)
+          << "row " << row << " column " << column;
+    }
+  }
+}
+
+FileBuilder withNodes(const Json& nodes) {
+  FileBuilder file;
+  file.json["nodes"] = nodes;
+  return file;
+}
+
+TEST(GltfNode, ComposesTranslationRotationAndScale) {
+  // A quarter turn about z, after scaling, before moving.
+  const double half = std::sqrt(0.5);
+  const gltf::Model model = loaded(withNodes(
+      {{{"translation", {1, 2, 3}}, {"rotation", {0, 0, half, half}}, {"scale", {2, 3, 4}}}}));
+  expectTransform(nodeGlobals(model, none, 0)[0], {{{0, -3, 0, 1}, {2, 0, 0, 2}, {0, 0, 4, 3}}});
+}
+
+TEST(GltfNode, ReadsAMatrixByColumns) {
+  const gltf::Model model =
+      loaded(withNodes({{{"matrix", {1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 10, 11, 12, 1}}}}));
+  expectTransform(nodeGlobals(model, none, 0)[0], {{{1, 4, 7, 10}, {2, 5, 8, 11}, {3, 6, 9, 12}}});
+}
+
+TEST(GltfNode, MultipliesParentsFirstWhateverTheOrder) {
+  // Node 0 hangs below 2, which hangs below 1.
+  const gltf::Model model = loaded(withNodes({{{"translation", {1, 0, 0}}},
+                                              {{"children", {2}}, {"scale", {10, 10, 10}}},
+                                              {{"children", {0}}, {"translation", {0, 1, 0}}}}));
+  const auto globals = nodeGlobals(model, none, 0);
+  EXPECT_EQ(translationOf(globals[0]), (std::array<double, 3>{10, 10, 0}));
+  EXPECT_EQ(translationOf(globals[2]), (std::array<double, 3>{0, 10, 0}));
+  EXPECT_EQ(model.nodeOrder, (std::vector<std::uint32_t>{1, 2, 0}));
+  EXPECT_EQ(model.nodes[0].parent, 2u);
+  EXPECT_EQ(model.nodes[1].parent, none);
+}
+
+TEST(GltfNode, NormalizesRotations) {
+  const gltf::Model model = loaded(withNodes(
+      {{{"rotation", {0, 0, 2, 2}}}, {{"rotation", {0, 0, 0, 0}}}, {{"rotation", {0, 0, 0, 1}}}}));
+  EXPECT_NEAR(model.nodes[0].rotation[2], std::sqrt(0.5), 1e-15);
+  EXPECT_EQ(model.nodes[1].rotation, (std::array<double, 4>{0, 0, 0, 1}));
+  EXPECT_EQ(model.notes.at(0), "2 node rotations not of unit length, normalised");
+}
+
+// A chain as deep as a hostile file likes: no recursion may follow it.
+TEST(GltfNode, FollowsADeepChain) {
+  Json nodes = Json::array();
+  constexpr int depth = 50'000;
+  for (int i = 0; i < depth; ++i) {
+    Json node = {{"translation", {1, 0, 0}}};
+    if (i > 0) node["children"] = {i - 1};
+    nodes.push_back(node);
+  }
+  const gltf::Model model = loaded(withNodes(nodes));
+  EXPECT_EQ(translationOf(nodeGlobals(model, none, 0)[0])[0], depth);
+}
+
+TEST(GltfNode, RefusesWhatIsNoTree) {
+  expectInvalid(withNodes({{{"children", {1}}}, {{"children", {0}}}}),
+                "node 0: it is part of, or below, a cycle of nodes");
+  expectInvalid(withNodes({Json::object(), {{"children", {1}}}}), "node 1: it is part of");
+  expectInvalid(withNodes({{{"children", {2}}}, {{"children", {2}}}, Json::object()}),
+                "node 2: it is a child of both node 0 and node 1");
+  expectInvalid(withNodes({{{"children", {1, 1}}}, Json::object()}),
+                "node 0: children lists 1 twice");
+}
+
+TEST(GltfNode, RefusesBadProperties) {
+  expectInvalid(withNodes({{{"children", {5}}}}),
+                "node 0: an entry of children is 5, and the file has 1 nodes");
+  expectInvalid(withNodes({{{"children", 5}}}), "node 0: children is not an array");
+  expectInvalid(withNodes({{{"mesh", 0}}}), "node 0: mesh is 0, and the file has 0 meshes");
+  expectInvalid(withNodes({{{"skin", 0}}}), "node 0: skin is 0, and the file has 0 skins");
+  expectInvalid(withNodes({{{"camera", 2}}}), "node 0: camera is 2");
+  expectInvalid(withNodes({{{"weights", {1}}}}), "node 0: it has weights but no mesh");
+  expectInvalid(withNodes({{{"translation", {1, 2}}}}),
+                "node 0: translation is not an array of 3 numbers");
+  expectInvalid(withNodes({{{"rotation", {1, 2, 3, "x"}}}}),
+                "node 0: rotation holds something other than numbers");
+  expectInvalid(withNodes({{{"scale", {1, 1, 1e300}}}}),
+                "node 0: scale holds a number that float32 cannot hold");
+  expectInvalid(withNodes({{{"matrix", {1, 0, 0, 0}}}}),
+                "node 0: matrix is not an array of 16 numbers");
+  expectInvalid(withNodes({{{"matrix", {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}}),
+                "node 0: the fourth row of its matrix is not 0 0 0 1");
+  expectInvalid(withNodes({{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}},
+                            {"scale", {1, 1, 1}}}}),
+                "node 0: it has both matrix and scale");
+  FileBuilder file = skinnedTriangle();
+  file.json["nodes"][0].erase("mesh");
+  expectInvalid(file, "node 0: it has skin but no mesh");
+}
+
+TEST(GltfScene, ListsSkinnedPrimitivesByNodeThenPrimitive) {
+  FileBuilder file = skinnedTriangle();
+  file.json["meshes"][0]["primitives"].push_back(file.primitive());
+  // A second node has the same mesh with another skin; the scene names it first.
+  file.json["nodes"].push_back({{"mesh", 0}, {"skin", 1}});
+  file.json["skins"].push_back({{"joints", {2, 1}}});
+  file.json["scenes"][0]["nodes"] = {3, 1, 0};
+  const gltf::Model model = loaded(file);
+  ASSERT_EQ(model.skinnedPrimitives.size(), 4u);
+  const std::uint32_t expected[4][3] = {{0, 0, 0}, {0, 1, 0}, {3, 0, 1}, {3, 1, 1}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(model.skinnedPrimitives[i].node, expected[i][0]);
+    EXPECT_EQ(model.skinnedPrimitives[i].primitive, expected[i][1]);
+    EXPECT_EQ(model.skinnedPrimitives[i].skin, expected[i][2]);
+    EXPECT_EQ(model.skinnedPrimitives[i].mesh, 0u);
+  }
+  EXPECT_EQ(model.skins[1].joints, (std::vector<std::uint32_t>{2, 1}));
+}
+
+TEST(GltfScene, TakesTheDefaultScene) {
+  FileBuilder file = skinnedTriangle();
+  file.json["scenes"] = {{{"nodes", {1}}}, {{"nodes", {0, 1}}}};
+  file.json["scene"] = 1;
+  EXPECT_EQ(loaded(file).skinnedPrimitives.size(), 1u);
+  file.json["scene"] = 0;
+  gltf::Model model = loaded(file);
+  EXPECT_TRUE(model.skinnedPrimitives.empty());
+  EXPECT_TRUE(model.meshes.at(0).primitives.empty()) << "decoded though nothing skins it";
+  EXPECT_EQ(model.notes.at(0), "1 node with a mesh outside the default scene left out");
+  file.json.erase("scene");
+  EXPECT_TRUE(loaded(file).skinnedPrimitives.empty()) << "without a scene number it is scene 0";
+  file.json.erase("scenes");
+  model = loaded(file);
+  EXPECT_EQ(model.skinnedPrimitives.size(), 1u) << "without scenes it is all root nodes";
+  EXPECT_EQ(model.notes.at(0), "the file has no scene: all its nodes are taken");
+}
+
+TEST(GltfScene, FindsSkinnedNodesBelowTheRoots) {
+  FileBuilder file = skinnedTriangle();
+  file.json["nodes"].push_back({{"children", {0}}, {"translation", {9, 9, 9}}});
+  file.json["scenes"][0]["nodes"] = {1, 3};
+  EXPECT_EQ(loaded(file).skinnedPrimitives.size(), 1u);
+}
+
+TEST(GltfScene, LeavesOutMeshesWithoutASkin) {
+  FileBuilder file = skinnedTriangle();
+  file.json["nodes"].push_back({{"mesh", 0}});
+  file.json["nodes"].push_back({{"mesh", 0}});
+  file.json["scenes"][0]["nodes"] = {0, 1, 3, 4};
+  const gltf::Model model = loaded(file);
+  EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
+  EXPECT_EQ(model.notes.at(0), "2 nodes with a mesh but no skin left out");
+}
+
+TEST(GltfScene, LoadsAFileWithNothingInIt) {
+  const gltf::Model model = loaded(FileBuilder());
+  EXPECT_TRUE(model.nodes.empty());
+  EXPECT_TRUE(model.skinnedPrimitives.empty());
+  EXPECT_TRUE(nodeGlobals(model, none, 0).empty());
+  EXPECT_TRUE(palette(model, 0, none, 0).empty());
+}
+
+TEST(GltfScene, RefusesBadScenes) {
+  FileBuilder file = skinnedTriangle();
+  file.json["scene"] = 1;
+  expectInvalid(file, "the file: scene is 1, and the file has 1 scenes");
+  file.json["scene"] = 0;
+  file.json["scenes"][0]["nodes"] = {0, 7};
+  expectInvalid(file, "scene 0: an entry of nodes is 7, and the file has 3 nodes");
+  file.json["scenes"][0]["nodes"] = {0, 2};
+  expectInvalid(file, "scene 0: node 2 is not a root, but a child of node 1");
+}
+
+TEST(GltfSkin, TakesIdentitiesWhereThereAreNoMatrices) {
+  const gltf::Model model = loaded(skinnedTriangle());
+  const auto matrices = palette(model, 0, none, 0);
+  ASSERT_EQ(matrices.size(), 2u);
+  EXPECT_EQ(matrices[0].m[0][0], 1.0f);
+  EXPECT_EQ(matrices[0].m[1][3], 0.0f);
+  EXPECT_EQ(matrices[1].m[1][3], 1.0f);
+}
+
+std::vector<float> matrixByColumns(float scale, float x, float y, float z) {
+  return {scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0, x, y, z, 1};
+}
+
+TEST(GltfSkin, MultipliesJointByInverseBindMatrix) {
+  FileBuilder file = skinnedTriangle();
+  std::vector<float> matrices = matrixByColumns(1, 0, 0, 0);
+  const auto second = matrixByColumns(2, 5, 6, 7);
+  matrices.insert(matrices.end(), second.begin(), second.end());
+  matrices.insert(matrices.end(), second.begin(), second.end());  // One more than needed.
+  file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(matrices, "MAT4");
+  const auto result = palette(loaded(file), 0, none, 0);
+  ASSERT_EQ(result.size(), 2u);
+  // Joint 2 stands at y = 1: its translation is added to what the matrix does.
+  EXPECT_EQ(result[1].m[0][0], 2.0f);
+  EXPECT_EQ(result[1].m[0][3], 5.0f);
+  EXPECT_EQ(result[1].m[1][3], 7.0f);
+  EXPECT_EQ(result[1].m[2][3], 7.0f);
+}
+
+// glTF 2.0, 3.7.3.3: a skinned mesh goes where its joints are, not where its node is.
+TEST(GltfSkin, IgnoresTheSkinnedNodesTransform) {
+  FileBuilder file = skinnedTriangle();
+  const auto still = palette(loaded(file), 0, none, 0);
+  file.json["nodes"][0]["translation"] = {100, 200, 300};
+  const auto moved = palette(loaded(file), 0, none, 0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(std::memcmp(&still[i], &moved[i], sizeof still[i]), 0);
+  }
+}
+
+TEST(GltfSkin, FollowsNodesThatAreNoJoints) {
+  FileBuilder file = skinnedTriangle();
+  // 1 is a joint, 3 between them is none, 2 is a joint again; the root above is outside the scene.
+  file.json["nodes"] = {{{"mesh", 0}, {"skin", 0}},
+                        {{"children", {3}}},
+                        {{"translation", {0, 1, 0}}},
+                        {{"children", {2}}, {"translation", {0, 0, 5}}},
+                        {{"children", {1}}, {"scale", {2, 2, 2}}}};
+  file.json["scenes"][0]["nodes"] = {0};
+  const auto matrices = palette(loaded(file), 0, none, 0);
+  EXPECT_EQ(matrices[1].m[0][0], 2.0f);
+  EXPECT_EQ(matrices[1].m[1][3], 2.0f);
+  EXPECT_EQ(matrices[1].m[2][3], 10.0f);
+}
+
+TEST(GltfSkin, NotesJointsWithoutACommonRoot) {
+  FileBuilder file = skinnedTriangle();
+  file.json["skins"][0]["joints"] = {1, 0};
+  EXPECT_EQ(loaded(file).notes.at(0), "skin 0: its joints have no common root");
+}
+
+TEST(GltfSkin, RefusesBadSkins) {
+  FileBuilder file = skinnedTriangle();
+  Json& skin = file.json["skins"][0];
+  skin["joints"] = {1, 9};
+  expectInvalid(file, "skin 0: an entry of joints is 9, and the file has 3 nodes");
+  skin["joints"] = {1, 1};
+  expectInvalid(file, "skin 0: joints lists 1 twice");
+  skin["joints"] = Json::array();
+  expectInvalid(file, "skin 0: joints is an empty array");
+  skin.erase("joints");
+  expectInvalid(file, "skin 0: it has no joints");
+  skin["joints"] = {1, 2};
+  skin["skeleton"] = 3;
+  expectInvalid(file, "skin 0: skeleton is 3, and the file has 3 nodes");
+  skin.erase("skeleton");
+  skin["inverseBindMatrices"] = 8;
+  expectInvalid(file, "skin 0: inverseBindMatrices is 8, and the file has 3 accessors");
+  skin["inverseBindMatrices"] = 0;
+  expectInvalid(file,
+                "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float where MAT4 of float");
+  file.json["nodes"][0]["skin"] = 1;
+  expectInvalid(file, "node 0: skin is 1, and the file has 1 skins");
+  file.json["skins"] = Json::array();
+  expectInvalid(file, "'skins' is an empty array");
+}
+
+TEST(GltfSkin, RefusesBadMatrices) {
+  const auto withMatrices = [](std::vector<float> matrices) {
+    FileBuilder file = skinnedTriangle();
+    file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(matrices, "MAT4");
+    return file;
+  };
+  const auto two = [](std::size_t place, float value) {
+    std::vector<float> matrices = matrixByColumns(1, 0, 0, 0);
+    matrices.insert(matrices.end(), matrices.begin(), matrices.begin() + 16);
+    matrices[place] = value;
+    return matrices;
+  };
+  expectInvalid(withMatrices(matrixByColumns(1, 0, 0, 0)),
+                "skin 0 inverseBindMatrices: accessor 3 has 1 matrices for 2 joints");
+  expectInvalid(withMatrices(two(20, std::numeric_limits<float>::quiet_NaN())),
+                "skin 0: inverse bind matrix 1 holds a number that is not finite");
+  expectInvalid(withMatrices(two(0, std::numeric_limits<float>::infinity())),
+                "skin 0: inverse bind matrix 0 holds a number that is not finite");
+  expectInvalid(withMatrices(two(19, 0.5f)),
+                "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1");
+  loaded(withMatrices(two(19, 1e-7f)));
+  FileBuilder file = withMatrices(two(0, 1));
+  file.json["bufferViews"].back()["byteStride"] = 64;
+  expectInvalid(file, "inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of 64");
+}
+
+}  // namespace
+}  // namespace dermis::test
