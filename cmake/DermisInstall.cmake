@@ -1,0 +1,49 @@
+# cmake --install: the libraries that were built, their headers, the kernels' sources, and the CMake package `dermis`.
+#
+# Each library is a component of the package with an export file of its own, dermis_NAME_targets.cmake, so that a consumer
+# of dermis::core needs none of what the others are linked with.
+
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(dermisPackageDir ${CMAKE_INSTALL_LIBDIR}/cmake/dermis)
+set(dermisShaderDir ${CMAKE_INSTALL_DATADIR}/dermis/shaders)
+# The headers that belong to one component; those left over belong to core.
+set(dermisHeaders_vulkan vulkan)
+set(dermisHeaders_shader_compiler shader_compiler.h)
+set(dermisHeaders_gltf gltf.h)
+
+get_property(dermisLibraries GLOBAL PROPERTY DERMIS_LIBRARIES)
+set(dermisComponents)
+foreach(library IN LISTS dermisLibraries)
+  get_target_property(component ${library} EXPORT_NAME)
+  list(APPEND dermisComponents ${component})
+  install(TARGETS ${library} EXPORT dermis_${component}
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis
+          INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT dermis_${component} NAMESPACE dermis:: DESTINATION ${dermisPackageDir}
+          FILE dermis_${component}_targets.cmake COMPONENT dermis)
+endforeach()
+
+set(excluded)
+foreach(component IN ITEMS vulkan shader_compiler gltf)
+  if(NOT component IN_LIST dermisComponents)
+    list(APPEND excluded PATTERN dermis/${dermisHeaders_${component}} EXCLUDE)
+  endif()
+endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/engine/include/dermis DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dermis
+        FILES_MATCHING PATTERN "*.h" ${excluded})
+
+# For an engine with an RHI of its own, which compiles the kernels itself and reads the records of abi.h.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/shaders/ DESTINATION ${dermisShaderDir} COMPONENT dermis
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp")
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/dermis COMPONENT dermis)
+
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/dermisConfig.cmake
+  INSTALL_DESTINATION ${dermisPackageDir} PATH_VARS dermisShaderDir NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+# While the version is 0.x, a minor version may change the interface.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
+  VERSION ${PROJECT_VERSION} COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
+        DESTINATION ${dermisPackageDir} COMPONENT dermis)
