@@ -155,7 +155,7 @@ class PrimitiveCheck {
 
 // Sets of four side by side: vertex 0's JOINTS_0, vertex 0's JOINTS_1, …
 template <typename Value>
-void interleave(const std::vector<Value>& set, std::uint32_t number, std::uint32_t width,
+void interleave(const std::vector<Value>& set, std::size_t number, std::size_t width,
                 std::vector<Value>& all) {
   for (std::size_t vertex = 0; vertex * 4 < set.size(); ++vertex) {
     std::copy_n(set.begin() + static_cast<std::ptrdiff_t>(vertex * 4), 4,
@@ -169,7 +169,7 @@ void readInfluences(Source& source, const std::map<std::string, int>& attributes
   if (sets == 0) return;
   const std::uint32_t width = 4 * sets;
   const std::uint64_t size = std::uint64_t{primitive.vertexCount} * width;
-  source.spend(2 * 4 * size, where);
+  source.spend(8 * size, where);
   primitive.influencesPerVertex = width;
   primitive.joints.resize(size);
   primitive.weights.resize(size);
