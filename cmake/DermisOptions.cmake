@@ -4,6 +4,7 @@ option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" O
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_BUILD_FUZZERS "Build the libFuzzer programs; needs Clang, and instruments everything" OFF)
 option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_WARNINGS_AS_ERRORS "Stop at the first compiler warning" OFF)
 set(DERMIS_SANITIZE "" CACHE STRING "Sanitizers to build Dermis with: address, thread, or empty for none")
@@ -14,6 +15,10 @@ if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_BUILD_VULKAN AND DERMIS_BUILD_GLTF))
 endif()
 if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_SAMPLES)
   message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_SAMPLES: the tests use its device and its models")
+endif()
+
+if(DERMIS_BUILD_FUZZERS AND NOT (DERMIS_BUILD_GLTF AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))
+  message(FATAL_ERROR "DERMIS_BUILD_FUZZERS needs Clang and DERMIS_BUILD_GLTF")
 endif()
 
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)

@@ -9,6 +9,9 @@ target_compile_options(dermis_build_flags INTERFACE
 if(DERMIS_WARNINGS_AS_ERRORS)
   target_compile_options(dermis_build_flags INTERFACE -Werror)
 endif()
+if(DERMIS_BUILD_FUZZERS)
+  target_compile_options(dermis_build_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 if(DERMIS_SANITIZE STREQUAL "address")
   target_compile_options(dermis_build_flags INTERFACE
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)

@@ -359,7 +359,9 @@ VKAPI_ATTR VkBool32 VKAPI_CALL Device::onMessage(VkDebugUtilsMessageSeverityFlag
                                                  void* user) {
   Device& device = *static_cast<Device*>(user);
   const std::lock_guard lock(device.messagesMutex_);
-  device.messages_.emplace_back(data->pMessage);
+  // Newer layers leave the identifier out of the text.
+  const std::string identifier = data->pMessageIdName != nullptr ? data->pMessageIdName : "";
+  device.messages_.push_back(identifier + ": " + data->pMessage);
   return VK_FALSE;
 }
 

@@ -23,8 +23,7 @@ class SynchronizationTest : public DeviceTest {};
 std::size_t countHazards(const std::vector<std::string>& messages) {
   return static_cast<std::size_t>(
       std::count_if(messages.begin(), messages.end(), [](const std::string& message) {
-        return message.find("SYNC-HAZARD-READ-AFTER-WRITE") != std::string::npos ||
-               message.find("READ_AFTER_WRITE") != std::string::npos;
+        return message.starts_with("SYNC-HAZARD-READ-AFTER-WRITE");
       }));
 }
 

@@ -12,6 +12,22 @@ struct Attempt {
   TestDevice device;
 };
 
+std::array<Attempt, 2> attempts;
+
+/// Devices go before the process's static objects do: those of the loader and its layers among
+/// them.
+class DestroyDevices : public ::testing::Environment {
+ public:
+  void TearDown() override {
+    for (Attempt& attempt : attempts) {
+      attempt.device.context.reset();
+      attempt.device.device.reset();
+    }
+  }
+};
+[[maybe_unused]] const ::testing::Environment* const destroyDevices =
+    ::testing::AddGlobalTestEnvironment(new DestroyDevices);
+
 void tryToCreate(bool pushDescriptors, Attempt& attempt) {
   samples::DeviceOptions options;
   options.validation = true;
@@ -35,7 +51,6 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
 }  // namespace
 
 TestDevice* testDevice(bool pushDescriptors, std::string& reason) {
-  static std::array<Attempt, 2> attempts;
   Attempt& attempt = attempts[pushDescriptors ? 1 : 0];
   if (!attempt.tried) {
     attempt.tried = true;

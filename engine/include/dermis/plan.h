@@ -88,6 +88,10 @@ struct Variant {
   std::uint64_t key() const;
 };
 
+/// Every variant that a plan with this tuning may need: for an engine that cannot foresee its
+/// batches, to hand to `Context::prepare` while loading.
+std::vector<Variant> everyVariant(const Tuning& tuning);
+
 /// The buffers of a batch.
 enum class BufferRole : std::uint8_t { meshes, matrices, tables, palettes, output };
 

@@ -70,10 +70,14 @@ struct Piece {
   std::uint32_t job;
 };
 
+/// Kernels are specialised for so many influences a vertex; 0 is any number.
+constexpr std::array<std::uint8_t, 4> influenceClasses{1, 2, 4, 0};
+
 std::uint8_t influenceClass(std::uint32_t maxInfluences) {
-  if (maxInfluences <= 1) return 1;
-  if (maxInfluences <= 2) return 2;
-  return maxInfluences <= 4 ? 4 : 0;
+  for (const std::uint8_t influences : influenceClasses) {
+    if (maxInfluences <= influences) return influences;
+  }
+  return 0;
 }
 
 Error invalid(std::string message) {
@@ -184,6 +188,22 @@ std::uint64_t Variant::key() const {
          static_cast<std::uint64_t>(normals) << 12 | static_cast<std::uint64_t>(influences) << 16 |
          static_cast<std::uint64_t>(instancesPerInvocation) << 24 |
          static_cast<std::uint64_t>(workgroupSize) << 32;
+}
+
+std::vector<Variant> everyVariant(const Tuning& tuning) {
+  const auto workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+  std::vector<Variant> variants{
+      {Kernel::palette, Method::dualQuaternion, false, 0, 1, workgroupSize}};
+  for (const Method method : allMethods) {
+    for (const bool normals : {false, true}) {
+      for (const std::uint8_t influences : influenceClasses) {
+        variants.push_back({Kernel::skin, method, normals, influences,
+                            static_cast<std::uint8_t>(tuning.instancesPerInvocation),
+                            workgroupSize});
+      }
+    }
+  }
+  return variants;
 }
 
 struct Plan::State {
