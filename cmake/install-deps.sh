@@ -7,9 +7,9 @@ packages="
 cmake ninja-build g++
 libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
 glslang-dev glslang-tools spirv-tools
-libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev
+libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
-libgtest-dev libbenchmark-dev
+libgtest-dev
 "
 
 if ! command -v dpkg-query >/dev/null 2>&1; then

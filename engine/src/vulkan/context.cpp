@@ -86,7 +86,6 @@ Result<Context> Context::create(const DeviceDescription& description) {
 
   VkPhysicalDeviceProperties properties{};
   state.table.getPhysicalDeviceProperties(description.physicalDevice, &properties);
-  state.deviceType = properties.deviceType;
   // Whole words: NVIDIA says 2^32 - 1.
   state.limits.maxStorageBufferRange = properties.limits.maxStorageBufferRange & ~3u;
   state.limits.minStorageBufferOffsetAlignment =

@@ -24,7 +24,6 @@ struct Context::State {
   const VkAllocationCallbacks* allocator;
   DispatchTable table;
   DeviceLimits limits;
-  VkPhysicalDeviceType deviceType = VK_PHYSICAL_DEVICE_TYPE_OTHER;
   VkDescriptorSetLayout setLayout = VK_NULL_HANDLE;
   VkPipelineLayout pipelineLayout = VK_NULL_HANDLE;
   std::unique_ptr<Pipelines> pipelines;
