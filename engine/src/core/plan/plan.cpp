@@ -1,0 +1,75 @@
+#include "dermis/plan.h"
+
+#include <cstring>
+#include <string>
+
+#include "plan/check.h"
+#include "plan/state.h"
+
+namespace dermis {
+namespace {
+
+constexpr std::uint32_t storageBufferUsage = 0x20;   // VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+constexpr std::uint32_t transferTargetUsage = 0x02;  // VK_BUFFER_USAGE_TRANSFER_DST_BIT
+
+}  // namespace
+
+Plan::Plan() : state_(std::make_unique<State>()) {}
+Plan::~Plan() = default;
+Plan::Plan(Plan&&) noexcept = default;
+Plan& Plan::operator=(Plan&&) noexcept = default;
+
+std::span<const Dispatch> Plan::dispatches() const {
+  return state_->dispatches;
+}
+std::span<const Variant> Plan::variants() const {
+  return state_->variants;
+}
+std::uint32_t Plan::instanceCount() const {
+  return state_->instanceCount;
+}
+std::uint64_t Plan::vertexCount() const {
+  return state_->vertexCount;
+}
+
+std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
+  if (palette >= state_->paletteUnits.size() || state_->paletteUnits[palette] == notUsed)
+    return noStatus;
+  return state_->paletteUnits[palette] * unitBytes;
+}
+
+BufferRequirement Plan::buffer(BufferRole role) const {
+  const std::uint32_t alignment = state_->alignment;
+  switch (role) {
+    case BufferRole::meshes:
+      return {state_->meshesSize, alignment, storageBufferUsage | transferTargetUsage, false, true};
+    case BufferRole::matrices:
+      return {state_->matricesSize, alignment, storageBufferUsage, true, true};
+    case BufferRole::tables:
+      return {state_->tables.size() * 4, alignment, storageBufferUsage, true, true};
+    case BufferRole::palettes:
+      return {state_->palettesSize, alignment, storageBufferUsage, true, false};
+    case BufferRole::output:
+      return {state_->outputSize, alignment, storageBufferUsage, false, false};
+  }
+  return {};
+}
+
+Result<void> plan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning, Plan& out) {
+  out.state_->clear();
+  Result<void> built = out.state_->build(batch, limits, tuning);
+  if (!built) out.state_->clear();
+  return built;
+}
+
+Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes) {
+  const std::vector<std::uint32_t>& tables = plan.state_->tables;
+  if (bytes.size() < tables.size() * 4) {
+    return invalid("the tables of the plan need " + std::to_string(tables.size() * 4) +
+                   " bytes, there are " + std::to_string(bytes.size()));
+  }
+  if (!tables.empty()) std::memcpy(bytes.data(), tables.data(), tables.size() * 4);
+  return {};
+}
+
+}  // namespace dermis
