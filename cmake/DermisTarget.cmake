@@ -37,7 +37,7 @@ function(dermis_add_library name)
   add_library(dermis::${name} ALIAS dermis_${name})
   set_target_properties(dermis_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(dermis_${name}
-    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/engine/include> $<INSTALL_INTERFACE:include>
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/engine/include>
     PRIVATE ${PROJECT_SOURCE_DIR}/engine/src)
   dermis_configure_target(dermis_${name})
   set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})

@@ -37,7 +37,7 @@ struct Crowd {
   dermis::samples::MappedBuffer meshes;
   dermis::samples::MappedBuffer output;  ///< The vertex buffer that the engine draws from.
   std::array<Frame, framesInFlight> frames;
-  // Reused from frame to frame, so that planning stops allocating.
+  // Reused from frame to frame, to keep their memory.
   std::vector<dermis::Palette> palettes;
   std::vector<dermis::Job> jobs;
   dermis::Plan plan;

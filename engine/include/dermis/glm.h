@@ -11,8 +11,8 @@ namespace dermis {
 /// The upper three rows of a GLM matrix (its last row must be 0 0 0 1).
 inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
   JointMatrix result;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) result.m[row][column] = matrix[column][row];
+  for (glm::length_t row = 0; row < 3; ++row) {
+    for (glm::length_t column = 0; column < 4; ++column) result.m[row][column] = matrix[column][row];
   }
   return result;
 }
@@ -20,8 +20,8 @@ inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
 /// Four columns of three.
 inline glm::mat4x3 toGlm(const JointMatrix& matrix) {
   glm::mat4x3 result(1.0f);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) result[column][row] = matrix.m[row][column];
+  for (glm::length_t row = 0; row < 3; ++row) {
+    for (glm::length_t column = 0; column < 4; ++column) result[column][row] = matrix.m[row][column];
   }
   return result;
 }

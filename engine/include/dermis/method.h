@@ -18,7 +18,7 @@ enum class Method : std::uint8_t {
   dualQuaternion,
 };
 
-inline constexpr std::array allMethods{Method::linear, Method::dualQuaternion};
+inline constexpr std::array<Method, 2> allMethods{Method::linear, Method::dualQuaternion};
 
 /// The method's name on the command line and in reports: "linear", "dual_quaternion".
 std::string_view methodName(Method method);

@@ -1,0 +1,46 @@
+# cmake --install: the files that must be there, no other, and none that knows where it was built or first installed.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+set(staging "${testFolder}/staging")
+file(REMOVE_RECURSE "${staging}" "${prefix}")
+run(ignored "Install into ${staging}" ${CMAKE_COMMAND} --install "${buildFolder}" --prefix "${staging}")
+say("Move it to ${prefix}")
+file(RENAME "${staging}" "${prefix}")
+
+say("Compare the list of files")
+set(expected)
+foreach(component IN ITEMS core gltf shader_compiler vulkan)
+  list(APPEND expected ${libFolder}/libdermis_${component}.a
+       ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
+endforeach()
+list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/cmake/dermis/dermisConfigVersion.cmake
+     ${dataFolder}/doc/dermis/LICENSE)
+file(GLOB_RECURSE headers RELATIVE "${sourceFolder}/engine/include" "${sourceFolder}/engine/include/*.h")
+list(TRANSFORM headers PREPEND ${includeFolder}/)
+file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
+     "${sourceFolder}/shaders/*.comp")
+list(TRANSFORM shaders PREPEND ${dataFolder}/dermis/shaders/)
+list(APPEND expected ${headers} ${shaders})
+
+file(GLOB_RECURSE installed RELATIVE "${prefix}" "${prefix}/*")
+list(FILTER installed EXCLUDE REGEX "_targets-[a-z]+\\.cmake$")  # one for each build type
+list(SORT expected)
+list(SORT installed)
+if(NOT installed STREQUAL expected)
+  set(missing ${expected})
+  list(REMOVE_ITEM missing ${installed})
+  list(REMOVE_ITEM installed ${expected})
+  wrong("missing: ${missing}\nnot expected: ${installed}")
+endif()
+
+say("Look for paths of this machine in the package's CMake files")
+file(GLOB_RECURSE files "${prefix}/*.cmake")
+foreach(file IN LISTS files)
+  file(READ "${file}" text)
+  foreach(path IN ITEMS "${sourceFolder}" "${buildFolder}" "${staging}")
+    string(FIND "${text}" "${path}" place)
+    if(NOT place EQUAL -1)
+      wrong("${file} names ${path}")
+    endif()
+  endforeach()
+endforeach()

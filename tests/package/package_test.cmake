@@ -1,0 +1,43 @@
+# What the scripts of this folder share.
+cmake_minimum_required(VERSION 3.25)
+include("${SETTINGS}")
+
+# say(TEXT): progress, on standard output.
+function(say text)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E echo "${text}")
+endfunction()
+
+# wrong(TEXT): ends the test.
+function(wrong text)
+  message(FATAL_ERROR "${text}")
+endfunction()
+
+# run(OUTPUT what COMMAND...): runs a command that must succeed; OUTPUT gets all that it printed.
+function(run output what)
+  say("${what}")
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE printed ERROR_VARIABLE printed)
+  if(NOT status EQUAL 0)
+    wrong("${what}: failed with ${status}\n${printed}")
+  endif()
+  set(${output} "${printed}" PARENT_SCOPE)
+endfunction()
+
+# build_consumer(SOURCE ARGUMENTS...): configures, with nothing left from before, and builds a project with COMPILER, in
+# BUILD, which it sets. SOURCE is a path, or the name of a folder in consumers/. A warning of CMake is an error. CONFIGURED gets what CMake printed.
+function(build_consumer source)
+  cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${scriptFolder}/consumers")
+  set(build "${testFolder}/${NAME}")
+  file(REMOVE_RECURSE "${build}")
+  run(configured "Configure ${source} with ${COMPILER}" ${CMAKE_COMMAND} -S "${source}"
+    -B "${build}" -G "${generator}" "-DCMAKE_MAKE_PROGRAM=${makeProgram}" "-DCMAKE_CXX_COMPILER=${COMPILER}"
+    "-DCMAKE_CXX_FLAGS=${consumerFlags}" "-DCMAKE_PREFIX_PATH=${prefix}" "-DDERMIS_VERSION=${version}"
+    "-DDERMIS_INCLUDE_FOLDER=${prefix}/${includeFolder}" --no-warn-unused-cli ${ARGN})
+  if(configured MATCHES "CMake (Deprecation )?Warning")
+    wrong("CMake warns:\n${configured}")
+  endif()
+  run(built "Build it" ${CMAKE_COMMAND} --build "${build}" --parallel 2)
+  if(built MATCHES "warning: ")
+    wrong("the compiler warns:\n${built}")
+  endif()
+  set(BUILD "${build}" PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,1 @@
+#error "dermis::core must not need <glslang/Public/ShaderLang.h>"

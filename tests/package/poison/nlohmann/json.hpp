@@ -1,0 +1,1 @@
+#error "dermis::core must not need <nlohmann/json.hpp>"

@@ -1,0 +1,1 @@
+#error "dermis::core must not need <vulkan/vulkan.hpp>"

@@ -1,0 +1,27 @@
+# An engine that has Dermis as a subproject: the folders that a build needs are copied below an engine's source, so that what
+# is written there is seen.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+set(engine "${testFolder}/${NAME}.source")
+file(REMOVE_RECURSE "${engine}")
+file(COPY "${scriptFolder}/consumers/subproject/CMakeLists.txt" "${scriptFolder}/consumers/vulkan/main.cpp"
+     DESTINATION "${engine}")
+file(COPY "${scriptFolder}/consumers/consumer.cmake" DESTINATION "${engine}/consumers")
+file(COPY "${sourceFolder}/CMakeLists.txt" "${sourceFolder}/cmake" "${sourceFolder}/engine" "${sourceFolder}/shaders"
+     DESTINATION "${engine}/third_party/dermis")
+file(GLOB_RECURSE before "${engine}/*")
+
+set(consumerFlags "")  # nothing of this build is linked
+build_consumer("${engine}" -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
+run(printed "Run engine" "${BUILD}/engine")
+say("${printed}")
+
+file(GLOB_RECURSE after "${engine}/*")
+if(NOT after STREQUAL before)
+  list(REMOVE_ITEM after ${before})
+  wrong("the build wrote into the source: ${after}")
+endif()
+file(GLOB programs "${BUILD}/bin/*" "${BUILD}/lib/*")
+if(programs)
+  wrong("the build set output folders: ${programs}")
+endif()
