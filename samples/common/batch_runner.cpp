@@ -82,10 +82,7 @@ void fill(const Layout& layout, std::span<const SkinRequest> requests, const Buf
 
 void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
                    const vulkan::Dependency& dependency) {
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstAccessMask = dependency.destination.accesses;
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
   device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
                                         dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
                                         0, nullptr);

@@ -52,10 +52,7 @@ Result<void> makeBuffer(samples::Device& engine, const Plan& plan, BufferRole ro
 
 void recordBarrier(const samples::Device& engine, VkCommandBuffer commandBuffer,
                    const vulkan::Dependency& dependency) {
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstAccessMask = dependency.destination.accesses;
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
   engine.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
                                         dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
                                         0, nullptr);
@@ -108,7 +105,7 @@ Result<void> skinFrame(const samples::Device& engine, Crowd& crowd, Frame& frame
   if (Result<void> done = writeTables(crowd.plan, frame.tables.bytes()); !done) return done;
 
   // The barriers at the edges are the engine's: only it knows what stands before and after.
-  recordBarrier(engine, commandBuffer, vulkan::inputScope(vulkan::Producer::previousRecord));
+  recordBarrier(engine, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
   if (Result<void> done = crowd.context.record(commandBuffer, crowd.plan, frame.bindings); !done)
     return done;
   // This program reads the vertices back; one that draws them says Consumer::vertexInput.

@@ -52,11 +52,8 @@ class ThreadsTest : public DeviceTest {
  protected:
   /// Each repeat uses the palettes and the output of the one before.
   void recordEdge(VkCommandBuffer commandBuffer) {
-    const vulkan::Dependency dependency = vulkan::inputScope(vulkan::Producer::previousRecord);
-    VkMemoryBarrier barrier{};
-    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-    barrier.srcAccessMask = dependency.source.accesses;
-    barrier.dstAccessMask = dependency.destination.accesses;
+    const vulkan::Dependency dependency = vulkan::inputScope(vulkan::PreviousUse::previousRecord);
+    const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
     device().functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
                                             dependency.destination.stages, 0, 1, &barrier, 0,
                                             nullptr, 0, nullptr);

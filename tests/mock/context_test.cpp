@@ -304,12 +304,37 @@ TEST(ScopeTest, OutputScopesNameTheConsumer) {
               dependency.destination.accesses);
   }
   const VkBufferMemoryBarrier barrier =
-      outputBarrier(Consumer::vertexInput, reinterpret_cast<VkBuffer>(std::uintptr_t{5}), 16, 32,
-                    QueueTransfer::release, 1, 2);
+      bufferBarrier(outputScope(Consumer::vertexInput, QueueTransfer::release),
+                    reinterpret_cast<VkBuffer>(std::uintptr_t{5}), 16, 32, 1, 2);
   EXPECT_EQ(barrier.srcQueueFamilyIndex, 1u);
   EXPECT_EQ(barrier.dstQueueFamilyIndex, 2u);
   EXPECT_EQ(barrier.offset, 16u);
   EXPECT_EQ(barrier.size, 32u);
+}
+
+TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
+  using namespace vulkan;
+  for (const PreviousUse writer :
+       {PreviousUse::hostWrite, PreviousUse::transferWrite, PreviousUse::computeWrite}) {
+    EXPECT_NE(inputScope(writer).source.accesses, 0u);
+    EXPECT_EQ(inputScope(writer).destination.accesses,
+              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT));
+  }
+  for (const PreviousUse reader :
+       {PreviousUse::vertexInput, PreviousUse::vertexShader, PreviousUse::compute,
+        PreviousUse::accelerationStructureBuild, PreviousUse::transfer}) {
+    EXPECT_NE(inputScope(reader).source.stages, 0u);
+    EXPECT_EQ(inputScope(reader).source.accesses, 0u);
+    EXPECT_EQ(inputScope(reader).destination.stages,
+              static_cast<VkPipelineStageFlags>(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
+  }
+  const Dependency both =
+      inputScope(PreviousUse::transferWrite) | inputScope(PreviousUse::vertexInput);
+  EXPECT_EQ(both.source.stages,
+            static_cast<VkPipelineStageFlags>(VK_PIPELINE_STAGE_TRANSFER_BIT |
+                                              VK_PIPELINE_STAGE_VERTEX_INPUT_BIT));
+  EXPECT_EQ(memoryBarrier(both).srcAccessMask,
+            static_cast<VkAccessFlags>(VK_ACCESS_TRANSFER_WRITE_BIT));
 }
 
 TEST(KernelsTest, SpirvAndConstantsAreThereWithoutADevice) {

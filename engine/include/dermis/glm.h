@@ -12,7 +12,8 @@ namespace dermis {
 inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
   JointMatrix result;
   for (glm::length_t row = 0; row < 3; ++row) {
-    for (glm::length_t column = 0; column < 4; ++column) result.m[row][column] = matrix[column][row];
+    for (glm::length_t column = 0; column < 4; ++column)
+      result.m[row][column] = matrix[column][row];
   }
   return result;
 }
@@ -21,7 +22,8 @@ inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
 inline glm::mat4x3 toGlm(const JointMatrix& matrix) {
   glm::mat4x3 result(1.0f);
   for (glm::length_t row = 0; row < 3; ++row) {
-    for (glm::length_t column = 0; column < 4; ++column) result[column][row] = matrix.m[row][column];
+    for (glm::length_t column = 0; column < 4; ++column)
+      result[column][row] = matrix.m[row][column];
   }
   return result;
 }

@@ -61,10 +61,10 @@ struct MeshView {
   std::span<const InfluenceSet> influenceSets;
 };
 
-/// A tightly packed float32 attribute.
+/// A float32 attribute; `stride` in bytes, 0 for tightly packed.
 inline AttributeView floatAttribute(const float* data, std::uint32_t count,
-                                    std::uint32_t components) {
-  return {data, count, components * 4, ComponentType::float32, components};
+                                    std::uint32_t components, std::uint32_t stride = 0) {
+  return {data, count, stride != 0 ? stride : components * 4, ComponentType::float32, components};
 }
 
 }  // namespace dermis

@@ -65,9 +65,13 @@ class [[nodiscard]] Result {
   const T* operator->() const { return &value(); }
 
   /// The error; only where not `ok()`.
-  const Error& error() const {
+  const Error& error() const& {
     assert(!ok());
     return *std::get_if<1>(&state_);
+  }
+  Error error() && {
+    assert(!ok());
+    return std::move(*std::get_if<1>(&state_));
   }
 
  private:
@@ -84,9 +88,13 @@ class [[nodiscard]] Result<void> {
   explicit operator bool() const { return ok_; }
 
   /// The error; only where not `ok()`.
-  const Error& error() const {
+  const Error& error() const& {
     assert(!ok_);
     return error_;
+  }
+  Error error() && {
+    assert(!ok_);
+    return std::move(error_);
   }
 
  private:

@@ -26,21 +26,32 @@ Scope scopeOf(Consumer consumer) {
 
 }  // namespace
 
-Dependency inputScope(Producer producer) {
+Dependency inputScope(PreviousUse use) {
   const Scope reads{compute, VK_ACCESS_SHADER_READ_BIT};
-  const Scope writes{compute, VK_ACCESS_SHADER_WRITE_BIT};
-  switch (producer) {
-    case Producer::hostWrite:
+  // Overwriting what was only read needs no memory made visible: an execution dependency.
+  const auto afterReader = [](Consumer reader) {
+    return Dependency{{scopeOf(reader).stages, 0}, {compute, 0}};
+  };
+  switch (use) {
+    case PreviousUse::hostWrite:
       return {{VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_WRITE_BIT}, reads};
-    case Producer::transferWrite:
+    case PreviousUse::transferWrite:
       return {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}, reads};
-    case Producer::computeWrite:
+    case PreviousUse::computeWrite:
       return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, reads};
-    // Reading before writing needs no memory made visible: an execution dependency.
-    case Producer::vertexInput:
-      return {{VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, 0}, {compute, 0}};
-    case Producer::previousRecord:
-      return {writes, {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}};
+    case PreviousUse::vertexInput:
+      return afterReader(Consumer::vertexInput);
+    case PreviousUse::vertexShader:
+      return afterReader(Consumer::vertexShader);
+    case PreviousUse::compute:
+      return afterReader(Consumer::compute);
+    case PreviousUse::accelerationStructureBuild:
+      return afterReader(Consumer::accelerationStructureBuild);
+    case PreviousUse::transfer:
+      return afterReader(Consumer::transfer);
+    case PreviousUse::previousRecord:
+      return {{compute, VK_ACCESS_SHADER_WRITE_BIT},
+              {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}};
   }
   return {};
 }
@@ -54,18 +65,23 @@ Dependency outputScope(Consumer consumer, QueueTransfer transfer) {
   return dependency;
 }
 
-VkBufferMemoryBarrier outputBarrier(Consumer consumer, VkBuffer buffer, VkDeviceSize offset,
-                                    VkDeviceSize size, QueueTransfer transfer,
+VkMemoryBarrier memoryBarrier(const Dependency& dependency) {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  return barrier;
+}
+
+VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffer,
+                                    VkDeviceSize offset, VkDeviceSize size,
                                     std::uint32_t sourceFamily, std::uint32_t destinationFamily) {
-  const Dependency dependency = outputScope(consumer, transfer);
   VkBufferMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
   barrier.srcAccessMask = dependency.source.accesses;
   barrier.dstAccessMask = dependency.destination.accesses;
-  barrier.srcQueueFamilyIndex =
-      transfer == QueueTransfer::none ? VK_QUEUE_FAMILY_IGNORED : sourceFamily;
-  barrier.dstQueueFamilyIndex =
-      transfer == QueueTransfer::none ? VK_QUEUE_FAMILY_IGNORED : destinationFamily;
+  barrier.srcQueueFamilyIndex = sourceFamily;
+  barrier.dstQueueFamilyIndex = destinationFamily;
   barrier.buffer = buffer;
   barrier.offset = offset;
   barrier.size = size;

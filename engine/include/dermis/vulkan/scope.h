@@ -23,15 +23,29 @@ struct Dependency {
   Scope destination;
 };
 
-/// Who wrote what `record` reads (meshes, matrices, tables), or used what it overwrites (palettes,
-/// output).
-enum class Producer : std::uint8_t {
-  hostWrite,  ///< written through a mapping before the submission: `vkQueueSubmit` is the barrier,
-              ///< nothing to record
-  transferWrite,   ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
-  computeWrite,    ///< another compute pass
-  vertexInput,     ///< the last frame's draws still read the output
-  previousRecord,  ///< an earlier `record` used the same palettes buffer or output
+/// Both needs in one barrier: a frame that uploads its tables and overwrites what the last frame
+/// drew has two.
+inline Dependency operator|(const Dependency& a, const Dependency& b) {
+  return {{a.source.stages | b.source.stages, a.source.accesses | b.source.accesses},
+          {a.destination.stages | b.destination.stages,
+           a.destination.accesses | b.destination.accesses}};
+}
+
+/// What a buffer of the batch was last used for, before `record`.
+enum class PreviousUse : std::uint8_t {
+  // Someone wrote what `record` reads: meshes, matrices, tables.
+  hostWrite,  ///< through a mapping, before the submission: `vkQueueSubmit` is the barrier, none is
+              ///< needed
+  transferWrite,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
+  computeWrite,   ///< another compute pass
+  // Someone still reads what `record` overwrites: the output.
+  vertexInput,                 ///< draws, as a vertex buffer
+  vertexShader,                ///< draws, as a storage or texel buffer
+  compute,                     ///< another compute pass
+  accelerationStructureBuild,  ///< a build or refit
+  transfer,                    ///< vkCmdCopyBuffer
+  // Both: the palettes, and the output.
+  previousRecord,  ///< an earlier `record` used the same buffer
 };
 
 /// Who reads the skinned vertices next.
@@ -49,17 +63,20 @@ enum class Consumer : std::uint8_t {
 /// source scope (Vulkan 1.3, 7.7.4).
 enum class QueueTransfer : std::uint8_t { none, release, acquire };
 
-/// The barrier before `record`, for the buffers that `producer` touched.
-Dependency inputScope(Producer producer);
+/// The barrier before `record`, for a buffer that was last used so.
+Dependency inputScope(PreviousUse use);
 
 /// The barrier after `record`, for the output buffer.
 Dependency outputScope(Consumer consumer, QueueTransfer transfer = QueueTransfer::none);
 
-/// `outputScope` as a buffer barrier over a range of the output; the engine passes it to
-/// vkCmdPipelineBarrier with the stages of `outputScope`. Without a queue-family transfer both
-/// families are VK_QUEUE_FAMILY_IGNORED.
-VkBufferMemoryBarrier outputBarrier(Consumer consumer, VkBuffer buffer, VkDeviceSize offset,
-                                    VkDeviceSize size, QueueTransfer transfer = QueueTransfer::none,
+/// A dependency as the structures that vkCmdPipelineBarrier takes; the stages are those of its two
+/// scopes.
+VkMemoryBarrier memoryBarrier(const Dependency& dependency);
+
+/// The same for a part of one buffer and, where the families differ, as one half of a queue-family
+/// transfer.
+VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffer,
+                                    VkDeviceSize offset, VkDeviceSize size,
                                     std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
                                     std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
 

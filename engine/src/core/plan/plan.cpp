@@ -39,14 +39,16 @@ std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
 }
 
 BufferRequirement Plan::buffer(BufferRole role) const {
+  // What the host fills may be staged: written to another buffer, and copied.
+  constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
   const std::uint32_t alignment = state_->alignment;
   switch (role) {
     case BufferRole::meshes:
-      return {state_->meshesSize, alignment, storageBufferUsage | transferTargetUsage, false, true};
+      return {state_->meshesSize, alignment, filled, false, true};
     case BufferRole::matrices:
-      return {state_->matricesSize, alignment, storageBufferUsage, true, true};
+      return {state_->matricesSize, alignment, filled, true, true};
     case BufferRole::tables:
-      return {state_->tables.size() * 4, alignment, storageBufferUsage, true, true};
+      return {state_->tables.size() * 4, alignment, filled, true, true};
     case BufferRole::palettes:
       return {state_->palettesSize, alignment, storageBufferUsage, true, false};
     case BufferRole::output:
