@@ -64,8 +64,8 @@ struct ScaleShear {
   vec3 mixed;     // xy xz yz
 };
 
-// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the sign goes into S; a
-// determinant that rounding could have made negative counts as 0.
+// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the sign goes into S; one so
+// small that rounding may have made it negative counts as 0: a flat matrix stored in float32 comes to 1e-6.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
   if (largest == 0.0) {
@@ -77,7 +77,7 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
   precise vec3 n1 = r1 / largest;
   precise vec3 n2 = r2 / largest;
   precise float determinant = dot3(n0, cross3(n1, n2));
-  float side = determinant < -2e-7 ? -1.0 : 1.0;
+  float side = determinant < -4e-6 ? -1.0 : 1.0;
   rotation = nearestRotation(side * n0, side * n1, side * n2);
 
   // Columns of S: each column of C turned back, averaged with its transpose.

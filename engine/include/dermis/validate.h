@@ -63,16 +63,22 @@ const char* problemName(Problem problem);
 /// glTF validator), or when the stored integers sum to 255 or 65535 exactly.
 MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
-/// A copy of a mesh with its bad values mended. Owns its memory.
+/// A copy of a mesh with its bad values mended. Owns its memory; movable, not copyable.
 class RepairedMesh {
  public:
+  RepairedMesh(RepairedMesh&&) = default;
+  RepairedMesh& operator=(RepairedMesh&&) = default;
+  RepairedMesh(const RepairedMesh&) = delete;
+  RepairedMesh& operator=(const RepairedMesh&) = delete;
+
   /// The mended mesh: float32 attributes, one influence set of uint32 joints and float32 weights.
-  /// Valid as long as this object lives and is not moved from.
+  /// Valid as long as this object lives and is neither moved nor assigned to.
   MeshView view() const;
   /// What was found before: every finding that `refusedByPack` has been mended.
   const MeshReport& report() const { return report_; }
 
  private:
+  RepairedMesh() = default;
   friend Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
 
   std::string name_;

@@ -10,6 +10,9 @@
 
 namespace dermis {
 
+/// What `loadWeight` returns for a weight of 1.
+inline constexpr double wholeWeight = 65535.0;
+
 template <typename Stored>
 Stored loadComponent(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
   Stored value;
@@ -36,18 +39,17 @@ inline std::uint32_t loadUnsigned(const AttributeView& view, std::uint32_t eleme
   return 0;
 }
 
-/// A float, or a normalised integer's value.
-inline double loadNumber(const AttributeView& view, std::uint32_t element,
+/// A weight times 65535. In these units weights that are stored as integers are integers, whose
+/// sums are exact: which influence is the strongest must not depend on how a quotient is rounded.
+inline double loadWeight(const AttributeView& view, std::uint32_t element,
                          std::uint32_t component) {
   switch (view.type) {
-    case ComponentType::float32:
-      return static_cast<double>(loadComponent<float>(view, element, component));
     case ComponentType::unorm8:
-      return loadUnsigned(view, element, component) / 255.0;
+      return loadUnsigned(view, element, component) * 257.0;
     case ComponentType::unorm16:
-      return loadUnsigned(view, element, component) / 65535.0;
-    default:
       return loadUnsigned(view, element, component);
+    default:
+      return static_cast<double>(loadComponent<float>(view, element, component)) * wholeWeight;
   }
 }
 

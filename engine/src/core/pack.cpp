@@ -41,7 +41,7 @@ void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
   influences.clear();
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
-      const double weight = loadNumber(set.weights, vertex, slot);
+      const double weight = loadWeight(set.weights, vertex, slot);
       if (weight == 0) continue;
       const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
       const auto same = std::find_if(influences.begin(), influences.end(),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "attribute.h"
@@ -164,7 +165,7 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
   bool good = true;
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
-      const double weight = loadNumber(set.weights, vertex, slot);
+      const double weight = loadWeight(set.weights, vertex, slot);
       if (weight == 0) continue;
       const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
       if (!std::isfinite(weight)) {
@@ -189,7 +190,7 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
         good = false;
         continue;
       }
-      sum += weight;
+      sum += weight / wholeWeight;
       ++usedWeights;
       used.push_back(joint);
     }
@@ -200,8 +201,11 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
     return;
   }
   if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
-    findings.addVertex(Problem::weightsNotNormalized, vertex,
-                       [&] { return "the weights sum to " + std::to_string(sum) + ", not to 1"; });
+    findings.addVertex(Problem::weightsNotNormalized, vertex, [&] {
+      char digits[32];
+      std::snprintf(digits, sizeof(digits), "%.9g", sum);
+      return std::string("the weights sum to ") + digits + ", not to 1";
+    });
   }
   std::sort(used.begin(), used.end());
   const auto twice = std::adjacent_find(used.begin(), used.end());

@@ -212,6 +212,7 @@ void Plan::State::writeInstances(const Batch& batch, const DeviceLimits& limits,
 
 Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& limits,
                                 const Tuning& tuning) {
+  if (Result<void> good = checkLimits(limits); !good) return good;
   if (Result<void> good = checkTuning(tuning); !good) return good;
   meshesSize = batch.meshesSize;
   matricesSize = batch.matricesSize;

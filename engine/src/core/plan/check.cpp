@@ -90,6 +90,17 @@ Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_
   return {};
 }
 
+Result<void> checkLimits(const DeviceLimits& limits) {
+  // Far below what Vulkan guarantees; what is asked here is that nothing below divides by zero.
+  if (limits.maxWorkgroupCountX == 0 || limits.maxWorkgroupCountY == 0 ||
+      limits.maxStorageBufferRange < 1024 ||
+      !std::has_single_bit(limits.minStorageBufferOffsetAlignment) ||
+      limits.minStorageBufferOffsetAlignment > limits.maxStorageBufferRange / 4) {
+    return invalid("the limits are not those of a Vulkan device");
+  }
+  return {};
+}
+
 Result<void> checkTuning(const Tuning& tuning) {
   if (!std::has_single_bit(tuning.workgroupSize) || tuning.workgroupSize < 8 ||
       tuning.workgroupSize > 128) {

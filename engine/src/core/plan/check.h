@@ -14,6 +14,7 @@ inline constexpr std::uint32_t outputAttributeSize = 12;
 Error invalid(std::string message);
 std::string jobName(std::size_t index);
 
+Result<void> checkLimits(const DeviceLimits& limits);
 Result<void> checkTuning(const Tuning& tuning);
 Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index);
 Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index);

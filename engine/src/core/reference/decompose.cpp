@@ -37,6 +37,12 @@ glm::dvec3 anyPerpendicular(const glm::dvec3& v) {
   return glm::normalize(glm::cross(v, axis));
 }
 
+double largestEntry(const glm::dmat3& matrix) {
+  double largest = 0;
+  for (int i = 0; i < 9; ++i) largest = std::max(largest, std::abs(matrix[i / 3][i % 3]));
+  return largest;
+}
+
 }  // namespace
 
 SingularValues singularValues(const glm::dmat3& matrix) {
@@ -78,9 +84,9 @@ PolarParts polarParts(const glm::dmat3& matrix) {
 
   const double determinant = glm::determinant(matrix);
   const bool singular = svd.values[2] <= 1e-6 * svd.values[0];
-  // Float32 cannot tell a mirror this thin from none.
-  parts.degenerate |=
-      determinant < 0 && svd.values[1] * svd.values[2] <= 1e-5 * svd.values[0] * svd.values[0];
+  // A kernel decides by a determinant in float32: in between it may decide otherwise.
+  const double share = std::abs(determinant) / std::pow(largestEntry(matrix), 3);
+  if (determinant < 0) parts.degenerate |= singular ? share > 2e-6 : share <= 1e-5;
   const bool mirrored = determinant < 0 && !singular;
 
   glm::dmat3 left = mirrored ? -svd.left : svd.left;

@@ -99,23 +99,26 @@ Joint takeApart(const JointMatrix& matrix) {
 
 struct Influence {
   std::uint32_t joint;
-  double weight;
+  double stored;      ///< the weight as stored, times 65535, duplicates added up: what the pivot is
+                      ///< chosen by
+  double weight = 0;  ///< normalised
 };
 
+/// A weight times 65535: sums of what is stored as integers then are exact, and a tie is a tie.
 double readWeight(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
   const auto* element = static_cast<const unsigned char*>(view.data) + vertex * view.stride;
   switch (view.type) {
     case ComponentType::unorm8:
-      return element[slot] / 255.0;
+      return element[slot] * 257.0;
     case ComponentType::unorm16: {
       std::uint16_t value;
       std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return value / 65535.0;
+      return value;
     }
     default: {
       float value;
       std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return static_cast<double>(value);
+      return static_cast<double>(value) * 65535.0;
     }
   }
 }
@@ -160,22 +163,22 @@ void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influe
   double sum = 0;
   std::size_t kept = 0;
   for (const Influence& influence : influences) {
-    sum += influence.weight;
+    sum += influence.stored;
     if (kept > 0 && influences[kept - 1].joint == influence.joint) {
-      influences[kept - 1].weight += influence.weight;
+      influences[kept - 1].stored += influence.stored;
     } else {
       influences[kept++] = influence;
     }
   }
   influences.resize(kept);
-  for (Influence& influence : influences) influence.weight /= sum;
+  for (Influence& influence : influences) influence.weight = influence.stored / sum;
 }
 
 /// The strongest influence, the lowest joint on a tie: the order is that of joints.
 std::size_t pivotOf(std::span<const Influence> influences) {
   std::size_t pivot = 0;
   for (std::size_t i = 1; i < influences.size(); ++i) {
-    if (influences[i].weight > influences[pivot].weight) pivot = i;
+    if (influences[i].stored > influences[pivot].stored) pivot = i;
   }
   return pivot;
 }
@@ -192,8 +195,9 @@ dvec3 transformNormal(const dmat3& m, const dvec3& normal, Conditioning& conditi
   const double largest = singularValues(m).values[0];
   const double inputLength = glm::length(normal);
   conditioning.normalRotatedOnly = false;
+  if (inputLength == 0) return result;  // stays zero, exactly
   conditioning.normalAlignment =
-      largest > 0 && inputLength > 0 ? glm::length(result) / (largest * largest * inputLength) : 0;
+      largest > 0 ? glm::length(result) / (largest * largest * inputLength) : 0;
   // Where the determinant is a matter of rounding, so is the side that the normal points to.
   if (std::abs(determinant) <= 1e-5 * largest * largest * largest) conditioning.normalAlignment = 0;
   return determinant < 0 ? -result : result;

@@ -1,0 +1,314 @@
+// Dual-quaternion blending of rigid joints in the reference: what it keeps, and which influence
+// decides the signs.
+
+#include "reference_rig.h"
+
+namespace dermis::test {
+namespace {
+
+JointMatrix turnAboutZ(double degrees) {
+  return jointOf(rotationAbout({0, 0, 1}, degrees * pi / 180));
+}
+
+/// The angle, in degrees from 0 to 360, by which (1, 0, 0) is turned about z.
+double angleOf(const reference::Double3& p) {
+  const double angle = std::atan2(p[1], p[0]) * 180 / pi;
+  return angle < -1e-5 ? angle + 360 : angle;
+}
+
+double blendedAngle(std::span<const JointMatrix> pose, std::initializer_list<RigInfluence> slots) {
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = static_cast<std::uint32_t>(slots.size());
+  addVertex(mesh, {1, 0, 0}, slots);
+  return angleOf(skinned(mesh, pose, Method::dualQuaternion).positions[0]);
+}
+
+TEST(ReferenceDualQuaternion, OneInfluenceIsItsJoint) {
+  RigRandom random(1);
+  std::vector<JointMatrix> pose;
+  for (int joint = 0; joint < 50; ++joint) {
+    pose.push_back(
+        jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(3)));
+  }
+  OwnedMesh mesh = scatteredMesh(random, 500, 50, 1);
+  const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
+  for (std::size_t vertex = 0; vertex < 500; ++vertex) {
+    const JointMatrix& joint = pose[mesh.joints[vertex]];
+    expectNear(toVector(dual.positions[vertex]),
+               linearOf(joint) * bindPosition(mesh, vertex) + offsetOf(joint), 1e-14);
+  }
+}
+
+TEST(ReferenceDualQuaternion, TranslationsBlendLinearly) {
+  const std::array pose{jointOf(glm::dmat3(1.0), {1, 2, 3}), jointOf(glm::dmat3(1.0), {5, -2, 7})};
+  OwnedMesh mesh;
+  addVertex(mesh, {1, 1, 1}, {{0, 0.25f}, {1, 0.75f}});
+  expectNear(toVector(skinned(mesh, pose, Method::dualQuaternion).positions[0]), {5, 0, 7}, 1e-15);
+}
+
+TEST(ReferenceDualQuaternion, HalfTurnsAboutEveryAxis) {
+  RigRandom random(2);
+  std::vector<glm::dvec3> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {0, -1, 1}};
+  for (int trial = 0; trial < 50; ++trial) axes.push_back(random.direction());
+  for (const glm::dvec3& axis : axes) {
+    const std::array pose{jointOf(rotationAbout(axis, pi), {1, 2, 3})};
+    OwnedMesh mesh;
+    addVertex(mesh, {0.5, -0.25, 2}, {{0, 1.0f}});
+    expectNear(toVector(skinned(mesh, pose, Method::dualQuaternion).positions[0]),
+               linearOf(pose[0]) * glm::dvec3(0.5, -0.25, 2) + offsetOf(pose[0]), 1e-14);
+  }
+}
+
+TEST(ReferenceDualQuaternion, Truth05_WeightsMayBeMultiplied) {
+  RigRandom random(3);
+  std::vector<JointMatrix> pose;
+  for (int joint = 0; joint < 9; ++joint) {
+    pose.push_back(
+        jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(1)));
+  }
+  OwnedMesh mesh = scatteredMesh(random, 300, 9, 4);
+  const reference::SkinnedMesh before = skinned(mesh, pose, Method::dualQuaternion);
+  const std::vector<float> weights = mesh.weights;
+  for (float& weight : mesh.weights) weight *= 0.25f;  // exactly
+  const reference::SkinnedMesh quarter = skinned(mesh, pose, Method::dualQuaternion);
+  for (std::size_t vertex = 0; vertex < 300; ++vertex) {
+    expectNear(toVector(quarter.positions[vertex]), toVector(before.positions[vertex]), 1e-14);
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i) mesh.weights[i] = weights[i] * 0.37f;
+  const reference::SkinnedMesh part = skinned(mesh, pose, Method::dualQuaternion);
+  for (std::size_t vertex = 0; vertex < 300; ++vertex) {  // the products are rounded to float
+    expectNear(toVector(part.positions[vertex]), toVector(before.positions[vertex]), 4e-6);
+  }
+}
+
+// Joints that float32 holds exactly: then the 1e-14 of double shows.
+TEST(ReferenceDualQuaternion, Truth08_TheResultIsRigid) {
+  RigRandom random(4);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::vector<JointMatrix> pose;
+    for (int joint = 0; joint < 4; ++joint) {
+      pose.push_back(jointOf(exactRotation(random), random.vector(1)));
+    }
+    OwnedMesh mesh;
+    const auto weight = [&] { return static_cast<float>(random.between(0.05, 1)); };
+    const float weights[] = {weight(), weight(), weight(), weight()};
+    for (const glm::dvec3& corner :
+         {glm::dvec3(0.0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
+      addVertex(mesh, corner, {{0, weights[0]}, {1, weights[1]}, {2, weights[2]}, {3, weights[3]}});
+    }
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+    glm::dmat3 r;
+    for (int i = 0; i < 3; ++i) {
+      r[i] = toVector(result.positions[static_cast<std::size_t>(i) + 1]) -
+             toVector(result.positions[0]);
+    }
+    const glm::dmat3 gram = glm::transpose(r) * r;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) EXPECT_NEAR(gram[i][j], i == j ? 1 : 0, 1e-14);
+    }
+    EXPECT_NEAR(glm::determinant(r), 1, 1e-14);
+  }
+}
+
+TEST(ReferenceDualQuaternion, Truth09_NoCandyWrapper) {
+  for (const double degrees : {10.0, 60.0, 90.0, 120.0, 150.0, 179.0, 179.9}) {
+    const std::array pose{JointMatrix{}, turnAboutZ(degrees)};
+    for (const double weight : {0.0, 0.125, 0.25, 0.5, 0.75, 1.0}) {
+      OwnedMesh mesh;
+      addVertex(mesh, {1, 0, 0.5},
+                {{0, static_cast<float>(1 - weight)}, {1, static_cast<float>(weight)}});
+      const reference::Double3 p = skinned(mesh, pose, Method::dualQuaternion).positions[0];
+      EXPECT_NEAR(std::hypot(p[0], p[1]), 1, 1.5e-7) << degrees << " degrees, weight " << weight;
+      EXPECT_NEAR(p[2], 0.5, 1e-7);
+      // The way it turns between the two is known as well.
+      const double half = degrees * pi / 360;
+      const double angle =
+          2 * std::atan2(weight * std::sin(half), 1 - weight + weight * std::cos(half));
+      // Near 180° the float matrix says less about its angle, as the tangent grows.
+      EXPECT_NEAR(angleOf(p), angle * 180 / pi, 2e-5) << degrees << " degrees, weight " << weight;
+    }
+  }
+}
+
+void expectVolumeKept(const JointMatrix& joint, double length) {
+  double error[3];
+  int index = 0;
+  for (const std::uint32_t count : {16u, 32u, 64u}) {
+    Tube tube = tubeOf(count, count, length, 0.5);
+    error[index++] = volumeRatio(tube, joint, Method::dualQuaternion) - 1;
+  }
+  EXPECT_NEAR(error[2], 0, 3e-3);
+  EXPECT_NEAR(error[0] / error[1], 4, 0.4);
+  EXPECT_NEAR(error[1] / error[2], 4, 0.2);
+}
+
+TEST(ReferenceDualQuaternion, Truth10_TwistKeepsTheVolume) {
+  for (const double degrees : {45.0, 90.0, 120.0, 170.0}) {
+    for (const double length : {0.5, 3.0}) {
+      SCOPED_TRACE(testing::Message() << degrees << " degrees, length " << length);
+      expectVolumeKept(turnAboutZ(degrees), length);
+    }
+  }
+}
+
+TEST(ReferenceDualQuaternion, Truth11_BendKeepsTheVolume) {
+  for (const double degrees : {45.0, 90.0, 120.0, 170.0}) {
+    for (const double length : {1.0, 3.0}) {
+      for (const double height : {0.0, 0.2 * length}) {
+        SCOPED_TRACE(testing::Message() << degrees << " degrees, length " << length);
+        const glm::dmat3 bend = rotationAbout({1, 0, 0}, degrees * pi / 180);
+        const glm::dvec3 pivot(0, 0, height);
+        expectVolumeKept(jointOf(bend, pivot - bend * pivot), length);
+      }
+    }
+  }
+}
+
+TEST(ReferenceDualQuaternion, Truth12_TheLowerOfTwoStrongestIsThePivot) {
+  const std::array pose{turnAboutZ(0), turnAboutZ(170), turnAboutZ(-170)};
+  EXPECT_NEAR(blendedAngle(pose, {{0, 0.1f}, {1, 0.45f}, {2, 0.45f}}), 167.27, 0.005);
+  // The order of the slots does not matter, the joint's index does.
+  EXPECT_NEAR(blendedAngle(pose, {{2, 0.45f}, {0, 0.1f}, {1, 0.45f}}), 167.27, 0.005);
+  const std::array swapped{turnAboutZ(0), turnAboutZ(-170), turnAboutZ(170)};
+  EXPECT_NEAR(blendedAngle(swapped, {{0, 0.1f}, {1, 0.45f}, {2, 0.45f}}), 360 - 167.27, 0.005);
+}
+
+TEST(ReferenceDualQuaternion, Truth13_OnATieOfThreeTheLowestJoint) {
+  const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
+  const auto third = 1.0f / 3;
+  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, third}, {2, third}}), 0, 1e-4);
+  EXPECT_NEAR(blendedAngle(pose, {{2, third}, {1, third}, {0, third}}), 0, 1e-4);
+  // The other two answers, each where that influence is a little stronger.
+  const float more = std::nextafter(third, 1.0f);
+  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, more}, {2, third}}), 123.97, 0.005);
+  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, third}, {2, more}}), 236.03, 0.005);
+}
+
+TEST(ReferenceDualQuaternion, DuplicatesAreAddedUpBeforeThePivotIsChosen) {
+  const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
+  // No single slot of joint 2 is the strongest, together they are.
+  const double once = blendedAngle(pose, {{0, 0.3125f}, {1, 0.25f}, {2, 0.4375f}});
+  const double twice = blendedAngle(pose, {{2, 0.21875f}, {0, 0.3125f}, {1, 0.25f}, {2, 0.21875f}});
+  EXPECT_NEAR(twice, once, 1e-12);
+  EXPECT_GT(std::abs(once - blendedAngle(pose, {{0, 0.4375f}, {1, 0.25f}, {2, 0.3125f}})), 30);
+}
+
+TEST(ReferenceDualQuaternion, WeightsOfOneJointThatAddUpToATieAreATie) {
+  // 60/255 + 67/255 is 127/255, whatever double makes of the quotients: joint 0 is the pivot.
+  const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
+  const std::uint8_t joints[] = {0, 0, 1, 2};
+  const float position[] = {1, 0, 0};
+  for (std::uint32_t total = 2; total <= 127; ++total) {
+    for (std::uint32_t part = 1; 2 * part <= total; ++part) {
+      const std::uint8_t weights[] = {
+          static_cast<std::uint8_t>(part), static_cast<std::uint8_t>(total - part),
+          static_cast<std::uint8_t>(total), static_cast<std::uint8_t>(total)};
+      const InfluenceSet set{{joints, 1, 4, ComponentType::uint8, 4},
+                             {weights, 1, 4, ComponentType::unorm8, 4}};
+      MeshView mesh;
+      mesh.vertexCount = 1;
+      mesh.positions = floatAttribute(position, 1, 3);
+      mesh.influenceSets = {&set, 1};
+      const Result<reference::SkinnedMesh> result =
+          reference::skin(mesh, pose, Method::dualQuaternion);
+      ASSERT_TRUE(result.ok());
+      ASSERT_NEAR(angleOf(result->positions[0]), 0, 1e-4)
+          << part << " + " << total - part << " against " << total;
+    }
+  }
+}
+
+// "On the weights as stored": a difference that dividing by the sum rounds away still counts.
+TEST(ReferenceDualQuaternion, ThePivotIsChosenBeforeNormalising) {
+  const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
+  RigRandom random(5);
+  const float tiny = std::ldexp(1.0f, -53);
+  int collapsing = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const auto strong = static_cast<float>(random.between(0.95, 0.999));
+    const auto weak = static_cast<float>(random.between(0.94, 0.95));
+    // Joint 2 is stronger than joint 0 by one unit of double.
+    const double stronger = static_cast<double>(strong) + static_cast<double>(tiny);
+    ASSERT_GT(stronger, static_cast<double>(strong));
+    const double sum = static_cast<double>(strong) + static_cast<double>(weak) + stronger;
+    if (static_cast<double>(strong) / sum == stronger / sum) ++collapsing;
+    const double angle = blendedAngle(pose, {{0, strong}, {1, weak}, {2, strong}, {2, tiny}});
+    // Nearly a third each: Truth 13 with the third as pivot is 236°, with the first 0°.
+    ASSERT_NEAR(angle, 236.03, 3) << strong << " " << weak;
+  }
+  EXPECT_GT(collapsing, 0) << "the test would not notice";
+}
+
+// The dot product of two turns about one axis is the cosine of half the angle between them.
+TEST(ReferenceDualQuaternion, SaysWhereTheSignIsArbitrary) {
+  const auto short180 = [](double dot) { return turnAboutZ(180 - 2 * std::asin(dot) * 180 / pi); };
+  const std::array pose{JointMatrix{},  turnAboutZ(180), short180(5e-6),
+                        short180(2e-5), short180(-2e-5), turnAboutZ(170)};
+  OwnedMesh mesh;
+  for (std::uint32_t joint = 1; joint < 6; ++joint) {
+    addVertex(mesh, {1, 0, 0}, {{0, 0.5f}, {joint, 0.5f}});
+  }
+  addVertex(mesh, {1, 0, 0}, {{0, 1.0f}, {1, 0.0f}});
+  const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+  const bool expected[] = {true, true, false, false, false, false};
+  for (std::size_t vertex = 0; vertex < 6; ++vertex) {
+    EXPECT_EQ(result.conditioning[vertex].signAmbiguous, expected[vertex]) << vertex;
+    EXPECT_TRUE(isFiniteVector(result.positions[vertex]));
+  }
+}
+
+TEST(ReferenceDualQuaternion, ConditioningIsWhatItsCommentSays) {
+  // σ = 3 and |t| = 5 come from different joints.
+  const std::array pose{jointOf(diagonalMatrix(3, 1, 2), {0, 1, 0}),
+                        jointOf(glm::dmat3(1.0), {3, 0, 4}), jointOf(diagonalMatrix(9, 9, 9))};
+  OwnedMesh mesh;
+  addVertex(mesh, {0, 2, 0}, {{0, 0.5f}, {1, 0.5f}});
+  addVertex(mesh, {0, 2, 0}, {{1, 1.0f}, {2, 0.0f}});
+  for (const Method method : allMethods) {
+    const reference::SkinnedMesh result = skinned(mesh, pose, method);
+    EXPECT_NEAR(result.conditioning[0].scale, 5 + 3 * 2, 1e-12);
+    EXPECT_NEAR(result.conditioning[0].distance, 2, 1e-15);
+    EXPECT_NEAR(result.conditioning[1].scale, 5 + 1 * 2, 1e-12);
+    EXPECT_FALSE(result.conditioning[0].degenerate);
+    EXPECT_EQ(result.conditioning[1].rigidShortcut, 0);
+  }
+}
+
+// A joint of which |CᵀC − 1| ≤ 8e-6 is not decomposed by kernels; the reference decomposes it, and
+// says how much that may matter.
+TEST(ReferenceDualQuaternion, TakesNoShortCutForNearlyRigidJoints) {
+  OwnedMesh mesh;
+  addVertex(mesh, {1, 0, 0}, {{0, 1.0f}});
+  mesh.normals = {0, 0, 1};
+  const auto skinnedBy = [&](double scale) {
+    const std::array pose{jointOf(diagonalMatrix(scale, scale, scale))};
+    return skinned(mesh, pose, Method::dualQuaternion);
+  };
+  for (const int steps : {-60, -4, 4, 30}) {  // of 2⁻²³: CᵀC − 1 is at most 7.2e-6
+    const double scale = 1 + steps * std::ldexp(1.0, -23 + (steps < 0 ? -1 : 0));
+    const reference::SkinnedMesh result = skinnedBy(scale);
+    EXPECT_NEAR(result.positions[0][0], scale, 1e-15);
+    EXPECT_NEAR(result.conditioning[0].rigidShortcut, std::abs(scale - 1), 1e-14);
+    EXPECT_TRUE(result.conditioning[0].normalRotatedOnly);
+  }
+  for (const double scale : {1 + std::ldexp(1.0, -14), 1 - std::ldexp(1.0, -14), 2.0}) {
+    const reference::SkinnedMesh result = skinnedBy(scale);
+    EXPECT_NEAR(result.positions[0][0], scale, 1e-15);
+    EXPECT_EQ(result.conditioning[0].rigidShortcut, 0);
+    EXPECT_FALSE(result.conditioning[0].normalRotatedOnly);
+  }
+}
+
+// Truth 19: a mirror is no rotation, though CᵀC is 1.
+TEST(ReferenceDualQuaternion, MirrorsAreNotRigid) {
+  OwnedMesh mesh;
+  addVertex(mesh, {1, 0, 0}, {{0, 1.0f}});
+  mesh.normals = {0, 0, 1};
+  for (const glm::dmat3& mirror : {diagonalMatrix(-1, 1, 1), glm::dmat3(-1.0)}) {
+    const std::array pose{jointOf(mirror)};
+    EXPECT_FALSE(skinned(mesh, pose, Method::dualQuaternion).conditioning[0].normalRotatedOnly);
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,316 @@
+// The accuracy contract: the bounds of TRUTHS.md, and a comparison that misses nothing.
+
+#include "dermis/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr double u = 1.0 / 16777216.0;  // 2^-24
+
+TEST(Accuracy, TheUnitIsTwoToTheMinus24) {
+  EXPECT_EQ(floatRounding, u);
+}
+
+TEST(Accuracy, Truth16_PositionBounds) {
+  reference::Conditioning conditioning;
+  conditioning.scale = 2.5;
+  conditioning.distance = 3;
+  EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning), 6 * u * 2.5);
+  EXPECT_DOUBLE_EQ(positionBound(Method::dualQuaternion, conditioning), 24 * u * 2.5);
+  // At 10,000 units from the origin: joints as far away as the point.
+  conditioning.scale = 10000;
+  EXPECT_NEAR(positionBound(Method::linear, conditioning), 3.6e-3, 1e-4);
+}
+
+TEST(Accuracy, JointsTakenForRigidAddAtMost4e6OfTheDistance) {
+  reference::Conditioning conditioning;
+  conditioning.scale = 1;
+  conditioning.distance = 3;
+  conditioning.rigidShortcut = 1e-6;
+  EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning), 6 * u);
+  EXPECT_DOUBLE_EQ(positionBound(Method::dualQuaternion, conditioning), 24 * u + 3e-6);
+  conditioning.rigidShortcut = 1e-5;
+  EXPECT_DOUBLE_EQ(positionBound(Method::dualQuaternion, conditioning), 24 * u + 12e-6);
+}
+
+TEST(Accuracy, Truth16_NormalBounds) {
+  reference::Conditioning conditioning;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 1.5e-6);
+  conditioning.rigidShortcut = 2e-6;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 3.5e-6);
+  EXPECT_DOUBLE_EQ(normalBound(Method::linear, conditioning), 6 * u);
+  conditioning.normalAlignment = 0.25;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 3.5e-6) << "only rotated";
+  conditioning.normalRotatedOnly = false;
+  conditioning.rigidShortcut = 0;
+  EXPECT_DOUBLE_EQ(normalBound(Method::linear, conditioning), 24 * u);
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 24 * u + 1.5e-6);
+  conditioning.normalAlignment = 1e-3;
+  EXPECT_GT(normalBound(Method::linear, conditioning), 0);
+  conditioning.normalAlignment = 0.9999e-3;
+  EXPECT_LT(normalBound(Method::linear, conditioning), 0);
+  EXPECT_LT(normalBound(Method::dualQuaternion, conditioning), 0);
+}
+
+/// Twenty vertices around 1 with unit normals, and the same in float.
+struct CompareTest : public ::testing::Test {
+  CompareTest() {
+    for (std::size_t vertex = 0; vertex < count; ++vertex) {
+      const float x = 1 + static_cast<float>(vertex) / 64;
+      expected.positions.push_back({x, 0.5, -0.25});
+      expected.normals.push_back({0, 0.6, 0.8});
+      reference::Conditioning conditioning;
+      conditioning.scale = 2;
+      expected.conditioning.push_back(conditioning);
+      positions.insert(positions.end(), {x, 0.5f, -0.25f});
+      normals.insert(normals.end(), {0.0f, 0.6f, 0.8f});
+    }
+  }
+
+  Comparison compared(Method method = Method::dualQuaternion) {
+    const Result<Comparison> result = compare(expected, floatAttribute(positions.data(), count, 3),
+                                              floatAttribute(normals.data(), count, 3), method);
+    EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
+    return result ? *result : Comparison{};
+  }
+  void expectOneFailure(std::uint32_t vertex, Method method = Method::dualQuaternion) {
+    const Comparison comparison = compared(method);
+    EXPECT_FALSE(comparison.passed());
+    EXPECT_EQ(comparison.failures, 1u);
+    EXPECT_EQ(comparison.firstFailure, vertex);
+  }
+
+  static constexpr std::uint32_t count = 20;
+  reference::SkinnedMesh expected;
+  std::vector<float> positions, normals;
+};
+
+TEST_F(CompareTest, TheSamePasses) {
+  for (auto& normal : expected.normals) normal = {0, 0.6f, 0.8f};
+  for (const Method method : allMethods) {
+    const Comparison comparison = compared(method);
+    EXPECT_TRUE(comparison.passed());
+    EXPECT_EQ(comparison.compared, count);
+    EXPECT_EQ(comparison.onlyFinite, 0u);
+    EXPECT_EQ(comparison.worstPosition, 0);
+    EXPECT_EQ(comparison.worstNormal, 0);
+    EXPECT_EQ(comparison.largestPositionError, 0);
+  }
+}
+
+TEST_F(CompareTest, OneWrongPositionIsFound) {
+  for (const Method method : allMethods) {
+    const double bound = (method == Method::linear ? 6 : 24) * u * 2;
+    for (int component = 0; component < 3; ++component) {
+      for (const double share : {-1.01, -0.99, 0.99, 1.01}) {
+        auto& coordinate = expected.positions[13][static_cast<std::size_t>(component)];
+        const double before = coordinate;
+        coordinate += share * bound;
+        const Comparison comparison = compared(method);
+        EXPECT_EQ(comparison.passed(), std::abs(share) < 1);
+        EXPECT_NEAR(comparison.worstPosition, std::abs(share), 1e-6);
+        EXPECT_EQ(comparison.worstPositionVertex, 13u);
+        EXPECT_NEAR(comparison.largestPositionError, std::abs(share) * bound, 1e-15);
+        if (std::abs(share) > 1) expectOneFailure(13, method);
+        coordinate = before;
+      }
+    }
+  }
+}
+
+TEST_F(CompareTest, DistancesCountNotComponents) {
+  // 0.7 of the bound in each direction is 1.21 of it together.
+  for (double& coordinate : expected.positions[4]) coordinate += 0.7 * 24 * u * 2;
+  expectOneFailure(4);
+}
+
+TEST_F(CompareTest, EachVertexIsHeldAgainstItsOwnBound) {
+  positions[3 * 3] += 1e-3f;
+  expected.conditioning[3].scale = 1000;
+  EXPECT_TRUE(compared().passed());
+  positions[2 * 3] += 1e-3f;
+  expectOneFailure(2);
+}
+
+TEST_F(CompareTest, AVertexAtTheOriginMayHaveNoErrorAtAll) {
+  expected.conditioning[7].scale = 0;
+  EXPECT_TRUE(compared().passed());
+  expected.positions[7][2] += 1e-12;
+  expectOneFailure(7);
+}
+
+TEST_F(CompareTest, OneWrongNormalIsFound) {
+  for (const double error : {1.4e-6, 1.7e-6}) {
+    expected.normals[19] = {error, 0.6f, 0.8f};
+    const Comparison comparison = compared();
+    EXPECT_EQ(comparison.passed(), error < 1.5e-6);
+    EXPECT_EQ(comparison.worstNormalVertex, 19u);
+    EXPECT_NEAR(comparison.worstNormal, error / 1.5e-6, 1e-6);
+  }
+  expectOneFailure(19);
+  normals[19 * 3 + 2] = -0.8f;
+  expectOneFailure(19);
+}
+
+TEST_F(CompareTest, NumbersThatAreNotFiniteFail) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinity, -infinity}) {
+    for (std::vector<float>* values : {&positions, &normals}) {
+      for (std::size_t component = 0; component < 3; ++component) {
+        float& value = (*values)[11 * 3 + component];
+        const float before = value;
+        value = bad;
+        expectOneFailure(11);
+        expectOneFailure(11, Method::linear);
+        for (bool reference::Conditioning::*excuse :
+             {&reference::Conditioning::signAmbiguous, &reference::Conditioning::degenerate}) {
+          expected.conditioning[11].*excuse = true;
+          expectOneFailure(11);
+          expected.conditioning[11].*excuse = false;
+        }
+        value = before;
+      }
+    }
+  }
+}
+
+TEST_F(CompareTest, SeveralFailuresAreCounted) {
+  for (const std::size_t vertex : {5u, 9u, 17u}) positions[vertex * 3 + 1] += 1;
+  positions[9 * 3] += 3;
+  const Comparison comparison = compared();
+  EXPECT_EQ(comparison.failures, 3u);
+  EXPECT_EQ(comparison.firstFailure, 5u);
+  EXPECT_EQ(comparison.worstPositionVertex, 9u);
+  EXPECT_NEAR(comparison.largestPositionError, std::hypot(1, 3), 1e-6);
+}
+
+TEST_F(CompareTest, WhatIsAMatterOfRoundingNeedOnlyBeFinite) {
+  for (bool reference::Conditioning::*excuse :
+       {&reference::Conditioning::signAmbiguous, &reference::Conditioning::degenerate}) {
+    expected.conditioning[6].*excuse = true;
+    positions[6 * 3] += 10;
+    const Comparison comparison = compared();
+    EXPECT_TRUE(comparison.passed());
+    EXPECT_EQ(comparison.onlyFinite, 1u);
+    EXPECT_EQ(comparison.compared, count - 1);
+    // Linear blending knows neither signs nor rotations.
+    expectOneFailure(6, Method::linear);
+    positions[6 * 3] -= 10;
+    expected.conditioning[6].*excuse = false;
+  }
+}
+
+TEST_F(CompareTest, VerticesWithoutAFiniteAnswerAreNotLookedAt) {
+  expected.positions[6][1] = std::numeric_limits<double>::quiet_NaN();
+  positions[6 * 3] = std::numeric_limits<float>::infinity();
+  const Comparison comparison = compared();
+  EXPECT_TRUE(comparison.passed());
+  EXPECT_EQ(comparison.compared, count - 1);
+}
+
+TEST_F(CompareTest, Truth16_ABadlyAlignedNormalNeedOnlyBeOfUnitLength) {
+  for (reference::Conditioning& conditioning : expected.conditioning) {
+    conditioning.normalRotatedOnly = false;
+  }
+  expected.conditioning[8].normalAlignment = 0.5e-3;
+  normals[8 * 3 + 2] = -0.8f;
+  EXPECT_TRUE(compared().passed());
+  EXPECT_TRUE(compared(Method::linear).passed());
+  normals[8 * 3 + 2] = -0.81f;
+  expectOneFailure(8);
+  expectOneFailure(8, Method::linear);
+}
+
+TEST_F(CompareTest, AZeroNormalThatBecameOneIsFound) {
+  expected.normals[8] = {0, 0, 0};
+  expectOneFailure(8);
+  expectOneFailure(8, Method::linear);
+  for (std::size_t i = 0; i < 3; ++i) normals[8 * 3 + i] = 0;
+  EXPECT_TRUE(compared().passed());
+  expected.normals[8] = {0, 0.6, 0.8};
+  expectOneFailure(8);
+}
+
+// The same with what the reference itself says of a mesh whose normal is zero.
+TEST(Compare, AZeroNormalMustStayZero) {
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = 1;
+  mesh.positions = {1, 0, 0, 0, 1, 0};
+  mesh.normals = {0, 0, 0, 0, 0, 1};
+  mesh.joints = {0, 0};
+  mesh.weights = {1, 1};
+  for (const float scale : {1.0f, 2.0f}) {
+    JointMatrix joint;
+    for (int i = 0; i < 3; ++i) joint.m[i][i] = scale;
+    for (const Method method : allMethods) {
+      const Result<reference::SkinnedMesh> expected =
+          reference::skin(mesh.view(), {&joint, 1}, method);
+      ASSERT_TRUE(expected.ok());
+      std::vector<float> positions, normals{0, 0, 0, 0, 0, 1};
+      for (const float coordinate : mesh.positions) positions.push_back(coordinate * scale);
+      const auto passes = [&] {
+        return compare(*expected, floatAttribute(positions.data(), 2, 3),
+                       floatAttribute(normals.data(), 2, 3), method)
+            ->passed();
+      };
+      EXPECT_TRUE(passes()) << methodName(method) << ", scale " << scale;
+      normals[0] = 1;
+      EXPECT_FALSE(passes()) << methodName(method) << ", scale " << scale;
+    }
+  }
+}
+
+TEST_F(CompareTest, NormalsAreComparedWhereBothHaveThem) {
+  normals.assign(normals.size(), 5.0f);
+  EXPECT_FALSE(compared().passed());
+  const AttributeView view = floatAttribute(positions.data(), count, 3);
+  EXPECT_TRUE(compare(expected, view, {}, Method::linear)->passed());
+  const AttributeView bad = floatAttribute(normals.data(), count, 3);
+  expected.normals.clear();
+  EXPECT_TRUE(compare(expected, view, bad, Method::linear)->passed());
+}
+
+TEST_F(CompareTest, ReadsWithStrides) {
+  std::vector<unsigned char> bytes(1 + count * 29, 0xff);
+  for (std::size_t vertex = 0; vertex < count; ++vertex) {
+    std::memcpy(&bytes[1 + vertex * 29], &positions[vertex * 3], 12);
+    std::memcpy(&bytes[14 + vertex * 29], &normals[vertex * 3], 12);
+  }
+  const AttributeView positionView{&bytes[1], count, 29, ComponentType::float32, 3};
+  const AttributeView normalView{&bytes[14], count, 29, ComponentType::float32, 3};
+  EXPECT_TRUE(compare(expected, positionView, normalView, Method::linear)->passed());
+  bytes[1 + 19 * 29 + 3] ^= 0x80;
+  EXPECT_EQ(compare(expected, positionView, normalView, Method::linear)->firstFailure, 19u);
+}
+
+TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
+  const AttributeView good = floatAttribute(positions.data(), count, 3);
+  const AttributeView goodNormals = floatAttribute(normals.data(), count, 3);
+  std::vector<AttributeView> bad(5, good);
+  bad[0].count = count - 1;
+  bad[1].type = ComponentType::uint32;
+  bad[2].components = 2;
+  bad[3].stride = 8;
+  bad[4].count = count + 1;
+  for (const AttributeView& view : bad) {
+    const Result<Comparison> positionsRefused =
+        compare(expected, view, goodNormals, Method::linear);
+    ASSERT_FALSE(positionsRefused.ok());
+    EXPECT_EQ(positionsRefused.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(positionsRefused.error().message.find("20"), std::string::npos);
+    EXPECT_FALSE(compare(expected, good, view, Method::linear).ok());
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,72 @@
+// Views, plain data and names: what crosses the interface.
+
+#include <gtest/gtest.h>
+
+#include <type_traits>
+
+#include "dermis/dermis.h"
+
+namespace dermis::test {
+namespace {
+
+TEST(Mesh, ComponentsHaveTheSizeOfTheirType) {
+  EXPECT_EQ(componentSize(ComponentType::float32), 4u);
+  EXPECT_EQ(componentSize(ComponentType::unorm8), 1u);
+  EXPECT_EQ(componentSize(ComponentType::unorm16), 2u);
+  EXPECT_EQ(componentSize(ComponentType::uint8), 1u);
+  EXPECT_EQ(componentSize(ComponentType::uint16), 2u);
+  EXPECT_EQ(componentSize(ComponentType::uint32), 4u);
+}
+
+TEST(Mesh, FloatAttributesAreTightlyPacked) {
+  const float data[8] = {};
+  const AttributeView view = floatAttribute(data, 2, 4);
+  EXPECT_EQ(view.data, data);
+  EXPECT_EQ(view.count, 2u);
+  EXPECT_EQ(view.stride, 16u);
+  EXPECT_EQ(view.type, ComponentType::float32);
+  EXPECT_EQ(view.components, 4u);
+  EXPECT_TRUE(view);
+  EXPECT_FALSE(AttributeView{});
+}
+
+// 12 floats a joint for linear blending (48 bytes); a dual quaternion has 8 (32 bytes).
+TEST(Mesh, Truth15_JointMatricesAre48BytesDualQuaternions32) {
+  EXPECT_EQ(sizeof(JointMatrix), 48u);
+  EXPECT_EQ(sizeof(DualQuatf), 32u);
+  EXPECT_TRUE(std::is_standard_layout_v<JointMatrix>);
+  EXPECT_TRUE(std::is_trivially_copyable_v<JointMatrix>);
+  const JointMatrix identity;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column)
+      EXPECT_EQ(identity.m[row][column], row == column ? 1.0f : 0.0f);
+  }
+}
+
+TEST(Mesh, GlmMatricesAreTransposedOnTheWay) {
+  glm::mat4 matrix(1.0f);
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 3; ++row) matrix[column][row] = static_cast<float>(10 * row + column);
+  }
+  const JointMatrix joint = toJointMatrix(matrix);
+  const glm::mat4x3 back = toGlm(joint);
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      EXPECT_EQ(joint.m[row][column], static_cast<float>(10 * row + column));
+      EXPECT_EQ(back[column][row], static_cast<float>(10 * row + column));
+    }
+  }
+}
+
+TEST(Method, NamesGoBothWays) {
+  EXPECT_EQ(methodName(Method::linear), "linear");
+  EXPECT_EQ(methodName(Method::dualQuaternion), "dual_quaternion");
+  for (const Method method : allMethods) EXPECT_EQ(methodFromName(methodName(method)), method);
+  for (const char* name : {"", "Linear", "dualQuaternion", "unknown", "linear "}) {
+    EXPECT_EQ(methodFromName(name), std::nullopt) << name;
+  }
+  EXPECT_EQ(methodName(static_cast<Method>(200)), "unknown");
+}
+
+}  // namespace
+}  // namespace dermis::test

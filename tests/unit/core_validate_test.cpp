@@ -1,0 +1,448 @@
+// validate: every kind of problem, with its count, its first place and a sentence that names it.
+
+#include "dermis/validate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "dermis/types.h"
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr std::uint32_t vertexCount = 10;
+constexpr std::uint32_t jointCount = 24;
+
+/// A good mesh of ten vertices and four slots, named 'Fox'; a test breaks what it wants to.
+struct ValidateTest : public ::testing::Test {
+  ValidateTest() {
+    mesh.name = "Fox";
+    for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+      for (int i = 0; i < 3; ++i) mesh.positions.push_back(static_cast<float>(vertex));
+      mesh.normals.insert(mesh.normals.end(), {0.0f, 0.0f, 1.0f});
+      mesh.joints.insert(mesh.joints.end(), {vertex, vertex + 1, 0, 0});
+      mesh.weights.insert(mesh.weights.end(), {0.75f, 0.25f, 0.0f, 0.0f});
+      tangents.insert(tangents.end(), {1.0f, 0.0f, 0.0f, 1.0f});
+    }
+    view = mesh.view();
+    view.tangents = floatAttribute(tangents.data(), vertexCount, 4);
+    set = mesh.set;
+    view.influenceSets = {&set, 1};
+  }
+
+  /// One finding, of this kind; returns its sentence.
+  std::string onlyFinding(Problem problem, std::uint64_t count, std::uint32_t firstVertex) {
+    const MeshReport report = validate(view, jointCount);
+    EXPECT_EQ(report.findings.size(), 1u);
+    for (const Finding& finding : report.findings) {
+      EXPECT_EQ(finding.problem, problem) << finding.message;
+    }
+    const Finding* finding = report.find(problem);
+    EXPECT_NE(finding, nullptr);
+    if (finding == nullptr) return "";
+    EXPECT_EQ(finding->count, count);
+    EXPECT_EQ(finding->firstVertex, firstVertex);
+    EXPECT_EQ(report.packable(), problem >= Problem::weightsNotNormalized);
+    EXPECT_EQ(report.repairable(), problem > Problem::wrongFormat);
+    return finding->message;
+  }
+
+  OwnedMesh mesh;
+  std::vector<float> tangents;
+  MeshView view;
+  InfluenceSet set;
+};
+
+TEST_F(ValidateTest, FindsNothingInAGoodMesh) {
+  const MeshReport report = validate(view, jointCount);
+  EXPECT_TRUE(report.findings.empty());
+  EXPECT_TRUE(report.packable());
+  EXPECT_TRUE(report.repairable());
+  EXPECT_EQ(report.find(Problem::emptyMesh), nullptr);
+  view.normals = {};
+  view.tangents = {};
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+}
+
+// ---- The views
+
+TEST_F(ValidateTest, NoVertices) {
+  view.vertexCount = 0;
+  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
+  view = {};
+  view.name = "Fox";
+  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
+}
+
+TEST_F(ValidateTest, NoPositions) {
+  view.positions = {};
+  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no positions");
+}
+
+TEST_F(ValidateTest, NoInfluenceSets) {
+  view.influenceSets = {};
+  EXPECT_EQ(onlyFinding(Problem::noInfluenceSets, 1, 0),
+            "mesh 'Fox': it has no joints and weights");
+}
+
+TEST_F(ValidateTest, ASetWithoutJointsOrWeights) {
+  InfluenceSet sets[] = {set, set};
+  view.influenceSets = sets;
+  sets[1].joints = {};
+  EXPECT_NE(onlyFinding(Problem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
+  sets[1] = set;
+  sets[1].weights = {};
+  EXPECT_NE(onlyFinding(Problem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
+}
+
+TEST_F(ValidateTest, CountsThatDisagree) {
+  const struct {
+    AttributeView* attribute;
+    const char* name;
+  } cases[] = {{&view.positions, "positions"},
+               {&view.normals, "normals"},
+               {&view.tangents, "tangents"},
+               {&set.joints, "joints"},
+               {&set.weights, "weights"}};
+  for (const auto& [attribute, name] : cases) {
+    for (const std::uint32_t count : {9u, 11u, 0u}) {
+      attribute->count = count;
+      EXPECT_EQ(onlyFinding(Problem::countMismatch, 1, 0),
+                "mesh 'Fox': there are " + std::to_string(count) + " " + name + " for 10 vertices");
+    }
+    attribute->count = vertexCount;
+  }
+  view.normals.count = 9;
+  view.tangents.count = 8;
+  EXPECT_EQ(onlyFinding(Problem::countMismatch, 2, 0),
+            "mesh 'Fox': there are 9 normals for 10 vertices");
+}
+
+TEST_F(ValidateTest, StridesThatAreTooSmall) {
+  const struct {
+    AttributeView* attribute;
+    const char* name;
+    std::uint32_t size;
+  } cases[] = {{&view.positions, "positions", 12},
+               {&view.normals, "normals", 12},
+               {&view.tangents, "tangents", 16},
+               {&set.joints, "joints", 16},
+               {&set.weights, "weights", 16}};
+  for (const auto& [attribute, name, size] : cases) {
+    EXPECT_EQ(attribute->stride, size);
+    for (const std::uint32_t stride : {size - 1, 0u}) {
+      attribute->stride = stride;
+      EXPECT_EQ(onlyFinding(Problem::strideTooSmall, 1, 0),
+                "mesh 'Fox': the stride of the " + std::string(name) + " is " +
+                    std::to_string(stride) + " bytes, an element has " + std::to_string(size));
+    }
+    attribute->stride = size;
+  }
+}
+
+TEST_F(ValidateTest, ComponentsWhoseSizeOverflows32BitsDoNotFitAnyStride) {
+  set.joints.components = set.weights.components = 0x40000001u;  // times 4 is 4 in 32 bits
+  onlyFinding(Problem::strideTooSmall, 2, 0);
+}
+
+TEST_F(ValidateTest, FormatsThatAnAttributeMayNotHave) {
+  using Types = std::vector<ComponentType>;
+  const struct {
+    AttributeView* attribute;
+    const char* name;
+    Types refused;
+    std::uint32_t components;
+  } cases[] = {{&view.positions,
+                "positions",
+                {ComponentType::unorm8, ComponentType::unorm16, ComponentType::uint8,
+                 ComponentType::uint16, ComponentType::uint32},
+                3},
+               {&view.normals, "normals", {ComponentType::unorm16, ComponentType::uint32}, 3},
+               {&view.tangents, "tangents", {ComponentType::unorm16, ComponentType::uint32}, 4},
+               {&set.joints,
+                "joints",
+                {ComponentType::float32, ComponentType::unorm8, ComponentType::unorm16},
+                0},
+               {&set.weights,
+                "weights",
+                {ComponentType::uint8, ComponentType::uint16, ComponentType::uint32},
+                0}};
+  for (const auto& [attribute, name, refused, components] : cases) {
+    const AttributeView good = *attribute;
+    for (const ComponentType type : refused) {
+      attribute->type = type;
+      const std::string message = onlyFinding(Problem::wrongFormat, 1, 0);
+      EXPECT_NE(message.find(name), std::string::npos) << message;
+      EXPECT_NE(message.find("mesh 'Fox'"), std::string::npos) << message;
+    }
+    *attribute = good;
+    if (components == 0) continue;
+    for (const std::uint32_t wrong : {0u, components - 1, components + 1}) {
+      attribute->components = wrong;
+      EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find(name), std::string::npos);
+    }
+    *attribute = good;
+  }
+}
+
+TEST_F(ValidateTest, JointsAndWeightsOfDifferentNumber) {
+  set.joints.components = 3;
+  EXPECT_EQ(onlyFinding(Problem::wrongFormat, 1, 0),
+            "mesh 'Fox': an influence set has 3 joints but 4 weights a vertex");
+  set.joints.components = 0;
+  onlyFinding(Problem::wrongFormat, 2, 0);
+}
+
+TEST_F(ValidateTest, BadViewsAreNotRead) {
+  // Were the values looked at, this would be found as well (or crash).
+  view.positions.count = 11;
+  mesh.weights[0] = nan;
+  onlyFinding(Problem::countMismatch, 1, 0);
+}
+
+// ---- The values
+
+TEST_F(ValidateTest, NonFiniteAttributes) {
+  const struct {
+    Problem problem;
+    std::vector<float>* values;
+    std::size_t components;
+    const char* name;
+  } cases[] = {{Problem::nonFinitePosition, &mesh.positions, 3, "position"},
+               {Problem::nonFiniteNormal, &mesh.normals, 3, "normal"},
+               {Problem::nonFiniteTangent, &tangents, 4, "tangent"}};
+  for (const auto& [problem, values, components, name] : cases) {
+    const std::vector<float> good = *values;
+    for (std::size_t component = 0; component < components; ++component) {
+      for (const float bad : {nan, infinity, -infinity}) {
+        std::copy(good.begin(), good.end(), values->begin());
+        (*values)[7 * components + component] = bad;
+        EXPECT_EQ(onlyFinding(problem, 1, 7),
+                  "mesh 'Fox', vertex 7: the " + std::string(name) + " is not finite");
+      }
+    }
+    (*values)[9 * components] = nan;
+    (*values)[9 * components + 1] = nan;
+    onlyFinding(problem, 2, 7);
+    std::copy(good.begin(), good.end(), values->begin());
+  }
+}
+
+TEST_F(ValidateTest, NonFiniteWeights) {
+  for (const float bad : {nan, infinity, -infinity}) {
+    mesh.weights[4 * 4 + 1] = bad;
+    EXPECT_EQ(onlyFinding(Problem::nonFiniteWeight, 1, 4),
+              "mesh 'Fox', vertex 4: the weight of joint 5 is not finite");
+  }
+  mesh.weights[4 * 4 + 2] = nan;  // the same vertex counts once
+  mesh.weights[8 * 4 + 3] = nan;
+  onlyFinding(Problem::nonFiniteWeight, 2, 4);
+}
+
+TEST_F(ValidateTest, NegativeWeights) {
+  mesh.weights[4 * 4 + 1] = -1e-30f;
+  mesh.weights[5 * 4 + 0] = -0.75f;
+  EXPECT_EQ(onlyFinding(Problem::negativeWeight, 2, 4),
+            "mesh 'Fox', vertex 4: the weight of joint 5 is negative");
+}
+
+TEST_F(ValidateTest, NegativeZeroIsZero) {
+  mesh.weights[4 * 4 + 2] = -0.0f;
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+}
+
+TEST_F(ValidateTest, JointsOutsideThePalette) {
+  mesh.joints[7 * 4 + 1] = jointCount - 1;
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+  mesh.joints[7 * 4 + 1] = 31;
+  EXPECT_EQ(onlyFinding(Problem::jointOutOfRange, 1, 7),
+            "mesh 'Fox', vertex 7: joint 31 is outside the palette of 24");
+  mesh.joints[6 * 4] = jointCount;
+  mesh.joints[9 * 4] = 0xffffffffu;
+  EXPECT_EQ(onlyFinding(Problem::jointOutOfRange, 3, 6),
+            "mesh 'Fox', vertex 6: joint 24 is outside the palette of 24");
+}
+
+TEST_F(ValidateTest, Truth14_JointsOfSlotsWithoutWeightMayBeAnything) {
+  mesh.joints[7 * 4 + 2] = 0xffffffffu;
+  mesh.joints[7 * 4 + 3] = 0xffffffffu;  // nor are they duplicates
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+}
+
+TEST_F(ValidateTest, JointsEndWithTheLargestPalette) {
+  mesh.joints[0] = 65535;
+  EXPECT_TRUE(validate(view, maxPaletteJoints).findings.empty());
+  mesh.joints[0] = 65536;
+  EXPECT_EQ(validate(view, maxPaletteJoints).findings.size(), 1u);
+  EXPECT_EQ(validate(view, 0xffffffffu).findings.size(), 1u) << "joint indices have 16 bits";
+  EXPECT_NE(validate(view, 0).find(Problem::jointOutOfRange), nullptr);
+}
+
+// ---- Sums: 2e-7 for each weight that is not 0, or 255 and 65535 exactly
+
+TEST_F(ValidateTest, Truth18_FloatSumsWithinTheToleranceOfTheGltfValidator) {
+  // With two weights 4e-7 are allowed; above 1 a step of float is 1.2e-7, below half of it.
+  const auto sumOf = [&](double difference) {
+    mesh.weights[3 * 4 + 0] = 0.75f;
+    mesh.weights[3 * 4 + 1] = static_cast<float>(0.25 + difference);
+    return std::abs(static_cast<double>(mesh.weights[3 * 4 + 1]) - 0.25 - difference) < 2e-8;
+  };
+  for (const double difference : {3.8e-7, -3.8e-7, 1e-7, -1e-7}) {
+    ASSERT_TRUE(sumOf(difference));
+    EXPECT_TRUE(validate(view, jointCount).findings.empty()) << difference;
+  }
+  for (const double difference : {4.3e-7, -4.3e-7, 1e-6, 0.5, -0.1}) {
+    ASSERT_TRUE(sumOf(difference));
+    EXPECT_NE(onlyFinding(Problem::weightsNotNormalized, 1, 3).find("mesh 'Fox', vertex 3"),
+              std::string::npos);
+  }
+}
+
+TEST_F(ValidateTest, Truth18_TheToleranceGrowsWithTheWeightsThatAreNotZero) {
+  const double difference = 7e-7;
+  for (std::uint32_t used = 1; used <= 4; ++used) {
+    for (std::uint32_t slot = 0; slot < 4; ++slot) {
+      mesh.joints[slot] = slot;
+      mesh.weights[slot] = slot < used ? 1.0f / static_cast<float>(used) : 0.0f;
+    }
+    mesh.weights[0] += static_cast<float>(difference);
+    EXPECT_EQ(validate(view, jointCount).findings.empty(), used == 4) << used;
+  }
+}
+
+TEST_F(ValidateTest, TheSumIsOverAllSetsTogether) {
+  std::vector<float> half(vertexCount * 4, 0.0f);
+  std::vector<std::uint32_t> joints(vertexCount * 4, 20);
+  const InfluenceSet sets[] = {set,
+                               {{joints.data(), vertexCount, 16, ComponentType::uint32, 4},
+                                floatAttribute(half.data(), vertexCount, 4)}};
+  view.influenceSets = sets;
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+  half[6 * 4] = 0.5f;
+  const std::string message = onlyFinding(Problem::weightsNotNormalized, 1, 6);
+  EXPECT_EQ(message.find("mesh 'Fox', vertex 6: the weights sum to 1.5"), 0u) << message;
+  mesh.weights[6 * 4] = 0.25f;
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+}
+
+// A sum that is printed as 1.000000 does not say what is wrong with it.
+TEST_F(ValidateTest, TheSentenceShowsThatTheSumIsNotOne) {
+  mesh.weights[3 * 4 + 1] = 0.25000045f;
+  const std::string message = onlyFinding(Problem::weightsNotNormalized, 1, 3);
+  EXPECT_EQ(message.find("1.000000,"), std::string::npos) << message;
+  mesh.weights[3 * 4 + 1] = 0.25f;
+  for (std::size_t slot = 0; slot < 4; ++slot) mesh.weights[8 * 4 + slot] *= 1e-9f;
+  const std::string tiny = onlyFinding(Problem::weightsNotNormalized, 1, 8);
+  EXPECT_EQ(tiny.find(" 0.000000,"), std::string::npos) << tiny;
+}
+
+template <typename T>
+void expectExactSums(MeshView view, ComponentType type, const OwnedMesh& mesh) {
+  const auto largest = std::numeric_limits<T>::max();
+  std::vector<T> weights(vertexCount * 4, T{0});
+  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+    weights[vertex * 4] = static_cast<T>(largest - vertex * 7);
+    weights[vertex * 4 + 1] = static_cast<T>(vertex * 7);
+  }
+  const InfluenceSet set{mesh.set.joints, {weights.data(), vertexCount, 4 * sizeof(T), type, 4}};
+  view.influenceSets = {&set, 1};
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+  for (const int off : {-1, 1}) {
+    weights[5 * 4] = static_cast<T>(largest - 5 * 7 + off);
+    const MeshReport report = validate(view, jointCount);
+    ASSERT_EQ(report.findings.size(), 1u);
+    EXPECT_EQ(report.findings[0].problem, Problem::weightsNotNormalized);
+    EXPECT_EQ(report.findings[0].count, 1u);
+    EXPECT_EQ(report.findings[0].firstVertex, 5u);
+  }
+}
+
+TEST_F(ValidateTest, Truth18_BytesMustSumTo255ShortsTo65535) {
+  expectExactSums<std::uint8_t>(view, ComponentType::unorm8, mesh);
+  expectExactSums<std::uint16_t>(view, ComponentType::unorm16, mesh);
+}
+
+TEST_F(ValidateTest, DuplicateJoints) {
+  mesh.joints[2 * 4 + 1] = mesh.joints[2 * 4];
+  mesh.joints[5 * 4 + 1] = mesh.joints[5 * 4];
+  EXPECT_EQ(onlyFinding(Problem::duplicateJoint, 2, 2),
+            "mesh 'Fox', vertex 2: joint 2 has weight twice");
+}
+
+TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbours) {
+  const std::uint32_t joints[] = {9, 4, 9, 1};
+  const float weights[] = {0.25f, 0.25f, 0.25f, 0.25f};
+  for (std::size_t slot = 0; slot < 4; ++slot) {
+    mesh.joints[8 * 4 + slot] = joints[slot];
+    mesh.weights[8 * 4 + slot] = weights[slot];
+  }
+  EXPECT_EQ(onlyFinding(Problem::duplicateJoint, 1, 8),
+            "mesh 'Fox', vertex 8: joint 9 has weight twice");
+}
+
+TEST_F(ValidateTest, DuplicatesAcrossSets) {
+  std::vector<float> none(vertexCount, 0.0f);
+  std::vector<std::uint8_t> joints(vertexCount, 0);
+  const InfluenceSet sets[] = {set,
+                               {{joints.data(), vertexCount, 1, ComponentType::uint8, 1},
+                                floatAttribute(none.data(), vertexCount, 1)}};
+  view.influenceSets = sets;
+  EXPECT_TRUE(validate(view, jointCount).findings.empty());
+  joints[6] = 7;
+  none[6] = 0.25f;
+  mesh.weights[6 * 4] = 0.5f;
+  onlyFinding(Problem::duplicateJoint, 1, 6);
+}
+
+TEST_F(ValidateTest, VerticesWithoutWeight) {
+  for (const std::size_t vertex : {3u, 8u}) {
+    for (std::size_t slot = 0; slot < 4; ++slot) mesh.weights[vertex * 4 + slot] = 0;
+  }
+  EXPECT_EQ(onlyFinding(Problem::vertexWithoutWeight, 2, 3),
+            "mesh 'Fox', vertex 3: no joint has weight; it stays in bind pose");
+}
+
+TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {
+  mesh.weights[0] = nan;
+  mesh.weights[1 * 4] = -1;
+  mesh.joints[2 * 4] = 99;
+  mesh.weights[3 * 4] = 0.5f;
+  mesh.joints[4 * 4] = mesh.joints[4 * 4 + 1];
+  mesh.weights[5 * 4] = mesh.weights[5 * 4 + 1] = 0;
+  mesh.positions[6 * 3] = nan;
+  mesh.normals[7 * 3] = nan;
+  tangents[8 * 4] = nan;
+  const MeshReport report = validate(view, jointCount);
+  const Problem expected[] = {
+      Problem::nonFinitePosition,    Problem::nonFiniteNormal, Problem::nonFiniteTangent,
+      Problem::nonFiniteWeight,      Problem::negativeWeight,  Problem::jointOutOfRange,
+      Problem::weightsNotNormalized, Problem::duplicateJoint,  Problem::vertexWithoutWeight};
+  const std::uint32_t vertices[] = {6, 7, 8, 0, 1, 2, 3, 4, 5};
+  ASSERT_EQ(report.findings.size(), std::size(expected));
+  for (std::size_t i = 0; i < std::size(expected); ++i) {
+    EXPECT_EQ(report.findings[i].problem, expected[i]);
+    EXPECT_EQ(report.findings[i].firstVertex, vertices[i]);
+    EXPECT_EQ(report.findings[i].count, 1u);
+  }
+}
+
+TEST(Validate, EveryKindHasANameAndAConsequence) {
+  std::set<std::string> names;
+  for (int kind = 0; kind <= static_cast<int>(Problem::vertexWithoutWeight); ++kind) {
+    const auto problem = static_cast<Problem>(kind);
+    names.insert(problemName(problem));
+    EXPECT_EQ(refusedByPack(problem), kind <= static_cast<int>(Problem::jointOutOfRange));
+  }
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(Problem::vertexWithoutWeight) + 1);
+  EXPECT_STREQ(problemName(Problem::jointOutOfRange), "joint out of range");
+  EXPECT_STREQ(problemName(static_cast<Problem>(99)), "unknown");
+}
+
+}  // namespace
+}  // namespace dermis::test
