@@ -36,7 +36,7 @@ Layout layOut(std::span<const SkinRequest> requests, const RunOptions& options) 
     const bool normals = options.normals && request.mesh->hasNormals();
     const std::uint32_t stride = std::max(options.stride, normals ? 24u : 12u);
     Job job;
-    job.mesh = request.mesh;
+    job.mesh = request.mesh->info();
     job.meshOffset = entry->second;
     job.palette = static_cast<std::uint32_t>(layout.palettes.size() - 1);
     job.method = request.method;
@@ -116,7 +116,7 @@ BatchResult readBack(const Layout& layout, const Plan& plan, const Buffers& buff
   for (const Job& job : layout.jobs) {
     SkinnedVertices skinned;
     const std::uint64_t used = job.normals.stride != 0 ? 24 : 12;
-    for (std::uint64_t vertex = 0; vertex < job.mesh->vertexCount(); ++vertex) {
+    for (std::uint64_t vertex = 0; vertex < job.mesh.vertexCount; ++vertex) {
       const std::uint64_t offset = job.positions.offset + vertex * job.positions.stride;
       readVector(output, offset, skinned.positions);
       if (job.normals.stride != 0) readVector(output, offset + 12, skinned.normals);
@@ -145,7 +145,7 @@ Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
   batch.matricesSize = layout.matricesSize;
   batch.outputSize = layout.outputSize;
   Plan plan;
-  if (Result<void> planned = dermis::plan(batch, context.limits(), options.tuning, plan); !planned)
+  if (Result<void> planned = makePlan(batch, context.limits(), options.tuning, plan); !planned)
     return planned.error();
   if (Result<void> ready = context.prepare(plan.variants()); !ready) return ready.error();
 

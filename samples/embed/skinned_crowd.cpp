@@ -9,6 +9,7 @@ using namespace dermis;
 namespace embed {
 namespace {
 
+// [plan]
 /// Says who is skinned by which pose, and to where: as often as that changes.
 Result<void> planCrowd(Crowd& crowd) {
   const std::uint64_t poseSize = crowd.jointCount * sizeof(JointMatrix);
@@ -22,7 +23,7 @@ Result<void> planCrowd(Crowd& crowd) {
 
     const std::uint64_t firstVertex = instance * instanceSize;
     Job& job = crowd.jobs[instance];
-    job.mesh = &crowd.mesh;
+    job.mesh = crowd.mesh.info();
     job.palette = instance;
     job.method = Method::dualQuaternion;
     job.positions = {firstVertex + offsetof(SkinnedVertex, position), sizeof(SkinnedVertex)};
@@ -34,8 +35,9 @@ Result<void> planCrowd(Crowd& crowd) {
   batch.meshesSize = crowd.mesh.bytes().size();
   batch.matricesSize = instanceCount * poseSize;
   batch.outputSize = instanceCount * instanceSize;
-  return plan(batch, crowd.context.limits(), crowd.context.tuning(), crowd.plan);
+  return makePlan(batch, crowd.context.limits(), crowd.context.tuning(), crowd.plan);
 }
+// [/plan]
 
 /// The engine makes its buffers as large, and for what use, as the plan says.
 Result<void> makeBuffer(samples::Device& engine, const Plan& plan, BufferRole role,

@@ -64,7 +64,7 @@ class ThreadsTest : public DeviceTest {
     const std::vector<JointMatrix> pose = randomPose(seed, 10, Rigidity::rigid);
     const Palette palette{10, 0, false};
     Job job;
-    job.mesh = &mesh;
+    job.mesh = mesh.info();
     job.positions = {0, 24};
     job.normals = {12, 24};
     Batch batch;
@@ -73,7 +73,7 @@ class ThreadsTest : public DeviceTest {
     batch.meshesSize = mesh.bytes().size();
     batch.matricesSize = pose.size() * sizeof(JointMatrix);
     batch.outputSize = std::uint64_t{mesh.vertexCount()} * 24;
-    ASSERT_TRUE(plan(batch, context().limits(), {}, work.plan).ok());
+    ASSERT_TRUE(makePlan(batch, context().limits(), {}, work.plan).ok());
     const auto make = [&](BufferRole role) {
       const BufferRequirement requirement = work.plan.buffer(role);
       return *samples::MappedBuffer::create(device(), requirement.size, requirement.usage, true);

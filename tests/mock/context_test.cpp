@@ -33,14 +33,14 @@ const std::vector<std::string> neededFunctions{"vkGetDeviceProcAddr",
 struct SmallBatch {
   OwnedMesh mesh = randomMesh(1, 100, 4, 4);
   PackedMesh packed = *pack(mesh.view(), 4);
-  dermis::Plan plan;
+  Plan plan;
 
   explicit SmallBatch(std::vector<Method> methods = {Method::linear, Method::dualQuaternion}) {
     const Palette palette{4, 0, true};
     std::vector<Job> jobs;
     for (const Method method : methods) {
       Job job;
-      job.mesh = &packed;
+      job.mesh = packed.info();
       job.method = method;
       job.positions = {jobs.size() * 2400, 24};
       job.normals = {jobs.size() * 2400 + 12, 24};
@@ -52,7 +52,7 @@ struct SmallBatch {
     batch.meshesSize = packed.bytes().size();
     batch.matricesSize = 4 * sizeof(JointMatrix);
     batch.outputSize = jobs.size() * 2400;
-    EXPECT_TRUE(dermis::plan(batch, {}, {}, plan).ok());
+    EXPECT_TRUE(makePlan(batch, {}, {}, plan).ok());
   }
 
   vulkan::BatchBuffers buffers() const {

@@ -1,6 +1,7 @@
 // Dual-quaternion blending of rigid joints in the reference: what it keeps, and which influence
 // decides the signs.
 
+#include "dermis/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -308,6 +309,38 @@ TEST(ReferenceDualQuaternion, MirrorsAreNotRigid) {
     const std::array pose{jointOf(mirror)};
     EXPECT_FALSE(skinned(mesh, pose, Method::dualQuaternion).conditioning[0].normalRotatedOnly);
   }
+}
+
+// What kernels take for rigid they turn and shift, no more: the bound has to allow for what that
+// leaves out, also where a shear this small lies in one direction.
+TEST(ReferenceDualQuaternion, Truth16_JointsTakenForRigidStayInsideTheBound) {
+  RigRandom random(6);
+  double worst = 0;
+  int taken = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    // A stretch along one axis, of up to 12e-6: then each entry of CᵀC − 1 may be below 8e-6.
+    const glm::dvec3 axis = trial % 2 == 0 ? random.direction() : glm::normalize(glm::dvec3(1));
+    const glm::dmat3 rotation = rotationAbout(random.direction(), random.between(-pi, pi));
+    const glm::dmat3 stretch =
+        glm::dmat3(1.0) + glm::outerProduct(axis, axis) * random.between(-12e-6, 12e-6);
+    const std::array pose{jointOf(rotation * stretch)};
+    const glm::dmat3 c = linearOf(pose[0]);
+    const glm::dmat3 gram = glm::transpose(c) * c - glm::dmat3(1.0);
+    double deviation = 0;
+    for (int i = 0; i < 9; ++i) deviation = std::max(deviation, std::abs(gram[i / 3][i % 3]));
+    if (deviation > 8e-6) continue;
+    OwnedMesh mesh;
+    addVertex(mesh, axis, {{0, 1.0f}});
+    mesh.normals = {0, 0, 1};
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+    if (!result.conditioning[0].normalRotatedOnly) continue;  // not taken for rigid
+    ++taken;
+    const double error =
+        glm::length(rotation * bindPosition(mesh, 0) - toVector(result.positions[0]));
+    worst = std::max(worst, error / positionBound(Method::dualQuaternion, result.conditioning[0]));
+  }
+  EXPECT_GT(taken, 1000);
+  EXPECT_LE(worst, 1) << "of the bound";
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ struct OwnedBatch {
   Job& addJob(std::uint32_t mesh, std::uint32_t palette, Method method, bool normals,
               std::uint32_t stride = 24) {
     Job job;
-    job.mesh = &meshes[mesh];
+    job.mesh = meshes[mesh].info();
     job.meshOffset = meshOffsets[mesh];
     job.palette = palette;
     job.method = method;
@@ -84,7 +84,7 @@ class Simulation {
       : batch_(batch), limits_(limits), tuning_(tuning), plan_(plan), tables_(tablesOf(plan)) {
     for (std::uint32_t index = 0; index < batch.jobs.size(); ++index) {
       const Job& job = batch.jobs[index];
-      for (std::uint32_t vertex = 0; vertex < job.mesh->vertexCount(); ++vertex) {
+      for (std::uint32_t vertex = 0; vertex < job.mesh.vertexCount; ++vertex) {
         places_[job.positions.offset + std::uint64_t{vertex} * job.positions.stride] = {index,
                                                                                         vertex};
       }
@@ -225,7 +225,7 @@ class Simulation {
     ASSERT_EQ(dispatch.variant.method, job.method);
     ASSERT_EQ(std::uint64_t{word(group + abi::GROUP_MESH)} * 4, job.meshOffset);
     ASSERT_TRUE(dispatch.variant.influences == 0 ||
-                dispatch.variant.influences >= job.mesh->maxInfluences());
+                dispatch.variant.influences >= job.mesh.maxInfluences);
     const Palette& palette = batch_.palettes[job.palette];
     ASSERT_EQ(word(record + abi::INSTANCE_JOINTS), palette.jointCount);
     ASSERT_EQ(
@@ -255,7 +255,7 @@ class Simulation {
 
 void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
                    Plan& out) {
-  const Result<void> result = plan(batch.batch(), limits, tuning, out);
+  const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
   ASSERT_TRUE(result.ok()) << result.error().message;
   Simulation(batch, limits, tuning, out).run();
 }
@@ -370,7 +370,7 @@ TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
   addMeshes(batch);
   addPalettes(batch);
   for (const Batch& empty : {Batch{}, batch.batch()}) {
-    ASSERT_TRUE(plan(empty, {}, {}, out).ok());
+    ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
     EXPECT_TRUE(out.dispatches().empty());
     EXPECT_TRUE(out.variants().empty());
     EXPECT_EQ(out.instanceCount(), 0u);
@@ -402,7 +402,7 @@ OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
                      engine() % 2 == 0 ? Method::linear : Method::dualQuaternion, normals, stride);
     if (!normals || engine() % 2 == 0) continue;
     // Planar: first all positions, then all normals with a stride of their own.
-    const std::uint32_t vertices = job.mesh->vertexCount();
+    const std::uint32_t vertices = job.mesh.vertexCount;
     job.positions.stride = 12 + static_cast<std::uint32_t>(engine() % 2) * 4;
     job.normals.offset = job.positions.offset + std::uint64_t{vertices} * job.positions.stride;
     job.normals.stride = 12 + static_cast<std::uint32_t>(engine() % 3) * 4;
@@ -460,7 +460,8 @@ TEST(Plan, OutputRangesStepByLessThanTheyAreLong) {
 class PlanWindows : public ::testing::TestWithParam<std::tuple<std::uint64_t, std::uint32_t>> {};
 
 TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
-  const auto [range, alignment] = GetParam();
+  const std::uint64_t range = std::get<0>(GetParam());
+  const std::uint32_t alignment = std::get<1>(GetParam());
   const DeviceLimits limits{range, alignment, 65535, 65535};
   for (std::uint32_t seed = 1; seed <= 6; ++seed) {
     OwnedBatch batch = randomBatch(seed, 60);
@@ -512,7 +513,7 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
     SCOPED_TRACE(apart);
     job.normals.offset = job.positions.offset + apart;
     Plan out;
-    const Result<void> result = plan(batch.batch(), limits, {64, 4}, out);
+    const Result<void> result = makePlan(batch.batch(), limits, {64, 4}, out);
     if (result) {
       ++good;
       ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {64, 4}, out));
@@ -561,7 +562,7 @@ TEST(Plan, BuffersAreDescribed) {
   DeviceLimits limits;
   limits.minStorageBufferOffsetAlignment = 64;
   Plan out;
-  ASSERT_TRUE(plan(batch.batch(), limits, {}, out).ok());
+  ASSERT_TRUE(makePlan(batch.batch(), limits, {}, out).ok());
   const std::uint32_t storage = 0x20, transferTarget = 0x02;  // VkBufferUsageFlagBits
   const struct {
     BufferRole role;
@@ -640,7 +641,7 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeeds) {
           batch.addPalette(8, false);
           batch.addJob(0, 0, method, normals);
           Plan out;
-          ASSERT_TRUE(plan(batch.batch(), {}, tuning, out).ok());
+          ASSERT_TRUE(makePlan(batch.batch(), {}, tuning, out).ok());
           for (const Variant& variant : out.variants()) {
             EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
             keys.erase(variant.key());
@@ -677,8 +678,8 @@ TEST(Plan, AReusedObjectIsAsGoodAsANewOne) {
         return job.normals.stride != 0 && job.normals.offset - job.positions.offset > 2048;
       });
       Plan fresh;
-      ASSERT_TRUE(plan(batch.batch(), limits, {}, fresh).ok());
-      ASSERT_TRUE(plan(batch.batch(), limits, {}, reused).ok());
+      ASSERT_TRUE(makePlan(batch.batch(), limits, {}, fresh).ok());
+      ASSERT_TRUE(makePlan(batch.batch(), limits, {}, reused).ok());
       EXPECT_TRUE(samePlan(fresh, reused)) << seed;
       for (std::uint32_t palette = 0; palette < 5; ++palette) {
         EXPECT_EQ(fresh.statusOffset(palette), reused.statusOffset(palette));
@@ -690,8 +691,8 @@ TEST(Plan, AReusedObjectIsAsGoodAsANewOne) {
 TEST(Plan, MovesWithItsContents) {
   const OwnedBatch batch = randomBatch(2, 10);
   Plan first, second;
-  ASSERT_TRUE(plan(batch.batch(), {}, {}, first).ok());
-  ASSERT_TRUE(plan(batch.batch(), {}, {}, second).ok());
+  ASSERT_TRUE(makePlan(batch.batch(), {}, {}, first).ok());
+  ASSERT_TRUE(makePlan(batch.batch(), {}, {}, second).ok());
   const Plan moved = std::move(first);
   EXPECT_TRUE(samePlan(moved, second));
 }
@@ -699,7 +700,7 @@ TEST(Plan, MovesWithItsContents) {
 TEST(Plan, TablesAreWrittenWhereThereIsRoom) {
   const OwnedBatch batch = randomBatch(3, 10);
   Plan out;
-  ASSERT_TRUE(plan(batch.batch(), {}, {}, out).ok());
+  ASSERT_TRUE(makePlan(batch.batch(), {}, {}, out).ok());
   const std::size_t size = out.buffer(BufferRole::tables).size;
   std::vector<std::byte> bytes(size + 16, std::byte{0xab});
   ASSERT_TRUE(writeTables(out, bytes).ok());
@@ -726,8 +727,8 @@ struct PlanErrors : public ::testing::Test {
 
   void expectRefused(ErrorCode code, std::initializer_list<const char*> parts) {
     Plan out;
-    ASSERT_TRUE(plan(randomBatch(1, 5).batch(), {}, {}, out).ok());
-    const Result<void> result = plan(batch.batch(), limits, tuning, out);
+    ASSERT_TRUE(makePlan(randomBatch(1, 5).batch(), {}, {}, out).ok());
+    const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, code) << result.error().message;
     for (const char* part : parts) {
@@ -746,7 +747,7 @@ struct PlanErrors : public ::testing::Test {
   }
   void expectGood() {
     Plan out;
-    const Result<void> result = plan(batch.batch(), limits, tuning, out);
+    const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
     EXPECT_TRUE(result.ok()) << result.error().message;
   }
 
@@ -760,7 +761,7 @@ TEST_F(PlanErrors, TheBatchIsGoodBeforeItIsBroken) {
 }
 
 TEST_F(PlanErrors, NoMesh) {
-  job().mesh = nullptr;
+  job().mesh = {};
   expectInvalid({"job 1", "mesh"});
 }
 
@@ -819,7 +820,7 @@ TEST_F(PlanErrors, UnknownMethods) {
 }
 
 TEST_F(PlanErrors, NormalsOfAMeshWithoutAny) {
-  job().mesh = &batch.meshes[1];
+  job().mesh = batch.meshes[1].info();
   job().meshOffset = batch.meshOffsets[1];
   expectInvalid({"job 1", "normals"});
   job().normals = {};
@@ -937,7 +938,7 @@ TEST_F(PlanErrors, LimitsThatNoDeviceHas) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto planned = [&](const DeviceLimits& bad) {
     Plan out;
-    const Result<void> result = plan(batch.batch(), bad, {}, out);
+    const Result<void> result = makePlan(batch.batch(), bad, {}, out);
     std::exit(result.ok() ? 1 : 0);
   };
   DeviceLimits bad;

@@ -43,7 +43,8 @@ TEST(Result, GivesUpAValueThatCanOnlyBeMoved) {
   Result<std::unique_ptr<int>> result(std::make_unique<int>(7));
   const std::unique_ptr<int> taken = std::move(result).value();
   EXPECT_EQ(*taken, 7);
-  const std::unique_ptr<int> another = *Result<std::unique_ptr<int>>(std::make_unique<int>(8));
+  Result<std::unique_ptr<int>> second(std::make_unique<int>(8));
+  const std::unique_ptr<int> another = *std::move(second);
   EXPECT_EQ(*another, 8);
 }
 

@@ -24,7 +24,7 @@ std::string region(const std::string& text, const std::string& name) {
 TEST(DocumentationTest, TheReadmesCodeIsTheSamplesCode) {
   const std::string readme = readText("README.md"),
                     sample = readText("samples/embed/skinned_crowd.cpp");
-  for (const char* name : {"set-up", "frame"}) {
+  for (const char* name : {"plan", "set-up", "frame"}) {
     const std::string code = region(sample, name);
     ASSERT_FALSE(code.empty()) << name;
     EXPECT_NE(readme.find("```cpp\n" + code + "```"), std::string::npos)

@@ -14,6 +14,17 @@ namespace dermis {
 /// Where a packed mesh may stand in the engine's mesh buffer: a multiple of this many bytes.
 inline constexpr std::uint32_t packedMeshAlignment = 16;
 
+/// What `makePlan` has to know of a packed mesh. Keep this by the mesh, and free the blob once its
+/// bytes are on the GPU.
+struct MeshInfo {
+  std::uint64_t byteSize = 0;  ///< of the blob
+  std::uint32_t vertexCount = 0;
+  std::uint32_t requiredJoints =
+      0;  ///< the fewest joints of a palette for this mesh: its largest joint index + 1
+  std::uint32_t maxInfluences = 0;  ///< the most influences of one vertex
+  bool hasNormals = false;
+};
+
 /// A packed mesh owns a blob of little-endian 32-bit words. It is relocatable (offsets count from
 /// its start) and versioned, so that an asset cooker can store it. The order of vertices is that of
 /// the mesh.
@@ -28,6 +39,8 @@ class PackedMesh {
 
   /// The blob; its size is a multiple of `packedMeshAlignment`.
   std::span<const std::byte> bytes() const { return std::as_bytes(std::span(words_)); }
+
+  MeshInfo info() const;
 
   std::uint32_t vertexCount() const;
   /// The fewest joints that a palette for this mesh may have: its largest joint index + 1.

@@ -36,9 +36,10 @@ struct Tuning {
 struct Palette {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPaletteJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
-  /// Whether joints may scale or shear. Costs 32 bytes a joint of scratch; joints that do so
-  /// undeclared are skinned by their rotation alone and counted in `PaletteStatus`.
-  bool mayScale = false;
+  /// Whether joints may scale or shear: many exporters leave a scale in their joints. It costs 32
+  /// bytes a joint of scratch. Where it is denied, joints that do so all the same are skinned by
+  /// their rotation alone, and counted in `PaletteStatus`.
+  bool mayScale = true;
 };
 
 /// Where one attribute of the skinned vertices goes: vertex v to `offset + v * stride` in the
@@ -53,8 +54,7 @@ struct OutputAttribute {
 /// batch may write the same byte; that is not checked. Bytes between the attributes are never
 /// touched.
 struct Job {
-  const PackedMesh* mesh =
-      nullptr;  ///< Read by `plan` only; its bytes must stand in the mesh buffer at `meshOffset`.
+  MeshInfo mesh;  ///< `PackedMesh::info` of the mesh whose bytes stand in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
   std::uint32_t palette = 0;     ///< index into `Batch::palettes`
   Method method = Method::dualQuaternion;
@@ -140,8 +140,8 @@ struct PaletteStatus {
   std::uint32_t nonFiniteJoints = 0;  ///< joints with a NaN or an infinity
 };
 
-/// The dispatches of a batch. Reuse one object: its memory is kept. Not thread-safe while `plan`
-/// fills it, immutable after.
+/// The dispatches of a batch. Reuse one object: its memory is kept. Not thread-safe while
+/// `makePlan` fills it, immutable after.
 class Plan {
  public:
   Plan();
@@ -153,7 +153,8 @@ class Plan {
   std::span<const Dispatch> dispatches() const;
   /// The variants that the dispatches use, each once: what `Context::prepare` must have built.
   std::span<const Variant> variants() const;
-  /// What the buffer of that role must be.
+  /// What the buffer of that role must be. Meshes, matrices and output: as large as the batch said
+  /// they are. Tables and palettes: as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
   /// Bytes into the palettes buffer at which the `PaletteStatus` of a palette stands; `noStatus`
   /// where no dual-quaternion job uses that palette.
@@ -164,7 +165,7 @@ class Plan {
   std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances
 
  private:
-  friend Result<void> plan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
+  friend Result<void> makePlan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
   friend Result<void> writeTables(const Plan&, std::span<std::byte>);
   struct State;
   std::unique_ptr<State> state_;
@@ -179,7 +180,8 @@ class Plan {
 /// wanted of a mesh that has none, a range outside its buffer; and with `limitExceeded` where one
 /// vertex's attributes lie further apart than a device's storage buffer range allows. The plan is
 /// then empty.
-Result<void> plan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning, Plan& out);
+Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                      Plan& out);
 
 /// Writes the tables that the kernels read, `buffer(BufferRole::tables).size` bytes, to mapped
 /// memory. The memory is written once from front to back and never read. Fails with

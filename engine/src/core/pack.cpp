@@ -273,6 +273,10 @@ Result<PackedMesh> PackedMesh::fromBytes(std::span<const std::byte> bytes) {
   return packed;
 }
 
+MeshInfo PackedMesh::info() const {
+  return {bytes().size(), vertexCount(), requiredJoints(), maxInfluences(), hasNormals()};
+}
+
 std::uint32_t PackedMesh::vertexCount() const {
   return words_[abi::MESH_HEADER_VERTEX_COUNT];
 }

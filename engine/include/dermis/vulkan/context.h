@@ -52,7 +52,7 @@ class Context {
   Context(Context&&) noexcept;
   Context& operator=(Context&&) noexcept;
 
-  /// The limits that `plan` has to keep to.
+  /// The limits that `makePlan` has to keep to.
   const DeviceLimits& limits() const;
 
   /// How to cut up the work on this device.

@@ -36,7 +36,7 @@ void Plan::State::addPiece(const Job& job, std::uint32_t jobIndex, GroupKey key)
   if (group == notUsed || !(groups[group].key == key)) {
     const auto [entry, isNew] = groupOf.try_emplace(key, static_cast<std::uint32_t>(groups.size()));
     group = entry->second;
-    if (isNew) groups.push_back({key, job.mesh->maxInfluences(), 0, 0, 0});
+    if (isNew) groups.push_back({key, job.mesh.maxInfluences, 0, 0, 0});
   }
   ++groups[group].instances;
   pieces.push_back({group, jobIndex});
@@ -54,7 +54,7 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const DeviceLimits& l
                 job.normals.stride, job.method});
     }
     ++instanceCount;
-    vertexCount += job.mesh->vertexCount();
+    vertexCount += job.mesh.vertexCount;
   }
   return {};
 }

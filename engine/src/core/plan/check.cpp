@@ -41,30 +41,29 @@ std::string jobName(std::size_t index) {
 }
 
 Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index) {
-  if (job.mesh == nullptr) return invalid(jobName(index) + " has no mesh");
+  if (job.mesh.vertexCount == 0) return invalid(jobName(index) + " has no mesh");
   if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
-      job.mesh->bytes().size() > batch.meshesSize - job.meshOffset) {
-    return invalid(jobName(index) + ": a packed mesh of " +
-                   std::to_string(job.mesh->bytes().size()) + " bytes cannot stand at byte " +
-                   std::to_string(job.meshOffset) + " of a mesh buffer of " +
-                   std::to_string(batch.meshesSize));
+      job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
+    return invalid(jobName(index) + ": a packed mesh of " + std::to_string(job.mesh.byteSize) +
+                   " bytes cannot stand at byte " + std::to_string(job.meshOffset) +
+                   " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
   if (job.palette >= batch.palettes.size()) {
     return invalid(jobName(index) + ": there is no palette " + std::to_string(job.palette) +
                    " among " + std::to_string(batch.palettes.size()));
   }
-  if (batch.palettes[job.palette].jointCount < job.mesh->requiredJoints()) {
+  if (batch.palettes[job.palette].jointCount < job.mesh.requiredJoints) {
     return invalid(jobName(index) + ": its mesh needs a palette of " +
-                   std::to_string(job.mesh->requiredJoints()) + " joints, palette " +
+                   std::to_string(job.mesh.requiredJoints) + " joints, palette " +
                    std::to_string(job.palette) + " has " +
                    std::to_string(batch.palettes[job.palette].jointCount));
   }
   if (methodName(job.method) == "unknown")
     return invalid(jobName(index) + ": its method is not one of Method");
-  if (job.normals.stride != 0 && !job.mesh->hasNormals()) {
+  if (job.normals.stride != 0 && !job.mesh.hasNormals) {
     return invalid(jobName(index) + " wants normals, its mesh has none");
   }
-  const std::uint32_t vertices = job.mesh->vertexCount();
+  const std::uint32_t vertices = job.mesh.vertexCount;
   if (Result<void> good =
           checkAttribute(job.positions, "positions", vertices, batch.outputSize, index);
       !good) {

@@ -57,7 +57,8 @@ BufferRequirement Plan::buffer(BufferRole role) const {
   return {};
 }
 
-Result<void> plan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning, Plan& out) {
+Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                      Plan& out) {
   out.state_->clear();
   Result<void> built = out.state_->build(batch, limits, tuning);
   if (!built) out.state_->clear();

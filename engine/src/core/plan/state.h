@@ -66,7 +66,7 @@ struct Plan::State {
   std::uint32_t instanceCount = 0;
   std::uint64_t vertexCount = 0;
 
-  // Scratch of `plan`, kept for its memory.
+  // Scratch of `makePlan`, kept for its memory.
   std::vector<Group> groups;
   std::vector<VertexRun> runs;
   std::vector<Piece> pieces;

@@ -58,7 +58,7 @@ std::uint64_t outputWindowStep(const DeviceLimits& limits) {
 Result<void> cutIntoRuns(const Job& job, std::size_t jobIndex, std::uint64_t outputSize,
                          const DeviceLimits& limits, std::vector<VertexRun>& runs) {
   runs.clear();
-  const std::uint32_t vertices = job.mesh->vertexCount();
+  const std::uint32_t vertices = job.mesh.vertexCount;
   if (outputSize <= limits.maxStorageBufferRange) {
     runs.push_back({0, vertices, 0});
     return {};

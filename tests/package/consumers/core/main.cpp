@@ -114,7 +114,7 @@ int main() {
   const Palette palette{jointCount, 0, true};
   std::vector<Job> jobs(3);
   for (std::uint32_t index = 0; index < jobs.size(); ++index) {
-    jobs[index].mesh = &*loaded;
+    jobs[index].mesh = loaded->info();
     jobs[index].method = index == 1 ? Method::linear : Method::dualQuaternion;
     jobs[index].positions = {std::uint64_t{index} * vertexCount * 24, 24};
     jobs[index].normals = {std::uint64_t{index} * vertexCount * 24 + 12, 24};
@@ -126,7 +126,7 @@ int main() {
   batch.matricesSize = jointCount * sizeof(JointMatrix);
   batch.outputSize = std::uint64_t{jobs.size()} * vertexCount * 24;
   Plan planned;
-  if (Result<void> done = plan(batch, DeviceLimits{}, Tuning{}, planned); !done)
+  if (Result<void> done = makePlan(batch, DeviceLimits{}, Tuning{}, planned); !done)
     return fail(done.error());
   std::vector<std::byte> tables(planned.buffer(BufferRole::tables).size);
   if (Result<void> done = writeTables(planned, tables); !done) return fail(done.error());
