@@ -84,7 +84,7 @@ TEST(Repair, BadInfluencesAreDroppedTheOthersStay) {
   EXPECT_EQ(result.report().find(Problem::nonFiniteWeight)->count, 3u);
   EXPECT_EQ(result.report().find(Problem::negativeWeight)->count, 1u);
   EXPECT_EQ(result.report().find(Problem::jointOutOfRange)->count, 2u);
-  const InfluenceSet& set = result.view().influenceSets[0];
+  const InfluenceSet set = result.view().influenceSets[0];
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
     const std::uint32_t dropped = vertex < 4 ? 1 : vertex == 4 ? 3 : 0;
     for (std::uint32_t slot = 0; slot < 4; ++slot) {
