@@ -2,6 +2,8 @@
 
 #include "reference/decompose.h"
 
+#include <algorithm>
+
 #include "reference_rig.h"
 
 namespace dermis::test {

@@ -1,7 +1,9 @@
 // Dual-quaternion blending of rigid joints in the reference: what it keeps, and which influence
 // decides the signs.
 
+#include <algorithm>
 #include "dermis/accuracy.h"
+
 #include "reference_rig.h"
 
 namespace dermis::test {

@@ -1,5 +1,7 @@
 // Linear blend skinning in the reference: v' = (Σ w_j C_j) v, and what it is known to do to a tube.
 
+#include <algorithm>
+
 #include "reference_rig.h"
 
 namespace dermis::test {

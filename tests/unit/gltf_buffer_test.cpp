@@ -1,6 +1,7 @@
 // Where the bytes come from: data URIs, and files beside the glTF file and nowhere else.
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
