@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "dermis/reference.h"
 #include "mesh_output.h"
+#include "open_device.h"
 #include "progress.h"
 #include "skinned_scene.h"
 
@@ -171,11 +172,10 @@ ExitStatus skin(const SkinOptions& options) {
     return writePoses(options, *scene, *clip, referenceSkinner(*scene, method));
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
-  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(deviceOptions);
-  if (!device) return reportDeviceError(device.error());
-  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
-  if (!context) return reportDeviceError(context.error());
-  return writePoses(options, *scene, *clip, deviceSkinner(*scene, method, **device, *context));
+  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
+  if (!open) return reportDeviceError(open.error());
+  return writePoses(options, *scene, *clip,
+                    deviceSkinner(*scene, method, *open->device, open->context));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "open_device.h"
 #include "progress.h"
 #include "verification_report.h"
 
@@ -63,10 +64,8 @@ ExitStatus verify(const VerifyOptions& options) {
   }
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
-  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(deviceOptions);
-  if (!device) return reportDeviceError(device.error());
-  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
-  if (!context) return reportDeviceError(context.error());
+  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
+  if (!open) return reportDeviceError(open.error());
 
   ExitStatus status = ExitStatus::done;
   std::vector<ModelVerification> models;
@@ -84,15 +83,16 @@ ExitStatus verify(const VerifyOptions& options) {
       status = reportError(ExitStatus::badInput, models.back().error);
       continue;
     }
-    if (Result<void> verified = verifyModel(**device, *context, *scene, models.back()); !verified) {
+    if (Result<void> verified = verifyModel(*open->device, open->context, *scene, models.back());
+        !verified) {
       return reportDeviceError(verified.error());
     }
     if (models.back().failures() != 0 && status == ExitStatus::done)
       status = ExitStatus::verificationFailed;
   }
-  fmt::print("device  {}\n", (*device)->info().name);
+  fmt::print("device  {}\n", open->device->info().name);
   printReport(models);
-  if (const ExitStatus written = writeReports(options, (*device)->info().name, models);
+  if (const ExitStatus written = writeReports(options, open->device->info().name, models);
       written != ExitStatus::done) {
     return written;
   }

@@ -14,7 +14,8 @@ std::string quoted(const std::string& name) {
 std::string meshName(const gltf::Model& model, const gltf::SkinnedPrimitive& source) {
   const gltf::Mesh& mesh = model.meshes[source.mesh];
   const std::string name = mesh.name.empty() ? fmt::format("number {}", source.mesh) : mesh.name;
-  return mesh.primitives.size() == 1 ? name : fmt::format("{}' primitive '{}", name, source.primitive);
+  return mesh.primitives.size() == 1 ? name
+                                     : fmt::format("{}' primitive '{}", name, source.primitive);
 }
 
 std::string counted(const Finding& finding) {

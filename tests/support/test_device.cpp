@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdlib>
+#include <optional>
+#include <utility>
 
 namespace dermis::test {
 namespace {
@@ -9,7 +11,7 @@ namespace {
 struct Attempt {
   bool tried = false;
   std::string reason;
-  TestDevice device;
+  std::optional<samples::OpenDevice> device;
 };
 
 std::array<Attempt, 2> attempts;
@@ -19,10 +21,7 @@ std::array<Attempt, 2> attempts;
 class DestroyDevices : public ::testing::Environment {
  public:
   void TearDown() override {
-    for (Attempt& attempt : attempts) {
-      attempt.device.context.reset();
-      attempt.device.device.reset();
-    }
+    for (Attempt& attempt : attempts) attempt.device.reset();
   }
 };
 [[maybe_unused]] const ::testing::Environment* const destroyDevices =
@@ -34,30 +33,24 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
   options.pushDescriptors = pushDescriptors;
   const char* wanted = std::getenv("DERMIS_TEST_DEVICE");
   if (wanted != nullptr) options.device = wanted;
-  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(options);
-  if (!device) {
+  Result<samples::OpenDevice> device = samples::openDevice(options);
+  if (device) {
+    attempt.device.emplace(std::move(*device));
+  } else {
     attempt.reason = device.error().message;
-    return;
   }
-  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
-  if (!context) {
-    attempt.reason = context.error().message;
-    return;
-  }
-  attempt.device.context.emplace(std::move(*context));
-  attempt.device.device = std::move(*device);
 }
 
 }  // namespace
 
-TestDevice* testDevice(bool pushDescriptors, std::string& reason) {
+samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason) {
   Attempt& attempt = attempts[pushDescriptors ? 1 : 0];
   if (!attempt.tried) {
     attempt.tried = true;
     tryToCreate(pushDescriptors, attempt);
   }
   reason = attempt.reason;
-  return attempt.device.device ? &attempt.device : nullptr;
+  return attempt.device ? &*attempt.device : nullptr;
 }
 
 bool isContinuousIntegration() {

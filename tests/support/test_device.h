@@ -5,23 +5,15 @@
 
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <optional>
 #include <string>
 
-#include "dermis/vulkan/context.h"
-#include "device.h"
+#include "open_device.h"
 
 namespace dermis::test {
 
-struct TestDevice {
-  std::unique_ptr<samples::Device> device;
-  std::optional<vulkan::Context> context;
-};
-
 /// The device of this process, made once for each choice; null where there is none, and then
 /// `reason` says why.
-TestDevice* testDevice(bool pushDescriptors, std::string& reason);
+samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason);
 
 /// Whether a missing device must fail.
 bool isContinuousIntegration();
@@ -34,9 +26,9 @@ class DeviceTest : public ::testing::Test {
   void useDevice(bool pushDescriptors);
 
   samples::Device& device() { return *device_->device; }
-  vulkan::Context& context() { return *device_->context; }
+  vulkan::Context& context() { return device_->context; }
 
-  TestDevice* device_ = nullptr;
+  samples::OpenDevice* device_ = nullptr;
 };
 
 }  // namespace dermis::test
