@@ -3,7 +3,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(flags -std=c++20 -fsyntax-only -fno-exceptions -fno-rtti -Wall -Wextra -Werror -I "${scriptFolder}/poison"
-    -I "${sourceFolder}/engine/include" -I "${sourceFolder}/engine/src" -I "${sourceFolder}/shaders")
+    -I "${sourceFolder}/engine/include" -I "${sourceFolder}/engine/src" -I "${coreFolder}" -I "${sourceFolder}/shaders")
 foreach(folder IN LISTS glmFolders)
   list(APPEND flags -idirafter "${folder}")
 endforeach()

@@ -193,6 +193,18 @@ TEST(Decompose, RankOneAndZeroAreFiniteAndDegenerate) {
   }
 }
 
+// Kernels take a matrix for mirrored where its determinant, over the cube of its largest entry, is
+// below −4e-6 in float32: near that the sense of a mirror is a matter of rounding.
+TEST(Decompose, MirrorsTooThinToBeToldAreDegenerate) {
+  for (const double thickness : {3e-6, 4e-6, 5e-6}) {
+    EXPECT_TRUE(polarParts(diagonalMatrix(1, 1, -thickness)).degenerate) << thickness;
+    EXPECT_FALSE(polarParts(diagonalMatrix(1, 1, thickness)).degenerate) << thickness;
+  }
+  for (const double thickness : {1e-3, 0.1}) {
+    EXPECT_FALSE(polarParts(diagonalMatrix(1, 1, -thickness)).degenerate) << thickness;
+  }
+}
+
 TEST(Decompose, DistanceFromRotationIsTheLargestStretch) {
   RigRandom random(9);
   const glm::dmat3 rotation = randomRotation(random);

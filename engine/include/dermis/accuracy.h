@@ -17,7 +17,7 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 
 /// The largest distance a float32 position may have from the reference's: 6 u · scale for `linear`,
 /// 24 u · scale for `dualQuaternion`, u = `floatRounding`. A joint that is rigid but for rounding
-/// (det > 0, max |CᵀC − 1| ≤ 8e-6) is not decomposed by the kernels: `rigidShortcut` · |p| more, at
+/// (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is not decomposed by the kernels: `rigidShortcut` · |p| more, at
 /// most 4e-6 |p|.
 double positionBound(Method method, const reference::Conditioning& conditioning);
 

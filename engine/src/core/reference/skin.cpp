@@ -89,9 +89,12 @@ Joint takeApart(const JointMatrix& matrix) {
   joint.dual = 0.5 * multiply(dvec4(joint.translation, 0), joint.real);
 
   const dmat3 gram = glm::transpose(joint.linear) * joint.linear - dmat3(1.0);
-  double deviation = 0;
-  for (int i = 0; i < 9; ++i) deviation = std::max(deviation, std::abs(gram[i / 3][i % 3]));
-  // The kernels decide on float sums, so that a joint near the threshold may go either way.
+  double deviation = 0;  // the largest sum of a row's absolute values
+  for (int row = 0; row < 3; ++row) {
+    deviation = std::max(deviation,
+                         std::abs(gram[0][row]) + std::abs(gram[1][row]) + std::abs(gram[2][row]));
+  }
+  // The kernels decide on float sums, so that a joint near the threshold of 8e-6 may go either way.
   joint.rigidForKernels = glm::determinant(joint.linear) > 0 && deviation <= 1e-5;
   joint.distanceFromRotation = parts.distanceFromRotation;
   return joint;
