@@ -98,10 +98,8 @@ Result<Comparison> compare(const reference::SkinnedMesh& expected, const Attribu
       const double bound = normalBound(method, conditioning);
       const double expectedLength = length(expected.normals[vertex]);
       if (bound < 0) {
-        // Only its length can be said: 1, or 0 where the bind pose's normal, or all of it,
-        // vanished.
-        const double normalLength = length(normal);
-        normalShare = normalLength == 0 ? 0 : std::abs(normalLength - 1) / 1e-6;
+        // Only its length can be said.
+        normalShare = std::abs(length(normal) - (expectedLength > 0 ? 1 : 0)) / 1e-6;
       } else if (expectedLength > 0 || length(normal) > 0) {
         normalShare = share(distance(normal, expected.normals[vertex]), bound);
       }

@@ -16,7 +16,7 @@ bool orthogonalize(glm::dmat3& work, glm::dmat3& right, int a, int b) {
   const double alpha = glm::dot(work[a], work[a]);
   const double beta = glm::dot(work[b], work[b]);
   const double gamma = glm::dot(work[a], work[b]);
-  if (std::abs(gamma) <= 1e-17 * std::sqrt(alpha * beta) || gamma == 0) return false;
+  if (std::abs(gamma) <= 1e-16 * std::sqrt(alpha * beta) || gamma == 0) return false;
   const double zeta = (beta - alpha) / (2 * gamma);
   const double tangent = std::copysign(1.0, zeta) / (std::abs(zeta) + std::sqrt(1 + zeta * zeta));
   const double cosine = 1 / std::sqrt(1 + tangent * tangent);

@@ -203,6 +203,7 @@ dvec3 transformNormal(const dmat3& m, const dvec3& normal, Conditioning& conditi
       largest > 0 ? glm::length(result) / (largest * largest * inputLength) : 0;
   // Where the determinant is a matter of rounding, so is the side that the normal points to.
   if (std::abs(determinant) <= 1e-5 * largest * largest * largest) conditioning.normalAlignment = 0;
+  if (glm::length(result) == 0) return normal;  // of rank 1 or 0: any direction will do
   return determinant < 0 ? -result : result;
 }
 
