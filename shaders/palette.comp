@@ -61,14 +61,14 @@ void main() {
     vec4 r2 = matrices[firstMatrix + joint * 3u + 2u];
     vec4 rotation;
     ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
-    if (isRigid(r0.xyz, r1.xyz, r2.xyz)) {
-      rotation = quaternionOfRows(r0.xyz, r1.xyz, r2.xyz);
-    } else if (isFinite(r0) && isFinite(r1) && isFinite(r2)) {
-      atomicAdd(nonRigidJoints, 1u);
-      polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
-    } else {
+    if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
       atomicAdd(nonFiniteJoints, 1u);
       rotation = vec4(uintBitsToFloat(0x7fc00000u));
+    } else if (isRigid(r0.xyz, r1.xyz, r2.xyz)) {
+      rotation = quaternionOfRows(r0.xyz, r1.xyz, r2.xyz);
+    } else {
+      atomicAdd(nonRigidJoints, 1u);
+      polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
     palettes[status + 1u + joint * 2u] = floatBitsToUint(rotation);

@@ -64,8 +64,17 @@ struct ScaleShear {
   vec3 mixed;     // xy xz yz
 };
 
-// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the sign goes into S; one so
-// small that rounding may have made it negative counts as 0: a flat matrix stored in float32 comes to 1e-6.
+// The determinant of a matrix given by its rows, and how large it would be if no product in it cancelled: what its rounding
+// error is measured by.
+float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
+  vec3 c = cross3(r1, r2);
+  precise vec3 uncancelled = abs(r1.yzx * r2.zxy) + abs(r1.zxy * r2.yzx);
+  magnitude = dot3(abs(r0), uncancelled);
+  return dot3(r0, c);
+}
+
+// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the sign goes into S; one that
+// rounding may have made negative (24 roundings of 2^-24) counts as 0: a flat matrix has one of either sign.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
   if (largest == 0.0) {
@@ -76,8 +85,9 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
   precise vec3 n0 = r0 / largest;
   precise vec3 n1 = r1 / largest;
   precise vec3 n2 = r2 / largest;
-  precise float determinant = dot3(n0, cross3(n1, n2));
-  float side = determinant < -4e-6 ? -1.0 : 1.0;
+  float magnitude;
+  float determinant = determinantOf(n0, n1, n2, magnitude);
+  float side = determinant < -1.43e-6 * magnitude ? -1.0 : 1.0;
   rotation = nearestRotation(side * n0, side * n1, side * n2);
 
   // Columns of S: each column of C turned back, averaged with its transpose.

@@ -62,7 +62,7 @@ TEST_P(AccuracyTest, EveryVertexIsInsideItsBound) {
 
 std::string caseName(const ::testing::TestParamInfo<AccuracyTest::ParamType>& info) {
   const auto [method, rigidity, counts] = info.param;
-  const char* rigidities[] = {"rigid", "scale", "shear", "mirrored"};
+  const char* rigidities[] = {"rigid", "scale", "shear", "mirrored", "oneAxisMirrored"};
   return std::string(methodName(method)) + "_" + rigidities[static_cast<int>(rigidity)] + "_" +
          std::to_string(counts.vertices) + "v_" + std::to_string(counts.joints) + "j_" +
          std::to_string(counts.influences) + "i";
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(
     RandomRigs, AccuracyTest,
     ::testing::Combine(::testing::Values(Method::linear, Method::dualQuaternion),
                        ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
-                                         Rigidity::mirrored),
+                                         Rigidity::mirrored, Rigidity::mirroredAlongOneAxis),
                        ::testing::Values(Case{1, 1, 1}, Case{63, 2, 2}, Case{64, 3, 4},
                                          Case{65, 300, 4}, Case{1234, 50, 8}, Case{70001, 300, 4},
                                          Case{5000, 300, 17})),

@@ -145,17 +145,17 @@ TEST_F(BatchTest, NanInAPoseAffectsThatInstanceAlone) {
   Crowd crowd = makeCrowd(12);
   const samples::BatchResult before = run(crowd.requests);
   crowd.poses[4][3].m[1][1] = std::numeric_limits<float>::quiet_NaN();
-  crowd.poses[5][0].m[0][3] = std::numeric_limits<float>::infinity();
+  crowd.poses[6][0].m[0][3] = std::numeric_limits<float>::infinity();
   const samples::BatchResult after = run(crowd.requests);
   for (std::size_t instance = 0; instance < 12; ++instance) {
-    if (instance == 4 || instance == 5) {
+    if (instance == 4 || instance == 6) {
       EXPECT_FALSE(isFinite(after.instances[instance].positions));
     } else {
       expectSameBits(before.instances[instance], after.instances[instance]);
     }
     const bool isDualQuaternion = crowd.requests[instance].method == Method::dualQuaternion;
     EXPECT_EQ(after.instances[instance].status.nonFiniteJoints,
-              isDualQuaternion && (instance == 4 || instance == 5) ? 1u : 0u);
+              isDualQuaternion && (instance == 4 || instance == 6) ? 1u : 0u);
   }
 }
 

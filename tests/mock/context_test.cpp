@@ -251,6 +251,20 @@ TEST(ContextTest, BuffersThatAreTooSmallOrMisalignedAreRefused) {
   EXPECT_TRUE(mock.commands.empty());
 }
 
+TEST(ContextTest, APlanForOtherLimitsIsRefused) {
+  const SmallBatch batch;
+  MockVulkan mock;
+  mock.limits.maxStorageBufferRange = 1 << 28;
+  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
+  const Result<void> recorded = context->record(commandBuffer, batch.plan, *bindings);
+  ASSERT_FALSE(recorded.ok());
+  EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
+  EXPECT_NE(recorded.error().message.find("other limits"), std::string::npos);
+  EXPECT_TRUE(mock.commands.empty());
+}
+
 TEST(ContextTest, BindingsOfAnotherContextAreRefused) {
   MockVulkan mock;
   Result<vulkan::Context> one = vulkan::Context::create(mock.description());

@@ -169,15 +169,18 @@ TEST(Decompose, RankTwoIsNotDegenerate) {
 // Float32 rounding leaves a rank of 2 with a little of either sign in the third axis.
 TEST(Decompose, NearlyRankTwoOfEitherSideHasTheSameRotation) {
   RigRandom random(7);
+  int negative = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const glm::dmat3 rotation = randomRotation(random);
-    const glm::dvec3 values(random.between(0.5, 2), random.between(0.5, 2),
-                            random.between(-3e-7, 3e-7));
-    const glm::dmat3 flat = symmetric(random, values);
-    const PolarParts parts = polarParts(rotation * flat);
-    expectPolar(parts, rotation * flat, 1);
-    EXPECT_LE(largestEntry(parts.rotation - rotation), 1e-13);
+    const glm::dmat3 flat = symmetric(random, {random.between(0.5, 2), random.between(0.5, 2), 0});
+    const glm::dmat3 stored = linearOf(jointOf(rotation * flat));
+    negative += glm::determinant(stored) < 0 ? 1 : 0;
+    const PolarParts parts = polarParts(stored);
+    expectPolar(parts, stored, 1);
+    EXPECT_LE(largestEntry(parts.rotation - rotation), 2e-6);
   }
+  EXPECT_GT(negative, 50);
+  EXPECT_LT(negative, 250);
 }
 
 TEST(Decompose, RankOneAndZeroAreFiniteAndDegenerate) {
@@ -193,16 +196,35 @@ TEST(Decompose, RankOneAndZeroAreFiniteAndDegenerate) {
   }
 }
 
-// Kernels take a matrix for mirrored where its determinant, over the cube of its largest entry, is
-// below −4e-6 in float32: near that the sense of a mirror is a matter of rounding.
+// Along the axes a determinant is one exact product: a mirror is a mirror however thin it is.
+TEST(Decompose, AThinMirrorAlongTheAxesIsAMirror) {
+  for (const double thickness : {1e-7, 3e-6, 1e-3, 0.1}) {
+    const PolarParts parts = polarParts(diagonalMatrix(1, 1, -thickness));
+    EXPECT_FALSE(parts.degenerate) << thickness;
+    EXPECT_LE(largestEntry(parts.rotation - diagonalMatrix(-1, -1, 1)), 1e-13) << thickness;
+  }
+  EXPECT_FALSE(polarParts(diagonalMatrix(1, 0.0015, -0.0015)).degenerate);
+}
+
+// Elsewhere its products cancel: within 16 roundings of 0 it counts as flat, within 32 it is a
+// matter of rounding.
 TEST(Decompose, MirrorsTooThinToBeToldAreDegenerate) {
-  for (const double thickness : {3e-6, 4e-6, 5e-6}) {
-    EXPECT_TRUE(polarParts(diagonalMatrix(1, 1, -thickness)).degenerate) << thickness;
-    EXPECT_FALSE(polarParts(diagonalMatrix(1, 1, thickness)).degenerate) << thickness;
+  RigRandom random(11);
+  int frames = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const glm::dmat3 frame = randomRotation(random);
+    const auto mirror = [&](double thickness) {
+      return polarParts(frame * diagonalMatrix(1, 1, -thickness) * glm::transpose(frame));
+    };
+    EXPECT_FALSE(mirror(1e-9).degenerate);
+    EXPECT_FALSE(mirror(1e-4).degenerate);
+    bool between = false;
+    for (double thickness = 1e-9; thickness < 1e-4; thickness *= 1.1)
+      between |= mirror(thickness).degenerate;
+    frames += between ? 1 : 0;
   }
-  for (const double thickness : {1e-3, 0.1}) {
-    EXPECT_FALSE(polarParts(diagonalMatrix(1, 1, -thickness)).degenerate) << thickness;
-  }
+  // All but frames near the axes.
+  EXPECT_GE(frames, 45);
 }
 
 TEST(Decompose, DistanceFromRotationIsTheLargestStretch) {

@@ -42,6 +42,11 @@ glm::dmat3 scaleShear(Random& random, Rigidity rigidity) {
   const glm::dmat3 frame = glm::mat3_cast(random.rotation());
   const glm::dmat3 stretch =
       diagonal(random.between(0.5, 2), random.between(0.5, 2), random.between(0.5, 2));
+  if (rigidity == Rigidity::mirroredAlongOneAxis) {
+    // Thin ones among them.
+    const glm::dmat3 mirror = diagonal(1, random.between(0.1, 2), -random.between(0.01, 2));
+    return frame * mirror * glm::transpose(frame);
+  }
   const glm::dmat3 symmetric = frame * stretch * glm::transpose(frame);
   return rigidity == Rigidity::mirrored ? symmetric * -1.0 : symmetric;
 }

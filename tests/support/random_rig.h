@@ -35,7 +35,7 @@ struct OwnedMesh {
   }
 };
 
-enum class Rigidity { rigid, uniformScale, shear, mirrored };
+enum class Rigidity { rigid, uniformScale, shear, mirrored, mirroredAlongOneAxis };
 
 /// `influences` slots a vertex, of which a random number carry weight; one vertex in 50 carries
 /// none at all.

@@ -23,6 +23,8 @@ struct DeviceLimits {
   std::uint32_t minStorageBufferOffsetAlignment = 256;           ///< bytes, a power of two
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
+
+  friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
 
 /// How the work is cut up. It changes the speed, never a bit of the result.
@@ -160,6 +162,9 @@ class Plan {
   /// where no dual-quaternion job uses that palette.
   std::uint64_t statusOffset(std::uint32_t palette) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
+
+  /// The limits that the plan was made for.
+  const DeviceLimits& limits() const;
 
   std::uint32_t instanceCount() const;
   std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances

@@ -1,8 +1,8 @@
 // Errors as values: no exception crosses the interface of Dermis.
 #pragma once
 
-#include <cassert>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -45,17 +45,17 @@ class [[nodiscard]] Result {
   bool ok() const { return state_.index() == 0; }
   explicit operator bool() const { return ok(); }
 
-  /// The value; only where `ok()`.
+  /// The value; only where `ok()`, otherwise the program is stopped.
   T& value() & {
-    assert(ok());
+    require(ok());
     return *std::get_if<0>(&state_);
   }
   const T& value() const& {
-    assert(ok());
+    require(ok());
     return *std::get_if<0>(&state_);
   }
   T value() && {
-    assert(ok());
+    require(ok());
     return std::move(*std::get_if<0>(&state_));
   }
   T& operator*() & { return value(); }
@@ -64,17 +64,22 @@ class [[nodiscard]] Result {
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
 
-  /// The error; only where not `ok()`.
+  /// The error; only where not `ok()`, otherwise the program is stopped.
   const Error& error() const& {
-    assert(!ok());
+    require(!ok());
     return *std::get_if<1>(&state_);
   }
   Error error() && {
-    assert(!ok());
+    require(!ok());
     return std::move(*std::get_if<1>(&state_));
   }
 
  private:
+  // In release too: what would follow is a null dereference somewhere else.
+  static void require(bool condition) {
+    if (!condition) std::abort();
+  }
+
   std::variant<T, Error> state_;
 };
 
@@ -87,13 +92,13 @@ class [[nodiscard]] Result<void> {
   bool ok() const { return ok_; }
   explicit operator bool() const { return ok_; }
 
-  /// The error; only where not `ok()`.
+  /// The error; only where not `ok()`, otherwise the program is stopped.
   const Error& error() const& {
-    assert(!ok_);
+    if (ok_) std::abort();
     return error_;
   }
   Error error() && {
-    assert(!ok_);
+    if (ok_) std::abort();
     return std::move(error_);
   }
 

@@ -17,8 +17,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "packed meshes are little-endian words");
 
 struct Influence {
-  std::uint32_t joint;
-  double weight;
+  std::uint32_t joint = 0;
+  double weight = 0;
 };
 
 /// FNV-1a, a word at a time: each step is a bijection, so that no single damaged word goes
@@ -42,17 +42,20 @@ void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
       const double weight = loadWeight(set.weights, vertex, slot);
-      if (weight == 0) continue;
-      const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
-      const auto same = std::find_if(influences.begin(), influences.end(),
-                                     [&](const Influence& other) { return other.joint == joint; });
-      if (same == influences.end()) {
-        influences.push_back({joint, weight});
-      } else {
-        same->weight += weight;
-      }
+      if (weight != 0) influences.push_back({loadUnsigned(set.joints, vertex, slot), weight});
     }
   }
+  std::stable_sort(influences.begin(), influences.end(),
+                   [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
+  std::size_t kept = 0;
+  for (const Influence& influence : influences) {
+    if (kept > 0 && influences[kept - 1].joint == influence.joint) {
+      influences[kept - 1].weight += influence.weight;
+    } else {
+      influences[kept++] = influence;
+    }
+  }
+  influences.resize(kept, Influence{});
   std::sort(influences.begin(), influences.end(), [](const Influence& a, const Influence& b) {
     return a.weight != b.weight ? a.weight > b.weight : a.joint < b.joint;
   });

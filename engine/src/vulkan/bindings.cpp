@@ -112,6 +112,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   if (const VkResult result = context.table.createDescriptorPool(context.device, &poolInfo,
                                                                  context.allocator, &state.pool);
       result != VK_SUCCESS) {
+    state.pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorPool", result);
   }
   const std::vector<VkDescriptorSetLayout> layouts(setCount, context.setLayout);

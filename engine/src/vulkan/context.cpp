@@ -52,6 +52,7 @@ Result<void> Context::State::createLayouts() {
   if (const VkResult result =
           table.createDescriptorSetLayout(device, &setInfo, allocator, &setLayout);
       result != VK_SUCCESS) {
+    setLayout = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorSetLayout", result);
   }
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, abi::PUSH_WORDS * 4};
@@ -64,6 +65,7 @@ Result<void> Context::State::createLayouts() {
   if (const VkResult result =
           table.createPipelineLayout(device, &layoutInfo, allocator, &pipelineLayout);
       result != VK_SUCCESS) {
+    pipelineLayout = VK_NULL_HANDLE;
     return vulkanError("vkCreatePipelineLayout", result);
   }
   return {};

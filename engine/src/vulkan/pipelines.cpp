@@ -25,6 +25,7 @@ Result<void> Pipelines::create() {
     info.pCode = spirv.data();
     if (const VkResult result = table_.createShaderModule(device_, &info, allocator_, module);
         result != VK_SUCCESS) {
+      *module = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
       return vulkanError("vkCreateShaderModule", result);
     }
   }

@@ -72,6 +72,11 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
                                           {BufferRole::output, &buffers.output, "output"}}) {
     if (Result<void> good = checkBuffer(plan, role, *range, name); !good) return good;
   }
+  if (!plan.dispatches().empty() && plan.limits() != context.limits) {
+    return Error{
+        ErrorCode::invalidArgument,
+        "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
+  }
   for (const Variant& variant : plan.variants()) {
     if (context.pipelines->find(variant) == VK_NULL_HANDLE) {
       return Error{ErrorCode::notPrepared,

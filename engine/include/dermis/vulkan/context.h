@@ -62,8 +62,9 @@ class Context {
   /// from a loading thread. Where it fails (`vulkanError`), what was built before stays built.
   Result<void> prepare(std::span<const Variant> variants);
 
-  /// Makes the descriptor sets for a set of buffers. Fails with `invalidArgument` (misaligned, or
-  /// larger than a storage buffer range where that is not allowed) or `vulkanError`.
+  /// Makes the descriptor sets for a set of buffers. Fails with `invalidArgument` (misaligned, no
+  /// size), `limitExceeded` (larger than a storage buffer range where that is not allowed) or
+  /// `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
   /// Records the dispatches of a plan, and a barrier between the palette and the skin kernel.

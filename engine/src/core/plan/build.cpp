@@ -42,7 +42,7 @@ void Plan::State::addPiece(const Job& job, std::uint32_t jobIndex, GroupKey key)
   pieces.push_back({group, jobIndex});
 }
 
-Result<void> Plan::State::gatherPieces(const Batch& batch, const DeviceLimits& limits) {
+Result<void> Plan::State::gatherPieces(const Batch& batch) {
   for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
     const Job& job = batch.jobs[index];
     if (Result<void> good = checkJob(batch, job, index); !good) return good;
@@ -60,8 +60,7 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const DeviceLimits& l
 }
 
 Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t workgroups,
-                                      const DispatchConstants& constants,
-                                      const DeviceLimits& limits) {
+                                      const DispatchConstants& constants) {
   if (workgroups >
       std::min<std::uint64_t>(std::uint64_t{limits.maxWorkgroupCountX} * limits.maxWorkgroupCountY,
                               std::numeric_limits<std::uint32_t>::max())) {
@@ -82,8 +81,7 @@ Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t work
   return {};
 }
 
-Result<void> Plan::State::placePalettes(const Batch& batch, const DeviceLimits& limits,
-                                        const Tuning& tuning) {
+Result<void> Plan::State::placePalettes(const Batch& batch, const Tuning& tuning) {
   for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
     if (Result<void> good = checkPalette(batch, batch.palettes[index], index); !good) return good;
   }
@@ -112,17 +110,17 @@ Result<void> Plan::State::placePalettes(const Batch& batch, const DeviceLimits& 
         "meshes, matrices or palettes of " +
             std::to_string(std::max({palettesSize, batch.matricesSize, batch.meshesSize})) +
             " bytes are more than a storage buffer range of " +
-            std::to_string(limits.maxStorageBufferRange) + " bytes; split the batch"};
+            std::to_string(limits.maxStorageBufferRange) +
+            " bytes; a batch of fewer of them would fit"};
   }
   if (records == 0) return {};
   Variant variant;
   variant.kernel = Kernel::palette;
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
-  return addDispatch(variant, records, {0, records, 0, 0}, limits);
+  return addDispatch(variant, records, {0, records, 0, 0});
 }
 
-Result<void> Plan::State::placeGroups(const Batch& batch, const DeviceLimits& limits,
-                                      const Tuning& tuning) {
+Result<void> Plan::State::placeGroups(const Batch& batch, const Tuning& tuning) {
   const auto variantOrder = [&](std::uint32_t index) {
     const GroupKey& key = groups[index].key;
     return std::array<std::uint32_t, 3>{key.window, static_cast<std::uint32_t>(key.method),
@@ -174,18 +172,17 @@ Result<void> Plan::State::placeGroups(const Batch& batch, const DeviceLimits& li
     const DispatchConstants constants{
         static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
         static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
-    if (Result<void> good = addDispatch(variant, workgroups, constants, limits); !good) return good;
+    if (Result<void> good = addDispatch(variant, workgroups, constants); !good) return good;
     dispatches.back().outputWindow = key.window;
     dispatches.back().outputOffset = key.window * outputWindowStep(limits);
     dispatches.back().afterPalettes = afterPalettes && key.method != Method::linear;
     begin = end;
   }
-  writeInstances(batch, limits, instanceRecords);
+  writeInstances(batch, instanceRecords);
   return {};
 }
 
-void Plan::State::writeInstances(const Batch& batch, const DeviceLimits& limits,
-                                 std::uint32_t firstRecord) {
+void Plan::State::writeInstances(const Batch& batch, std::uint32_t firstRecord) {
   const std::uint64_t step = outputWindowStep(limits);
   tables.resize(firstRecord + pieces.size() * abi::INSTANCE_WORDS);
   for (const Piece& piece : pieces) {
@@ -210,18 +207,18 @@ void Plan::State::writeInstances(const Batch& batch, const DeviceLimits& limits,
   }
 }
 
-Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& limits,
+Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& deviceLimits,
                                 const Tuning& tuning) {
+  limits = deviceLimits;
   if (Result<void> good = checkLimits(limits); !good) return good;
   if (Result<void> good = checkTuning(tuning); !good) return good;
   meshesSize = batch.meshesSize;
   matricesSize = batch.matricesSize;
   outputSize = batch.outputSize;
-  alignment = limits.minStorageBufferOffsetAlignment;
   if (batch.jobs.size() > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
-  if (Result<void> good = gatherPieces(batch, limits); !good) return good;
-  if (Result<void> good = placePalettes(batch, limits, tuning); !good) return good;
-  if (Result<void> good = placeGroups(batch, limits, tuning); !good) return good;
+  if (Result<void> good = gatherPieces(batch); !good) return good;
+  if (Result<void> good = placePalettes(batch, tuning); !good) return good;
+  if (Result<void> good = placeGroups(batch, tuning); !good) return good;
   if (tables.size() * 4 > limits.maxStorageBufferRange) {
     return Error{ErrorCode::limitExceeded,
                  "the tables of the batch are larger than a storage buffer range; split it"};

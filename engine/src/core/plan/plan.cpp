@@ -25,6 +25,9 @@ std::span<const Dispatch> Plan::dispatches() const {
 std::span<const Variant> Plan::variants() const {
   return state_->variants;
 }
+const DeviceLimits& Plan::limits() const {
+  return state_->limits;
+}
 std::uint32_t Plan::instanceCount() const {
   return state_->instanceCount;
 }
@@ -41,7 +44,7 @@ std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
 BufferRequirement Plan::buffer(BufferRole role) const {
   // What the host fills may be staged: written to another buffer, and copied.
   constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
-  const std::uint32_t alignment = state_->alignment;
+  const std::uint32_t alignment = state_->limits.minStorageBufferOffsetAlignment;
   switch (role) {
     case BufferRole::meshes:
       return {state_->meshesSize, alignment, filled, false, true};
@@ -59,6 +62,7 @@ BufferRequirement Plan::buffer(BufferRole role) const {
 
 Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                       Plan& out) {
+  if (out.state_ == nullptr) out.state_ = std::make_unique<Plan::State>();
   out.state_->clear();
   Result<void> built = out.state_->build(batch, limits, tuning);
   if (!built) out.state_->clear();

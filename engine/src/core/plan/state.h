@@ -62,7 +62,7 @@ struct Plan::State {
       paletteUnits;  ///< where each palette stands in the palettes buffer, or notUsed
   std::uint64_t palettesSize = 0;
   std::uint64_t meshesSize = 0, matricesSize = 0, outputSize = 0;
-  std::uint32_t alignment = 256;
+  DeviceLimits limits;
   std::uint32_t instanceCount = 0;
   std::uint64_t vertexCount = 0;
 
@@ -74,16 +74,16 @@ struct Plan::State {
   std::unordered_map<GroupKey, std::uint32_t, GroupKeyHash> groupOf;
 
   void clear();
-  Result<void> build(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning);
+  Result<void> build(const Batch& batch, const DeviceLimits& deviceLimits, const Tuning& tuning);
 
  private:
-  Result<void> gatherPieces(const Batch& batch, const DeviceLimits& limits);
+  Result<void> gatherPieces(const Batch& batch);
   void addPiece(const Job& job, std::uint32_t jobIndex, GroupKey key);
-  Result<void> placePalettes(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning);
-  Result<void> placeGroups(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning);
-  void writeInstances(const Batch& batch, const DeviceLimits& limits, std::uint32_t firstRecord);
+  Result<void> placePalettes(const Batch& batch, const Tuning& tuning);
+  Result<void> placeGroups(const Batch& batch, const Tuning& tuning);
+  void writeInstances(const Batch& batch, std::uint32_t firstRecord);
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
-                           const DispatchConstants& constants, const DeviceLimits& limits);
+                           const DispatchConstants& constants);
 };
 
 }  // namespace dermis

@@ -37,10 +37,14 @@ glm::dvec3 anyPerpendicular(const glm::dvec3& v) {
   return glm::normalize(glm::cross(v, axis));
 }
 
-double largestEntry(const glm::dmat3& matrix) {
-  double largest = 0;
-  for (int i = 0; i < 9; ++i) largest = std::max(largest, std::abs(matrix[i / 3][i % 3]));
-  return largest;
+/// How large the determinant would be if no product in it cancelled.
+double uncancelledDeterminant(const glm::dmat3& m) {
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    sum += std::abs(m[0][i]) * (std::abs(m[1][j] * m[2][k]) + std::abs(m[1][k] * m[2][j]));
+  }
+  return sum;
 }
 
 }  // namespace
@@ -82,12 +86,12 @@ PolarParts polarParts(const glm::dmat3& matrix) {
   parts.distanceFromRotation = std::max(std::abs(svd.values[0] - 1), std::abs(svd.values[2] - 1));
   parts.degenerate = svd.values[1] <= 1e-5 * svd.values[0] || svd.values[0] == 0;
 
+  // A determinant within 16 roundings of 0 counts as 0; a kernel, whose own determinant is rounded
+  // as well, draws the line somewhere between that and twice as much.
   const double determinant = glm::determinant(matrix);
-  const bool singular = svd.values[2] <= 1e-6 * svd.values[0];
-  // A kernel decides by a determinant in float32: in between it may decide otherwise.
-  const double share = std::abs(determinant) / std::pow(largestEntry(matrix), 3);
-  if (determinant < 0) parts.degenerate |= singular ? share > 2e-6 : share <= 1e-5;
-  const bool mirrored = determinant < 0 && !singular;
+  const double rounding = 16 * 0x1p-24 * uncancelledDeterminant(matrix);
+  const bool mirrored = determinant < -rounding;
+  parts.degenerate |= mirrored && determinant >= -2 * rounding;
 
   glm::dmat3 left = mirrored ? -svd.left : svd.left;
   // Where the matrix is singular the last axis may point either way: take the one that makes a

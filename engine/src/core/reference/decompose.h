@@ -27,9 +27,9 @@ struct PolarParts {
       false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of rounding
 };
 
-/// TRUTHS of the decomposition: with a negative determinant the rotation is that of −matrix, and
-/// the sign goes into the scale part. Of rank 2 (smallest singular value below 1e-6 of the
-/// largest): the rotation of the same side, det +1.
+/// With a negative determinant the rotation is that of −matrix, and the sign goes into the scale
+/// part. A matrix whose determinant is 0 but for rounding in float32 is flat, not mirrored: the
+/// rotation of its two axes, det +1.
 PolarParts polarParts(const glm::dmat3& matrix);
 
 }  // namespace dermis::reference
