@@ -24,7 +24,7 @@ echo
 echo "The Vulkan devices of this machine:"
 "$dermis" devices
 echo
-echo "Skinning the figure's walk, 8 poses with dual quaternions, on the first of them ..."
+echo "Skinning the figure's walk, 8 poses with dual quaternions, on the best of them ..."
 "$dermis" skin "$models/figure.glb" --animation walk --frames 8 --fps 8 -o "$out/figure-%02d.ply"
 echo "Comparing every vertex, in every clip, with both methods, with the double-precision reference ..."
 "$dermis" verify "$models/figure.glb" "$models/bar.glb" "$models/arm.glb" --json "$out/verify.json" --junit "$out/verify.xml"

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "plain_text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -28,12 +29,13 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["tangents"] = !primitive.tangents.empty();
   json["morphTargets"] = primitive.morphTargets.size();
   json["influencesStored"] = primitive.influencesPerVertex;
-  json["influencesUsed"] = part.packed ? part.packed->maxInfluences() : 0;
-  json["jointsUsed"] = part.packed ? part.packed->requiredJoints() : 0;
-  json["joints"] = scene.model.skins[part.source.skin].joints.size();
-  json["packedBytes"] = part.packed ? part.packed->bytes().size() : 0;
+  json["influencesUsed"] = part.mesh ? part.mesh->packed().maxInfluences() : 0;
+  json["jointsUsed"] = part.mesh ? part.mesh->packed().requiredJoints() : 0;
+  json["joints"] = scene.model->skins[part.source.skin].joints.size();
+  json["packedBytes"] = part.mesh ? part.mesh->packed().bytes().size() : 0;
   json["problems"] = Json::array();
-  for (const Finding& finding : part.report.findings) {
+  static const MeshReport none;
+  for (const Finding& finding : (part.mesh ? part.mesh->report() : none).findings) {
     json["problems"].push_back({{"kind", problemName(finding.problem)},
                                 {"vertices", finding.count},
                                 {"firstVertex", finding.firstVertex},
@@ -46,14 +48,13 @@ Json describePart(const Scene& scene, const ScenePart& part) {
 Json describe(const Scene& scene) {
   Json json;
   json["meshes"] = Json::array();
-  for (const std::unique_ptr<ScenePart>& part : scene.parts)
-    json["meshes"].push_back(describePart(scene, *part));
+  for (const ScenePart& part : scene.parts) json["meshes"].push_back(describePart(scene, part));
   json["skins"] = Json::array();
-  for (const gltf::Skin& skin : scene.model.skins) {
+  for (const gltf::Skin& skin : scene.model->skins) {
     json["skins"].push_back({{"name", skin.name}, {"joints", skin.joints.size()}});
   }
   json["clips"] = Json::array();
-  for (const gltf::Clip& clip : scene.model.clips) {
+  for (const gltf::Clip& clip : scene.model->clips) {
     json["clips"].push_back(
         {{"name", clip.name}, {"seconds", clip.duration}, {"channels", clip.channels.size()}});
   }
@@ -63,7 +64,7 @@ Json describe(const Scene& scene) {
 }
 
 void printText(const Json& json) {
-  const auto text = [](const Json& value) { return value.get<std::string>(); };
+  const auto text = [](const Json& value) { return plainLine(value.get<std::string>()); };
   fmt::print("{} skinned primitives, {} skins, {} clips\n", json["meshes"].size(),
              json["skins"].size(), json["clips"].size());
   for (const Json& mesh : json["meshes"]) {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <regex>
@@ -50,13 +51,13 @@ SkinParts referenceSkinner(const Scene& scene, Method method) {
   return [&scene, method](const std::vector<std::vector<JointMatrix>>& palettes)
              -> Result<std::vector<samples::SkinnedVertices>> {
     std::vector<samples::SkinnedVertices> all;
-    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-      if (!part->hasInfluences) {
-        all.push_back(bindPose(*part));
+    for (const ScenePart& part : scene.parts) {
+      if (part.mesh == nullptr) {
+        all.push_back(bindPose(part));
         continue;
       }
       const Result<reference::SkinnedMesh> skinned =
-          reference::skin(part->view(), palettes[part->source.skin], method);
+          reference::skin(part.mesh->view(), palettes[part.source.skin], method);
       if (!skinned) return skinned.error();
       all.push_back({toFloats(skinned->positions), toFloats(skinned->normals), {}});
     }
@@ -69,16 +70,16 @@ SkinParts deviceSkinner(const Scene& scene, Method method, samples::Device& devi
   return [&scene, method, &device, &context](const std::vector<std::vector<JointMatrix>>& palettes)
              -> Result<std::vector<samples::SkinnedVertices>> {
     std::vector<samples::SkinRequest> requests;
-    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-      if (part->hasInfluences)
-        requests.push_back({&*part->packed, palettes[part->source.skin], true, method});
+    for (const ScenePart& part : scene.parts) {
+      if (part.mesh != nullptr)
+        requests.push_back({&part.mesh->packed(), palettes[part.source.skin], true, method});
     }
     Result<samples::BatchResult> result = samples::runBatch(device, context, requests);
     if (!result) return result.error();
     std::vector<samples::SkinnedVertices> all;
     std::size_t next = 0;
-    for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-      all.push_back(part->hasInfluences ? std::move(result->instances[next++]) : bindPose(*part));
+    for (const ScenePart& part : scene.parts) {
+      all.push_back(part.mesh != nullptr ? std::move(result->instances[next++]) : bindPose(part));
     }
     return all;
   };
@@ -89,7 +90,7 @@ OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> sk
   for (std::size_t index = 0; index < scene.parts.size(); ++index) {
     OutputMesh part;
     part.positions = std::move(skinned[index].positions);
-    part.triangles = scene.parts[index]->primitive->triangles;
+    part.triangles = scene.parts[index].primitive->triangles;
     part.normals = skinned[index].normals.empty() ? computeNormals(part.positions, part.triangles)
                                                   : std::move(skinned[index].normals);
     append(whole, part);
@@ -97,14 +98,23 @@ OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> sk
   return whole;
 }
 
-/// The name of a frame: %d or %0Nd in the pattern replaced by its number, or nothing where there is
-/// no such pattern.
+/// The name of a frame: %0Nd in the pattern replaced by its number, or nothing where there is no
+/// such place.
 std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
-  static const std::regex place("%0([1-9][0-9]?)d");
+  static const std::regex place("%0([1-9])d");
   std::smatch match;
   if (!std::regex_search(pattern, match, place)) return std::nullopt;
   return match.prefix().str() + fmt::format("{:0{}}", frame, std::stoi(match[1].str())) +
          match.suffix().str();
+}
+
+/// Whether a name looks as if a number were meant to go into it in a way, or as often, as none
+/// goes.
+bool hasWrongPattern(const std::string& name) {
+  static const std::regex anyPlace("%[0-9]*d");
+  const auto places = std::distance(std::sregex_iterator(name.begin(), name.end(), anyPlace),
+                                    std::sregex_iterator());
+  return places > 1 || (places == 1 && !frameName(name, 0));
 }
 
 ExitStatus checkUsage(const SkinOptions& options) {
@@ -121,6 +131,10 @@ ExitStatus checkUsage(const SkinOptions& options) {
     return reportError(ExitStatus::wrongUsage, "--time must be a number of seconds");
   if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond)) {
     return reportError(ExitStatus::wrongUsage, "--fps must be a number above 0");
+  }
+  if (hasWrongPattern(options.output)) {
+    return reportError(ExitStatus::wrongUsage,
+                       "the place for a number in OUT is %01d to %09d, and there is one at most");
   }
   const bool pattern = frameName(options.output, 0).has_value();
   if (options.frames && *options.frames == 0)
@@ -145,8 +159,13 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
     Result<std::vector<samples::SkinnedVertices>> skinned =
         skinParts(scenePalettes(scene, clip, time));
     if (!skinned) return reportDeviceError(skinned.error());
+    OutputMesh mesh = assemble(scene, std::move(*skinned));
+    if (const std::size_t bad = countNonFinite(mesh); bad != 0) {
+      reportWarning(fmt::format(
+          "{} vertices at {:.4g} s are not finite: joints of the pose are not", bad, time));
+    }
     const std::string name = frameName(options.output, frame).value_or(options.output);
-    if (Result<void> written = writePly(name, assemble(scene, std::move(*skinned))); !written) {
+    if (Result<void> written = writePly(name, mesh); !written) {
       return reportError(ExitStatus::stopped, written.error().message);
     }
     progress.step();
@@ -159,12 +178,13 @@ ExitStatus skin(const SkinOptions& options) {
   const Result<Scene> scene = loadScene(options.model, options.strict);
   if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
+  for (const std::string& remark : scene->remarks) reportNote(remark);
   for (const std::string& note : scene->notes) reportNote(note);
   if (scene->parts.empty()) {
     return reportError(ExitStatus::badInput,
                        fmt::format("{} has no skinned mesh in its scene", options.model));
   }
-  const Result<std::uint32_t> clip = chooseClip(scene->model, options.animation);
+  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
   const Method method = *methodFromName(options.method);
 
@@ -191,8 +211,9 @@ Run addSkin(CLI::App& app) {
   command->add_option("--animation", options->animation,
                       "A clip's number or name, or none for the rest pose [the first]");
   command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");
-  command->add_option("--frames", options->frames, "Write this many poses, from --time on");
-  command->add_option("--fps", options->framesPerSecond, "Poses a second [30]");
+  CLI::Option* frames =
+      command->add_option("--frames", options->frames, "Write this many poses, from --time on");
+  command->add_option("--fps", options->framesPerSecond, "Poses a second [30]")->needs(frames);
   command->add_option("--method", options->method, "linear or dual_quaternion [dual_quaternion]");
   command->add_option("--device", options->device,
                       "auto, cpu (the reference), a number of 'dermis devices', or part of a name");

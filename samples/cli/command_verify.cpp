@@ -21,7 +21,7 @@ struct VerifyOptions {
 /// Fills `verification`; what it returns is a failure of the device.
 Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
                          ModelVerification& verification) {
-  const std::vector<PoseToVerify> poses = posesToVerify(scene.model);
+  const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
   Progress progress(verification.model, poses.size());
   for (const PoseToVerify& pose : poses) {
     Result<std::vector<VerifiedCase>> cases = verifyPose(device, context, scene, pose);
@@ -35,8 +35,8 @@ Result<void> verifyModel(samples::Device& device, vulkan::Context& context, cons
 
 /// Why there is nothing to verify in a model, or empty.
 std::string nothingToVerify(const Scene& scene) {
-  for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-    if (part->hasInfluences) return {};
+  for (const ScenePart& part : scene.parts) {
+    if (part.mesh != nullptr) return {};
   }
   return "it has no skinned mesh with joints and weights in its scene";
 }
@@ -102,8 +102,9 @@ ExitStatus verify(const VerifyOptions& options) {
 }  // namespace
 
 Run addVerify(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "verify", "Skin with every method and variant on the device, and compare with the reference");
+  CLI::App* command = app.add_subcommand("verify",
+                                         "Skin with every method on the device, the work cut up in "
+                                         "several ways, and compare with the reference");
   const auto options = std::make_shared<VerifyOptions>();
   command->add_option("MODEL", options->models, "A .gltf or .glb file, or several")->required();
   command->add_option("--device", options->device,

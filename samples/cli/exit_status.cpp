@@ -2,20 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdio>
+
+#include "plain_text.h"
 
 namespace dermis::cli {
 namespace {
-
-/// A file may put line ends and terminal controls into its names: what is printed stays one plain
-/// line.
-std::string plainLine(std::string_view text) {
-  std::string line(text);
-  std::replace_if(
-      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
-  return line;
-}
 
 void print(std::string_view kind, std::string_view message) {
   std::fflush(stdout);

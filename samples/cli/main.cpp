@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <string_view>
 #include <utility>
 
 #include "commands.h"
@@ -31,6 +33,13 @@ ExitStatus run(int argc, char** argv) {
       {"skin", dermis::cli::addSkin(app)},
       {"verify", dermis::cli::addVerify(app)},
   }};
+  if (argc > 1 && argv[1][0] != '-' &&
+      std::none_of(commands.begin(), commands.end(), [&](const auto& command) {
+        return std::string_view(command.first) == argv[1];
+      })) {
+    return reportError(ExitStatus::wrongUsage,
+                       fmt::format("there is no command '{}' (dermis --help tells more)", argv[1]));
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {

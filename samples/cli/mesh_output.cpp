@@ -48,6 +48,18 @@ std::vector<float> computeNormals(const std::vector<float>& positions,
   return normals;
 }
 
+std::size_t countNonFinite(const OutputMesh& mesh) {
+  std::size_t count = 0;
+  for (std::size_t vertex = 0; vertex * 3 < mesh.positions.size(); ++vertex) {
+    bool finite = true;
+    for (std::size_t i = vertex * 3; i < vertex * 3 + 3; ++i) {
+      finite &= std::isfinite(mesh.positions[i]) && std::isfinite(mesh.normals[i]);
+    }
+    if (!finite) ++count;
+  }
+  return count;
+}
+
 void append(OutputMesh& whole, const OutputMesh& part) {
   const auto base = static_cast<std::uint32_t>(whole.positions.size() / 3);
   whole.positions.insert(whole.positions.end(), part.positions.begin(), part.positions.end());
@@ -72,23 +84,13 @@ Result<void> writePly(const std::filesystem::path& path, const OutputMesh& mesh)
       put(bytes, static_cast<std::int32_t>(mesh.triangles[corner + i]));
   }
 
-  const std::filesystem::path temporary = path.string() + ".part";
-  std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();
+  if (file) return {};
   std::error_code error;
-  if (!file) {
-    std::filesystem::remove(temporary, error);
-    return Error{ErrorCode::ioError, fmt::format("{} cannot be written", path.string())};
-  }
-  std::filesystem::rename(temporary, path, error);
-  if (error) {
-    const std::string reason = error.message();
-    std::filesystem::remove(temporary, error);
-    return Error{ErrorCode::ioError,
-                 fmt::format("{} cannot be written: {}", path.string(), reason)};
-  }
-  return {};
+  if (std::filesystem::is_regular_file(path, error)) std::filesystem::remove(path, error);
+  return Error{ErrorCode::ioError, fmt::format("{} cannot be written", path.string())};
 }
 
 }  // namespace dermis::cli

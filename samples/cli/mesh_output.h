@@ -23,6 +23,9 @@ std::vector<float> computeNormals(const std::vector<float>& positions,
 /// refused before.
 void append(OutputMesh& whole, const OutputMesh& part);
 
+/// Vertices with a position or normal that is NaN or infinite.
+std::size_t countNonFinite(const OutputMesh& mesh);
+
 /// Binary little-endian PLY: float x y z nx ny nz, then the faces. Written to a temporary name
 /// first, so that no half file is left behind. Fails with `ioError`.
 Result<void> writePly(const std::filesystem::path& path, const OutputMesh& mesh);

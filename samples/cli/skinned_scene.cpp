@@ -2,8 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <tuple>
+
 namespace dermis::cli {
 namespace {
+
+/// A pose of all parts takes 24 bytes a vertex and more; a small file can name a mesh very often.
+constexpr std::uint64_t mostVertices = 100'000'000;
 
 std::string quoted(const std::string& name) {
   return name.empty() ? std::string() : fmt::format(" '{}'", name);
@@ -18,10 +24,16 @@ std::string meshName(const gltf::Model& model, const gltf::SkinnedPrimitive& sou
                                      : fmt::format("{}' primitive '{}", name, source.primitive);
 }
 
-std::string counted(const Finding& finding) {
-  return finding.count == 1
-             ? finding.message
-             : fmt::format("{} (and {} more such vertices)", finding.message, finding.count - 1);
+void addFindings(Scene& scene, const MeshReport& report) {
+  for (const Finding& finding : report.findings) {
+    std::string text = finding.message;
+    if (finding.count > 1) text += fmt::format(" (and {} more such vertices)", finding.count - 1);
+    if (refusedByPack(finding.problem)) {
+      scene.warnings.push_back(text + "; repaired");
+    } else {
+      scene.remarks.push_back(std::move(text));
+    }
+  }
 }
 
 }  // namespace
@@ -31,46 +43,47 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
   if (!loaded) return loaded.error();
 
   Scene scene;
-  scene.model = std::move(*loaded);
-  const gltf::Model& model = scene.model;
+  scene.model = std::make_unique<gltf::Model>(std::move(*loaded));
+  const gltf::Model& model = *scene.model;
   scene.notes = model.notes;
+  std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>,
+           std::shared_ptr<const PreparedMesh>>
+      prepared;
+  std::uint64_t vertices = 0;
   std::size_t morphed = 0;
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
-    scene.parts.push_back(std::make_unique<ScenePart>());
-    ScenePart& part = *scene.parts.back();
+    ScenePart part;
     part.source = source;
     part.primitive = &model.meshes[source.mesh].primitives[source.primitive];
     part.name = fmt::format("node {}{}, {}", source.node, quoted(model.nodes[source.node].name),
                             part.primitive->name);
-    part.hasInfluences = part.primitive->influencesPerVertex != 0;
+    vertices += part.primitive->vertexCount;
     if (!part.primitive->morphTargets.empty()) ++morphed;
-    if (!part.hasInfluences) {
+    if (part.primitive->influencesPerVertex == 0) {
       scene.notes.push_back(fmt::format("{} has no JOINTS_0: its {} vertices stay in bind pose",
                                         part.name, part.primitive->vertexCount));
-      continue;
-    }
-
-    part.original_ = part.primitive->view(part.set_);
-    part.meshName_ = meshName(model, source);
-    part.original_.name = part.meshName_;
-    const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
-    part.report = validate(part.original_, jointCount);
-    for (const Finding& finding : part.report.findings) {
-      if (refusedByPack(finding.problem) && strict) {
-        return Error{ErrorCode::invalidMesh,
-                     fmt::format("{}: {}", path.string(), counted(finding))};
+    } else {
+      const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
+      std::shared_ptr<const PreparedMesh>& mesh =
+          prepared[{source.mesh, source.primitive, jointCount}];
+      if (mesh == nullptr) {
+        Result<std::shared_ptr<const PreparedMesh>> made =
+            PreparedMesh::prepare(*part.primitive, meshName(model, source), jointCount, strict);
+        if (!made)
+          return Error{made.error().code,
+                       fmt::format("'{}': {}", path.filename().string(), made.error().message)};
+        mesh = std::move(*made);
+        addFindings(scene, mesh->report());
       }
-      (refusedByPack(finding.problem) ? scene.warnings : scene.notes)
-          .push_back(counted(finding) + (refusedByPack(finding.problem) ? "; repaired" : ""));
+      part.mesh = mesh;
     }
-    if (!part.report.packable()) {
-      Result<RepairedMesh> repaired = repair(part.original_, jointCount);
-      if (!repaired) return repaired.error();
-      part.repaired.emplace(std::move(*repaired));
-    }
-    Result<PackedMesh> packed = pack(part.view(), jointCount);
-    if (!packed) return packed.error();
-    part.packed.emplace(std::move(*packed));
+    scene.parts.push_back(std::move(part));
+  }
+  if (vertices > mostVertices) {
+    return Error{ErrorCode::limitExceeded,
+                 fmt::format("'{}': its scene has {} skinned vertices, more than the {} that this "
+                             "command takes",
+                             path.filename().string(), vertices, mostVertices)};
   }
   if (morphed != 0)
     scene.notes.push_back(
@@ -90,11 +103,11 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
 
 std::vector<std::vector<JointMatrix>> scenePalettes(const Scene& scene, std::uint32_t clip,
                                                     double time) {
-  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(scene.model, clip, time);
-  std::vector<std::vector<JointMatrix>> palettes(scene.model.skins.size());
-  for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-    std::vector<JointMatrix>& palette = palettes[part->source.skin];
-    if (palette.empty()) palette = gltf::palette(scene.model, part->source.skin, globals);
+  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
+  std::vector<std::vector<JointMatrix>> palettes(scene.model->skins.size());
+  for (const ScenePart& part : scene.parts) {
+    std::vector<JointMatrix>& palette = palettes[part.source.skin];
+    if (palette.empty()) palette = gltf::palette(*scene.model, part.source.skin, globals);
   }
   return palettes;
 }

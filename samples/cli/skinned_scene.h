@@ -8,41 +8,26 @@
 #include <vector>
 
 #include "dermis/gltf.h"
-#include "dermis/pack.h"
 #include "dermis/result.h"
-#include "dermis/validate.h"
+#include "prepared_mesh.h"
 
 namespace dermis::cli {
 
-/// One skinned primitive. Not movable: its views point into it.
+/// One skinned primitive of the scene. Primitives that stand in it several times share what was
+/// prepared.
 struct ScenePart {
-  ScenePart() = default;
-  ScenePart(const ScenePart&) = delete;
-  ScenePart& operator=(const ScenePart&) = delete;
-
   gltf::SkinnedPrimitive source;
   const gltf::Primitive* primitive = nullptr;
-  std::string name;                      ///< "node 3 'Fox', mesh 'fox1' primitive 0"
-  bool hasInfluences = false;            ///< without, it stays in bind pose
-  MeshReport report;                     ///< of the mesh as the file has it
-  std::optional<RepairedMesh> repaired;  ///< where `pack` would have refused it
-  std::optional<PackedMesh> packed;      ///< where it has influences
-
-  /// The mesh to skin: the repaired one where there is one.
-  MeshView view() const { return repaired ? repaired->view() : original_; }
-
- private:
-  friend Result<struct Scene> loadScene(const std::filesystem::path& path, bool strict);
-  std::string meshName_;
-  InfluenceSet set_;
-  MeshView original_;
+  std::string name;                          ///< "node 3 'Fox', mesh 'fox1' primitive 0"
+  std::shared_ptr<const PreparedMesh> mesh;  ///< null without influences: it stays in bind pose
 };
 
 struct Scene {
-  gltf::Model model;
-  std::vector<std::unique_ptr<ScenePart>> parts;
+  std::unique_ptr<gltf::Model> model;
+  std::vector<ScenePart> parts;
   std::vector<std::string> warnings;  ///< what was repaired
-  std::vector<std::string> notes;     ///< what was normalised, left out or not skinned
+  std::vector<std::string> remarks;   ///< what `validate` counted and `pack` deals with
+  std::vector<std::string> notes;     ///< what was mended on reading, left out, or is not skinned
 };
 
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or

@@ -76,14 +76,14 @@ Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Co
   const std::vector<std::vector<JointMatrix>> palettes = scenePalettes(scene, pose.clip, pose.time);
   std::vector<Expected> expected;
   std::vector<samples::SkinRequest> requests;
-  for (const std::unique_ptr<ScenePart>& part : scene.parts) {
-    if (!part->hasInfluences) continue;
-    const std::vector<JointMatrix>& palette = palettes[part->source.skin];
+  for (const ScenePart& part : scene.parts) {
+    if (part.mesh == nullptr) continue;
+    const std::vector<JointMatrix>& palette = palettes[part.source.skin];
     for (const Method method : allMethods) {
-      Result<reference::SkinnedMesh> skinned = reference::skin(part->view(), palette, method);
+      Result<reference::SkinnedMesh> skinned = reference::skin(part.mesh->view(), palette, method);
       if (!skinned) return skinned.error();
-      expected.push_back({part.get(), method, std::move(*skinned)});
-      requests.push_back({&*part->packed, palette, true, method});
+      expected.push_back({&part, method, std::move(*skinned)});
+      requests.push_back({&part.mesh->packed(), palette, true, method});
     }
   }
 

@@ -21,7 +21,10 @@ struct VerifiedCase {
   /// Floats that differ in any bit from the first variant's: none may.
   std::uint64_t differingFloats = 0;
 
-  bool passed() const { return comparison.passed() && differingFloats == 0; }
+  bool passed() const {
+    return comparison.passed() && differingFloats == 0 &&
+           comparison.compared + comparison.onlyFinite != 0;
+  }
   std::string failure() const;  ///< a sentence, where it did not pass
 };
 

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "plain_text.h"
+
 namespace dermis::cli {
 namespace {
 
@@ -48,10 +50,20 @@ Result<void> writeText(const std::filesystem::path& path, const std::string& tex
 
 struct Summary {
   std::set<std::string> poses, variants;
-  std::uint64_t vertices = 0, onlyFinite = 0;
+  std::uint64_t vertices = 0, onlyFinite = 0, skipped = 0;
   double worstPosition = 0, worstNormal = 0;
   std::size_t failures = 0;
 };
+
+/// What was not held against a bound, where there is any.
+std::string exceptions(const Summary& summary) {
+  std::string text;
+  if (summary.onlyFinite != 0)
+    text += fmt::format(", {} only asked to be finite", summary.onlyFinite);
+  if (summary.skipped != 0)
+    text += fmt::format(", {} left out: a joint is not finite", summary.skipped);
+  return text;
+}
 
 Json describe(const VerifiedCase& verified) {
   const Comparison& comparison = verified.comparison;
@@ -64,6 +76,7 @@ Json describe(const VerifiedCase& verified) {
   if (!verified.passed()) json["failure"] = verified.failure();
   json["vertices"] = comparison.compared;
   json["onlyFinite"] = comparison.onlyFinite;
+  json["skipped"] = comparison.skipped;
   json["failures"] = comparison.failures;
   json["worstPositionOfBound"] = comparison.worstPosition;
   json["worstNormalOfBound"] = comparison.worstNormal;
@@ -90,21 +103,24 @@ void printReport(const std::vector<ModelVerification>& models) {
       summary.variants.insert(verified.variant);
       summary.vertices += verified.comparison.compared;
       summary.onlyFinite += verified.comparison.onlyFinite;
+      summary.skipped += verified.comparison.skipped;
       summary.worstPosition = std::max(summary.worstPosition, verified.comparison.worstPosition);
       summary.worstNormal = std::max(summary.worstNormal, verified.comparison.worstNormal);
       if (!verified.passed()) ++summary.failures;
     }
     for (const auto& [method, summary] : byMethod) {
       fmt::print(
-          "{}  {}  {}: {} poses, {} variants, {} vertices compared; worst position {:.2f} of its "
+          "{}  {}  {}: {} poses, {} variants, {} vertices compared{}; worst position {:.2f} of its "
           "bound, normal {:.2f}\n",
-          summary.failures == 0 ? "passed" : "FAILED", model.model, method, summary.poses.size(),
-          summary.variants.size(), summary.vertices, summary.worstPosition, summary.worstNormal);
+          summary.failures == 0 ? "passed" : "FAILED", plainLine(model.model), method,
+          summary.poses.size(), summary.variants.size(), summary.vertices, exceptions(summary),
+          summary.worstPosition, summary.worstNormal);
     }
     for (const VerifiedCase& verified : model.cases) {
       if (!verified.passed()) {
-        fmt::print("  {}, {}, {}, {}: {}\n", verified.part, verified.method, verified.pose,
-                   verified.variant, verified.failure());
+        fmt::print("  {}\n",
+                   plainLine(fmt::format("{}, {}, {}, {}: {}", verified.part, verified.method,
+                                         verified.pose, verified.variant, verified.failure())));
       }
     }
   }

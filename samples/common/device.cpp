@@ -213,8 +213,8 @@ Result<void> Device::choose(const std::string& wanted) {
 
   std::size_t number = 0;
   const auto [end, parsed] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), number);
-  const bool isNumber =
-      !wanted.empty() && parsed == std::errc() && end == wanted.data() + wanted.size();
+  const bool isNumber = !wanted.empty() && parsed == std::errc() &&
+                        end == wanted.data() + wanted.size() && number < infos.size();
   std::size_t best = infos.size();
   for (std::size_t index = 0; index < infos.size(); ++index) {
     const bool matches =

@@ -36,7 +36,8 @@ struct Comparison {
   std::uint32_t worstNormalVertex = 0;
   std::uint64_t compared = 0;  ///< vertices held against their bound
   std::uint64_t onlyFinite =
-      0;  ///< vertices whose answer is a matter of rounding: asked to be finite
+      0;                      ///< vertices whose answer is a matter of rounding: asked to be finite
+  std::uint64_t skipped = 0;  ///< vertices not looked at: a joint of theirs is not finite
   std::uint64_t failures = 0;  ///< vertices outside their bound, or not finite
   std::uint32_t firstFailure = 0;
 

@@ -71,7 +71,10 @@ Result<Comparison> compare(const reference::SkinnedMesh& expected, const Attribu
   };
   for (std::size_t vertex = 0; vertex < count; ++vertex) {
     const reference::Conditioning& conditioning = expected.conditioning[vertex];
-    if (!isFinite(expected.positions[vertex])) continue;
+    if (!isFinite(expected.positions[vertex])) {
+      ++result.skipped;
+      continue;
+    }
     const reference::Double3 position = readVector(positions, vertex);
     const reference::Double3 normal =
         withNormals ? readVector(normals, vertex) : reference::Double3{};

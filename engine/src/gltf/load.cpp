@@ -1,6 +1,7 @@
 #include <exception>
 #include <limits>
 #include <new>
+#include <system_error>
 #include <utility>
 
 #include "dermis/gltf.h"
@@ -53,6 +54,11 @@ Result<Model> loadFromMemory(std::span<const std::byte> bytes,
 
 Result<Model> load(const std::filesystem::path& path) {
   return guarded([&] {
+    std::error_code error;
+    // Not a device or a pipe, which might never end. What does not exist is left to readFile.
+    if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
+      fail(ErrorCode::ioError, join(inQuotes(path.string()), " is not a file"));
+    }
     const auto bytes = readFile(path, std::numeric_limits<std::uint64_t>::max(), "glTF file");
     // A name without a folder stands in the current one; an empty folder would mean that there is
     // none.

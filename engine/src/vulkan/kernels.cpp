@@ -5,9 +5,7 @@
 
 namespace dermis::vulkan {
 
-static_assert(abi::CONSTANT_COUNT == 5 && abi::CONSTANT_WORKGROUP_SIZE == 0 &&
-              abi::CONSTANT_METHOD == 1 && abi::CONSTANT_NORMALS == 2 &&
-              abi::CONSTANT_INFLUENCES == 3 && abi::CONSTANT_INSTANCES == 4);
+static_assert(abi::CONSTANT_COUNT <= SpecializationConstants().values.size());
 static_assert(abi::METHOD_LINEAR == static_cast<std::uint32_t>(Method::linear));
 static_assert(abi::METHOD_DUAL_QUATERNION == static_cast<std::uint32_t>(Method::dualQuaternion));
 static_assert(sizeof(DispatchConstants) == abi::PUSH_WORDS * 4);
@@ -19,9 +17,15 @@ std::span<const std::uint32_t> kernelSpirv(Kernel kernel) {
   return kernel == Kernel::palette ? kernels::palette_spirv : kernels::skin_spirv;
 }
 
-std::array<std::uint32_t, 5> specializationConstants(const Variant& variant) {
-  return {variant.workgroupSize, static_cast<std::uint32_t>(variant.method),
-          variant.normals ? 1u : 0u, variant.influences, variant.instancesPerInvocation};
+SpecializationConstants specializationConstants(const Variant& variant) {
+  SpecializationConstants constants;
+  constants.count = abi::CONSTANT_COUNT;
+  constants.values[abi::CONSTANT_WORKGROUP_SIZE] = variant.workgroupSize;
+  constants.values[abi::CONSTANT_METHOD] = static_cast<std::uint32_t>(variant.method);
+  constants.values[abi::CONSTANT_NORMALS] = variant.normals ? 1u : 0u;
+  constants.values[abi::CONSTANT_INFLUENCES] = variant.influences;
+  constants.values[abi::CONSTANT_INSTANCES] = variant.instancesPerInvocation;
+  return constants;
 }
 
 }  // namespace dermis::vulkan

@@ -35,14 +35,14 @@ Result<void> Pipelines::create() {
 Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
   if (find(variant) != VK_NULL_HANDLE) return {};
 
-  const auto constants = specializationConstants(variant);
-  std::array<VkSpecializationMapEntry, constants.size()> entries{};
-  for (std::uint32_t id = 0; id < entries.size(); ++id) entries[id] = {id, id * 4, 4};
+  const SpecializationConstants constants = specializationConstants(variant);
+  std::array<VkSpecializationMapEntry, constants.values.size()> entries{};
+  for (std::uint32_t id = 0; id < constants.count; ++id) entries[id] = {id, id * 4, 4};
   VkSpecializationInfo specialization{};
-  specialization.mapEntryCount = static_cast<std::uint32_t>(entries.size());
+  specialization.mapEntryCount = constants.count;
   specialization.pMapEntries = entries.data();
-  specialization.dataSize = sizeof(constants);
-  specialization.pData = constants.data();
+  specialization.dataSize = std::size_t{constants.count} * 4;
+  specialization.pData = constants.values.data();
 
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;

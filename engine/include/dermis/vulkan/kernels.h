@@ -16,8 +16,13 @@ namespace dermis::vulkan {
 /// SPIR-V 1.3, entry point "main". The memory is static.
 std::span<const std::uint32_t> kernelSpirv(Kernel kernel);
 
-/// The values of specialisation constants 0 to 4 for a variant, 4 bytes each, in the order of their
-/// ids.
-std::array<std::uint32_t, 5> specializationConstants(const Variant& variant);
+/// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
+/// 1, 4 bytes each.
+struct SpecializationConstants {
+  std::array<std::uint32_t, 16> values{};
+  std::uint32_t count = 0;
+};
+
+SpecializationConstants specializationConstants(const Variant& variant);
 
 }  // namespace dermis::vulkan
