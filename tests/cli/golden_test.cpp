@@ -77,28 +77,35 @@ double skinAndCompare(const std::filesystem::path& model, const std::string& ani
   return worst / golden.size();
 }
 
-class GoldenTest : public ::testing::TestWithParam<const char*> {};
+class GoldenTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const std::optional<std::filesystem::path> data = testDataFolder();
+    if (!data) GTEST_SKIP() << noTestData;
+    data_ = *data;
+    std::string reason;
+    if (std::string(GetParam()) != "cpu" && testDevice(true, reason) == nullptr) {
+      ASSERT_FALSE(isContinuousIntegration()) << reason;
+      GTEST_SKIP() << reason;
+    }
+  }
+
+  std::filesystem::path data_;
+};
 
 TEST_P(GoldenTest, EveryPoseAgrees) {
-  const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << "no golden poses: neither DERMIS_TEST_DATA nor ../shared is there";
-  std::string reason;
-  if (std::string(GetParam()) != "cpu" && testDevice(true, reason) == nullptr) {
-    ASSERT_FALSE(isContinuousIntegration()) << reason;
-    GTEST_SKIP() << reason;
-  }
-  std::ifstream manifest(*data / "golden" / "manifest.jsonl");
+  std::ifstream manifest(data_ / "golden" / "manifest.jsonl");
   std::size_t poses = 0;
   double worst = 0;
   for (std::string line; std::getline(manifest, line);) {
     const nlohmann::json entry = nlohmann::json::parse(line);
-    const Golden golden = readGolden(*data / "golden" / entry["golden"].get<std::string>());
+    const Golden golden = readGolden(data_ / "golden" / entry["golden"].get<std::string>());
     std::string animation = entry["anim"].get<std::string>();
     if (animation == "-") animation = "none";
     SCOPED_TRACE(line.substr(0, 160));
     for (const bool dualQuaternion : {false, true}) {
       const double error =
-          skinAndCompare(*data / "models" / entry["file"].get<std::string>(), animation,
+          skinAndCompare(data_ / "models" / entry["file"].get<std::string>(), animation,
                          entry["time"].dump(), dualQuaternion, GetParam(), golden);
       EXPECT_LE(error, 1e-5) << (dualQuaternion ? "dual_quaternion" : "linear");
       worst = std::max(worst, error);
@@ -112,16 +119,9 @@ TEST_P(GoldenTest, EveryPoseAgrees) {
 // Blender 3.4.1's armature modifier, preserve volume off, then on: an independent dual-quaternion
 // skinner. Its floats, and the importer's, agree to 6e-6 of the figure's size.
 TEST_P(GoldenTest, BlenderAgrees) {
-  const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << "no golden poses: neither DERMIS_TEST_DATA nor ../shared is there";
-  std::string reason;
-  if (std::string(GetParam()) != "cpu" && testDevice(true, reason) == nullptr) {
-    ASSERT_FALSE(isContinuousIntegration()) << reason;
-    GTEST_SKIP() << reason;
-  }
-  const Golden golden = readGolden(*data / "golden" / "CesiumMan.blender.f64");
+  const Golden golden = readGolden(data_ / "golden" / "CesiumMan.blender.f64");
   for (const bool dualQuaternion : {false, true}) {
-    EXPECT_LE(skinAndCompare(*data / "models" / "CesiumMan/glTF-Binary/CesiumMan.glb", "0", "0.37",
+    EXPECT_LE(skinAndCompare(data_ / "models" / "CesiumMan/glTF-Binary/CesiumMan.glb", "0", "0.37",
                              dualQuaternion, GetParam(), golden),
               1e-5);
   }
