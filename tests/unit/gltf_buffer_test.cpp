@@ -98,7 +98,7 @@ TEST_F(GltfBuffer, LoadsAPathAndItsSideFiles) {
   std::filesystem::current_path(before);
 
   expectError(gltf::load(folder_ / "absent.gltf"), ErrorCode::ioError, "absent.gltf");
-  expectError(gltf::load(folder_), ErrorCode::ioError, "cannot be opened");
+  expectError(gltf::load(folder_), ErrorCode::ioError, "is not a file");
   write("broken.gltf", bytesOf("{"));
   expectError(gltf::load(folder_ / "broken.gltf"), ErrorCode::invalidData, "'broken.gltf': ");
 }

@@ -30,7 +30,7 @@ int main() {
     const std::span<const std::uint32_t> words = vulkan::kernelSpirv(kernel);
     if (words.size() < 100 || words[0] != 0x07230203u) return 1;
   }
-  if (vulkan::specializationConstants(Variant{})[0] != Variant{}.workgroupSize) return 2;
+  if (vulkan::specializationConstants(Variant{}).values[0] != Variant{}.workgroupSize) return 2;
   if (vulkan::outputScope(vulkan::Consumer::vertexInput).destination.accesses !=
       VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT)
     return 3;
