@@ -9,6 +9,7 @@
 #include "dermis/method.h"
 #include "dermis/reference.h"
 #include "dermis/result.h"
+#include "dermis/vertex_format.h"
 
 namespace dermis {
 
@@ -44,9 +45,28 @@ struct Comparison {
   bool passed() const { return failures == 0; }
 };
 
-/// Compares float32 positions, and normals where both have them, with the reference's. A vertex
-/// with a joint that is not finite is not looked at. Fails with `invalidArgument` where the counts
-/// disagree.
+/// One attribute of skinned vertices where it stands in an output buffer. No alignment is needed.
+struct SkinnedAttribute {
+  const void* data = nullptr;  ///< vertex 0's; null where there is none
+  std::uint32_t count = 0;     ///< vertices
+  std::uint32_t stride = 0;    ///< bytes
+  VertexFormat format = VertexFormat::none;
+};
+
+/// What a kernel made of a mesh.
+struct SkinnedView {
+  SkinnedAttribute positions;
+  SkinnedAttribute normals;   ///< may be absent
+  SkinnedAttribute tangents;  ///< may be absent
+  Box box;                    ///< of positions in snorm16
+};
+
+/// Compares skinned positions, normals and tangents with the reference's, each against the bound of
+/// its method and format. A vertex with a joint that is not finite is not looked at. Fails with
+/// `invalidArgument` where the counts disagree, or a format does not fit its attribute.
+Result<Comparison> compare(const reference::SkinnedMesh& expected, const SkinnedView& actual,
+                           Method method);
+
 Result<Comparison> compare(const reference::SkinnedMesh& expected, const AttributeView& positions,
                            const AttributeView& normals, Method method);
 

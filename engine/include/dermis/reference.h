@@ -16,6 +16,7 @@
 namespace dermis::reference {
 
 using Double3 = std::array<double, 3>;
+using Double4 = std::array<double, 4>;
 
 /// What the accuracy of a float32 result depends on, per vertex (accuracy.h turns it into bounds).
 struct Conditioning {
@@ -35,16 +36,21 @@ struct Conditioning {
 
 struct SkinnedMesh {
   std::vector<Double3> positions;
-  std::vector<Double3> normals;  ///< Empty where the mesh has none.
+  std::vector<Double3> normals;   ///< Empty where the mesh has none.
+  std::vector<Double4> tangents;  ///< x y z and the handedness; likewise.
   std::vector<Conditioning> conditioning;
 };
 
-/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix).
-/// Influences are normalised over all sets together; a vertex without weight stays in bind pose.
-/// Positions and normals are in the palette's space. Formulas: Kavan et al. 2007, section 4, for
-/// dual quaternions; two-phase scale and shear by polar decomposition, without a threshold; normals
-/// by the adjugate transpose of the blended 3×3. Fails with `invalidMesh` where the mesh, with that
-/// many joints, would be refused by `pack`.
-Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method);
+/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix), after
+/// adding the active morph targets to the bind pose. Influences are normalised over all sets
+/// together; a vertex without weight stays in bind pose (morphed). Positions, normals and tangents
+/// are in the palette's space. Formulas: Kavan et al. 2007, section 4, for dual quaternions;
+/// two-phase scale and shear by polar decomposition, without a threshold; normals by the adjugate
+/// transpose of the blended 3×3, tangents by the blended 3×3 itself, not made orthogonal, their
+/// handedness times the sign of its determinant. Fails with `invalidMesh` where the mesh, with that
+/// many joints, would be refused by `pack`, and with `invalidArgument` for a morph target that the
+/// mesh does not have.
+Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
+                         std::span<const MorphWeight> morphs = {});
 
 }  // namespace dermis::reference

@@ -17,4 +17,10 @@ static_assert(sizeof(JointMatrix) == 48);
 /// The most joints that one palette may hold: joint indices are stored in 16 bits.
 inline constexpr std::uint32_t maxPaletteJoints = 65536;
 
+/// An axis-aligned box.
+struct Box {
+  float min[3] = {0, 0, 0};
+  float max[3] = {0, 0, 0};
+};
+
 }  // namespace dermis

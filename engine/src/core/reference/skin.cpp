@@ -284,7 +284,7 @@ Double3 toArray(const dvec3& v) {
 }  // namespace
 
 Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette,
-                         Method method) {
+                         Method method, std::span<const MorphWeight>) {
   const MeshReport report = validate(
       mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPaletteJoints)));
   if (!report.packable()) {
