@@ -28,7 +28,7 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["normals"] = !primitive.normals.empty();
   json["tangents"] = !primitive.tangents.empty();
   json["morphTargets"] = primitive.morphTargets.size();
-  json["influencesStored"] = primitive.influencesPerVertex;
+  json["influencesStored"] = primitive.influencesPerVertex();
   json["influencesUsed"] = part.mesh ? part.mesh->packed().maxInfluences() : 0;
   json["jointsUsed"] = part.mesh ? part.mesh->packed().requiredJoints() : 0;
   json["joints"] = scene.model->skins[part.source.skin].joints.size();

@@ -10,7 +10,7 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(const gltf::Pr
                                                                   bool strict) {
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
   mesh->name_ = std::move(name);
-  mesh->original_ = primitive.view(mesh->set_);
+  mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
   mesh->original_.name = mesh->name_;
   mesh->report_ = validate(mesh->original_, jointCount);
   if (!mesh->report_.packable()) {

@@ -32,7 +32,7 @@ class PreparedMesh {
  private:
   PreparedMesh() = default;
   std::string name_;
-  InfluenceSet set_;
+  std::optional<gltf::PrimitiveView> primitive_;
   MeshView original_;
   MeshReport report_;
   std::optional<RepairedMesh> repaired_;

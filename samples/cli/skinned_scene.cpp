@@ -59,7 +59,7 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
                             part.primitive->name);
     vertices += part.primitive->vertexCount;
     if (!part.primitive->morphTargets.empty()) ++morphed;
-    if (part.primitive->influencesPerVertex == 0) {
+    if (part.primitive->influences.empty()) {
       scene.notes.push_back(fmt::format("{} has no JOINTS_0: its {} vertices stay in bind pose",
                                         part.name, part.primitive->vertexCount));
     } else {

@@ -18,9 +18,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   for (const gltf::SkinnedPrimitive& skinned : result->skinnedPrimitives) {
-    InfluenceSet set;
-    const MeshView view = result->meshes[skinned.mesh].primitives[skinned.primitive].view(set);
-    if (view.vertexCount == 0) std::abort();
+    const gltf::Mesh& mesh = result->meshes[skinned.mesh];
+    const gltf::PrimitiveView view(mesh.primitives[skinned.primitive]);
+    if (view.mesh().vertexCount == 0) std::abort();
+    if (view.mesh().morphTargets.size() != mesh.morphTargetCount) std::abort();
+    const std::uint32_t clip = result->clips.empty() ? gltf::none : 0;
+    if (morphWeights(*result, skinned.node, clip, 0.5).size() != mesh.morphTargetCount)
+      std::abort();
   }
   // A hostile file may have very many clips and skins: a few of them will do.
   for (std::uint32_t clip = 0; clip < result->clips.size() && clip < 4; ++clip) {

@@ -170,6 +170,20 @@ inline gltf::Primitive firstPrimitive(const gltf::Model& model) {
   return there ? model.meshes[0].primitives[0] : gltf::Primitive{};
 }
 
+/// Joints or weights as the file stores them, component by component.
+template <typename T>
+std::vector<T> componentsOf(const std::vector<std::byte>& bytes) {
+  std::vector<T> components(bytes.size() / sizeof(T));
+  std::memcpy(components.data(), bytes.data(), components.size() * sizeof(T));
+  return components;
+}
+
+/// The only set of influences of a primitive.
+inline gltf::Influences onlySet(const gltf::Primitive& primitive) {
+  EXPECT_EQ(primitive.influences.size(), 1u);
+  return primitive.influences.empty() ? gltf::Influences{} : primitive.influences[0];
+}
+
 /// Expects an error of this kind whose sentence contains the text.
 inline void expectError(const Result<gltf::Model>& result, ErrorCode code,
                         const std::string& text) {

@@ -25,8 +25,8 @@ TEST(GltfContainer, ReadsTheSameFromTextAndBinary) {
   const gltf::Model text = loaded(file);
   const gltf::Model binary = loaded(loadFromMemory(file.glb(), {}));
   EXPECT_EQ(firstPrimitive(text).positions, firstPrimitive(binary).positions);
-  EXPECT_EQ(firstPrimitive(text).joints, firstPrimitive(binary).joints);
-  EXPECT_EQ(firstPrimitive(text).weights, firstPrimitive(binary).weights);
+  EXPECT_EQ(onlySet(firstPrimitive(text)).joints, onlySet(firstPrimitive(binary)).joints);
+  EXPECT_EQ(onlySet(firstPrimitive(text)).weights, onlySet(firstPrimitive(binary)).weights);
 }
 
 TEST(GltfContainer, ReadsAChunkThatItDoesNotKnow) {

@@ -1,4 +1,6 @@
 // Primitives: influences, triangles, the formats each attribute may have.
+#include <utility>
+
 #include "gltf_builder.h"
 
 namespace dermis::test {
@@ -6,13 +8,18 @@ namespace {
 
 using Floats = std::vector<float>;
 using Indices = std::vector<std::uint32_t>;
+using Bytes = std::vector<std::uint8_t>;
+using Shorts = std::vector<std::uint16_t>;
 
 TEST(GltfPrimitive, ReadsInfluences) {
   const gltf::Primitive primitive = firstPrimitive(loaded(skinnedTriangle()));
   EXPECT_EQ(primitive.vertexCount, 3u);
-  EXPECT_EQ(primitive.influencesPerVertex, 4u);
-  EXPECT_EQ(primitive.joints, (Indices{0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}));
-  EXPECT_EQ(primitive.weights, (Floats{1, 0, 0, 0, 1, 0, 0, 0, 0.25f, 0.75f, 0, 0}));
+  EXPECT_EQ(primitive.influencesPerVertex(), 4u);
+  const gltf::Influences set = onlySet(primitive);
+  EXPECT_EQ(set.jointType, ComponentType::uint8);
+  EXPECT_EQ(componentsOf<std::uint8_t>(set.joints), (Bytes{0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}));
+  EXPECT_EQ(set.weightType, ComponentType::float32);
+  EXPECT_EQ(componentsOf<float>(set.weights), (Floats{1, 0, 0, 0, 1, 0, 0, 0, 0.25f, 0.75f, 0, 0}));
   EXPECT_EQ(primitive.name, "mesh 0 primitive 0");
 }
 
@@ -22,16 +29,42 @@ TEST(GltfPrimitive, NamesItselfByItsMesh) {
   EXPECT_EQ(firstPrimitive(loaded(file)).name, "mesh 'Fox' primitive 0");
 }
 
-TEST(GltfPrimitive, ReadsNormalizedWeights) {
+// Which weights are equal is a matter of the integers, not of their quotients.
+TEST(GltfPrimitive, KeepsIntegerWeightsAsTheyAre) {
   FileBuilder file = skinnedTriangle();
-  file.attributes()["WEIGHTS_0"] = file.add<std::uint8_t>(
-      {255, 0, 0, 0, 51, 204, 0, 0, 1, 254, 0, 0}, "VEC4", unsignedByteType, true);
-  EXPECT_EQ(firstPrimitive(loaded(file)).weights,
-            (Floats{1, 0, 0, 0, 0.2f, 0.8f, 0, 0, 1 / 255.0f, 254 / 255.0f, 0, 0}));
-  file.attributes()["WEIGHTS_0"] = file.add<std::uint16_t>(
-      {65535, 0, 0, 0, 0, 65535, 0, 0, 1, 65534, 0, 0}, "VEC4", unsignedShortType, true);
-  EXPECT_EQ(firstPrimitive(loaded(file)).weights,
-            (Floats{1, 0, 0, 0, 0, 1, 0, 0, 1 / 65535.0f, 65534 / 65535.0f, 0, 0}));
+  const Bytes bytes{255, 0, 0, 0, 51, 204, 0, 0, 1, 254, 0, 0};
+  file.attributes()["WEIGHTS_0"] = file.add(bytes, "VEC4", unsignedByteType, true);
+  gltf::Influences set = onlySet(firstPrimitive(loaded(file)));
+  EXPECT_EQ(set.weightType, ComponentType::unorm8);
+  EXPECT_EQ(componentsOf<std::uint8_t>(set.weights), bytes);
+
+  const Shorts shorts{65535, 0, 0, 0, 0, 65535, 0, 0, 1, 65534, 0, 0};
+  file.attributes()["WEIGHTS_0"] = file.add(shorts, "VEC4", unsignedShortType, true);
+  file.attributes()["JOINTS_0"] = file.add(shorts, "VEC4", unsignedShortType);
+  set = onlySet(firstPrimitive(loaded(file)));
+  EXPECT_EQ(set.weightType, ComponentType::unorm16);
+  EXPECT_EQ(componentsOf<std::uint16_t>(set.weights), shorts);
+  EXPECT_EQ(set.jointType, ComponentType::uint16);
+  EXPECT_EQ(componentsOf<std::uint16_t>(set.joints), shorts);
+}
+
+TEST(GltfPrimitive, PutsSparseAndSpacedInfluencesTogether) {
+  FileBuilder file = skinnedTriangle();
+  const std::size_t indices = file.addView(bytesOf(Bytes{1}));
+  const std::size_t values = file.addView(bytesOf(Shorts{9, 8, 7, 6}));
+  // Elements 12 bytes apart, with something else between them.
+  const std::size_t spaced =
+      file.add(Shorts{1, 2, 3, 4, 99, 99, 5, 6, 7, 8, 99, 99, 10, 11, 12, 13, 99, 99}, "VEC4",
+               unsignedShortType, true);
+  file.json["bufferViews"].back()["byteStride"] = 12;
+  file.json["accessors"][spaced]["count"] = 3;
+  file.json["accessors"][spaced]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", indices}, {"componentType", unsignedByteType}}},
+      {"values", {{"bufferView", values}}}};
+  file.attributes()["WEIGHTS_0"] = spaced;
+  EXPECT_EQ(componentsOf<std::uint16_t>(onlySet(firstPrimitive(loaded(file))).weights),
+            (Shorts{1, 2, 3, 4, 9, 8, 7, 6, 10, 11, 12, 13}));
 }
 
 TEST(GltfPrimitive, ReadsAnyNumberOfSets) {
@@ -40,40 +73,78 @@ TEST(GltfPrimitive, ReadsAnyNumberOfSets) {
     const auto joint = static_cast<std::uint16_t>(set);
     const auto weight = static_cast<float>(set);
     file.attributes()["JOINTS_" + std::to_string(set)] =
-        file.add(std::vector<std::uint16_t>(12, joint), "VEC4", unsignedShortType);
+        file.add(Shorts(12, joint), "VEC4", unsignedShortType);
     file.attributes()["WEIGHTS_" + std::to_string(set)] =
         file.addFloats(Floats(12, weight), "VEC4");
   }
   const gltf::Primitive primitive = firstPrimitive(loaded(file));
-  ASSERT_EQ(primitive.influencesPerVertex, 48u);
-  ASSERT_EQ(primitive.joints.size(), 144u);
-  for (std::size_t vertex = 0; vertex < 3; ++vertex) {
-    for (std::size_t slot = 4; slot < 48; ++slot) {
-      EXPECT_EQ(primitive.joints[vertex * 48 + slot], slot / 4);
-      EXPECT_EQ(primitive.weights[vertex * 48 + slot], static_cast<float>(slot / 4));
-    }
+  EXPECT_EQ(primitive.influencesPerVertex(), 48u);
+  ASSERT_EQ(primitive.influences.size(), 12u);
+  for (std::size_t set = 1; set < 12; ++set) {
+    const gltf::Influences& influences = primitive.influences[set];
+    EXPECT_EQ(componentsOf<std::uint16_t>(influences.joints),
+              Shorts(12, static_cast<std::uint16_t>(set)));
+    EXPECT_EQ(componentsOf<float>(influences.weights), Floats(12, static_cast<float>(set)));
   }
-  EXPECT_EQ(primitive.weights[2 * 48 + 1], 0.75f);
+  EXPECT_EQ(componentsOf<float>(primitive.influences[0].weights)[9], 0.75f);
 }
 
-TEST(GltfPrimitive, ViewsItself) {
+TEST(GltfPrimitive, IsViewedWithAllItsSets) {
   FileBuilder file = skinnedTriangle();
   file.attributes()["NORMAL"] = file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
   file.attributes()["TANGENT"] = file.addFloats({1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, -1}, "VEC4");
+  file.attributes()["JOINTS_1"] = file.add(Shorts(12, 1), "VEC4", unsignedShortType);
+  file.attributes()["WEIGHTS_1"] = file.add(Bytes(12, 51), "VEC4", unsignedByteType, true);
   const gltf::Primitive primitive = firstPrimitive(loaded(file));
-  InfluenceSet set;
-  const MeshView view = primitive.view(set);
+  const gltf::PrimitiveView owner(primitive);
+  const MeshView view = owner.mesh();
   EXPECT_EQ(view.name, primitive.name);
   EXPECT_EQ(view.vertexCount, 3u);
   EXPECT_EQ(view.positions.data, primitive.positions.data());
   EXPECT_EQ(view.normals.components, 3u);
   EXPECT_EQ(view.tangents.components, 4u);
   EXPECT_EQ(view.tangents.stride, 16u);
-  ASSERT_EQ(view.influenceSets.size(), 1u);
-  EXPECT_EQ(view.influenceSets[0].joints.type, ComponentType::uint32);
-  EXPECT_EQ(view.influenceSets[0].joints.components, 4u);
-  EXPECT_EQ(view.influenceSets[0].joints.stride, 16u);
-  EXPECT_EQ(view.influenceSets[0].weights.data, primitive.weights.data());
+  EXPECT_TRUE(view.morphTargets.empty());
+  ASSERT_EQ(view.influenceSets.size(), 2u);
+  for (std::size_t set = 0; set < 2; ++set) {
+    const InfluenceSet& influences = view.influenceSets[set];
+    const gltf::Influences& stored = primitive.influences[set];
+    EXPECT_EQ(influences.joints.data, stored.joints.data());
+    EXPECT_EQ(influences.joints.type, stored.jointType);
+    EXPECT_EQ(influences.joints.stride, set == 0 ? 4u : 8u);
+    EXPECT_EQ(influences.joints.count, 3u);
+    EXPECT_EQ(influences.joints.components, 4u);
+    EXPECT_EQ(influences.weights.data, stored.weights.data());
+    EXPECT_EQ(influences.weights.type, stored.weightType);
+    EXPECT_EQ(influences.weights.stride, set == 0 ? 16u : 4u);
+    EXPECT_EQ(influences.weights.components, 4u);
+  }
+}
+
+TEST(GltfPrimitive, IsViewedWithItsMorphTargets) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["targets"] = {
+      {{"POSITION", file.addFloats({1, 2, 3, 4, 5, 6, 7, 8, 9}, "VEC3")}},
+      {{"NORMAL", file.addFloats(Floats(9, 1.0f), "VEC3")},
+       {"TANGENT", file.addFloats(Floats(9, 2.0f), "VEC3")}}};
+  const gltf::Primitive primitive = firstPrimitive(loaded(file));
+  gltf::PrimitiveView first(primitive);
+  const gltf::PrimitiveView owner = std::move(first);
+  const MeshView view = owner.mesh();
+  ASSERT_EQ(view.morphTargets.size(), 2u);
+  const MorphTargetView& position = view.morphTargets[0];
+  const MorphTargetView& rest = view.morphTargets[1];
+  EXPECT_TRUE(position.vertices.empty());
+  EXPECT_EQ(position.positions.data, primitive.morphTargets[0].positions.data());
+  EXPECT_EQ(position.positions.count, 3u);
+  EXPECT_EQ(position.positions.stride, 12u);
+  EXPECT_EQ(position.positions.components, 3u);
+  EXPECT_EQ(position.positions.type, ComponentType::float32);
+  EXPECT_FALSE(position.normals || position.tangents);
+  EXPECT_FALSE(rest.positions);
+  EXPECT_EQ(rest.normals.data, primitive.morphTargets[1].normals.data());
+  EXPECT_EQ(rest.tangents.data, primitive.morphTargets[1].tangents.data());
+  EXPECT_EQ(rest.tangents.components, 3u) << "the handedness is not displaced";
 }
 
 TEST(GltfPrimitive, KeepsAPrimitiveWithoutJoints) {
@@ -83,9 +154,9 @@ TEST(GltfPrimitive, KeepsAPrimitiveWithoutJoints) {
   const gltf::Model model = loaded(file);
   EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
   const gltf::Primitive primitive = firstPrimitive(model);
-  EXPECT_EQ(primitive.influencesPerVertex, 0u);
-  InfluenceSet set;
-  EXPECT_TRUE(primitive.view(set).influenceSets.empty());
+  EXPECT_EQ(primitive.influencesPerVertex(), 0u);
+  const gltf::PrimitiveView view(primitive);
+  EXPECT_TRUE(view.mesh().influenceSets.empty());
   ASSERT_EQ(model.notes.size(), 1u);
   EXPECT_EQ(model.notes[0], "1 primitive of a skinned node without joints, left in bind pose");
 }
@@ -239,6 +310,7 @@ TEST(GltfPrimitive, ReadsMorphTargets) {
   EXPECT_TRUE(primitive.morphTargets[0].normals.empty());
   EXPECT_EQ(primitive.morphTargets[1].normals, Floats(9, 1.0f));
   EXPECT_EQ(primitive.morphTargets[1].tangents, Floats(9, 2.0f));
+  EXPECT_EQ(model.meshes[0].morphTargetCount, 2u);
   EXPECT_EQ(model.meshes[0].morphWeights, (Floats{0.25f, 0.5f}));
   EXPECT_EQ(model.nodes[0].morphWeights, (Floats{1, 0}));
 }
@@ -374,9 +446,9 @@ TEST(GltfPrimitive, KeepsValuesThatValidateLooksAt) {
   file.attributes()["JOINTS_0"] =
       file.add(std::vector<std::uint16_t>(12, 60000), "VEC4", unsignedShortType);
   file.attributes()["WEIGHTS_0"] = file.addFloats(Floats(12, -1.0f), "VEC4");
-  const gltf::Primitive primitive = firstPrimitive(loaded(file));
-  EXPECT_EQ(primitive.joints[0], 60000u);
-  EXPECT_EQ(primitive.weights[0], -1.0f);
+  const gltf::Influences set = onlySet(firstPrimitive(loaded(file)));
+  EXPECT_EQ(componentsOf<std::uint16_t>(set.joints)[0], 60000u);
+  EXPECT_EQ(componentsOf<float>(set.weights)[0], -1.0f);
 }
 
 }  // namespace

@@ -66,16 +66,25 @@ struct Material {
   bool doubleSided = false;
 };
 
-/// Displacements of one morph target, 3 floats a vertex; an absent attribute is empty. Read, not
-/// yet skinned.
+/// Displacements of one morph target, 3 floats a vertex; an absent attribute is empty.
 struct MorphTarget {
   std::vector<float> positions, normals, tangents;
 };
 
+/// JOINTS_n and WEIGHTS_n of one n, 4 influences a vertex, tightly packed. The components are the
+/// file's own: which of several weights is the greatest, and which are equal, is a matter of the
+/// integers that it stores.
+struct Influences {
+  ComponentType jointType = ComponentType::uint8;     ///< uint8 or uint16
+  ComponentType weightType = ComponentType::float32;  ///< float32, unorm8 or unorm16
+  std::vector<std::byte> joints;
+  std::vector<std::byte> weights;
+};
+
 /// One primitive of a mesh, decoded: float32 attributes whatever the file stores (normalised
-/// integers divided by their largest value), influences in as many sets as the file has. Vertices
-/// stand in the order of the accessors. Values are as the file has them, NaN included, and joint
-/// indices may lie outside the skin: `validate` looks at both.
+/// integers divided by their largest value), influences as they are. Vertices stand in the order of
+/// the accessors. Values are as the file has them, NaN included, and joint indices may lie outside
+/// the skin: `validate` looks at both.
 struct Primitive {
   std::string name;  ///< "mesh 'Fox' primitive 0", for messages
   std::uint32_t vertexCount = 0;
@@ -84,25 +93,43 @@ struct Primitive {
   std::vector<float> tangents;                ///< 4 a vertex, or empty
   std::vector<std::vector<float>> texcoords;  ///< TEXCOORD_0, 1, …: 2 a vertex
   std::vector<float> colors;  ///< 4 a vertex (COLOR_0; alpha 1 where the file has none), or empty
-  std::vector<std::uint32_t> joints;  ///< `influencesPerVertex` a vertex: all JOINTS_n side by side
-  std::vector<float> weights;         ///< likewise, from WEIGHTS_n
-  /// 4 × the number of sets; 0 where the primitive has none: it stays in bind pose, its positions
-  /// as they are in the file.
-  std::uint32_t influencesPerVertex = 0;
+  /// One a set. Empty where the primitive has none: it stays in bind pose, its positions as they
+  /// are in the file.
+  std::vector<Influences> influences;
   /// 3 indices a triangle; strips and fans are unrolled; empty for points and lines.
   std::vector<std::uint32_t> triangles;
   std::vector<MorphTarget> morphTargets;
   std::uint32_t material = none;  ///< In `Model::materials`.
 
-  /// A view of the arrays above; valid while this object lives and is neither moved nor changed.
-  /// `set` is filled and must live as long; without influences the view has no set.
-  MeshView view(InfluenceSet& set) const;
+  /// Slots of all sets together; some may have no weight.
+  std::uint32_t influencesPerVertex() const {
+    return 4 * static_cast<std::uint32_t>(influences.size());
+  }
+};
+
+/// A primitive as `validate`, `pack` and `reference::skin` take it, with all its sets and morph
+/// targets. It points into the primitive, which must outlive it, neither moved nor changed.
+class PrimitiveView {
+ public:
+  explicit PrimitiveView(const Primitive& primitive);
+  explicit PrimitiveView(const Primitive&& primitive) = delete;
+
+  /// Valid while this object lives too and is neither moved nor assigned to. Its name is the
+  /// primitive's; without influences it has no set.
+  MeshView mesh() const&;
+  MeshView mesh() const&& = delete;
+
+ private:
+  const Primitive* primitive_;
+  std::vector<InfluenceSet> influenceSets_;
+  std::vector<MorphTargetView> morphTargets_;
 };
 
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;
-  std::vector<float> morphWeights;  ///< One a morph target, or empty: all 0.
+  std::uint32_t morphTargetCount = 0;  ///< Of each primitive, decoded or not.
+  std::vector<float> morphWeights;     ///< One a morph target, or empty: all 0.
 };
 
 enum class Interpolation : std::uint8_t { step, linear, cubicSpline };
@@ -188,5 +215,12 @@ std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
 /// Both in one, for a model with one skin.
 std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin, std::uint32_t clip,
                                  double time);
+
+/// The weight of every morph target of a node's mesh at a time in seconds: the clip's, sampled as
+/// in `nodeGlobals`, where it moves the weights of that node; otherwise the node's own, otherwise
+/// its mesh's, otherwise zeros. `clip` is as for `nodeGlobals`. As many as the mesh has targets;
+/// empty where it has none, where the node has no mesh, and where there is no such node.
+std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uint32_t clip,
+                                double time);
 
 }  // namespace dermis::gltf

@@ -281,6 +281,11 @@ void Source::requireNoStride(int index, const std::string& where) const {
               ", which only vertex attributes may have");
 }
 
+Format Source::format(int accessor) const {
+  const auto& found = content().accessors[static_cast<std::size_t>(accessor)];
+  return {found.componentType, found.normalized};
+}
+
 std::uint32_t Source::count(int accessor) const {
   return static_cast<std::uint32_t>(content().accessors[static_cast<std::size_t>(accessor)].count);
 }
@@ -339,20 +344,19 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
   return elements;
 }
 
-// `read` makes a Value of the address of a component.
-template <typename Value, typename Read>
-std::vector<Value> Source::decode(int index, Read read) {
-  spendOnAccessor(index);
+// Calls `visit` with the number of each component and its address; sparse values come later, with
+// the numbers of those that they replace. What is all zeros is not visited.
+template <typename Visit>
+void Source::forEachComponent(int index, Visit visit) {
   const tinygltf::Accessor& accessor = content().accessors[static_cast<std::size_t>(index)];
   const std::size_t width = components(index);
   const std::size_t component = sizeOfComponent(accessor.componentType);
-  std::vector<Value> values(accessor.count * width);
   if (accessor.bufferView >= 0) {
     const std::byte* element = viewData(accessor.bufferView) + accessor.byteOffset;
     const std::size_t stride = strideOf(accessor);
     for (std::size_t i = 0; i < accessor.count; ++i) {
       for (std::size_t j = 0; j < width; ++j) {
-        values[i * width + j] = read(element + i * stride + j * component);
+        visit(i * width + j, element + i * stride + j * component);
       }
     }
   }
@@ -360,12 +364,29 @@ std::vector<Value> Source::decode(int index, Read read) {
     const std::byte* data =
         viewData(accessor.sparse.values.bufferView) + accessor.sparse.values.byteOffset;
     for (const std::uint32_t element : sparseIndices(index)) {
-      for (std::size_t j = 0; j < width; ++j, data += component) {
-        values[element * width + j] = read(data);
-      }
+      for (std::size_t j = 0; j < width; ++j, data += component) visit(element * width + j, data);
     }
   }
+}
+
+// `read` makes a Value of the address of a component.
+template <typename Value, typename Read>
+std::vector<Value> Source::decode(int index, Read read) {
+  spendOnAccessor(index);
+  std::vector<Value> values(std::size_t{count(index)} * components(index));
+  forEachComponent(
+      index, [&](std::size_t place, const std::byte* address) { values[place] = read(address); });
   return values;
+}
+
+std::vector<std::byte> Source::stored(int index) {
+  spendOnAccessor(index);
+  const std::size_t size = sizeOfComponent(format(index).componentType);
+  std::vector<std::byte> bytes(std::size_t{count(index)} * components(index) * size);
+  forEachComponent(index, [&](std::size_t place, const std::byte* address) {
+    std::memcpy(&bytes[place * size], address, size);
+  });
+  return bytes;
 }
 
 std::vector<float> Source::floats(int index) {

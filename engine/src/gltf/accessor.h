@@ -39,6 +39,8 @@ class Source {
   /// Fails where the accessor's bufferView has a byteStride, which only vertex attributes may have.
   void requireNoStride(int accessor, const std::string& where) const;
 
+  /// How the accessor stores its components.
+  Format format(int accessor) const;
   /// Elements of the accessor.
   std::uint32_t count(int accessor) const;
   /// Components of an element: 3 for VEC3.
@@ -51,6 +53,9 @@ class Source {
   std::vector<float> floats(int accessor);
   /// The same for unsigned integers that are not normalized.
   std::vector<std::uint32_t> integers(int accessor);
+
+  /// All components of all elements as they are stored, tightly packed.
+  std::vector<std::byte> stored(int accessor);
 
   /// Counts an allocation against what the file's size justifies. Throws `Failure` with
   /// `limitExceeded`.
@@ -66,6 +71,8 @@ class Source {
   std::uint64_t strideOf(const tinygltf::Accessor& accessor) const;
   void spendOnAccessor(int accessor);
   std::vector<std::uint32_t> sparseIndices(int accessor);
+  template <typename Visit>
+  void forEachComponent(int accessor, Visit visit);
   template <typename Value, typename Read>
   std::vector<Value> decode(int accessor, Read read);
 

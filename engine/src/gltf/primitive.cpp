@@ -153,30 +153,29 @@ class PrimitiveCheck {
   std::string where_;
 };
 
-// Sets of four side by side: vertex 0's JOINTS_0, vertex 0's JOINTS_1, …
-template <typename Value>
-void interleave(const std::vector<Value>& set, std::size_t number, std::size_t width,
-                std::vector<Value>& all) {
-  for (std::size_t vertex = 0; vertex * 4 < set.size(); ++vertex) {
-    std::copy_n(set.begin() + static_cast<std::ptrdiff_t>(vertex * 4), 4,
-                all.begin() + static_cast<std::ptrdiff_t>(vertex * width + number * 4));
+ComponentType storedType(Format format) {
+  switch (format.componentType) {
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return format.normalized ? ComponentType::unorm8 : ComponentType::uint8;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return format.normalized ? ComponentType::unorm16 : ComponentType::uint16;
+    default:
+      return ComponentType::float32;
   }
 }
 
-void readInfluences(Source& source, const std::map<std::string, int>& attributes,
-                    const std::string& where, Primitive& primitive) {
-  const std::uint32_t sets = countSets(attributes, "JOINTS_", where);
-  if (sets == 0) return;
-  const std::uint32_t width = 4 * sets;
-  const std::uint64_t size = std::uint64_t{primitive.vertexCount} * width;
-  source.spend(8 * size, where);
-  primitive.influencesPerVertex = width;
-  primitive.joints.resize(size);
-  primitive.weights.resize(size);
-  for (std::uint32_t i = 0; i < sets; ++i) {
-    interleave(source.integers(attributes.at(join("JOINTS_", i))), i, width, primitive.joints);
-    interleave(source.floats(attributes.at(join("WEIGHTS_", i))), i, width, primitive.weights);
+std::vector<Influences> readInfluences(Source& source, const std::map<std::string, int>& attributes,
+                                       const std::string& where) {
+  std::vector<Influences> sets(countSets(attributes, "JOINTS_", where));
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    const int joints = attributes.at(join("JOINTS_", i));
+    const int weights = attributes.at(join("WEIGHTS_", i));
+    sets[i].jointType = storedType(source.format(joints));
+    sets[i].weightType = storedType(source.format(weights));
+    sets[i].joints = source.stored(joints);
+    sets[i].weights = source.stored(weights);
   }
+  return sets;
 }
 
 std::vector<float> readColors(Source& source, int accessor, const std::string& where) {
@@ -309,27 +308,12 @@ Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t p
   primitive.tangents = readOptional(source, findAttribute(from.attributes, "TANGENT"));
   primitive.texcoords = readTexcoords(source, from.attributes);
   primitive.colors = readColors(source, findAttribute(from.attributes, "COLOR_0"), where);
-  readInfluences(source, from.attributes, where, primitive);
+  primitive.influences = readInfluences(source, from.attributes, where);
   primitive.triangles = readTriangles(source, from, primitive.vertexCount, where, notes);
   for (const auto& target : from.targets) {
     primitive.morphTargets.push_back(readTarget(source, target));
   }
   return primitive;
-}
-
-MeshView Primitive::view(InfluenceSet& set) const {
-  MeshView view;
-  view.name = name;
-  view.vertexCount = vertexCount;
-  view.positions = floatAttribute(positions.data(), vertexCount, 3);
-  if (!normals.empty()) view.normals = floatAttribute(normals.data(), vertexCount, 3);
-  if (!tangents.empty()) view.tangents = floatAttribute(tangents.data(), vertexCount, 4);
-  if (influencesPerVertex == 0) return view;
-  set.joints = {joints.data(), vertexCount, influencesPerVertex * 4, ComponentType::uint32,
-                influencesPerVertex};
-  set.weights = floatAttribute(weights.data(), vertexCount, influencesPerVertex);
-  view.influenceSets = {&set, 1};
-  return view;
 }
 
 }  // namespace dermis::gltf

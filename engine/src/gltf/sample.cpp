@@ -62,7 +62,7 @@ void applyChannel(const Channel& channel, double time, LocalTransform& local) {
       interpolate(channel, time, local.scale);
       break;
     case ChannelPath::weights:
-      break;  // Morph targets are not skinned yet.
+      break;  // `morphWeights` samples them.
   }
 }
 

@@ -62,6 +62,8 @@ void readScene(Source& source, Model& model) {
   for (const tinygltf::Mesh& from : content.meshes) {
     Mesh& mesh = model.meshes.emplace_back();
     mesh.name = from.name;
+    // All primitives of a mesh have as many targets: the structural check has seen to it.
+    mesh.morphTargetCount = static_cast<std::uint32_t>(from.primitives[0].targets.size());
     for (const double weight : from.weights) {
       mesh.morphWeights.push_back(static_cast<float>(weight));
     }
@@ -80,7 +82,7 @@ void readScene(Source& source, Model& model) {
     const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
     for (std::uint32_t j = 0; j < primitives.size(); ++j) {
       if (primitives[j].vertexCount == 0) continue;
-      if (primitives[j].influencesPerVertex == 0) ++inBindPose;
+      if (primitives[j].influences.empty()) ++inBindPose;
       model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
     }
   }

@@ -1,0 +1,45 @@
+#include <algorithm>
+#include <limits>
+
+#include "dermis/gltf.h"
+#include "gltf/interpolate.h"
+
+namespace dermis::gltf {
+namespace {
+
+const Channel* findWeights(const Model& model, std::uint32_t node, std::uint32_t clip) {
+  if (clip >= model.clips.size()) return nullptr;
+  const std::vector<Channel>& channels = model.clips[clip].channels;
+  const auto found = std::find_if(channels.begin(), channels.end(), [node](const Channel& channel) {
+    return channel.node == node && channel.path == ChannelPath::weights;
+  });
+  return found == channels.end() ? nullptr : &*found;
+}
+
+// A spline may leave the range of its keys, and with it that of a float.
+float toFloat(double value) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(value, -largest, largest));
+}
+
+}  // namespace
+
+std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uint32_t clip,
+                                double time) {
+  if (node >= model.nodes.size() || model.nodes[node].mesh == none) return {};
+  const Node& from = model.nodes[node];
+  const Mesh& mesh = model.meshes[from.mesh];
+  std::vector<float> weights(mesh.morphTargetCount, 0.0f);
+  if (const Channel* channel = findWeights(model, node, clip)) {
+    std::vector<double> sampled(channel->components);
+    interpolate(*channel, time, sampled);
+    std::transform(sampled.begin(), sampled.end(), weights.begin(), toFloat);
+  } else if (!from.morphWeights.empty()) {
+    weights = from.morphWeights;
+  } else if (!mesh.morphWeights.empty()) {
+    weights = mesh.morphWeights;
+  }
+  return weights;
+}
+
+}  // namespace dermis::gltf
