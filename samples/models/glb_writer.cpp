@@ -1,21 +1,19 @@
 #include "glb_writer.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
+
+#include "glb_file.h"
 
 namespace dermis::models {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr int byteComponent = 5121;
-constexpr int shortComponent = 5123;
-constexpr int floatComponent = 5126;
-constexpr int vertexTarget = 34962;
-constexpr int indexTarget = 34963;
-constexpr int noTarget = 0;
+using Buffer = samples::GlbBuffer;
+using samples::GlbComponent;
+using samples::GlbTarget;
 
 float toFloat(double value) {
   return static_cast<float>(value) + 0.0F;
@@ -26,50 +24,12 @@ double rounded(double value) {
   return std::floor(value * 1e9 + 0.5) / 1e9 + 0.0;
 }
 
-// Collects little-endian bytes and the accessors that describe them.
-class Buffer {
- public:
-  void put(std::uint32_t value, int byteCount) {
-    for (int byte = 0; byte < byteCount; ++byte) {
-      bytes_.push_back(static_cast<std::byte>((value >> (8 * byte)) & 0xFFU));
-    }
-  }
-  void putFloat(float value) { put(std::bit_cast<std::uint32_t>(value), 4); }
-
-  // Starts a view; what is put until `end` is its content.
-  void begin() {
-    while (bytes_.size() % 4 != 0) bytes_.push_back(std::byte{0});
-    start_ = bytes_.size();
-  }
-  int end(int componentType, const char* type, std::size_t count, int target) {
-    Json view = {{"buffer", 0}, {"byteOffset", start_}, {"byteLength", bytes_.size() - start_}};
-    if (target != noTarget) view["target"] = target;
-    views_.push_back(view);
-    accessors_.push_back({{"bufferView", views_.size() - 1},
-                          {"componentType", componentType},
-                          {"count", count},
-                          {"type", type}});
-    return static_cast<int>(accessors_.size()) - 1;
-  }
-  Json& accessor(int index) { return accessors_[static_cast<std::size_t>(index)]; }
-
-  const std::vector<std::byte>& bytes() const { return bytes_; }
-  const Json& views() const { return views_; }
-  const Json& accessors() const { return accessors_; }
-
- private:
-  std::vector<std::byte> bytes_;
-  std::size_t start_ = 0;
-  Json views_ = Json::array();
-  Json accessors_ = Json::array();
-};
-
-int putVectors(Buffer& buffer, const std::vector<Vec3>& vectors, int target) {
+int putVectors(Buffer& buffer, const std::vector<Vec3>& vectors, GlbTarget target) {
   buffer.begin();
   for (const Vec3& vector : vectors) {
     for (int axis = 0; axis < 3; ++axis) buffer.putFloat(toFloat(vector[axis]));
   }
-  return buffer.end(floatComponent, "VEC3", vectors.size(), target);
+  return buffer.end(GlbComponent::float32, "VEC3", vectors.size(), target);
 }
 
 int putPositions(Buffer& buffer, const std::vector<Vec3>& positions) {
@@ -81,7 +41,7 @@ int putPositions(Buffer& buffer, const std::vector<Vec3>& positions) {
       high[axis] = std::max(high[axis], position[axis]);
     }
   }
-  const int accessor = putVectors(buffer, positions, vertexTarget);
+  const int accessor = putVectors(buffer, positions, GlbTarget::vertices);
   // glTF wants the very floats that are stored.
   buffer.accessor(accessor)["min"] = {toFloat(low.x), toFloat(low.y), toFloat(low.z)};
   buffer.accessor(accessor)["max"] = {toFloat(high.x), toFloat(high.y), toFloat(high.z)};
@@ -97,7 +57,8 @@ int putColours(Buffer& buffer, const std::vector<Vec3>& colours) {
     }
     buffer.put(255, 1);
   }
-  const int accessor = buffer.end(byteComponent, "VEC4", colours.size(), vertexTarget);
+  const int accessor =
+      buffer.end(GlbComponent::unsignedByte, "VEC4", colours.size(), GlbTarget::vertices);
   buffer.accessor(accessor)["normalized"] = true;
   return accessor;
 }
@@ -105,24 +66,26 @@ int putColours(Buffer& buffer, const std::vector<Vec3>& colours) {
 Json putPrimitive(Buffer& buffer, const Mesh& mesh) {
   Json attributes;
   attributes["POSITION"] = putPositions(buffer, mesh.positions);
-  attributes["NORMAL"] = putVectors(buffer, mesh.normals, vertexTarget);
+  attributes["NORMAL"] = putVectors(buffer, mesh.normals, GlbTarget::vertices);
   if (!mesh.colours.empty()) attributes["COLOR_0"] = putColours(buffer, mesh.colours);
 
   buffer.begin();
   for (const Influences& influences : mesh.influences) {
     for (const std::uint16_t joint : influences.joints) buffer.put(joint, 1);
   }
-  attributes["JOINTS_0"] = buffer.end(byteComponent, "VEC4", mesh.influences.size(), vertexTarget);
+  attributes["JOINTS_0"] =
+      buffer.end(GlbComponent::unsignedByte, "VEC4", mesh.influences.size(), GlbTarget::vertices);
   buffer.begin();
   for (const Influences& influences : mesh.influences) {
     for (const float weight : influences.weights) buffer.putFloat(weight);
   }
   attributes["WEIGHTS_0"] =
-      buffer.end(floatComponent, "VEC4", mesh.influences.size(), vertexTarget);
+      buffer.end(GlbComponent::float32, "VEC4", mesh.influences.size(), GlbTarget::vertices);
 
   buffer.begin();
   for (const std::uint32_t index : mesh.indices) buffer.put(index, 2);
-  const int indices = buffer.end(shortComponent, "SCALAR", mesh.indices.size(), indexTarget);
+  const int indices =
+      buffer.end(GlbComponent::unsignedShort, "SCALAR", mesh.indices.size(), GlbTarget::indices);
   return {{"attributes", attributes}, {"indices", indices}, {"material", 0}, {"mode", 4}};
 }
 
@@ -138,7 +101,7 @@ int putInverseBindMatrices(Buffer& buffer, const Skeleton& skeleton) {
       buffer.putFloat(column == 3 ? 1.0F : 0.0F);
     }
   }
-  return buffer.end(floatComponent, "MAT4", skeleton.joints.size(), noTarget);
+  return buffer.end(GlbComponent::float32, "MAT4", skeleton.joints.size(), GlbTarget::none);
 }
 
 // Quaternions q and −q turn alike; neighbours in time are kept in one half so that interpolation
@@ -168,7 +131,7 @@ bool isMoved(const Clip& clip, std::size_t joint) {
 Json putClip(Buffer& buffer, const Skeleton& skeleton, const Clip& clip, int firstJointNode) {
   buffer.begin();
   for (const double time : clip.times) buffer.putFloat(toFloat(time));
-  const int input = buffer.end(floatComponent, "SCALAR", clip.times.size(), noTarget);
+  const int input = buffer.end(GlbComponent::float32, "SCALAR", clip.times.size(), GlbTarget::none);
   buffer.accessor(input)["min"] = {toFloat(clip.times.front())};
   buffer.accessor(input)["max"] = {toFloat(clip.times.back())};
 
@@ -186,7 +149,7 @@ Json putClip(Buffer& buffer, const Skeleton& skeleton, const Clip& clip, int fir
       for (const Pose& pose : clip.poses) {
         translations.push_back(localTransform(skeleton, joint, pose[joint]).translation);
       }
-      addChannel(joint, "translation", putVectors(buffer, translations, noTarget));
+      addChannel(joint, "translation", putVectors(buffer, translations, GlbTarget::none));
     }
     if (isAnimated(clip, joint)) {
       buffer.begin();
@@ -196,7 +159,7 @@ Json putClip(Buffer& buffer, const Skeleton& skeleton, const Clip& clip, int fir
         }
       }
       addChannel(joint, "rotation",
-                 buffer.end(floatComponent, "VEC4", clip.times.size(), noTarget));
+                 buffer.end(GlbComponent::float32, "VEC4", clip.times.size(), GlbTarget::none));
     }
   }
   return {{"name", clip.name}, {"channels", channels}, {"samplers", samplers}};
@@ -215,33 +178,6 @@ Json jointNode(const Skeleton& skeleton, std::size_t joint, int firstJointNode) 
     }
   }
   return node;
-}
-
-std::vector<std::byte> assemble(std::string json, std::vector<std::byte> binary) {
-  while (json.size() % 4 != 0) json.push_back(' ');
-  while (binary.size() % 4 != 0) binary.push_back(std::byte{0});
-  constexpr std::uint32_t magic = 0x46546C67U;        // "glTF"
-  constexpr std::uint32_t jsonChunk = 0x4E4F534AU;    // "JSON"
-  constexpr std::uint32_t binaryChunk = 0x004E4942U;  // "BIN\0"
-  constexpr std::size_t headerSize = 12;
-  constexpr std::size_t chunkHeaderSize = 8;
-
-  std::vector<std::byte> file;
-  const auto putWord = [&file](std::size_t value) {
-    for (unsigned byte = 0; byte < 4; ++byte) {
-      file.push_back(static_cast<std::byte>((value >> (8U * byte)) & 0xFFU));
-    }
-  };
-  putWord(magic);
-  putWord(2);
-  putWord(headerSize + 2 * chunkHeaderSize + json.size() + binary.size());
-  putWord(json.size());
-  putWord(jsonChunk);
-  for (const char character : json) file.push_back(static_cast<std::byte>(character));
-  putWord(binary.size());
-  putWord(binaryChunk);
-  file.insert(file.end(), binary.begin(), binary.end());
-  return file;
 }
 
 }  // namespace
@@ -281,10 +217,7 @@ std::vector<std::byte> writeGlb(const Model& model) {
                                           {"metallicFactor", 0},
                                           {"roughnessFactor", model.roughness}}}}});
   document["animations"] = animations;
-  document["accessors"] = buffer.accessors();
-  document["bufferViews"] = buffer.views();
-  document["buffers"] = Json::array({{{"byteLength", (buffer.bytes().size() + 3) / 4 * 4}}});
-  return assemble(document.dump(), buffer.bytes());
+  return samples::glbFile(std::move(document), buffer);
 }
 
 }  // namespace dermis::models
