@@ -13,6 +13,7 @@
 #include "open_device.h"
 #include "progress.h"
 #include "skinned_scene.h"
+#include "vertex_normals.h"
 
 namespace dermis::cli {
 namespace {
@@ -86,16 +87,19 @@ SkinParts deviceSkinner(const Scene& scene, Method method, samples::Device& devi
 }
 
 OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> skinned) {
-  OutputMesh whole;
+  OutputMesh mesh;
+  mesh.materials = scene.model->materials;
   for (std::size_t index = 0; index < scene.parts.size(); ++index) {
-    OutputMesh part;
+    const ScenePart& from = scene.parts[index];
+    OutputPart& part = mesh.parts.emplace_back();
+    part.name = partName(*scene.model, from.source);
+    part.primitive = from.primitive;
     part.positions = std::move(skinned[index].positions);
-    part.triangles = scene.parts[index].primitive->triangles;
-    part.normals = skinned[index].normals.empty() ? computeNormals(part.positions, part.triangles)
-                                                  : std::move(skinned[index].normals);
-    append(whole, part);
+    part.normals = std::move(skinned[index].normals);
+    if (part.normals.empty())
+      part.normals = computeNormals(part.positions, from.primitive->triangles);
   }
-  return whole;
+  return mesh;
 }
 
 /// The name of a frame: %0Nd in the pattern replaced by its number, or nothing where there is no
@@ -118,9 +122,10 @@ bool hasWrongPattern(const std::string& name) {
 }
 
 ExitStatus checkUsage(const SkinOptions& options) {
-  if (!options.output.ends_with(".ply")) {
-    return reportError(ExitStatus::wrongUsage,
-                       fmt::format("OUT must end in .ply, not be '{}'", options.output));
+  if (!outputFormat(options.output)) {
+    return reportError(
+        ExitStatus::wrongUsage,
+        fmt::format("OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
     return reportError(ExitStatus::wrongUsage,
@@ -152,6 +157,7 @@ ExitStatus checkUsage(const SkinOptions& options) {
 
 ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint32_t clip,
                       const SkinParts& skinParts) {
+  const OutputFormat format = *outputFormat(options.output);
   const std::uint32_t count = options.frames.value_or(1);
   Progress progress("skinning", count);
   for (std::uint32_t frame = 0; frame < count; ++frame) {
@@ -159,13 +165,18 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
     Result<std::vector<samples::SkinnedVertices>> skinned =
         skinParts(scenePalettes(scene, clip, time));
     if (!skinned) return reportDeviceError(skinned.error());
-    OutputMesh mesh = assemble(scene, std::move(*skinned));
+    const OutputMesh mesh = assemble(scene, std::move(*skinned));
     if (const std::size_t bad = countNonFinite(mesh); bad != 0) {
-      reportWarning(fmt::format(
-          "{} vertices at {:.4g} s are not finite: joints of the pose are not", bad, time));
+      const std::string message = fmt::format(
+          "{} vertices at {:.4g} s are not finite: joints of the pose, or vertices that no joint "
+          "moves, are not",
+          bad, time);
+      if (!holdsNonFinite(format))
+        return reportError(ExitStatus::badInput, message + "; only a .ply can hold them");
+      reportWarning(message);
     }
     const std::string name = frameName(options.output, frame).value_or(options.output);
-    if (Result<void> written = writePly(name, mesh); !written) {
+    if (Result<void> written = writeMesh(name, format, mesh); !written) {
       return reportError(ExitStatus::stopped, written.error().message);
     }
     progress.step();
@@ -206,7 +217,7 @@ Run addSkin(CLI::App& app) {
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
   command
       ->add_option("-o,--output", options->output,
-                   "The file to write: .ply; with --frames, a name with %04d in it")
+                   "The file to write: .ply, .obj or .glb; with --frames, a name with %04d in it")
       ->required();
   command->add_option("--animation", options->animation,
                       "A clip's number or name, or none for the rest pose [the first]");

@@ -1,33 +1,53 @@
-// Skinned triangles on their way into a file.
+// Skinned primitives on their way into a file: what all formats have in common.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "dermis/gltf.h"
 #include "dermis/result.h"
 
 namespace dermis::cli {
 
-struct OutputMesh {
-  std::vector<float> positions;          ///< 3 a vertex
-  std::vector<float> normals;            ///< 3 a vertex
-  std::vector<std::uint32_t> triangles;  ///< 3 indices each
+/// One skinned primitive.
+struct OutputPart {
+  std::string name;  ///< never empty
+  /// What skinning leaves as it is: triangles, texture coordinates, colours, material.
+  const gltf::Primitive* primitive = nullptr;
+  std::vector<float> positions;  ///< 3 a vertex, in the scene's space
+  std::vector<float> normals;    ///< 3 a vertex
 };
 
-/// Area-weighted normals of the triangles; 0 0 1 for a vertex in none.
-std::vector<float> computeNormals(const std::vector<float>& positions,
-                                  const std::vector<std::uint32_t>& triangles);
+struct OutputMesh {
+  std::span<const gltf::Material> materials;  ///< those of the model
+  std::vector<OutputPart> parts;              ///< in the order in which they are written
+};
 
-/// Adds a part behind the others. Triangles whose indices lie outside the part must have been
-/// refused before.
-void append(OutputMesh& whole, const OutputMesh& part);
+enum class OutputFormat { ply, obj, glb };
+
+/// The format that a file's ending means, or nothing.
+std::optional<OutputFormat> outputFormat(std::string_view fileName);
+
+/// What a part is called: its node's name, or its mesh's, or the node's number; and which of the
+/// mesh's primitives it is where there are several.
+std::string partName(const gltf::Model& model, const gltf::SkinnedPrimitive& source);
 
 /// Vertices with a position or normal that is NaN or infinite.
 std::size_t countNonFinite(const OutputMesh& mesh);
 
-/// Binary little-endian PLY: float x y z nx ny nz, then the faces. Written to a temporary name
-/// first, so that no half file is left behind. Fails with `ioError`.
-Result<void> writePly(const std::filesystem::path& path, const OutputMesh& mesh);
+/// Only PLY stores floats as they are. glTF forbids what is not finite, and few readers of OBJ know
+/// how to spell it.
+bool holdsNonFinite(OutputFormat format);
+
+/// Writes a file whole or not at all: where it stops half-way, it is removed. Fails with `ioError`,
+/// and with `limitExceeded` where the format cannot hold so large a mesh. What is not finite must
+/// have been refused before, unless the format holds it.
+Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
+                       const OutputMesh& mesh);
 
 }  // namespace dermis::cli
