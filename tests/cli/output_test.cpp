@@ -1,0 +1,327 @@
+// What `dermis skin` writes, in each of its formats: read back by other means, and compared.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+
+#include "glb.h"
+#include "gltf_builder.h"
+#include "obj.h"
+#include "ply.h"
+#include "run_command.h"
+#include "test_data.h"
+
+namespace dermis::test {
+namespace {
+
+using Floats = std::vector<float>;
+
+/// Of the running test alone: others may run at the same time.
+std::string outFile(const std::string& name) {
+  return ::testing::TempDir() + "output_" +
+         ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
+}
+
+CommandResult skin(const std::string& model, const std::string& out,
+                   const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments{DERMIS_COMMAND, "skin", model, "-o", out, "--device", "cpu"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return runCommand(arguments);
+}
+
+std::string writeModel(const std::string& name, const FileBuilder& file) {
+  const std::string path = outFile(name);
+  std::ofstream(path) << file.text();
+  return path;
+}
+
+/// One pose in all three formats.
+struct Pose {
+  Ply ply;
+  Obj obj;
+  Glb glb;
+};
+
+Pose skinToAll(const std::string& model, const std::vector<std::string>& more = {}) {
+  for (const char* ending : {"ply", "obj", "glb"}) {
+    const CommandResult result = skin(model, outFile(std::string("pose.") + ending), more);
+    EXPECT_EQ(result.status, 0) << result.errors;
+    EXPECT_TRUE(result.output.empty()) << result.output;
+  }
+  const std::optional<Ply> ply = readPly(outFile("pose.ply"));
+  const std::optional<Obj> obj = readObj(outFile("pose.obj"));
+  EXPECT_TRUE(ply.has_value());
+  EXPECT_TRUE(obj.has_value());
+  EXPECT_TRUE(gltf::load(outFile("pose.glb")).ok()) << "the importer takes it too";
+  return {ply.value_or(Ply{}), obj.value_or(Obj{}), readGlb(outFile("pose.glb"))};
+}
+
+/// The same vertices and triangles in the same order, to the bit.
+void expectSame(const Pose& pose) {
+  EXPECT_EQ(pose.obj.positions, pose.ply.positions);
+  EXPECT_EQ(pose.obj.normals, pose.ply.normals);
+  ASSERT_EQ(pose.obj.objects.size(), pose.glb.parts.size());
+  std::size_t vertex = 0, face = 0, texcoord = 0;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < pose.glb.parts.size(); ++i) {
+    const GlbPart& part = pose.glb.parts[i];
+    const ObjObject& object = pose.obj.objects[i];
+    EXPECT_TRUE(names.insert(object.name).second) << object.name;
+    ASSERT_LE(vertex + part.positions.size(), pose.ply.positions.size());
+    EXPECT_TRUE(std::equal(part.positions.begin(), part.positions.end(),
+                           pose.ply.positions.begin() + static_cast<std::ptrdiff_t>(vertex)));
+    EXPECT_EQ(object.positions, part.positions.size());
+    EXPECT_EQ(object.normals, part.positions.size());
+    EXPECT_EQ(object.texcoords != 0, part.others.contains("TEXCOORD_0"));
+    ASSERT_EQ(object.faces.size(), part.indices.size() / 3);
+    ASSERT_LE(face + object.faces.size(), pose.ply.faces.size());
+    for (std::size_t corner = 0; corner < part.indices.size(); ++corner) {
+      const std::size_t whole = vertex + part.indices[corner];
+      const ObjCorner& fromObj = object.faces[corner / 3][corner % 3];
+      ASSERT_EQ(static_cast<std::size_t>(pose.ply.faces[face + corner / 3][corner % 3]), whole);
+      ASSERT_EQ(fromObj.position, whole);
+      ASSERT_EQ(fromObj.normal, whole);
+      const std::size_t expected = texcoord + part.indices[corner];
+      ASSERT_EQ(fromObj.texcoord.value_or(expected), expected);
+    }
+    vertex += part.positions.size();
+    face += object.faces.size();
+    texcoord += object.texcoords;
+  }
+  EXPECT_EQ(vertex, pose.ply.positions.size());
+  EXPECT_EQ(face, pose.ply.faces.size());
+  EXPECT_EQ(texcoord, pose.obj.texcoords.size());
+}
+
+TEST(OutputTest, SampleModelsAreTheSameInAllFormats) {
+  for (const char* name : {"bar", "arm", "figure"}) {
+    SCOPED_TRACE(name);
+    const Pose pose =
+        skinToAll(std::string(DERMIS_SAMPLE_MODELS) + "/" + name + ".glb", {"--time", "0.4"});
+    EXPECT_GE(pose.ply.faces.size(), 500u);
+    expectSame(pose);
+  }
+}
+
+TEST(OutputTest, RealModelsAreTheSameInAllFormats) {
+  const std::optional<std::filesystem::path> data = testDataFolder();
+  if (!data) GTEST_SKIP() << noTestData;
+  std::size_t skinned = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(*data / "models")) {
+    const std::string path = entry.path().string();
+    if (!path.ends_with(".gltf") && !path.ends_with(".glb") && !path.ends_with(".vrm")) continue;
+    SCOPED_TRACE(path);
+    // What is broken or has nothing to skin ends with 3.
+    if (skin(path, outFile("probe.ply")).status != 0) continue;
+    ++skinned;
+    expectSame(skinToAll(path, {"--time", "0.3"}));
+  }
+  EXPECT_GE(skinned, 40u);
+}
+
+TEST(OutputTest, KeepsWhatSkinningLeavesAsItIs) {
+  FileBuilder file = skinnedTriangle();
+  file.json["nodes"][0]["name"] = "Body";
+  file.json["materials"] = {{{"name", "unused"}},
+                            {{"name", "skin"},
+                             {"pbrMetallicRoughness",
+                              {{"baseColorFactor", {0.5, 0.25, 0.1, 0.75}},
+                               {"metallicFactor", 0.8},
+                               {"roughnessFactor", 0.3}}},
+                             {"emissiveFactor", {1, 0, 0.5}},
+                             {"alphaMode", "MASK"},
+                             {"alphaCutoff", 0.6},
+                             {"doubleSided", true}}};
+  file.primitive()["material"] = 1;
+  file.attributes()["TEXCOORD_0"] = file.addFloats({0, 1, 0.25f, 0.75f, 4, -5}, "VEC2");
+  file.attributes()["TEXCOORD_1"] =
+      file.add<std::uint16_t>({0, 65535, 0, 0, 65535, 0}, "VEC2", unsignedShortType, true);
+  file.attributes()["COLOR_0"] = file.addFloats({1, 0, 0, 0, 0.5f, 0, 0, 0, 1}, "VEC3");
+  const Pose pose = skinToAll(writeModel("kept.gltf", file));
+  expectSame(pose);
+  ASSERT_EQ(pose.glb.parts.size(), 1u);
+  const GlbPart& part = pose.glb.parts[0];
+  EXPECT_EQ(part.name, "Body");
+  EXPECT_EQ(part.mode, 4);
+  EXPECT_EQ(part.others.at("TEXCOORD_0"), (Floats{0, 1, 0.25f, 0.75f, 4, -5}));
+  EXPECT_EQ(part.others.at("TEXCOORD_1"), (Floats{0, 1, 0, 0, 1, 0}));
+  EXPECT_EQ(part.others.at("COLOR_0"), (Floats{1, 0, 0, 1, 0, 0.5f, 0, 1, 0, 0, 1, 1}));
+  // The very numbers of the file, not the digits of the floats in between.
+  EXPECT_EQ(part.material, Json::parse(R"({"name": "skin", "pbrMetallicRoughness":
+      {"baseColorFactor": [0.5, 0.25, 0.1, 0.75], "metallicFactor": 0.8, "roughnessFactor": 0.3},
+      "emissiveFactor": [1.0, 0.0, 0.5], "alphaMode": "MASK", "alphaCutoff": 0.6,
+      "doubleSided": true})"));
+  EXPECT_EQ(pose.glb.json.at("materials").size(), 1u) << "the unused one is left out";
+  // OBJ counts texture coordinates from the bottom.
+  EXPECT_EQ(pose.obj.texcoords,
+            (std::vector<std::array<float, 2>>{{0, 0}, {0.25f, 0.25f}, {4, 6}}));
+  EXPECT_EQ(pose.obj.objects.at(0).name, "Body");
+}
+
+// A validator refuses colours and factors outside 0 to 1, normals that are not of unit length, and
+// whatever is not finite.
+TEST(OutputTest, MendsInAGlbWhatGltfForbids) {
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["NORMAL"] = file.addFloats({0, 0, 0, 0, 3, 0, 1e-30f, 0, 0}, "VEC3");
+  file.attributes()["TEXCOORD_0"] = file.addFloats({nan, 1, -infinity, 0.5f, 4, 0}, "VEC2");
+  file.attributes()["COLOR_0"] =
+      file.addFloats({2, -1, nan, 1, infinity, 0.5f, 0, 7, 0, 0, 0, 0}, "VEC4");
+  file.json["materials"] = {
+      {{"pbrMetallicRoughness",
+        {{"baseColorFactor", {2, -1, 0.5, 1}}, {"metallicFactor", -3}, {"roughnessFactor", 1.5}}},
+       {"emissiveFactor", {10, 0, 0}},
+       {"alphaMode", "MASK"},
+       {"alphaCutoff", -1}}};
+  file.primitive()["material"] = 0;
+  const Pose pose = skinToAll(writeModel("mended.gltf", file));
+  expectSame(pose);
+  const GlbPart& part = pose.glb.parts.at(0);
+  EXPECT_EQ(pose.ply.normals.at(0), (std::array<float, 3>{0, 0, 0})) << "a zero normal stays zero";
+  EXPECT_EQ(part.normals.at(0), (std::array<float, 3>{0, 0, 1}));
+  EXPECT_EQ(part.normals.at(1), (std::array<float, 3>{0, 1, 0}));
+  EXPECT_EQ(part.others.at("TEXCOORD_0"), (Floats{0, 1, 0, 0.5f, 4, 0}));
+  EXPECT_EQ(part.others.at("COLOR_0"), (Floats{1, 0, 0, 1, 1, 0.5f, 0, 1, 0, 0, 0, 0}));
+  EXPECT_EQ(part.material.at("emissiveFactor"), Json::parse("[1.0, 0.0, 0.0]"));
+  EXPECT_EQ(part.material.at("alphaCutoff"), 0.0);
+  EXPECT_EQ(pose.obj.texcoords.at(0), (std::array<float, 2>{0, 0}));
+}
+
+// The triangle's mesh with a second primitive before and after it: points without texture
+// coordinates, and a strip.
+TEST(OutputTest, PointsAndStripsKeepTheirVertices) {
+  FileBuilder file = skinnedTriangle();
+  file.json["meshes"][0]["name"] = "Mixed";
+  const Json triangle = file.primitive();
+  Json points = triangle, strip = triangle;
+  points["mode"] = 0;
+  strip["mode"] = 5;
+  strip["indices"] = file.add<std::uint8_t>({0, 1, 2, 0}, "SCALAR", unsignedByteType);
+  const std::size_t texcoords = file.addFloats({0, 0, 1, 0, 0, 1}, "VEC2");
+  strip["attributes"]["TEXCOORD_0"] = texcoords;
+  file.json["meshes"][0]["primitives"] = {points, triangle, strip};
+  file.json["meshes"][0]["primitives"][1]["attributes"]["TEXCOORD_0"] = texcoords;
+  const Pose pose = skinToAll(writeModel("mixed.gltf", file));
+  expectSame(pose);
+  ASSERT_EQ(pose.glb.parts.size(), 3u);
+  EXPECT_EQ(pose.ply.positions.size(), 9u) << "shared accessors repeat their vertices";
+  EXPECT_EQ(pose.glb.parts[0].mode, 0);
+  EXPECT_EQ(pose.glb.parts[0].name, "Mixed.0");
+  EXPECT_TRUE(pose.obj.objects[0].faces.empty());
+  EXPECT_EQ(pose.glb.parts[1].indices, (std::vector<std::uint32_t>{0, 1, 2}));
+  EXPECT_EQ(pose.glb.parts[2].indices, (std::vector<std::uint32_t>{0, 1, 2, 1, 0, 2}));
+  EXPECT_EQ(pose.obj.objects[2].faces.at(1).at(0).texcoord, 4u) << "the first part has none";
+}
+
+TEST(OutputTest, NormalsThatAreMissingAreComputed) {
+  const Pose pose = skinToAll(writeModel("normals.gltf", skinnedTriangle()));
+  expectSame(pose);
+  for (const auto& normal : pose.glb.parts.at(0).normals) {
+    EXPECT_EQ(normal, (std::array<float, 3>{0, 0, 1}));
+  }
+}
+
+TEST(OutputTest, NamesCannotBreakAFile) {
+  FileBuilder file = skinnedTriangle();
+  file.json["nodes"][0]["name"] = "a b\nf 1 1 1\\\n#\tc";
+  file.json["nodes"].push_back(file.json["nodes"][0]);
+  file.json["nodes"].push_back({{"mesh", 0}, {"skin", 0}});
+  file.json["scenes"][0]["nodes"] = {0, 1, 3, 4};
+  const Pose pose = skinToAll(writeModel("names.gltf", file));
+  expectSame(pose);
+  ASSERT_EQ(pose.glb.parts.size(), 3u);
+  EXPECT_EQ(pose.glb.parts[0].name, "a b\nf 1 1 1\\\n#\tc");
+  EXPECT_EQ(pose.obj.objects[0].name, "a_b_f_1_1_1____c");
+  EXPECT_NE(pose.obj.objects[1].name, pose.obj.objects[0].name);
+  EXPECT_EQ(pose.obj.objects[2].name, "node_4");
+}
+
+TEST(OutputTest, IndicesThatDoNotFitIntoSixteenBitsAreThirtyTwo) {
+  for (const std::size_t vertices : {std::size_t{65535}, std::size_t{65536}}) {
+    FileBuilder file = skinnedTriangle();
+    Floats positions(vertices * 3);
+    for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = static_cast<float>(i % 7);
+    file.attributes() = {
+        {"POSITION", file.addFloats(positions, "VEC3")},
+        {"JOINTS_0", file.add(std::vector<std::uint8_t>(vertices * 4), "VEC4", unsignedByteType)},
+        {"WEIGHTS_0", file.addFloats(Floats(vertices * 4, 0.25f), "VEC4")}};
+    const auto last = static_cast<std::uint32_t>(vertices - 1);
+    file.primitive()["indices"] = file.add<std::uint32_t>({0, 1, last}, "SCALAR", unsignedIntType);
+    const Pose pose = skinToAll(writeModel("large.gltf", file));
+    expectSame(pose);
+    const Json& primitive = pose.glb.json.at("meshes").at(0).at("primitives").at(0);
+    EXPECT_EQ(pose.glb.json.at("accessors")
+                  .at(primitive.at("indices").get<std::size_t>())
+                  .at("componentType"),
+              vertices == 65535 ? unsignedShortType : unsignedIntType);
+  }
+}
+
+TEST(OutputTest, OnlyAPlyHoldsWhatIsNotFinite) {
+  FileBuilder file = skinnedTriangle();
+  // Each scale fits into float32, their product does not.
+  file.json["nodes"][1]["scale"] = {1e30, 1, 1};
+  file.json["nodes"][2]["scale"] = {1e30, 1, 1};
+  const std::string model = writeModel("infinite.gltf", file);
+  const CommandResult ply = skin(model, outFile("infinite.ply"));
+  EXPECT_EQ(ply.status, 0);
+  EXPECT_NE(ply.errors.find("dermis: warning: "), std::string::npos) << ply.errors;
+  for (const char* name : {"infinite.obj", "infinite.glb"}) {
+    std::filesystem::remove(outFile(name));
+    const CommandResult result = skin(model, outFile(name));
+    EXPECT_EQ(result.status, 3) << name;
+    EXPECT_NE(result.errors.find("are not finite"), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find("; only a .ply can hold them\n"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(outFile(name)));
+  }
+}
+
+TEST(OutputTest, FramesAreWrittenInEveryFormat) {
+  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  const std::vector<std::string> frames{"--frames", "2", "--fps", "4", "--time", "0.25"};
+  EXPECT_EQ(skin(bar, outFile("%02d.obj"), frames).status, 0);
+  EXPECT_EQ(skin(bar, outFile("%02d.glb"), frames).status, 0);
+  EXPECT_EQ(skin(bar, outFile("single.ply"), {"--time", "0.5"}).status, 0);
+  const std::optional<Ply> single = readPly(outFile("single.ply"));
+  const std::optional<Obj> obj = readObj(outFile("01.obj"));
+  ASSERT_TRUE(single && obj);
+  EXPECT_EQ(obj->positions, single->positions);
+  EXPECT_EQ(readGlb(outFile("01.glb")).parts.at(0).positions, single->positions);
+  EXPECT_NE(readGlb(outFile("00.glb")).parts.at(0).positions, single->positions);
+}
+
+TEST(OutputTest, WhatCannotBeWrittenEndsWithFive) {
+  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  for (const std::string ending : {".ply", ".obj", ".glb"}) {
+    EXPECT_EQ(skin(bar, "/nonexistent/folder/out" + ending).status, 5);
+    const std::string link = outFile("full" + ending);
+    std::filesystem::remove(link);
+    std::filesystem::create_symlink("/dev/full", link);
+    const CommandResult full = skin(bar, link);
+    EXPECT_EQ(full.status, 5);
+    EXPECT_EQ(full.errors, "dermis: error: " + link + " cannot be written\n");
+    EXPECT_TRUE(std::filesystem::is_symlink(link)) << "what is not a regular file stays";
+    const std::string folder = outFile("folder" + ending);
+    std::filesystem::create_directory(folder);
+    EXPECT_EQ(skin(bar, folder).status, 5);
+    EXPECT_TRUE(std::filesystem::is_directory(folder));
+  }
+}
+
+TEST(OutputTest, OtherEndingsAreRefused) {
+  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  for (const char* name : {"out.gltf", "out.stl", "out", "out.glb.zip", "out.fbx"}) {
+    const CommandResult result = skin(bar, outFile(name));
+    EXPECT_EQ(result.status, 2) << name;
+    EXPECT_NE(result.errors.find("OUT must end in .ply, .obj or .glb"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
