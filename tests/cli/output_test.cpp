@@ -7,7 +7,10 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "glb.h"
 #include "gltf_builder.h"
@@ -35,7 +38,7 @@ CommandResult skin(const std::string& model, const std::string& out,
 }
 
 std::string writeModel(const std::string& name, const FileBuilder& file) {
-  const std::string path = outFile(name);
+  std::string path = outFile(name);
   std::ofstream(path) << file.text();
   return path;
 }

@@ -30,7 +30,7 @@ std::string takeChunk(const std::string& bytes, std::uint32_t type, std::size_t&
   const std::uint32_t length = wordAt(bytes, place);
   EXPECT_EQ(wordAt(bytes, place + 4), type);
   EXPECT_EQ(length % 4, 0u);
-  const std::string content = bytes.substr(place + 8, length);
+  std::string content = bytes.substr(place + 8, length);
   EXPECT_EQ(content.size(), length);
   place += 8 + content.size();
   return content;
