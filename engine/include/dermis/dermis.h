@@ -2,6 +2,7 @@
 #pragma once
 
 #include "dermis/accuracy.h"
+#include "dermis/bounds.h"
 #include "dermis/dual_quat.h"
 #include "dermis/glm.h"
 #include "dermis/mesh.h"

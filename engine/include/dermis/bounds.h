@@ -1,0 +1,76 @@
+// A box around a skinned mesh, from the pose alone: for culling, and for positions in snorm16,
+// which need a box before there are positions. What has to be known of the vertices is gathered
+// once, at import; a pose then costs a few microseconds. docs/bounds.md has the proof.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "dermis/method.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace dermis {
+
+/// Where the vertices lie in bind pose, by the joints that move them. Plain data, made once at
+/// import by `jointBounds`; it depends on no pose and on no method, and may be stored with the
+/// mesh.
+struct JointBounds {
+  /// A joint that moves vertices. Boxes are in bind space; one with min > max holds nothing.
+  struct Joint {
+    std::uint32_t joint = 0;  ///< index into the palette
+    Box alone;                ///< of the vertices that this joint moves on its own
+  };
+
+  /// Two joints that have vertices in common, and the vertices that both of them move.
+  struct Pair {
+    std::uint32_t first = 0, second = 0;  ///< indices into `joints`, first < second
+    std::uint32_t influences = 2;         ///< the most influences that one of the vertices has
+    Box box;                              ///< of the vertices, in bind space
+    /// How the joints share the vertices: the least and greatest a = w₁ / (w₂ (k − 1)) and
+    /// b = w₂ / (w₁ (k − 1)), and the least a + b, of a vertex with k influences, w₁ the weight of
+    /// the first joint and w₂ that of the second.
+    float firstOverSecond[2] = {0, 0};
+    float secondOverFirst[2] = {0, 0};
+    float leastSum = 0;
+  };
+
+  std::vector<Joint> joints;         ///< by rising palette index
+  std::vector<Pair> pairs;           ///< by rising first, then second
+  Box unweighted;                    ///< of the vertices without weight, which stay in bind pose
+  std::uint32_t requiredJoints = 0;  ///< the fewest joints of a palette: the largest index + 1
+};
+
+/// The weights that a morph target is given, whatever the pose.
+struct MorphRange {
+  float min = 0;
+  float max = 1;
+};
+
+/// Gathers what `skinnedBounds` has to know of a mesh for palettes of `jointCount` joints.
+/// O(vertices × influences²). Morph targets may move every vertex by every combination of weights
+/// within `morphRanges`, one a target; empty: 0 to 1 for each. A mesh that is drawn without its
+/// morph targets gets a tighter box from a view without them. Fails with `invalidMesh` where `pack`
+/// would refuse the mesh, or a morph target does not fit it, and with `invalidArgument` for a
+/// `jointCount` of 0 or above `maxPaletteJoints`, or for ranges that are not finite, not in order
+/// or not one a target.
+Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
+                                std::span<const MorphRange> morphRanges = {});
+
+/// A box that holds every position that a kernel or the reference makes of the mesh in this pose,
+/// rounding included, in the palette's space. `palette` is what the mesh is skinned with: joint
+/// global transform × inverse bind matrix.
+///
+/// Exact, but for rounding, where all joints move alike and the mesh is turned by quarter turns;
+/// see docs/bounds.md for what to expect of others. Joints that move no vertex have no effect,
+/// whatever their matrices. The box is infinite (from -inf to inf) where a joint that moves
+/// vertices is not finite or outside the palette, and its sides may be infinite where numbers leave
+/// the range of float32; it never has a NaN. For a mesh without vertices, which `jointBounds` never
+/// makes, it has min > max.
+///
+/// O(joints + pairs); allocates only above 128 joints that move vertices. Any thread.
+Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method);
+
+}  // namespace dermis

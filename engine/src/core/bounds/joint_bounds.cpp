@@ -1,0 +1,247 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "attribute.h"
+#include "bounds/box.h"
+#include "dermis/bounds.h"
+#include "dermis/validate.h"
+
+namespace dermis {
+namespace {
+
+using bounds::Range;
+
+struct Influence {
+  std::uint32_t joint = 0;
+  double weight = 0;
+};
+
+/// A component of a position or a displacement as it is stored.
+double loadStored(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
+  return static_cast<double>(loadComponent<float>(view, element, component));
+}
+
+glm::dvec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {
+  glm::dvec3 position;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    position[static_cast<int>(i)] =
+        loadStored(mesh.positions, vertex, i) * static_cast<double>(mesh.positionScale[i]) +
+        static_cast<double>(mesh.positionOffset[i]);
+  }
+  return position;
+}
+
+/// The joints that move a vertex, by rising index, each once.
+void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
+                      std::vector<Influence>& influences) {
+  influences.clear();
+  for (const InfluenceSet& set : mesh.influenceSets) {
+    for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
+      const double weight = loadWeight(set.weights, vertex, slot);
+      if (weight != 0) influences.push_back({loadUnsigned(set.joints, vertex, slot), weight});
+    }
+  }
+  std::sort(influences.begin(), influences.end(),
+            [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
+  std::size_t kept = 0;
+  for (const Influence& influence : influences) {
+    if (kept > 0 && influences[kept - 1].joint == influence.joint) {
+      influences[kept - 1].weight += influence.weight;
+    } else {
+      influences[kept++] = influence;
+    }
+  }
+  influences.resize(kept);
+}
+
+Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
+  return {code, "mesh '" + std::string(mesh.name) + "'" + what};
+}
+
+/// Where each vertex may be, relative to its bind position; empty where nothing displaces it.
+class Displacements {
+ public:
+  Result<void> gather(const MeshView& mesh, std::span<const MorphRange> ranges) {
+    for (std::size_t target = 0; target < mesh.morphTargets.size(); ++target) {
+      const MorphRange range = ranges.empty() ? MorphRange{} : ranges[target];
+      const Result<void> added = add(mesh, target, range);
+      if (!added) return added.error();
+    }
+    return {};
+  }
+
+  Range around(std::uint32_t vertex, const glm::dvec3& position) const {
+    const Range point{position, position};
+    return ranges_.empty() ? point : point + ranges_[vertex];
+  }
+
+ private:
+  Result<void> add(const MeshView& mesh, std::size_t index, const MorphRange& range) {
+    const MorphTargetView& target = mesh.morphTargets[index];
+    if (!target.positions) return {};
+    const std::string name = ", morph target " + std::to_string(index);
+    const bool all = target.vertices.empty();
+    if (target.positions.count != (all ? mesh.vertexCount : target.vertices.size()) ||
+        target.positions.components < 3) {
+      return invalid(mesh, ErrorCode::invalidMesh, name + ": its positions do not fit the mesh");
+    }
+    ranges_.resize(mesh.vertexCount, Range{glm::dvec3(0.0), glm::dvec3(0.0)});
+    for (std::uint32_t element = 0; element < target.positions.count; ++element) {
+      const std::uint32_t vertex = all ? element : target.vertices[element];
+      glm::dvec3 whole;
+      for (std::uint32_t i = 0; i < 3; ++i) {
+        whole[static_cast<int>(i)] =
+            loadStored(target.positions, element, i) * static_cast<double>(target.positionScale[i]);
+      }
+      if (vertex >= mesh.vertexCount || !std::isfinite(whole.x + whole.y + whole.z)) {
+        return invalid(mesh, ErrorCode::invalidMesh,
+                       name + ", element " + std::to_string(element) +
+                           ": its vertex is outside the mesh, or it is not finite");
+      }
+      const glm::dvec3 low = static_cast<double>(range.min) * whole;
+      const glm::dvec3 high = static_cast<double>(range.max) * whole;
+      ranges_[vertex] = ranges_[vertex] + Range{glm::min(low, high), glm::max(low, high)};
+    }
+    return {};
+  }
+
+  std::vector<Range> ranges_;
+};
+
+struct PairRange {
+  std::uint32_t influences = 2;
+  Range box;
+  double firstOverSecond[2] = {bounds::infinity, 0};
+  double secondOverFirst[2] = {bounds::infinity, 0};
+  double leastSum = bounds::infinity;
+};
+
+/// What is stored may err by a few roundings: outward.
+float below(double ratio) {
+  return bounds::roundDown(ratio * (1 - 1e-7));
+}
+float above(double ratio) {
+  return std::min(bounds::roundUp(ratio * (1 + 1e-7)), std::numeric_limits<float>::max());
+}
+
+class Collector {
+ public:
+  explicit Collector(std::uint32_t jointCount) : alone_(jointCount), used_(jointCount, false) {}
+
+  void add(const std::vector<Influence>& influences, const Range& place) {
+    for (const Influence& influence : influences) used_[influence.joint] = true;
+    if (influences.empty()) unweighted_.add(place);
+    if (influences.size() == 1) alone_[influences[0].joint].add(place);
+    for (std::size_t second = 1; second < influences.size(); ++second) {
+      for (std::size_t first = 0; first < second; ++first) {
+        addPair(influences[first], influences[second], influences.size(), place);
+      }
+    }
+  }
+
+  JointBounds take() const {
+    JointBounds result;
+    std::vector<std::uint32_t> compact(alone_.size(), 0);
+    for (std::uint32_t joint = 0; joint < alone_.size(); ++joint) {
+      if (!used_[joint]) continue;
+      compact[joint] = static_cast<std::uint32_t>(result.joints.size());
+      result.joints.push_back({joint, bounds::boxOf(alone_[joint])});
+      result.requiredJoints = joint + 1;
+    }
+    result.unweighted = bounds::boxOf(unweighted_);
+    for (const auto& [key, pair] : pairs_) {
+      result.pairs.push_back(finish(compact[key >> 32], compact[key & 0xffffffffu], pair));
+    }
+    std::sort(result.pairs.begin(), result.pairs.end(),
+              [](const JointBounds::Pair& a, const JointBounds::Pair& b) {
+                return a.first != b.first ? a.first < b.first : a.second < b.second;
+              });
+    return result;
+  }
+
+ private:
+  void addPair(const Influence& first, const Influence& second, std::size_t influences,
+               const Range& place) {
+    PairRange& pair = pairs_[std::uint64_t{first.joint} << 32 | second.joint];
+    const auto others = static_cast<double>(influences - 1);
+    const double a = first.weight / (second.weight * others);
+    const double b = second.weight / (first.weight * others);
+    pair.influences = std::max(pair.influences, static_cast<std::uint32_t>(influences));
+    pair.box.add(place);
+    pair.firstOverSecond[0] = std::min(pair.firstOverSecond[0], a);
+    pair.firstOverSecond[1] = std::max(pair.firstOverSecond[1], a);
+    pair.secondOverFirst[0] = std::min(pair.secondOverFirst[0], b);
+    pair.secondOverFirst[1] = std::max(pair.secondOverFirst[1], b);
+    pair.leastSum = std::min(pair.leastSum, a + b);
+  }
+
+  static JointBounds::Pair finish(std::uint32_t first, std::uint32_t second,
+                                  const PairRange& pair) {
+    return {first,
+            second,
+            pair.influences,
+            bounds::boxOf(pair.box),
+            {below(pair.firstOverSecond[0]), above(pair.firstOverSecond[1])},
+            {below(pair.secondOverFirst[0]), above(pair.secondOverFirst[1])},
+            below(pair.leastSum)};
+  }
+
+  std::vector<Range> alone_;
+  std::vector<bool> used_;
+  std::unordered_map<std::uint64_t, PairRange> pairs_;
+  Range unweighted_;
+};
+
+Result<void> checkArguments(const MeshView& mesh, std::uint32_t jointCount,
+                            std::span<const MorphRange> morphRanges) {
+  if (jointCount == 0 || jointCount > maxPaletteJoints) {
+    return invalid(mesh, ErrorCode::invalidArgument,
+                   ": a palette has 1 to " + std::to_string(maxPaletteJoints) + " joints, not " +
+                       std::to_string(jointCount));
+  }
+  if (!morphRanges.empty() && morphRanges.size() != mesh.morphTargets.size()) {
+    return invalid(mesh, ErrorCode::invalidArgument,
+                   ": there are " + std::to_string(morphRanges.size()) + " ranges for " +
+                       std::to_string(mesh.morphTargets.size()) + " morph targets");
+  }
+  for (const MorphRange& range : morphRanges) {
+    if (!std::isfinite(range.min) || !std::isfinite(range.max) || range.min > range.max) {
+      return invalid(mesh, ErrorCode::invalidArgument,
+                     ": a range of morph weights is not finite, or its min is above its max");
+    }
+  }
+  const MeshReport report = validate(mesh, jointCount);
+  for (const Finding& finding : report.findings) {
+    if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
+                                std::span<const MorphRange> morphRanges) {
+  if (const Result<void> good = checkArguments(mesh, jointCount, morphRanges); !good) {
+    return good.error();
+  }
+  Displacements displacements;
+  if (const Result<void> good = displacements.gather(mesh, morphRanges); !good) {
+    return good.error();
+  }
+  Collector collector(jointCount);
+  std::vector<Influence> influences;
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
+    gatherInfluences(mesh, vertex, influences);
+    collector.add(influences, displacements.around(vertex, loadPosition(mesh, vertex)));
+  }
+  return collector.take();
+}
+
+}  // namespace dermis

@@ -1,0 +1,282 @@
+// The names and the proof are those of docs/bounds.md.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory_resource>
+#include <span>
+#include <vector>
+
+#include "bounds/box.h"
+#include "bounds/rotation.h"
+#include "dermis/accuracy.h"
+#include "dermis/bounds.h"
+
+namespace dermis {
+namespace {
+
+using bounds::Affine;
+using bounds::CentredBox;
+using bounds::Parts;
+using bounds::Range;
+
+/// A joint in the pose: v = C p, and for dual quaternions C = R S.
+struct Posed {
+  Affine map;
+  Parts parts;
+  /// Where Σ w S p may lie relative to this joint's own S p: 0 but where joints scale differently.
+  Range stretch{glm::dvec3(0.0), glm::dvec3(0.0)};
+  Range turnedStretch{glm::dvec3(0.0), glm::dvec3(0.0)};  ///< R times that
+  /// The two smallest |q · q'| with joints that share vertices of three influences or more.
+  double leastCosines[2] = {1, 1};
+  /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
+  bool split = false;
+};
+
+Affine affineOf(const JointMatrix& matrix) {
+  Affine map;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      map.linear[column][row] = static_cast<double>(matrix.m[row][column]);
+    }
+    map.offset[row] = static_cast<double>(matrix.m[row][3]);
+  }
+  return map;
+}
+
+bool isFinite(const JointMatrix& matrix) {
+  return std::all_of(&matrix.m[0][0], &matrix.m[0][0] + 12,
+                     [](float value) { return std::isfinite(value); });
+}
+
+/// How two joints turn against each other: the cosine of half the angle between them, not negative,
+/// and the axis, towards the first, times the sine.
+struct Turn {
+  double cosine;
+  glm::dvec3 axis;
+};
+
+Turn turnBetween(const Posed& first, const Posed& second) {
+  const glm::dvec4 &a = first.parts.real, &b = second.parts.real;
+  const double cosine = glm::dot(a, b);
+  const glm::dvec3 u(a), v(b);
+  const glm::dvec3 axis = b.w * u - a.w * v - glm::cross(u, v);  // of a b*
+  return cosine < 0 ? Turn{-cosine, -axis} : Turn{cosine, axis};
+}
+
+/// Below this cosine rounding may take the one or the other sign.
+constexpr double ambiguousCosine = 2e-5;
+
+class PoseBounds {
+ public:
+  PoseBounds(const JointBounds& bounds, Method method, std::pmr::memory_resource* memory)
+      : bounds_(bounds), method_(method), joints_(memory) {}
+
+  Box of(std::span<const JointMatrix> palette) {
+    Range everywhere;
+    everywhere.add(Range{glm::dvec3(-bounds::infinity), glm::dvec3(bounds::infinity)});
+    if (!pose(palette)) return bounds::boxOf(everywhere);
+    if (method_ == Method::dualQuaternion) {
+      compareJoints();
+      addAmbiguousJoints();
+    }
+    addJoints();
+    for (const JointBounds::Pair& pair : bounds_.pairs) {
+      if (method_ == Method::linear) {
+        addLinearPair(pair);
+      } else {
+        addDualQuaternionPair(pair);
+      }
+    }
+    const Range unweighted = bounds::rangeOf(bounds_.unweighted);
+    if (!unweighted.empty()) {
+      bind_.add(unweighted);
+      box_.add(unweighted);
+    }
+    if (box_.empty()) return bounds::boxOf(box_);
+    const Range grown = box_.grownBy(rounding());
+    const bool ordered = glm::all(glm::lessThanEqual(grown.min, grown.max));
+    return bounds::boxOf(ordered ? grown : everywhere);
+  }
+
+ private:
+  /// False where a joint that moves vertices is not finite, or is not there.
+  bool pose(std::span<const JointMatrix> palette) {
+    joints_.reserve(bounds_.joints.size());
+    for (const JointBounds::Joint& used : bounds_.joints) {
+      if (used.joint >= palette.size() || !isFinite(palette[used.joint])) return false;
+      Posed& joint = joints_.emplace_back();
+      joint.map = affineOf(palette[used.joint]);
+      if (method_ == Method::dualQuaternion) {
+        joint.parts = bounds::partsOf(joint.map.linear);
+        anyScales_ |= !joint.parts.rigid;
+        anyAmbiguous_ |= joint.parts.ambiguous;
+        largest_ = std::max(largest_, joint.parts.largest);
+      } else {
+        const glm::dmat3& c = joint.map.linear;
+        largest_ = std::max(largest_, std::sqrt(glm::dot(c[0], c[0]) + glm::dot(c[1], c[1]) +
+                                                glm::dot(c[2], c[2])));
+      }
+      furthest_ = std::max(furthest_, glm::length(joint.map.offset));
+    }
+    for (const JointBounds::Joint& used : bounds_.joints) bind_.add(bounds::rangeOf(used.alone));
+    for (const JointBounds::Pair& pair : bounds_.pairs) bind_.add(bounds::rangeOf(pair.box));
+    return true;
+  }
+
+  /// What has to be known of all pairs of a joint before any of them is looked at.
+  void compareJoints() {
+    for (const JointBounds::Pair& pair : bounds_.pairs) {
+      Posed &first = joints_[pair.first], &second = joints_[pair.second];
+      if (first.parts.ambiguous || second.parts.ambiguous) continue;
+      if (pair.influences > 2) {
+        const double cosine = std::abs(glm::dot(first.parts.real, second.parts.real));
+        for (Posed* joint : {&first, &second}) {
+          joint->leastCosines[1] =
+              std::min(joint->leastCosines[1], std::max(joint->leastCosines[0], cosine));
+          joint->leastCosines[0] = std::min(joint->leastCosines[0], cosine);
+        }
+      }
+      if (!first.parts.rigid || !second.parts.rigid) {
+        const Affine difference{second.parts.scaleShear - first.parts.scaleShear};
+        const Range stretch = bounds::imageOf(difference, CentredBox(pair.box));
+        first.stretch.add(stretch);
+        second.stretch.add(Range{-stretch.max, -stretch.min});
+      }
+    }
+    for (Posed& joint : joints_) {
+      const double a = joint.leastCosines[0], b = joint.leastCosines[1];
+      joint.split = a * a + b * b <= 1 + 1e-4;
+      if (anyScales_) {
+        joint.turnedStretch = bounds::imageOf(joint.parts.rotation, joint.stretch);
+      }
+    }
+  }
+
+  /// All vertices of a joint whose rotation is a matter of rounding: |v' − t| ≤ k max |v − t| for
+  /// any rotation.
+  void addAmbiguousJoints() {
+    if (!anyAmbiguous_) return;
+    const double reach = largest_ * bounds::reachOf(bind_);
+    for (std::uint32_t index = 0; index < joints_.size(); ++index) {
+      if (!joints_[index].parts.ambiguous) continue;
+      const glm::dvec3 centre = joints_[index].map.offset;
+      double distance = 0;
+      std::uint32_t influences = 0;
+      for (const JointBounds::Pair& pair : bounds_.pairs) {
+        if (pair.first != index && pair.second != index) continue;
+        const std::uint32_t other = pair.first == index ? pair.second : pair.first;
+        distance = std::max(distance, glm::length(joints_[other].map.offset - centre));
+        influences = std::max(influences, pair.influences);
+      }
+      if (influences == 0) continue;
+      box_.add(Range{centre, centre}.grownBy(influences * (reach + distance)));
+      amplification_ = std::max(amplification_, 0.5 * influences);
+    }
+  }
+
+  void addJoints() {
+    for (std::size_t index = 0; index < joints_.size(); ++index) {
+      const Box& alone = bounds_.joints[index].alone;
+      if (alone.min[0] > alone.max[0]) continue;
+      box_.add(bounds::imageOf(joints_[index].map, CentredBox(alone)));
+    }
+  }
+
+  /// The part of the way from the second joint's point to the first's that vertices may stand at.
+  struct Share {
+    double least, greatest;
+  };
+  static Share shareOf(const JointBounds::Pair& pair, double cosine) {
+    const auto share = [&](double a, double b) { return (a + cosine) / (a + b + 2 * cosine); };
+    return {share(static_cast<double>(pair.firstOverSecond[0]),
+                  static_cast<double>(pair.secondOverFirst[1])),
+            share(static_cast<double>(pair.firstOverSecond[1]),
+                  static_cast<double>(pair.secondOverFirst[0]))};
+  }
+
+  void addLinearPair(const JointBounds::Pair& pair) {
+    const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
+    const Share share = shareOf(pair, 1);
+    const CentredBox box(pair.box);
+    box_.add(bounds::imageOf(second + share.least * difference, box));
+    box_.add(bounds::imageOf(second + share.greatest * difference, box));
+  }
+
+  void addDualQuaternionPair(const JointBounds::Pair& pair) {
+    const Posed &first = joints_[pair.first], &second = joints_[pair.second];
+    if (first.parts.ambiguous || second.parts.ambiguous) return;
+    const Turn turn = turnBetween(first, second);
+    const CentredBox box(pair.box);
+    const Affine difference = first.map - second.map;
+    const Range stretchDifference = first.turnedStretch - second.turnedStretch;
+
+    const double bulging = 1 / (static_cast<double>(pair.leastSum) + 2 * turn.cosine);
+    const Affine bulge = bulging * bounds::cross(difference, turn.axis);
+    amplification_ = std::max(amplification_, 2 * bulging);
+
+    Range range;
+    const Share share = shareOf(pair, turn.cosine);
+    for (const double part : {share.least, share.greatest}) {
+      const Affine chord = second.map + part * difference;
+      range.add(bounds::imageOf(chord, box));
+      range.add(bounds::imageOf(chord + bulge, box));
+      if (turn.cosine < ambiguousCosine) range.add(bounds::imageOf(chord - bulge, box));
+    }
+    if (anyScales_) {
+      Range stretch = first.turnedStretch;
+      stretch.add(second.turnedStretch);
+      const double bulgeOfStretch =
+          bulging * glm::length(turn.axis) * bounds::reachOf(stretchDifference);
+      range = (range + stretch).grownBy(bulgeOfStretch);
+    }
+    box_.add(range);
+
+    if (pair.influences > 2 && (first.split || second.split)) {
+      const double radius = ballFactor(pair, turn.cosine) *
+                            bounds::reachOf(bounds::imageOf(difference, box) + stretchDifference);
+      for (const Posed* pivot : {&first, &second}) {
+        if (!pivot->split) continue;
+        box_.add((bounds::imageOf(pivot->map, box) + pivot->turnedStretch).grownBy(radius));
+      }
+    }
+  }
+
+  double ballFactor(const JointBounds::Pair& pair, double cosine) {
+    const double others = pair.influences - 1;
+    const double factor = 1 / (1 / others + std::max(0.0, cosine - ambiguousCosine));
+    amplification_ = std::max(amplification_, factor);
+    return factor;
+  }
+
+  /// What float32 may add, by the accuracy contract: the more where quaternions all but cancel.
+  /// 1e-5 is for kernels and the reference that take joints for rigid which are not quite.
+  double rounding() const {
+    const double reach = largest_ * bounds::reachOf(bind_);
+    const double scale = furthest_ + reach;
+    if (method_ == Method::linear) return 6 * floatRounding * scale;
+    return amplification_ * (24 * floatRounding * scale + 1e-5 * reach);
+  }
+
+  const JointBounds& bounds_;
+  Method method_;
+  std::pmr::vector<Posed> joints_;
+  Range box_, bind_;
+  double furthest_ = 0;  ///< the largest |t|
+  double largest_ = 1;   ///< no singular value is larger
+  double amplification_ = 1;
+  bool anyScales_ = false, anyAmbiguous_ = false;
+};
+
+}  // namespace
+
+Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method) {
+  // Room for the joints of nearly all rigs; what does not fit comes from the heap.
+  alignas(Posed) std::array<std::byte, 128 * sizeof(Posed)> room;
+  std::pmr::monotonic_buffer_resource memory(room.data(), room.size());
+  return PoseBounds(bounds, method, &memory).of(palette);
+}
+
+}  // namespace dermis
