@@ -3,6 +3,7 @@
 // once, at import; a pose then costs a few microseconds. docs/bounds.md has the proof.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,32 +15,51 @@
 
 namespace dermis {
 
+/// How far a set of points reaches: `reach[2 i]` is the largest d · p for direction d = i of the 13
+/// below, `reach[2 i + 1]` that for −d. -inf for no points at all. A box with its edges and corners
+/// cut: it stays tight when it is turned.
+struct Extent {
+  float reach[26];
+
+  /// Faces, edges and corners of a cube.
+  static constexpr std::int8_t directions[13][3] = {
+      {1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, -1, 0}, {1, 0, 1},  {1, 0, -1},
+      {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+
+  bool empty() const { return reach[0] < -reach[1]; }
+};
+
 /// Where the vertices lie in bind pose, by the joints that move them. Plain data, made once at
 /// import by `jointBounds`; it depends on no pose and on no method, and may be stored with the
 /// mesh.
 struct JointBounds {
-  /// A joint that moves vertices. Boxes are in bind space; one with min > max holds nothing.
+  /// A joint that moves vertices.
   struct Joint {
-    std::uint32_t joint = 0;  ///< index into the palette
-    Box alone;                ///< of the vertices that this joint moves on its own
+    std::uint32_t joint;  ///< index into the palette
+    Extent alone;         ///< of the vertices that this joint moves on its own, in bind space
   };
 
   /// Two joints that have vertices in common, and the vertices that both of them move.
   struct Pair {
-    std::uint32_t first = 0, second = 0;  ///< indices into `joints`, first < second
-    std::uint32_t influences = 2;         ///< the most influences that one of the vertices has
-    Box box;                              ///< of the vertices, in bind space
+    std::uint32_t first, second;  ///< indices into `joints`, first < second
+    std::uint32_t influences;     ///< the most influences that one of the vertices has
+    Extent extent;                ///< of the vertices, in bind space
     /// How the joints share the vertices: the least and greatest a = w₁ / (w₂ (k − 1)) and
     /// b = w₂ / (w₁ (k − 1)), and the least a + b, of a vertex with k influences, w₁ the weight of
     /// the first joint and w₂ that of the second.
-    float firstOverSecond[2] = {0, 0};
-    float secondOverFirst[2] = {0, 0};
-    float leastSum = 0;
+    float firstOverSecond[2];
+    float secondOverFirst[2];
+    float leastSum;
   };
 
-  std::vector<Joint> joints;         ///< by rising palette index
-  std::vector<Pair> pairs;           ///< by rising first, then second
-  Box unweighted;                    ///< of the vertices without weight, which stay in bind pose
+  /// Above this number of influences a vertex adds no trios.
+  static constexpr std::uint32_t mostInfluencesOfTrio = 8;
+
+  std::vector<Joint> joints;  ///< by rising palette index
+  std::vector<Pair> pairs;    ///< by rising first, then second
+  /// Three joints that have vertices in common: indices into `joints`, rising.
+  std::vector<std::array<std::uint32_t, 3>> trios;
+  Box unweighted;  ///< of the vertices without weight, which stay in bind pose; min > max for none
   std::uint32_t requiredJoints = 0;  ///< the fewest joints of a palette: the largest index + 1
 };
 
@@ -70,7 +90,7 @@ Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
 /// the range of float32; it never has a NaN. For a mesh without vertices, which `jointBounds` never
 /// makes, it has min > max.
 ///
-/// O(joints + pairs); allocates only above 128 joints that move vertices. Any thread.
+/// O(joints + pairs + trios); allocates only above 128 joints that move vertices. Any thread.
 Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method);
 
 }  // namespace dermis

@@ -1,4 +1,4 @@
-// Boxes in double precision, for the bounds of a skinned mesh.
+// Boxes and affine maps in double precision, for the bounds of a skinned mesh.
 #pragma once
 
 #include <algorithm>
@@ -29,6 +29,10 @@ struct Range {
   }
   Range grownBy(double margin) const { return {min - margin, max + margin}; }
 };
+
+inline Range everything() {
+  return {glm::dvec3(-infinity), glm::dvec3(infinity)};
+}
 
 inline Range operator+(const Range& a, const Range& b) {
   return {a.min + b.min, a.max + b.max};
@@ -73,17 +77,6 @@ inline Range rangeOf(const Box& box) {
   return {{box.min[0], box.min[1], box.min[2]}, {box.max[0], box.max[1], box.max[2]}};
 }
 
-/// The points c + h, |h| ≤ half in every component.
-struct CentredBox {
-  glm::dvec3 centre, half;
-
-  explicit CentredBox(const Box& box) {
-    const Range range = rangeOf(box);
-    centre = 0.5 * (range.min + range.max);
-    half = 0.5 * (range.max - range.min);
-  }
-};
-
 /// An affine map x → linear x + offset.
 struct Affine {
   glm::dmat3 linear{1.0};
@@ -106,15 +99,7 @@ inline Affine cross(const Affine& a, const glm::dvec3& v) {
           glm::cross(a.offset, v)};
 }
 
-/// The smallest range that holds the image of a box.
-inline Range imageOf(const Affine& map, const CentredBox& box) {
-  const glm::dvec3 centre = map.linear * box.centre + map.offset;
-  const glm::dvec3 half = glm::abs(map.linear[0]) * box.half.x +
-                          glm::abs(map.linear[1]) * box.half.y +
-                          glm::abs(map.linear[2]) * box.half.z;
-  return {centre - half, centre + half};
-}
-
+/// The smallest range that holds the image of another.
 inline Range imageOf(const glm::dmat3& linear, const Range& range) {
   const glm::dvec3 centre = linear * (0.5 * (range.min + range.max));
   const glm::dvec3 extent = 0.5 * (range.max - range.min);

@@ -5,11 +5,13 @@
 #include <limits>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "attribute.h"
 #include "bounds/box.h"
+#include "bounds/extent.h"
 #include "dermis/bounds.h"
 #include "dermis/validate.h"
 
@@ -17,6 +19,7 @@ namespace dermis {
 namespace {
 
 using bounds::Range;
+using bounds::Reach;
 
 struct Influence {
   std::uint32_t joint = 0;
@@ -117,7 +120,7 @@ class Displacements {
 
 struct PairRange {
   std::uint32_t influences = 2;
-  Range box;
+  Reach reach;
   double firstOverSecond[2] = {bounds::infinity, 0};
   double secondOverFirst[2] = {bounds::infinity, 0};
   double leastSum = bounds::infinity;
@@ -137,13 +140,18 @@ class Collector {
 
   void add(const std::vector<Influence>& influences, const Range& place) {
     for (const Influence& influence : influences) used_[influence.joint] = true;
-    if (influences.empty()) unweighted_.add(place);
-    if (influences.size() == 1) alone_[influences[0].joint].add(place);
+    if (influences.empty()) {
+      unweighted_.add(place);
+      return;
+    }
+    const Reach reach(place);
+    if (influences.size() == 1) alone_[influences[0].joint].add(reach);
     for (std::size_t second = 1; second < influences.size(); ++second) {
       for (std::size_t first = 0; first < second; ++first) {
-        addPair(influences[first], influences[second], influences.size(), place);
+        addPair(influences[first], influences[second], influences.size(), reach);
       }
     }
+    if (influences.size() <= JointBounds::mostInfluencesOfTrio) addTrios(influences);
   }
 
   JointBounds take() const {
@@ -152,29 +160,35 @@ class Collector {
     for (std::uint32_t joint = 0; joint < alone_.size(); ++joint) {
       if (!used_[joint]) continue;
       compact[joint] = static_cast<std::uint32_t>(result.joints.size());
-      result.joints.push_back({joint, bounds::boxOf(alone_[joint])});
+      result.joints.push_back({joint, alone_[joint].extent()});
       result.requiredJoints = joint + 1;
     }
     result.unweighted = bounds::boxOf(unweighted_);
+    // The order of a hash table is not the same everywhere; what is stored shall be.
     for (const auto& [key, pair] : pairs_) {
-      result.pairs.push_back(finish(compact[key >> 32], compact[key & 0xffffffffu], pair));
+      result.pairs.push_back(finish(compact[key >> 16], compact[key & 0xffffu], pair));
     }
     std::sort(result.pairs.begin(), result.pairs.end(),
               [](const JointBounds::Pair& a, const JointBounds::Pair& b) {
                 return a.first != b.first ? a.first < b.first : a.second < b.second;
               });
+    for (const std::uint64_t key : trios_) {
+      result.trios.push_back(
+          {compact[key >> 32], compact[key >> 16 & 0xffffu], compact[key & 0xffffu]});
+    }
+    std::sort(result.trios.begin(), result.trios.end());
     return result;
   }
 
  private:
   void addPair(const Influence& first, const Influence& second, std::size_t influences,
-               const Range& place) {
-    PairRange& pair = pairs_[std::uint64_t{first.joint} << 32 | second.joint];
+               const Reach& reach) {
+    PairRange& pair = pairs_[first.joint << 16 | second.joint];
     const auto others = static_cast<double>(influences - 1);
     const double a = first.weight / (second.weight * others);
     const double b = second.weight / (first.weight * others);
     pair.influences = std::max(pair.influences, static_cast<std::uint32_t>(influences));
-    pair.box.add(place);
+    pair.reach.add(reach);
     pair.firstOverSecond[0] = std::min(pair.firstOverSecond[0], a);
     pair.firstOverSecond[1] = std::max(pair.firstOverSecond[1], a);
     pair.secondOverFirst[0] = std::min(pair.secondOverFirst[0], b);
@@ -182,20 +196,33 @@ class Collector {
     pair.leastSum = std::min(pair.leastSum, a + b);
   }
 
+  void addTrios(const std::vector<Influence>& influences) {
+    for (std::size_t c = 2; c < influences.size(); ++c) {
+      for (std::size_t b = 1; b < c; ++b) {
+        for (std::size_t a = 0; a < b; ++a) {
+          trios_.insert(std::uint64_t{influences[a].joint} << 32 |
+                        std::uint64_t{influences[b].joint} << 16 | influences[c].joint);
+        }
+      }
+    }
+  }
+
   static JointBounds::Pair finish(std::uint32_t first, std::uint32_t second,
                                   const PairRange& pair) {
     return {first,
             second,
             pair.influences,
-            bounds::boxOf(pair.box),
+            pair.reach.extent(),
             {below(pair.firstOverSecond[0]), above(pair.firstOverSecond[1])},
             {below(pair.secondOverFirst[0]), above(pair.secondOverFirst[1])},
             below(pair.leastSum)};
   }
 
-  std::vector<Range> alone_;
+  static_assert(maxPaletteJoints <= 65536, "the keys below have 16 bits a joint");
+  std::vector<Reach> alone_;
   std::vector<bool> used_;
-  std::unordered_map<std::uint64_t, PairRange> pairs_;
+  std::unordered_map<std::uint32_t, PairRange> pairs_;
+  std::unordered_set<std::uint64_t> trios_;
   Range unweighted_;
 };
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bounds/box.h"
+#include "bounds/extent.h"
 #include "bounds/rotation.h"
 #include "dermis/accuracy.h"
 #include "dermis/bounds.h"
@@ -18,7 +19,6 @@ namespace dermis {
 namespace {
 
 using bounds::Affine;
-using bounds::CentredBox;
 using bounds::Parts;
 using bounds::Range;
 
@@ -29,10 +29,12 @@ struct Posed {
   /// Where Σ w S p may lie relative to this joint's own S p: 0 but where joints scale differently.
   Range stretch{glm::dvec3(0.0), glm::dvec3(0.0)};
   Range turnedStretch{glm::dvec3(0.0), glm::dvec3(0.0)};  ///< R times that
-  /// The two smallest |q · q'| with joints that share vertices of three influences or more.
+  /// The two smallest |q · q'| with joints that share vertices of more influences than trios have.
   double leastCosines[2] = {1, 1};
   /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
   bool split = false;
+  double partnerDistance = 0;  ///< largest |t − t'| of a joint that shares vertices, and the most
+  std::uint32_t influences = 0;  ///< influences of such a vertex; only where a joint is ambiguous
 };
 
 Affine affineOf(const JointMatrix& matrix) {
@@ -75,9 +77,7 @@ class PoseBounds {
       : bounds_(bounds), method_(method), joints_(memory) {}
 
   Box of(std::span<const JointMatrix> palette) {
-    Range everywhere;
-    everywhere.add(Range{glm::dvec3(-bounds::infinity), glm::dvec3(bounds::infinity)});
-    if (!pose(palette)) return bounds::boxOf(everywhere);
+    if (!pose(palette)) return bounds::boxOf(bounds::everything());
     if (method_ == Method::dualQuaternion) {
       compareJoints();
       addAmbiguousJoints();
@@ -90,19 +90,15 @@ class PoseBounds {
         addDualQuaternionPair(pair);
       }
     }
-    const Range unweighted = bounds::rangeOf(bounds_.unweighted);
-    if (!unweighted.empty()) {
-      bind_.add(unweighted);
-      box_.add(unweighted);
-    }
-    if (box_.empty()) return bounds::boxOf(box_);
-    const Range grown = box_.grownBy(rounding());
-    const bool ordered = glm::all(glm::lessThanEqual(grown.min, grown.max));
-    return bounds::boxOf(ordered ? grown : everywhere);
+    if (!box_.empty()) box_ = box_.grownBy(rounding());
+    addUnweighted();
+    const bool ordered = box_.empty() || glm::all(glm::lessThanEqual(box_.min, box_.max));
+    return bounds::boxOf(ordered ? box_ : bounds::everything());
   }
 
  private:
-  /// False where a joint that moves vertices is not finite, or is not there.
+  /// False where a joint that moves vertices is not finite, or is not there, and where the mesh is
+  /// so large that float32 cannot hold the sums of an extent: from here on no number is NaN.
   bool pose(std::span<const JointMatrix> palette) {
     joints_.reserve(bounds_.joints.size());
     for (const JointBounds::Joint& used : bounds_.joints) {
@@ -121,9 +117,11 @@ class PoseBounds {
       }
       furthest_ = std::max(furthest_, glm::length(joint.map.offset));
     }
-    for (const JointBounds::Joint& used : bounds_.joints) bind_.add(bounds::rangeOf(used.alone));
-    for (const JointBounds::Pair& pair : bounds_.pairs) bind_.add(bounds::rangeOf(pair.box));
-    return true;
+    for (const JointBounds::Joint& used : bounds_.joints) {
+      if (!used.alone.empty()) bind_.add(bounds::rangeOf(used.alone));
+    }
+    for (const JointBounds::Pair& pair : bounds_.pairs) bind_.add(bounds::rangeOf(pair.extent));
+    return bind_.empty() || bounds::reachOf(bind_) <= 1e38;
   }
 
   /// What has to be known of all pairs of a joint before any of them is looked at.
@@ -131,7 +129,7 @@ class PoseBounds {
     for (const JointBounds::Pair& pair : bounds_.pairs) {
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
       if (first.parts.ambiguous || second.parts.ambiguous) continue;
-      if (pair.influences > 2) {
+      if (pair.influences > JointBounds::mostInfluencesOfTrio) {
         const double cosine = std::abs(glm::dot(first.parts.real, second.parts.real));
         for (Posed* joint : {&first, &second}) {
           joint->leastCosines[1] =
@@ -141,47 +139,58 @@ class PoseBounds {
       }
       if (!first.parts.rigid || !second.parts.rigid) {
         const Affine difference{second.parts.scaleShear - first.parts.scaleShear};
-        const Range stretch = bounds::imageOf(difference, CentredBox(pair.box));
+        const Range stretch = bounds::imageOf(difference, pair.extent);
         first.stretch.add(stretch);
         second.stretch.add(Range{-stretch.max, -stretch.min});
       }
     }
+    for (const auto& [a, b, c] : bounds_.trios) {
+      splitIfTorn(joints_[a], joints_[b], joints_[c]);
+    }
     for (Posed& joint : joints_) {
       const double a = joint.leastCosines[0], b = joint.leastCosines[1];
-      joint.split = a * a + b * b <= 1 + 1e-4;
+      joint.split |= a * a + b * b <= 1 + 1e-4;
       if (anyScales_) {
         joint.turnedStretch = bounds::imageOf(joint.parts.rotation, joint.stretch);
       }
     }
   }
 
+  /// Whether no choice of signs brings three quaternions into one hemisphere, all of them.
+  static void splitIfTorn(Posed& a, Posed& b, Posed& c) {
+    const double ab = glm::dot(a.parts.real, b.parts.real);
+    const double bc = glm::dot(b.parts.real, c.parts.real);
+    const double ca = glm::dot(c.parts.real, a.parts.real);
+    const double least = std::min({std::abs(ab), std::abs(bc), std::abs(ca)});
+    if (ab * bc * ca > 0 && least > ambiguousCosine) return;
+    a.split = b.split = c.split = true;
+  }
+
   /// All vertices of a joint whose rotation is a matter of rounding: |v' − t| ≤ k max |v − t| for
   /// any rotation.
   void addAmbiguousJoints() {
     if (!anyAmbiguous_) return;
-    const double reach = largest_ * bounds::reachOf(bind_);
-    for (std::uint32_t index = 0; index < joints_.size(); ++index) {
-      if (!joints_[index].parts.ambiguous) continue;
-      const glm::dvec3 centre = joints_[index].map.offset;
-      double distance = 0;
-      std::uint32_t influences = 0;
-      for (const JointBounds::Pair& pair : bounds_.pairs) {
-        if (pair.first != index && pair.second != index) continue;
-        const std::uint32_t other = pair.first == index ? pair.second : pair.first;
-        distance = std::max(distance, glm::length(joints_[other].map.offset - centre));
-        influences = std::max(influences, pair.influences);
+    for (const JointBounds::Pair& pair : bounds_.pairs) {
+      Posed &first = joints_[pair.first], &second = joints_[pair.second];
+      const double distance = glm::length(first.map.offset - second.map.offset);
+      for (Posed* joint : {&first, &second}) {
+        joint->partnerDistance = std::max(joint->partnerDistance, distance);
+        joint->influences = std::max(joint->influences, pair.influences);
       }
-      if (influences == 0) continue;
-      box_.add(Range{centre, centre}.grownBy(influences * (reach + distance)));
-      amplification_ = std::max(amplification_, 0.5 * influences);
+    }
+    const double reach = largest_ * bounds::reachOf(bind_);
+    for (const Posed& joint : joints_) {
+      if (!joint.parts.ambiguous || joint.influences == 0) continue;
+      box_.add(Range{joint.map.offset, joint.map.offset}.grownBy(joint.influences *
+                                                                 (reach + joint.partnerDistance)));
+      amplification_ = std::max(amplification_, 0.5 * joint.influences);
     }
   }
 
   void addJoints() {
     for (std::size_t index = 0; index < joints_.size(); ++index) {
-      const Box& alone = bounds_.joints[index].alone;
-      if (alone.min[0] > alone.max[0]) continue;
-      box_.add(bounds::imageOf(joints_[index].map, CentredBox(alone)));
+      const Extent& alone = bounds_.joints[index].alone;
+      if (!alone.empty()) box_.add(bounds::imageOf(joints_[index].map, alone));
     }
   }
 
@@ -200,16 +209,14 @@ class PoseBounds {
   void addLinearPair(const JointBounds::Pair& pair) {
     const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
     const Share share = shareOf(pair, 1);
-    const CentredBox box(pair.box);
-    box_.add(bounds::imageOf(second + share.least * difference, box));
-    box_.add(bounds::imageOf(second + share.greatest * difference, box));
+    box_.add(bounds::imageOf(second + share.least * difference, pair.extent));
+    box_.add(bounds::imageOf(second + share.greatest * difference, pair.extent));
   }
 
   void addDualQuaternionPair(const JointBounds::Pair& pair) {
     const Posed &first = joints_[pair.first], &second = joints_[pair.second];
     if (first.parts.ambiguous || second.parts.ambiguous) return;
     const Turn turn = turnBetween(first, second);
-    const CentredBox box(pair.box);
     const Affine difference = first.map - second.map;
     const Range stretchDifference = first.turnedStretch - second.turnedStretch;
 
@@ -221,9 +228,9 @@ class PoseBounds {
     const Share share = shareOf(pair, turn.cosine);
     for (const double part : {share.least, share.greatest}) {
       const Affine chord = second.map + part * difference;
-      range.add(bounds::imageOf(chord, box));
-      range.add(bounds::imageOf(chord + bulge, box));
-      if (turn.cosine < ambiguousCosine) range.add(bounds::imageOf(chord - bulge, box));
+      range.add(bounds::imageOf(chord, pair.extent));
+      range.add(bounds::imageOf(chord + bulge, pair.extent));
+      if (turn.cosine < ambiguousCosine) range.add(bounds::imageOf(chord - bulge, pair.extent));
     }
     if (anyScales_) {
       Range stretch = first.turnedStretch;
@@ -235,11 +242,12 @@ class PoseBounds {
     box_.add(range);
 
     if (pair.influences > 2 && (first.split || second.split)) {
-      const double radius = ballFactor(pair, turn.cosine) *
-                            bounds::reachOf(bounds::imageOf(difference, box) + stretchDifference);
+      const double radius =
+          ballFactor(pair, turn.cosine) *
+          bounds::reachOf(bounds::imageOf(difference, pair.extent) + stretchDifference);
       for (const Posed* pivot : {&first, &second}) {
         if (!pivot->split) continue;
-        box_.add((bounds::imageOf(pivot->map, box) + pivot->turnedStretch).grownBy(radius));
+        box_.add((bounds::imageOf(pivot->map, pair.extent) + pivot->turnedStretch).grownBy(radius));
       }
     }
   }
@@ -251,13 +259,22 @@ class PoseBounds {
     return factor;
   }
 
-  /// What float32 may add, by the accuracy contract: the more where quaternions all but cancel.
-  /// 1e-5 is for kernels and the reference that take joints for rigid which are not quite.
+  /// They are copied, and so need none of what `rounding` allows the rest.
+  void addUnweighted() {
+    const Range unweighted = bounds::rangeOf(bounds_.unweighted);
+    if (unweighted.empty()) return;
+    box_.add(unweighted.grownBy(contract() * bounds::reachOf(unweighted)));
+  }
+
+  /// By how much a float32 position may be off, over its scale: `positionBound`.
+  double contract() const { return (method_ == Method::linear ? 6 : 24) * floatRounding; }
+
+  /// What float32 may add: the more where quaternions all but cancel. 1e-5 is for kernels and the
+  /// reference that take joints for rigid which are not quite.
   double rounding() const {
-    const double reach = largest_ * bounds::reachOf(bind_);
-    const double scale = furthest_ + reach;
-    if (method_ == Method::linear) return 6 * floatRounding * scale;
-    return amplification_ * (24 * floatRounding * scale + 1e-5 * reach);
+    const double reach = bind_.empty() ? 0 : largest_ * bounds::reachOf(bind_);
+    const double exactly = contract() * (furthest_ + reach);
+    return method_ == Method::linear ? exactly : amplification_ * (exactly + 1e-5 * reach);
   }
 
   const JointBounds& bounds_;
