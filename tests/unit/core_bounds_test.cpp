@@ -458,6 +458,27 @@ TEST(Bounds, AreTightForACreature) {
   }
 }
 
+TEST(Bounds, StayTightWhereAJointScales) {
+  // A limb's end made half as large again about its own origin, far from that of the mesh, and
+  // bent.
+  Creature creature;
+  Random random(12);
+  double sum = 0;
+  for (int i = 0; i < 40; ++i) {
+    std::vector<JointMatrix> pose = creature.pose(random, 30 * pi / 180);
+    const std::size_t joint = 3 * (1 + random.below(6));
+    const glm::dvec3 origin = creature.origins[joint];
+    for (auto& row : pose[joint].m) {
+      const glm::dvec3 axis(row[0], row[1], row[2]);
+      row[3] -= static_cast<float>(0.5 * glm::dot(axis, origin));
+      for (int column = 0; column < 3; ++column) row[column] *= 1.5f;
+    }
+    expectInside(creature.mesh, pose, "a creature with a large hand");
+    sum += excess(creature.mesh, pose, Method::dualQuaternion);
+  }
+  EXPECT_LE(sum / 40, 0.03);
+}
+
 TEST(Bounds, KeepVerticesWithoutWeightInBindPose) {
   OwnedMesh mesh;
   mesh.influencesPerVertex = 1;

@@ -37,10 +37,6 @@ inline Range everything() {
 inline Range operator+(const Range& a, const Range& b) {
   return {a.min + b.min, a.max + b.max};
 }
-inline Range operator-(const Range& a, const Range& b) {
-  return {a.min - b.max, a.max - b.min};
-}
-
 /// No point of the range is further from the origin.
 inline double reachOf(const Range& range) {
   return glm::length(glm::max(glm::abs(range.min), glm::abs(range.max)));
@@ -97,15 +93,6 @@ inline Affine cross(const Affine& a, const glm::dvec3& v) {
   return {glm::dmat3(glm::cross(a.linear[0], v), glm::cross(a.linear[1], v),
                      glm::cross(a.linear[2], v)),
           glm::cross(a.offset, v)};
-}
-
-/// The smallest range that holds the image of another.
-inline Range imageOf(const glm::dmat3& linear, const Range& range) {
-  const glm::dvec3 centre = linear * (0.5 * (range.min + range.max));
-  const glm::dvec3 extent = 0.5 * (range.max - range.min);
-  const glm::dvec3 half = glm::abs(linear[0]) * extent.x + glm::abs(linear[1]) * extent.y +
-                          glm::abs(linear[2]) * extent.z;
-  return {centre - half, centre + half};
 }
 
 }  // namespace dermis::bounds

@@ -116,7 +116,6 @@ Parts partsOf(const glm::dmat3& matrix) {
   const double deviation = deviationFromRotation(matrix);
   if (determinant > 0 && deviation <= 1e-5) {
     parts.real = quaternionOf(orthonormalized(matrix, deviation));
-    parts.rotation = rotationOf(parts.real);
     parts.largest = 1 + 1e-5;
     return parts;
   }
@@ -137,8 +136,7 @@ Parts partsOf(const glm::dmat3& matrix) {
   const double unitDeviation = deviationFromRotation(upright);
   parts.real = unitDeviation < 0.25 ? quaternionOf(orthonormalized(upright, unitDeviation))
                                     : nearestRotation(upright);
-  parts.rotation = rotationOf(parts.real);
-  parts.scaleShear = glm::transpose(parts.rotation) * matrix;
+  parts.scaleShear = glm::transpose(rotationOf(parts.real)) * matrix;
   return parts;
 }
 

@@ -8,9 +8,8 @@ namespace dermis::bounds {
 
 /// What a joint's 3×3 is made of: C = R S.
 struct Parts {
-  glm::dmat3 rotation{1.0};
   glm::dmat3 scaleShear{1.0};   ///< exactly 1 where the joint is rigid but for rounding
-  glm::dvec4 real{0, 0, 0, 1};  ///< the unit quaternion of `rotation`: x y z w
+  glm::dvec4 real{0, 0, 0, 1};  ///< the unit quaternion of R: x y z w
   double largest = 1;           ///< no singular value of C is larger
   bool rigid = true;
   /// R is a matter of rounding, a kernel's may be another: rank 1, or so near to a singular mirror

@@ -26,9 +26,6 @@ using bounds::Range;
 struct Posed {
   Affine map;
   Parts parts;
-  /// Where Σ w S p may lie relative to this joint's own S p: 0 but where joints scale differently.
-  Range stretch{glm::dvec3(0.0), glm::dvec3(0.0)};
-  Range turnedStretch{glm::dvec3(0.0), glm::dvec3(0.0)};  ///< R times that
   /// The two smallest |q · q'| with joints that share vertices of more influences than trios have.
   double leastCosines[2] = {1, 1};
   /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
@@ -79,7 +76,7 @@ class PoseBounds {
   Box of(std::span<const JointMatrix> palette) {
     if (!pose(palette)) return bounds::boxOf(bounds::everything());
     if (method_ == Method::dualQuaternion) {
-      compareJoints();
+      findSplitJoints();
       addAmbiguousJoints();
     }
     addJoints();
@@ -107,7 +104,6 @@ class PoseBounds {
       joint.map = affineOf(palette[used.joint]);
       if (method_ == Method::dualQuaternion) {
         joint.parts = bounds::partsOf(joint.map.linear);
-        anyScales_ |= !joint.parts.rigid;
         anyAmbiguous_ |= joint.parts.ambiguous;
         largest_ = std::max(largest_, joint.parts.largest);
       } else {
@@ -124,35 +120,26 @@ class PoseBounds {
     return bind_.empty() || bounds::reachOf(bind_) <= 1e38;
   }
 
-  /// What has to be known of all pairs of a joint before any of them is looked at.
-  void compareJoints() {
-    for (const JointBounds::Pair& pair : bounds_.pairs) {
-      Posed &first = joints_[pair.first], &second = joints_[pair.second];
-      if (first.parts.ambiguous || second.parts.ambiguous) continue;
-      if (pair.influences > JointBounds::mostInfluencesOfTrio) {
-        const double cosine = std::abs(glm::dot(first.parts.real, second.parts.real));
-        for (Posed* joint : {&first, &second}) {
-          joint->leastCosines[1] =
-              std::min(joint->leastCosines[1], std::max(joint->leastCosines[0], cosine));
-          joint->leastCosines[0] = std::min(joint->leastCosines[0], cosine);
-        }
-      }
-      if (!first.parts.rigid || !second.parts.rigid) {
-        const Affine difference{second.parts.scaleShear - first.parts.scaleShear};
-        const Range stretch = bounds::imageOf(difference, pair.extent);
-        first.stretch.add(stretch);
-        second.stretch.add(Range{-stretch.max, -stretch.min});
-      }
-    }
+  /// Finds the joints whose vertices may have influences in opposite hemispheres: by trios or,
+  /// where a vertex has too many influences for those, by angles, which see some where there are
+  /// none.
+  void findSplitJoints() {
     for (const auto& [a, b, c] : bounds_.trios) {
       splitIfTorn(joints_[a], joints_[b], joints_[c]);
     }
-    for (Posed& joint : joints_) {
-      const double a = joint.leastCosines[0], b = joint.leastCosines[1];
-      joint.split |= a * a + b * b <= 1 + 1e-4;
-      if (anyScales_) {
-        joint.turnedStretch = bounds::imageOf(joint.parts.rotation, joint.stretch);
+    for (const JointBounds::Pair& pair : bounds_.pairs) {
+      if (pair.influences <= JointBounds::mostInfluencesOfTrio) continue;
+      Posed &first = joints_[pair.first], &second = joints_[pair.second];
+      const double cosine = std::abs(glm::dot(first.parts.real, second.parts.real));
+      for (Posed* joint : {&first, &second}) {
+        auto& [least, next] = joint->leastCosines;
+        next = std::min(next, std::max(least, cosine));
+        least = std::min(least, cosine);
       }
+    }
+    for (Posed& joint : joints_) {
+      const auto& [least, next] = joint.leastCosines;
+      joint.split |= least * least + next * next <= 1 + 1e-4;
     }
   }
 
@@ -218,7 +205,7 @@ class PoseBounds {
     if (first.parts.ambiguous || second.parts.ambiguous) return;
     const Turn turn = turnBetween(first, second);
     const Affine difference = first.map - second.map;
-    const Range stretchDifference = first.turnedStretch - second.turnedStretch;
+    const double stretch = stretchBetween(first, second, pair.extent);
 
     const double bulging = 1 / (static_cast<double>(pair.leastSum) + 2 * turn.cosine);
     const Affine bulge = bulging * bounds::cross(difference, turn.axis);
@@ -232,24 +219,24 @@ class PoseBounds {
       range.add(bounds::imageOf(chord + bulge, pair.extent));
       if (turn.cosine < ambiguousCosine) range.add(bounds::imageOf(chord - bulge, pair.extent));
     }
-    if (anyScales_) {
-      Range stretch = first.turnedStretch;
-      stretch.add(second.turnedStretch);
-      const double bulgeOfStretch =
-          bulging * glm::length(turn.axis) * bounds::reachOf(stretchDifference);
-      range = (range + stretch).grownBy(bulgeOfStretch);
-    }
-    box_.add(range);
+    // |q − q'| = √(2 − 2 q · q')
+    const double stretching = bulging * std::sqrt(std::max(0.0, 2 - 2 * turn.cosine));
+    box_.add(range.grownBy(stretching * stretch));
 
     if (pair.influences > 2 && (first.split || second.split)) {
-      const double radius =
-          ballFactor(pair, turn.cosine) *
-          bounds::reachOf(bounds::imageOf(difference, pair.extent) + stretchDifference);
+      const double distance = bounds::reachOf(bounds::imageOf(difference, pair.extent));
+      const double radius = ballFactor(pair, turn.cosine) * (distance + 2 * stretch);
       for (const Posed* pivot : {&first, &second}) {
-        if (!pivot->split) continue;
-        box_.add((bounds::imageOf(pivot->map, pair.extent) + pivot->turnedStretch).grownBy(radius));
+        if (pivot->split) box_.add(bounds::imageOf(pivot->map, pair.extent).grownBy(radius));
       }
     }
+  }
+
+  /// The largest |S p − S' p| of a pair's vertices: how differently two joints scale them.
+  static double stretchBetween(const Posed& first, const Posed& second, const Extent& extent) {
+    if (first.parts.rigid && second.parts.rigid) return 0;
+    const Affine difference{first.parts.scaleShear - second.parts.scaleShear};
+    return bounds::reachOf(bounds::imageOf(difference, extent));
   }
 
   double ballFactor(const JointBounds::Pair& pair, double cosine) {
@@ -284,7 +271,7 @@ class PoseBounds {
   double furthest_ = 0;  ///< the largest |t|
   double largest_ = 1;   ///< no singular value is larger
   double amplification_ = 1;
-  bool anyScales_ = false, anyAmbiguous_ = false;
+  bool anyAmbiguous_ = false;
 };
 
 }  // namespace
