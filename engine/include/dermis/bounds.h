@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,7 @@ struct JointBounds {
     float leastSum;
   };
 
+  static constexpr float infinity = std::numeric_limits<float>::infinity();
   /// Above this number of influences a vertex adds no trios.
   static constexpr std::uint32_t mostInfluencesOfTrio = 8;
 
@@ -59,7 +61,8 @@ struct JointBounds {
   std::vector<Pair> pairs;    ///< by rising first, then second
   /// Three joints that have vertices in common: indices into `joints`, rising.
   std::vector<std::array<std::uint32_t, 3>> trios;
-  Box unweighted;  ///< of the vertices without weight, which stay in bind pose; min > max for none
+  /// Of the vertices without weight, which stay in bind pose; min > max for none.
+  Box unweighted{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   std::uint32_t requiredJoints = 0;  ///< the fewest joints of a palette: the largest index + 1
 };
 
@@ -83,14 +86,15 @@ Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
 /// rounding included, in the palette's space. `palette` is what the mesh is skinned with: joint
 /// global transform × inverse bind matrix.
 ///
-/// Exact, but for rounding, where all joints move alike and the mesh is turned by quarter turns;
-/// see docs/bounds.md for what to expect of others. Joints that move no vertex have no effect,
-/// whatever their matrices. The box is infinite (from -inf to inf) where a joint that moves
-/// vertices is not finite or outside the palette, and its sides may be infinite where numbers leave
-/// the range of float32; it never has a NaN. For a mesh without vertices, which `jointBounds` never
-/// makes, it has min > max.
+/// A few percent larger than it need be in ordinary poses; docs/bounds.md has the formulas, the
+/// proof and numbers. Joints that move no vertex have no effect, whatever their matrices. The box
+/// is infinite (from -inf to inf) where a joint that moves vertices is not finite or outside the
+/// palette, or the mesh reaches beyond 1e38, and its sides may be infinite where numbers leave the
+/// range of float32: ask `std::isfinite` before it becomes a format's box. It never has a NaN. A
+/// default-made `JointBounds` gives min > max.
 ///
-/// O(joints + pairs + trios); allocates only above 128 joints that move vertices. Any thread.
+/// O(joints + pairs + trios); allocates only above 128 joints that move vertices, and needs
+/// 32 KiB of stack. Any thread.
 Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method);
 
 }  // namespace dermis
