@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory_resource>
 #include <span>
 #include <vector>
+
+#include <glm/vec4.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "bounds/box.h"
 #include "bounds/extent.h"
