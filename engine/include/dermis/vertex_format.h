@@ -39,9 +39,9 @@ enum class VertexFormat : std::uint8_t {
 };
 
 inline constexpr std::array<VertexFormat, 10> allVertexFormats{
-    VertexFormat::float32x3, VertexFormat::float32x4,      VertexFormat::float16x3,
-    VertexFormat::float16x4, VertexFormat::snorm16x3,      VertexFormat::snorm16x4,
-    VertexFormat::snorm8x3,  VertexFormat::snorm8x4,       VertexFormat::octahedral16x2,
+    VertexFormat::float32x3,    VertexFormat::float32x4, VertexFormat::float16x3,
+    VertexFormat::float16x4,    VertexFormat::snorm16x3, VertexFormat::snorm16x4,
+    VertexFormat::snorm8x3,     VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
     VertexFormat::octahedral8x2};
 
 /// Bytes of one element; 0 for `none`.
@@ -58,7 +58,9 @@ bool isTangentFormat(VertexFormat format);
 
 /// What stands at `data`, in double precision: by the formulas above, for tests and tools. A
 /// direction that was stored octahedral is of unit length, any other as long as it was stored.
-/// `box` matters for snorm16 only. `data` needs no alignment, and holds `formatSize` bytes.
+/// `box` matters for snorm16 only; along an axis where it has no extent every value stands for its
+/// one coordinate. `data` needs no alignment, and holds `formatSize` bytes. A format that the
+/// attribute may not have gives zeros.
 std::array<double, 3> decodePosition(VertexFormat format, const void* data, const Box& box);
 std::array<double, 3> decodeNormal(VertexFormat format, const void* data);
 /// x y z and the handedness.
