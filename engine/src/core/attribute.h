@@ -33,7 +33,7 @@ inline std::uint32_t loadUnsigned(const AttributeView& view, std::uint32_t eleme
       return loadComponent<std::uint16_t>(view, element, component);
     case ComponentType::uint32:
       return loadComponent<std::uint32_t>(view, element, component);
-    case ComponentType::float32:
+    default:
       break;
   }
   return 0;

@@ -61,6 +61,14 @@ struct AttributeRule {
 bool isFloat(ComponentType type) {
   return type == ComponentType::float32;
 }
+bool isPositionType(ComponentType type) {
+  return isFloat(type) || type == ComponentType::float16 || type == ComponentType::snorm16 ||
+         type == ComponentType::unorm16;
+}
+bool isDirectionType(ComponentType type) {
+  return isFloat(type) || type == ComponentType::float16 || type == ComponentType::snorm8 ||
+         type == ComponentType::snorm16;
+}
 bool isJointType(ComponentType type) {
   return type == ComponentType::uint8 || type == ComponentType::uint16 ||
          type == ComponentType::uint32;
@@ -74,7 +82,8 @@ bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32
                Findings& findings) {
   const std::string name = rule.name;
   if (!rule.allows(view.type) || view.components == 0 ||
-      (rule.components != 0 && view.components != rule.components)) {
+      (rule.components != 0 && view.components != rule.components &&
+       (rule.components != 3 || view.components != 4))) {
     findings.addView(
         Problem::wrongFormat,
         name + " have a component type or number of components that they may not have");
@@ -105,11 +114,12 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
     findings.addView(Problem::emptyMesh, "it has no positions");
     return false;
   }
-  bool good = checkView(mesh.positions, {"positions", 3, isFloat}, mesh.vertexCount, findings);
+  bool good =
+      checkView(mesh.positions, {"positions", 3, isPositionType}, mesh.vertexCount, findings);
   if (mesh.normals)
-    good &= checkView(mesh.normals, {"normals", 3, isFloat}, mesh.vertexCount, findings);
+    good &= checkView(mesh.normals, {"normals", 3, isDirectionType}, mesh.vertexCount, findings);
   if (mesh.tangents)
-    good &= checkView(mesh.tangents, {"tangents", 4, isFloat}, mesh.vertexCount, findings);
+    good &= checkView(mesh.tangents, {"tangents", 4, isDirectionType}, mesh.vertexCount, findings);
   if (mesh.influenceSets.empty()) {
     findings.addView(Problem::noInfluenceSets, "it has no joints and weights");
     return false;
@@ -134,6 +144,7 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
 }
 
 bool isFiniteElement(const AttributeView& view, std::uint32_t vertex) {
+  if (view.type != ComponentType::float32) return true;
   for (std::uint32_t component = 0; component < view.components; ++component) {
     if (!std::isfinite(loadComponent<float>(view, vertex, component))) return false;
   }
