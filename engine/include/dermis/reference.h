@@ -19,15 +19,28 @@ using Double3 = std::array<double, 3>;
 using Double4 = std::array<double, 4>;
 
 /// What the accuracy of a float32 result depends on, per vertex (accuracy.h turns it into bounds).
+/// p, n and t are the position, normal and tangent in bind pose after morphing; u = 2^-24.
 struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
                         ///< value of joint j
+  double stretch = 1;   ///< max σ_j; 1 for a vertex without weight
   double distance = 0;  ///< |p|, from the origin of the bind pose
   double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels take for rigid as they are
+  /// What the bind pose in float32 may be off by, in units of u: of the mesh's for p, of |n| and
+  /// |t| for directions. A rounding for a stored value that is no float32, two for each target that
+  /// displaces the vertex (w d, and the sum), three where its d is no float32; each of them at most
+  /// u (|p| + Σ |w_i d_i|). 0 for float32 without morphs; infinite where displacements cancel a
+  /// direction.
+  double positionRounding = 0;
+  double normalRounding = 0;
+  double tangentRounding = 0;
   double normalAlignment =
-      1;  ///< |adjᵀ(M) n| / σ_max², M the blended 3×3; 1 where normals are only rotated
+      1;  ///< |adjᵀ(M) n| / (σ_max² |n|), M the blended 3×3 and σ_max its largest singular value
+  double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|)
   bool normalRotatedOnly =
-      true;  ///< dual quaternions with rigid joints: the normal passes through no 3×3
+      true;  ///< dual quaternions with rigid joints: directions pass through no 3×3
+  bool handednessAmbiguous =
+      false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: its sign is a matter of rounding
   bool signAmbiguous =
       false;  ///< |dot| with the pivot below 1e-5: the sign of an influence is arbitrary
   bool degenerate =
@@ -41,8 +54,8 @@ struct SkinnedMesh {
   std::vector<Conditioning> conditioning;
 };
 
-/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix), after
-/// adding the active morph targets to the bind pose. Influences are normalised over all sets
+/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix),
+/// after adding the active morph targets to the bind pose. Influences are normalised over all sets
 /// together; a vertex without weight stays in bind pose (morphed). Positions, normals and tangents
 /// are in the palette's space. Formulas: Kavan et al. 2007, section 4, for dual quaternions;
 /// two-phase scale and shear by polar decomposition, without a threshold; normals by the adjugate

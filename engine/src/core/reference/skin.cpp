@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -11,6 +13,8 @@
 
 #include "decompose.h"
 #include "dermis/validate.h"
+#include "morph.h"
+#include "read.h"
 
 namespace dermis::reference {
 namespace {
@@ -100,83 +104,6 @@ Joint takeApart(const JointMatrix& matrix) {
   return joint;
 }
 
-struct Influence {
-  std::uint32_t joint;
-  double stored;      ///< the weight as stored, times 65535, duplicates added up: what the pivot is
-                      ///< chosen by
-  double weight = 0;  ///< normalised
-};
-
-/// A weight times 65535: sums of what is stored as integers then are exact, and a tie is a tie.
-double readWeight(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
-  const auto* element = static_cast<const unsigned char*>(view.data) + vertex * view.stride;
-  switch (view.type) {
-    case ComponentType::unorm8:
-      return element[slot] * 257.0;
-    case ComponentType::unorm16: {
-      std::uint16_t value;
-      std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return value;
-    }
-    default: {
-      float value;
-      std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return static_cast<double>(value) * 65535.0;
-    }
-  }
-}
-
-std::uint32_t readJoint(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
-  const auto* element = static_cast<const unsigned char*>(view.data) + vertex * view.stride;
-  switch (view.type) {
-    case ComponentType::uint8:
-      return element[slot];
-    case ComponentType::uint16: {
-      std::uint16_t value;
-      std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return value;
-    }
-    default: {
-      std::uint32_t value;
-      std::memcpy(&value, element + slot * sizeof(value), sizeof(value));
-      return value;
-    }
-  }
-}
-
-dvec3 readVector(const AttributeView& view, std::size_t vertex) {
-  float value[3];
-  std::memcpy(value, static_cast<const unsigned char*>(view.data) + vertex * view.stride,
-              sizeof(value));
-  return dvec3(value[0], value[1], value[2]);
-}
-
-/// All sets together, one entry a joint, in the order of joints; the weights sum to 1. Empty: no
-/// weight.
-void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influence>& influences) {
-  influences.clear();
-  for (const InfluenceSet& set : mesh.influenceSets) {
-    for (std::uint32_t slot = 0; slot < set.joints.components; ++slot) {
-      const double weight = readWeight(set.weights, vertex, slot);
-      if (weight != 0) influences.push_back({readJoint(set.joints, vertex, slot), weight});
-    }
-  }
-  std::stable_sort(influences.begin(), influences.end(),
-                   [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
-  double sum = 0;
-  std::size_t kept = 0;
-  for (const Influence& influence : influences) {
-    sum += influence.stored;
-    if (kept > 0 && influences[kept - 1].joint == influence.joint) {
-      influences[kept - 1].stored += influence.stored;
-    } else {
-      influences[kept++] = influence;
-    }
-  }
-  influences.resize(kept);
-  for (Influence& influence : influences) influence.weight = influence.stored / sum;
-}
-
 /// The strongest influence, the lowest joint on a tie: the order is that of joints.
 std::size_t pivotOf(std::span<const Influence> influences) {
   std::size_t pivot = 0;
@@ -191,13 +118,26 @@ dmat3 adjugateTranspose(const dmat3& m) {
   return dmat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
 }
 
+/// The 3×3 that directions go through, and what their sense depends on.
+struct BlendedMatrix {
+  explicit BlendedMatrix(const dmat3& matrix, double largestOfJoints)
+      : m(matrix),
+        determinant(glm::determinant(matrix)),
+        largest(singularValues(matrix).values[0]),
+        stretch(largestOfJoints) {}
+
+  dmat3 m;
+  double determinant;
+  double largest;  ///< its largest singular value
+  double stretch;  ///< that of the joints: what the blended entries were rounded by
+};
+
 /// A normal by the inverse transpose of m, but for its length; finite also where m is singular.
-dvec3 transformNormal(const dmat3& m, const dvec3& normal, Conditioning& conditioning) {
+dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
+                      Conditioning& conditioning) {
+  const auto& [m, determinant, largest, stretch] = matrix;
   const dvec3 result = adjugateTranspose(m) * normal;
-  const double determinant = glm::determinant(m);
-  const double largest = singularValues(m).values[0];
   const double inputLength = glm::length(normal);
-  conditioning.normalRotatedOnly = false;
   if (inputLength == 0) return result;  // stays zero, exactly
   conditioning.normalAlignment =
       largest > 0 ? glm::length(result) / (largest * largest * inputLength) : 0;
@@ -207,14 +147,32 @@ dvec3 transformNormal(const dmat3& m, const dvec3& normal, Conditioning& conditi
   return determinant < 0 ? -result : result;
 }
 
+/// A tangent by the map of positions, but for its length.
+dvec3 transformTangent(const BlendedMatrix& matrix, const dvec3& tangent,
+                       Conditioning& conditioning) {
+  const dvec3 result = matrix.m * tangent;
+  const double inputLength = glm::length(tangent);
+  if (inputLength == 0) return result;  // stays zero, exactly
+  conditioning.tangentAlignment =
+      matrix.stretch > 0 ? glm::length(result) / (matrix.stretch * inputLength) : 0;
+  return glm::length(result) == 0 ? tangent : result;
+}
+
+/// A mirror turns a tangent frame's handedness over.
+double transformHandedness(const BlendedMatrix& matrix, double handedness,
+                           Conditioning& conditioning) {
+  conditioning.handednessAmbiguous =
+      std::abs(matrix.determinant) <= 1e-5 * matrix.stretch * matrix.largest * matrix.largest;
+  return matrix.determinant < 0 ? -handedness : handedness;
+}
+
 dvec3 unitOrZero(const dvec3& v) {
   const double length = glm::length(v);
   return length > 0 ? v / length : dvec3(0.0);
 }
 
-struct Vertex {
-  dvec3 position, normal;
-};
+/// Directions come out of unit length, or zero.
+using Vertex = BindVertex;
 
 Vertex skinLinear(std::span<const Joint> joints, std::span<const Influence> influences,
                   const Vertex& vertex, Conditioning& conditioning) {
@@ -224,8 +182,12 @@ Vertex skinLinear(std::span<const Joint> joints, std::span<const Influence> infl
     linear += influence.weight * joints[influence.joint].linear;
     translation += influence.weight * joints[influence.joint].translation;
   }
+  const BlendedMatrix matrix(linear, conditioning.stretch);
+  conditioning.normalRotatedOnly = false;
   return {linear * vertex.position + translation,
-          unitOrZero(transformNormal(linear, vertex.normal, conditioning))};
+          unitOrZero(transformNormal(matrix, vertex.normal, conditioning)),
+          unitOrZero(transformTangent(matrix, vertex.tangent, conditioning)),
+          transformHandedness(matrix, vertex.handedness, conditioning)};
 }
 
 /// Kavan et al. 2007, algorithm 1, with the pivot of greatest weight; two-phase scale and shear.
@@ -254,10 +216,13 @@ Vertex skinDualQuaternion(std::span<const Joint> joints, std::span<const Influen
     return v + 2.0 * glm::cross(r, glm::cross(r, v) + real.w * v);
   };
   const dvec3 translation = 2.0 * (real.w * d - dual.w * r + glm::cross(r, d));
-  const dvec3 scaledNormal = transformNormal(scaleShear, vertex.normal, conditioning);
+  const BlendedMatrix matrix(scaleShear, conditioning.stretch);
+  const dvec3 normal = unitOrZero(transformNormal(matrix, vertex.normal, conditioning));
+  const dvec3 tangent = unitOrZero(transformTangent(matrix, vertex.tangent, conditioning));
   conditioning.normalRotatedOnly = !kernelsScale;
-  return {rotate(scaleShear * vertex.position) + translation,
-          unitOrZero(rotate(unitOrZero(scaledNormal)))};
+  return {rotate(scaleShear * vertex.position) + translation, unitOrZero(rotate(normal)),
+          unitOrZero(rotate(tangent)),
+          transformHandedness(matrix, vertex.handedness, conditioning)};
 }
 
 void conditionOf(std::span<const Joint> joints, std::span<const Influence> influences,
@@ -273,8 +238,20 @@ void conditionOf(std::span<const Joint> joints, std::span<const Influence> influ
       conditioning.rigidShortcut = std::max(conditioning.rigidShortcut, joint.distanceFromRotation);
     }
   }
+  conditioning.stretch = largest;
   conditioning.scale = translation + largest * length;
   conditioning.distance = length;
+}
+
+Vertex skinVertex(std::span<const Joint> joints, std::span<const Influence> influences,
+                  const Vertex& bind, Method method, Conditioning& conditioning) {
+  if (influences.empty()) {
+    conditioning.distance = conditioning.scale = glm::length(bind.position);
+    return {bind.position, unitOrZero(bind.normal), unitOrZero(bind.tangent), bind.handedness};
+  }
+  conditionOf(joints, influences, bind.position, conditioning);
+  return method == Method::linear ? skinLinear(joints, influences, bind, conditioning)
+                                  : skinDualQuaternion(joints, influences, bind, conditioning);
 }
 
 Double3 toArray(const dvec3& v) {
@@ -283,8 +260,8 @@ Double3 toArray(const dvec3& v) {
 
 }  // namespace
 
-Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette,
-                         Method method, std::span<const MorphWeight>) {
+Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
+                         std::span<const MorphWeight> morphs) {
   const MeshReport report = validate(
       mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPaletteJoints)));
   if (!report.packable()) {
@@ -292,6 +269,8 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
       if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
     }
   }
+  const Result<std::vector<ActiveMorph>> active = activeMorphs(mesh, morphs);
+  if (!active) return active.error();
 
   std::vector<Joint> joints;
   joints.reserve(palette.size());
@@ -301,25 +280,20 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
   skinned.positions.resize(mesh.vertexCount);
   skinned.conditioning.resize(mesh.vertexCount);
   if (mesh.normals) skinned.normals.resize(mesh.vertexCount);
+  if (mesh.tangents) skinned.tangents.resize(mesh.vertexCount);
 
   std::vector<Influence> influences;
   for (std::size_t index = 0; index < mesh.vertexCount; ++index) {
     readInfluences(mesh, index, influences);
     Conditioning& conditioning = skinned.conditioning[index];
-    const dvec3 position = readVector(mesh.positions, index);
-    const Vertex bind{position, mesh.normals ? readVector(mesh.normals, index) : dvec3(0.0)};
-    Vertex result = bind;
-    if (influences.empty()) {
-      conditioning.scale = glm::length(position);
-      result.normal = unitOrZero(bind.normal);
-    } else {
-      conditionOf(joints, influences, position, conditioning);
-      result = method == Method::linear
-                   ? skinLinear(joints, influences, bind, conditioning)
-                   : skinDualQuaternion(joints, influences, bind, conditioning);
-    }
+    const Vertex bind = bindVertex(mesh, index, *active, conditioning);
+    const Vertex result = skinVertex(joints, influences, bind, method, conditioning);
     skinned.positions[index] = toArray(result.position);
     if (mesh.normals) skinned.normals[index] = toArray(result.normal);
+    if (mesh.tangents) {
+      const dvec3& t = result.tangent;
+      skinned.tangents[index] = {t.x, t.y, t.z, result.handedness};
+    }
   }
   return skinned;
 }

@@ -1,0 +1,117 @@
+#include "read.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace dermis::reference {
+namespace {
+
+template <typename Stored>
+Stored load(const AttributeView& view, std::size_t element, std::uint32_t component) {
+  Stored value;
+  std::memcpy(&value,
+              static_cast<const unsigned char*>(view.data) + element * view.stride +
+                  component * sizeof(value),
+              sizeof(value));
+  return value;
+}
+
+/// The value of a binary16: (-1)^s · 2^(e - 15) · (1 + f / 1024), without the 1 where e is 0.
+double valueOfHalf(std::uint16_t bits) {
+  const int exponent = bits / 1024 % 32;
+  const double fraction = bits % 1024 / 1024.0;
+  const double sign = bits >= 0x8000 ? -1 : 1;
+  if (exponent == 31) {
+    return fraction != 0 ? std::numeric_limits<double>::quiet_NaN()
+                         : sign * std::numeric_limits<double>::infinity();
+  }
+  return exponent == 0 ? sign * fraction * std::exp2(-14)
+                       : sign * (1 + fraction) * std::exp2(exponent - 15);
+}
+
+/// A weight times 65535: sums of what is stored as integers then are exact, and a tie is a tie.
+double readWeight(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
+  switch (view.type) {
+    case ComponentType::unorm8:
+      return load<std::uint8_t>(view, vertex, slot) * 257.0;
+    case ComponentType::unorm16:
+      return load<std::uint16_t>(view, vertex, slot);
+    default:
+      return readComponent(view, vertex, slot) * 65535.0;
+  }
+}
+
+std::uint32_t readJoint(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
+  switch (view.type) {
+    case ComponentType::uint8:
+      return load<std::uint8_t>(view, vertex, slot);
+    case ComponentType::uint16:
+      return load<std::uint16_t>(view, vertex, slot);
+    default:
+      return load<std::uint32_t>(view, vertex, slot);
+  }
+}
+
+}  // namespace
+
+double readComponent(const AttributeView& view, std::size_t element, std::uint32_t component) {
+  switch (view.type) {
+    case ComponentType::float32:
+      return static_cast<double>(load<float>(view, element, component));
+    case ComponentType::float16:
+      return valueOfHalf(load<std::uint16_t>(view, element, component));
+    case ComponentType::snorm8:
+      return std::max(-1.0, load<std::int8_t>(view, element, component) / 127.0);
+    case ComponentType::snorm16:
+      return std::max(-1.0, load<std::int16_t>(view, element, component) / 32767.0);
+    case ComponentType::unorm8:
+      return load<std::uint8_t>(view, element, component) / 255.0;
+    case ComponentType::unorm16:
+      return load<std::uint16_t>(view, element, component) / 65535.0;
+    case ComponentType::uint8:
+    case ComponentType::uint16:
+    case ComponentType::uint32:
+      return readJoint(view, element, component);
+  }
+  return 0;
+}
+
+glm::dvec3 readVector(const AttributeView& view, std::size_t element) {
+  return {readComponent(view, element, 0), readComponent(view, element, 1),
+          readComponent(view, element, 2)};
+}
+
+glm::dvec3 readPosition(const MeshView& mesh, std::size_t vertex) {
+  const auto& scale = mesh.positionScale;
+  const auto& offset = mesh.positionOffset;
+  return readVector(mesh.positions, vertex) * glm::dvec3(scale[0], scale[1], scale[2]) +
+         glm::dvec3(offset[0], offset[1], offset[2]);
+}
+
+void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influence>& influences) {
+  influences.clear();
+  for (const InfluenceSet& set : mesh.influenceSets) {
+    for (std::uint32_t slot = 0; slot < set.joints.components; ++slot) {
+      const double weight = readWeight(set.weights, vertex, slot);
+      if (weight != 0) influences.push_back({readJoint(set.joints, vertex, slot), weight});
+    }
+  }
+  std::stable_sort(influences.begin(), influences.end(),
+                   [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
+  double sum = 0;
+  std::size_t kept = 0;
+  for (const Influence& influence : influences) {
+    sum += influence.stored;
+    if (kept > 0 && influences[kept - 1].joint == influence.joint) {
+      influences[kept - 1].stored += influence.stored;
+    } else {
+      influences[kept++] = influence;
+    }
+  }
+  influences.resize(kept);
+  for (Influence& influence : influences) influence.weight = influence.stored / sum;
+}
+
+}  // namespace dermis::reference
