@@ -19,26 +19,53 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 /// The largest distance a float32 position may have from the reference's: 6 u · scale for `linear`,
 /// 24 u · scale for `dualQuaternion`, u = `floatRounding`. A joint that is rigid but for rounding
 /// (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is not decomposed by the kernels: `rigidShortcut` · |p| more, at
-/// most 4e-6 |p|.
+/// most 4e-6 |p|. Inputs that are no float32, and morph targets: u · `positionRounding` · `stretch`
+/// more.
 double positionBound(Method method, const reference::Conditioning& conditioning);
 
 /// The largest distance between a float32 unit normal and the reference's. Turned by a blended dual
 /// quaternion: 1.5e-6 (and `rigidShortcut`, as above). Through a blended 3×3 M: 6 u / a, a =
 /// `normalAlignment`. In two phases a normal goes through M and then is turned, so that both errors
-/// add up. Negative where a normal is only asked to be finite and of unit length (a < 1e-3).
+/// add up. What the bind pose is off by, u · `normalRounding`, is divided by a as well. Negative
+/// where a normal is only asked to be finite and of unit length: a < 1e-3, or a bind pose off by
+/// more than 0.05 a, so that displacements all but cancel.
 double normalBound(Method method, const reference::Conditioning& conditioning);
+
+/// The same for tangents, with `tangentAlignment` and `tangentRounding`.
+double tangentBound(Method method, const reference::Conditioning& conditioning);
+
+/// The largest distance between a position in float32 and what a format keeps of it; 0 for float32
+/// itself. float16: half a unit of the last place, at most 2^-11 |c| or, below the least normal
+/// number, 2^-25 for each component c. snorm16, along each axis of `box`, centre c and half its
+/// size h: half a step, h / 32767 / 2, and the roundings of (p − c) / h in float32, 4 u |c| + 8 u
+/// h; for what lies inside the box.
+double positionFormatBound(VertexFormat format, const reference::Double3& position, const Box& box);
+
+/// The same for unit normals. float16: 2^-11. snorm, L = 127 or 32767 its largest integer: √3 times
+/// half a step and a rounding, ½ / L + u. Octahedral: √18 δ, δ = ½ / L + 12 u. A step of δ in both
+/// components moves the point on the octahedron by (δ, δ, 2δ), of length √6 δ, and no point of it
+/// is nearer to the origin than 1 / √3, which divides the step where it is projected onto the
+/// sphere.
+double normalFormatBound(VertexFormat format);
+
+/// The same for tangents. Where they are octahedral, the second component has half as many steps:
+/// (δ, η, δ + η) with η = 1 / (L − 1) + 12 u, times √3.
+double tangentFormatBound(VertexFormat format);
 
 /// What a comparison found. An error is counted against its vertex' own bound: 1 is the bound.
 struct Comparison {
   double worstPosition = 0;  ///< the largest error ÷ bound
   double worstNormal = 0;
+  double worstTangent = 0;          ///< a wrong handedness counts as an error of 2
   double largestPositionError = 0;  ///< in the mesh's units
   std::uint32_t worstPositionVertex = 0;
   std::uint32_t worstNormalVertex = 0;
+  std::uint32_t worstTangentVertex = 0;
   std::uint64_t compared = 0;  ///< vertices held against their bound
   std::uint64_t onlyFinite =
       0;                      ///< vertices whose answer is a matter of rounding: asked to be finite
   std::uint64_t skipped = 0;  ///< vertices not looked at: a joint of theirs is not finite
+  std::uint64_t clamped = 0;  ///< vertices that the reference has outside the box of snorm16
   std::uint64_t failures = 0;  ///< vertices outside their bound, or not finite
   std::uint32_t firstFailure = 0;
 
@@ -62,8 +89,17 @@ struct SkinnedView {
 };
 
 /// Compares skinned positions, normals and tangents with the reference's, each against the bound of
-/// its method and format. A vertex with a joint that is not finite is not looked at. Fails with
-/// `invalidArgument` where the counts disagree, or a format does not fit its attribute.
+/// its method plus that of its format. Normals and tangents are compared where both have them. A
+/// vertex with a joint that is not finite is not looked at.
+///
+/// A handedness must be the reference's exactly, and 1 or -1 where the sign of the determinant is a
+/// matter of rounding; a fourth component of a position must be 1, of a normal 0. A zero direction
+/// stays zero, (0, 0, 1) where it is octahedral. A position outside the box of snorm16 is compared
+/// with the nearest point of the box. A float16 component is infinite, with the right sign, where
+/// the reference's with its bound reaches 65520, half a step above the largest finite number.
+///
+/// Fails with `invalidArgument` where the counts disagree, a format does not fit its attribute, a
+/// stride is less than its element, or the box of snorm16 is not finite or upside down.
 Result<Comparison> compare(const reference::SkinnedMesh& expected, const SkinnedView& actual,
                            Method method);
 

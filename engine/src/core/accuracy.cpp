@@ -2,118 +2,124 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace dermis {
 namespace {
 
-reference::Double3 readVector(const AttributeView& view, std::size_t element) {
-  float value[3];
-  std::memcpy(value, static_cast<const unsigned char*>(view.data) + element * view.stride,
-              sizeof(value));
-  return {value[0], value[1], value[2]};
+/// A direction that passes through a 3×3, or is turned by a dual quaternion, or both.
+/// `bindRounding` in units of u.
+double directionBound(Method method, const reference::Conditioning& conditioning, double alignment,
+                      double bindRounding) {
+  constexpr double leastAlignment = 1e-3;
+  constexpr double mostOfAlignment = 0.05;
+  const double bind = floatRounding * bindRounding;
+  const double turning = 1.5e-6 + conditioning.rigidShortcut;
+  const bool throughMatrix = method == Method::linear || !conditioning.normalRotatedOnly;
+  if (!throughMatrix) return bind > mostOfAlignment ? -1 : turning + bind;
+  if (alignment < leastAlignment || bind > mostOfAlignment * alignment) return -1;
+  const double matrix = (6 * floatRounding + bind) / alignment;
+  return method == Method::linear ? matrix : matrix + turning;
 }
 
-double distance(const reference::Double3& a, const reference::Double3& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+enum class Rounding { none, half, snorm, octahedral };
+
+struct Precision {
+  Rounding rounding = Rounding::none;
+  double largest = 1;  ///< the largest integer of a snorm component
+};
+
+Precision precisionOf(VertexFormat format) {
+  switch (format) {
+    case VertexFormat::none:
+    case VertexFormat::float32x3:
+    case VertexFormat::float32x4:
+      return {};
+    case VertexFormat::float16x3:
+    case VertexFormat::float16x4:
+      return {Rounding::half, 1};
+    case VertexFormat::snorm16x3:
+    case VertexFormat::snorm16x4:
+      return {Rounding::snorm, 32767};
+    case VertexFormat::snorm8x3:
+    case VertexFormat::snorm8x4:
+      return {Rounding::snorm, 127};
+    case VertexFormat::octahedral16x2:
+      return {Rounding::octahedral, 32767};
+    case VertexFormat::octahedral8x2:
+      return {Rounding::octahedral, 127};
+  }
+  return {};
 }
 
-double length(const reference::Double3& a) {
-  return std::hypot(a[0], a[1], a[2]);
+constexpr double halfRounding = 0x1p-11;
+constexpr double leastHalfRounding = 0x1p-25;
+// Up to 2.5 units in the last place of a division, and about seven other roundings.
+constexpr double foldingRounding = 12 * floatRounding;
+
+/// How far a unit vector moves when the point that stands for it on the octahedron moves by `x` and
+/// `y`.
+double octahedralBound(double x, double y) {
+  return std::sqrt(3.0) * std::hypot(x, y, x + y);
 }
 
-bool isFinite(const reference::Double3& a) {
-  return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]);
-}
-
-bool isThreeFloats(const AttributeView& view, std::size_t count) {
-  return view.count == count && view.type == ComponentType::float32 && view.components >= 3 &&
-         view.stride >= 12;
-}
-
-/// error ÷ bound, where a bound of 0 allows no error.
-double share(double error, double bound) {
-  if (error == 0) return 0;
-  return bound > 0 ? error / bound : HUGE_VAL;
+/// A unit vector whose components are rounded each for itself.
+double componentwiseBound(const Precision& precision) {
+  if (precision.rounding == Rounding::half) {
+    return halfRounding + std::sqrt(3.0) * leastHalfRounding;
+  }
+  if (precision.rounding == Rounding::none) return 0;
+  return std::sqrt(3.0) * (0.5 / precision.largest + floatRounding);
 }
 
 }  // namespace
 
 double positionBound(Method method, const reference::Conditioning& conditioning) {
-  if (method == Method::linear) return 6 * floatRounding * conditioning.scale;
+  const double bind = floatRounding * conditioning.positionRounding * conditioning.stretch;
+  if (method == Method::linear) return 6 * floatRounding * conditioning.scale + bind;
   return 24 * floatRounding * conditioning.scale +
-         std::min(4e-6, conditioning.rigidShortcut) * conditioning.distance;
+         std::min(4e-6, conditioning.rigidShortcut) * conditioning.distance + bind;
 }
 
 double normalBound(Method method, const reference::Conditioning& conditioning) {
-  constexpr double turning = 1.5e-6;
-  const bool throughMatrix = method == Method::linear || !conditioning.normalRotatedOnly;
-  if (!throughMatrix) return turning + conditioning.rigidShortcut;
-  if (conditioning.normalAlignment < 1e-3) return -1;
-  const double matrix = 6 * floatRounding / conditioning.normalAlignment;
-  return method == Method::linear ? matrix : matrix + turning + conditioning.rigidShortcut;
+  return directionBound(method, conditioning, conditioning.normalAlignment,
+                        conditioning.normalRounding);
 }
 
-Result<Comparison> compare(const reference::SkinnedMesh& expected, const AttributeView& positions,
-                           const AttributeView& normals, Method method) {
-  const std::size_t count = expected.positions.size();
-  const bool withNormals = normals && !expected.normals.empty();
-  if (!isThreeFloats(positions, count) || (withNormals && !isThreeFloats(normals, count))) {
-    return Error{ErrorCode::invalidArgument,
-                 "what is compared must have three floats for each of the reference's " +
-                     std::to_string(count) + " vertices"};
-  }
+double tangentBound(Method method, const reference::Conditioning& conditioning) {
+  return directionBound(method, conditioning, conditioning.tangentAlignment,
+                        conditioning.tangentRounding);
+}
 
-  Comparison result;
-  const auto fail = [&](std::size_t vertex) {
-    if (result.failures == 0) result.firstFailure = static_cast<std::uint32_t>(vertex);
-    ++result.failures;
-  };
-  for (std::size_t vertex = 0; vertex < count; ++vertex) {
-    const reference::Conditioning& conditioning = expected.conditioning[vertex];
-    if (!isFinite(expected.positions[vertex])) {
-      ++result.skipped;
-      continue;
+double positionFormatBound(VertexFormat format, const reference::Double3& position,
+                           const Box& box) {
+  const Precision precision = precisionOf(format);
+  reference::Double3 error{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (precision.rounding == Rounding::half) {
+      error[axis] = std::max(halfRounding * std::abs(position[axis]), leastHalfRounding);
+    } else if (precision.rounding == Rounding::snorm) {
+      const auto low = static_cast<double>(box.min[axis]);
+      const auto high = static_cast<double>(box.max[axis]);
+      const double centre = (low + high) / 2, half = (high - low) / 2;
+      error[axis] =
+          half * (0.5 / precision.largest) + floatRounding * (4 * std::abs(centre) + 8 * half);
     }
-    const reference::Double3 position = readVector(positions, vertex);
-    const reference::Double3 normal =
-        withNormals ? readVector(normals, vertex) : reference::Double3{};
-    if (!isFinite(position) || !isFinite(normal)) {
-      fail(vertex);
-      continue;
-    }
-    const bool arbitrary =
-        method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate);
-    if (arbitrary) {
-      ++result.onlyFinite;
-      continue;
-    }
-    ++result.compared;
-    const double error = distance(position, expected.positions[vertex]);
-    const double positionShare = share(error, positionBound(method, conditioning));
-    result.largestPositionError = std::max(result.largestPositionError, error);
-    if (positionShare > result.worstPosition) {
-      result.worstPosition = positionShare;
-      result.worstPositionVertex = static_cast<std::uint32_t>(vertex);
-    }
-    double normalShare = 0;
-    if (withNormals) {
-      const double bound = normalBound(method, conditioning);
-      const double expectedLength = length(expected.normals[vertex]);
-      if (bound < 0) {
-        // Only its length can be said.
-        normalShare = std::abs(length(normal) - (expectedLength > 0 ? 1 : 0)) / 1e-6;
-      } else if (expectedLength > 0 || length(normal) > 0) {
-        normalShare = share(distance(normal, expected.normals[vertex]), bound);
-      }
-      if (normalShare > result.worstNormal) {
-        result.worstNormal = normalShare;
-        result.worstNormalVertex = static_cast<std::uint32_t>(vertex);
-      }
-    }
-    if (positionShare > 1 || normalShare > 1) fail(vertex);
   }
-  return result;
+  return std::hypot(error[0], error[1], error[2]);
+}
+
+double normalFormatBound(VertexFormat format) {
+  const Precision precision = precisionOf(format);
+  if (precision.rounding != Rounding::octahedral) return componentwiseBound(precision);
+  const double step = 0.5 / precision.largest + foldingRounding;
+  return octahedralBound(step, step);
+}
+
+double tangentFormatBound(VertexFormat format) {
+  const Precision precision = precisionOf(format);
+  if (precision.rounding != Rounding::octahedral) return componentwiseBound(precision);
+  return octahedralBound(0.5 / precision.largest + foldingRounding,
+                         1 / (precision.largest - 1) + foldingRounding);
 }
 
 }  // namespace dermis
