@@ -6,8 +6,11 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "random_rig.h"
@@ -62,6 +65,40 @@ TEST(Accuracy, Truth16_NormalBounds) {
   EXPECT_LT(normalBound(Method::dualQuaternion, conditioning), 0);
 }
 
+TEST(Accuracy, TangentBoundsAreThoseOfNormalsWithTheirOwnAlignment) {
+  reference::Conditioning conditioning;
+  conditioning.normalAlignment = 0.5;
+  conditioning.tangentAlignment = 0.25;
+  conditioning.rigidShortcut = 2e-6;
+  EXPECT_DOUBLE_EQ(tangentBound(Method::dualQuaternion, conditioning), 3.5e-6);
+  EXPECT_DOUBLE_EQ(tangentBound(Method::linear, conditioning), 24 * u);
+  conditioning.normalRotatedOnly = false;
+  EXPECT_DOUBLE_EQ(tangentBound(Method::dualQuaternion, conditioning), 24 * u + 3.5e-6);
+  conditioning.tangentAlignment = 0.9999e-3;
+  EXPECT_LT(tangentBound(Method::linear, conditioning), 0);
+  EXPECT_LT(tangentBound(Method::dualQuaternion, conditioning), 0);
+}
+
+TEST(Accuracy, WhatTheBindPoseIsOffByIsStretchedAndDividedByTheAlignment) {
+  reference::Conditioning conditioning;
+  conditioning.positionRounding = 10;
+  conditioning.stretch = 3;
+  EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning), 30 * u);
+  EXPECT_DOUBLE_EQ(positionBound(Method::dualQuaternion, conditioning), 30 * u);
+  conditioning.normalRounding = 2;
+  conditioning.tangentRounding = 5;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 1.5e-6 + 2 * u);
+  EXPECT_DOUBLE_EQ(tangentBound(Method::dualQuaternion, conditioning), 1.5e-6 + 5 * u);
+  conditioning.normalAlignment = conditioning.tangentAlignment = 0.5;
+  EXPECT_DOUBLE_EQ(normalBound(Method::linear, conditioning), 16 * u);
+  EXPECT_DOUBLE_EQ(tangentBound(Method::linear, conditioning), 22 * u);
+  conditioning.tangentRounding = 0.026 / u;
+  EXPECT_LT(tangentBound(Method::linear, conditioning), 0);
+  EXPECT_GT(tangentBound(Method::dualQuaternion, conditioning), 0.026);
+  conditioning.tangentRounding = 0.051 / u;
+  EXPECT_LT(tangentBound(Method::dualQuaternion, conditioning), 0);
+}
+
 /// Twenty vertices around 1 with unit normals, and the same in float.
 struct CompareTest : public ::testing::Test {
   CompareTest() {
@@ -72,14 +109,22 @@ struct CompareTest : public ::testing::Test {
       reference::Conditioning conditioning;
       conditioning.scale = 2;
       expected.conditioning.push_back(conditioning);
+      expected.tangents.push_back({1, 0, 0, vertex % 2 == 0 ? 1.0 : -1.0});
       positions.insert(positions.end(), {x, 0.5f, -0.25f});
       normals.insert(normals.end(), {0.0f, 0.6f, 0.8f});
+      tangents.insert(tangents.end(), {1.0f, 0.0f, 0.0f, vertex % 2 == 0 ? 1.0f : -1.0f});
     }
   }
 
-  Comparison compared(Method method = Method::dualQuaternion) {
-    const Result<Comparison> result = compare(expected, floatAttribute(positions.data(), count, 3),
-                                              floatAttribute(normals.data(), count, 3), method);
+  SkinnedView view() const {
+    SkinnedView skinned;
+    skinned.positions = {positions.data(), count, 12, VertexFormat::float32x3};
+    skinned.normals = {normals.data(), count, 12, VertexFormat::float32x3};
+    skinned.tangents = {tangents.data(), count, 16, VertexFormat::float32x4};
+    return skinned;
+  }
+  Comparison compared(Method method = Method::dualQuaternion) const {
+    const Result<Comparison> result = compare(expected, view(), method);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     return result ? *result : Comparison{};
   }
@@ -92,7 +137,7 @@ struct CompareTest : public ::testing::Test {
 
   static constexpr std::uint32_t count = 20;
   reference::SkinnedMesh expected;
-  std::vector<float> positions, normals;
+  std::vector<float> positions, normals, tangents;
 };
 
 TEST_F(CompareTest, TheSamePasses) {
@@ -104,6 +149,7 @@ TEST_F(CompareTest, TheSamePasses) {
     EXPECT_EQ(comparison.onlyFinite, 0u);
     EXPECT_EQ(comparison.worstPosition, 0);
     EXPECT_EQ(comparison.worstNormal, 0);
+    EXPECT_EQ(comparison.worstTangent, 0);
     EXPECT_EQ(comparison.largestPositionError, 0);
   }
 }
@@ -165,9 +211,10 @@ TEST_F(CompareTest, OneWrongNormalIsFound) {
 TEST_F(CompareTest, NumbersThatAreNotFiniteFail) {
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinity, -infinity}) {
-    for (std::vector<float>* values : {&positions, &normals}) {
-      for (std::size_t component = 0; component < 3; ++component) {
-        float& value = (*values)[11 * 3 + component];
+    for (std::vector<float>* values : {&positions, &normals, &tangents}) {
+      const std::size_t components = values->size() / count;
+      for (std::size_t component = 0; component < components; ++component) {
+        float& value = (*values)[11 * components + component];
         const float before = value;
         value = bad;
         expectOneFailure(11);
@@ -259,9 +306,10 @@ TEST(Compare, AZeroNormalMustStayZero) {
       std::vector<float> positions, normals{0, 0, 0, 0, 0, 1};
       for (const float coordinate : mesh.positions) positions.push_back(coordinate * scale);
       const auto passes = [&] {
-        return compare(*expected, floatAttribute(positions.data(), 2, 3),
-                       floatAttribute(normals.data(), 2, 3), method)
-            ->passed();
+        SkinnedView actual;
+        actual.positions = {positions.data(), 2, 12, VertexFormat::float32x3};
+        actual.normals = {normals.data(), 2, 12, VertexFormat::float32x3};
+        return compare(*expected, actual, method)->passed();
       };
       EXPECT_TRUE(passes()) << methodName(method) << ", scale " << scale;
       normals[0] = 1;
@@ -270,46 +318,162 @@ TEST(Compare, AZeroNormalMustStayZero) {
   }
 }
 
-TEST_F(CompareTest, NormalsAreComparedWhereBothHaveThem) {
+TEST_F(CompareTest, DirectionsAreComparedWhereBothHaveThem) {
+  const std::vector<float> normalsBefore = normals, tangentsBefore = tangents;
   normals.assign(normals.size(), 5.0f);
   EXPECT_FALSE(compared().passed());
-  const AttributeView view = floatAttribute(positions.data(), count, 3);
-  EXPECT_TRUE(compare(expected, view, {}, Method::linear)->passed());
-  const AttributeView bad = floatAttribute(normals.data(), count, 3);
+  SkinnedView without = view();
+  without.normals = {};
+  EXPECT_TRUE(compare(expected, without, Method::linear)->passed());
+  normals = normalsBefore;
+  tangents.assign(tangents.size(), 5.0f);
+  EXPECT_FALSE(compared().passed());
+  without = view();
+  without.tangents = {};
+  EXPECT_TRUE(compare(expected, without, Method::linear)->passed());
+  normals.assign(normals.size(), 5.0f);
   expected.normals.clear();
-  EXPECT_TRUE(compare(expected, view, bad, Method::linear)->passed());
+  expected.tangents.clear();
+  EXPECT_TRUE(compared().passed());
 }
 
 TEST_F(CompareTest, ReadsWithStrides) {
-  std::vector<unsigned char> bytes(1 + count * 29, 0xff);
+  constexpr std::uint32_t stride = 47;
+  std::vector<unsigned char> bytes(1 + count * stride, 0xff);
   for (std::size_t vertex = 0; vertex < count; ++vertex) {
-    std::memcpy(&bytes[1 + vertex * 29], &positions[vertex * 3], 12);
-    std::memcpy(&bytes[14 + vertex * 29], &normals[vertex * 3], 12);
+    std::memcpy(&bytes[1 + vertex * stride], &positions[vertex * 3], 12);
+    std::memcpy(&bytes[14 + vertex * stride], &normals[vertex * 3], 12);
+    std::memcpy(&bytes[27 + vertex * stride], &tangents[vertex * 4], 16);
   }
-  const AttributeView positionView{&bytes[1], count, 29, ComponentType::float32, 3};
-  const AttributeView normalView{&bytes[14], count, 29, ComponentType::float32, 3};
-  EXPECT_TRUE(compare(expected, positionView, normalView, Method::linear)->passed());
-  bytes[1 + 19 * 29 + 3] ^= 0x80;
-  EXPECT_EQ(compare(expected, positionView, normalView, Method::linear)->firstFailure, 19u);
+  SkinnedView strided;
+  strided.positions = {&bytes[1], count, stride, VertexFormat::float32x3};
+  strided.normals = {&bytes[14], count, stride, VertexFormat::float32x3};
+  strided.tangents = {&bytes[27], count, stride, VertexFormat::float32x4};
+  EXPECT_TRUE(compare(expected, strided, Method::linear)->passed());
+  for (const std::size_t lastOfAttribute : {1u + 3, 14u + 11, 27u + 15}) {
+    unsigned char& byte = bytes[lastOfAttribute + 19 * stride];
+    byte ^= 0x80;
+    EXPECT_EQ(compare(expected, strided, Method::linear)->firstFailure, 19u);
+    byte ^= 0x80;
+  }
 }
 
 TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
-  const AttributeView good = floatAttribute(positions.data(), count, 3);
-  const AttributeView goodNormals = floatAttribute(normals.data(), count, 3);
-  std::vector<AttributeView> bad(5, good);
-  bad[0].count = count - 1;
-  bad[1].type = ComponentType::uint32;
-  bad[2].components = 2;
-  bad[3].stride = 8;
-  bad[4].count = count + 1;
-  for (const AttributeView& view : bad) {
-    const Result<Comparison> positionsRefused =
-        compare(expected, view, goodNormals, Method::linear);
-    ASSERT_FALSE(positionsRefused.ok());
-    EXPECT_EQ(positionsRefused.error().code, ErrorCode::invalidArgument);
-    EXPECT_NE(positionsRefused.error().message.find("20"), std::string::npos);
-    EXPECT_FALSE(compare(expected, good, view, Method::linear).ok());
+  for (SkinnedAttribute SkinnedView::*attribute :
+       {&SkinnedView::positions, &SkinnedView::normals, &SkinnedView::tangents}) {
+    const auto refused = [&](const SkinnedAttribute& bad, std::string_view part) {
+      SkinnedView skinned = view();
+      skinned.*attribute = bad;
+      const Result<Comparison> result = compare(expected, skinned, Method::linear);
+      ASSERT_FALSE(result.ok()) << part;
+      EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
+      EXPECT_NE(result.error().message.find(part), std::string::npos) << result.error().message;
+    };
+    const SkinnedAttribute good = view().*attribute;
+    SkinnedAttribute bad = good;
+    bad.count = count - 1;
+    refused(bad, "19");
+    bad.count = count + 1;
+    refused(bad, "for 20");
+    bad = good;
+    bad.stride = formatSize(good.format) - 1;
+    refused(bad, "stride");
+    bad = good;
+    bad.format = VertexFormat::none;
+    refused(bad, "none");
   }
+  SkinnedView skinned = view();
+  skinned.positions.format = VertexFormat::octahedral16x2;
+  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+  skinned = view();
+  skinned.tangents.format = VertexFormat::float32x3;
+  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+  skinned = view();
+  skinned.positions = {};
+  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+}
+
+TEST_F(CompareTest, OneWrongTangentIsFound) {
+  for (const double error : {1.4e-6, 1.7e-6}) {
+    expected.tangents[19] = {1, error, 0, -1};
+    const Comparison comparison = compared();
+    EXPECT_EQ(comparison.passed(), error < 1.5e-6);
+    EXPECT_EQ(comparison.worstTangentVertex, 19u);
+    EXPECT_NEAR(comparison.worstTangent, error / 1.5e-6, 1e-6);
+  }
+  expectOneFailure(19);
+}
+
+TEST_F(CompareTest, AHandednessMustBeExact) {
+  for (const float wrong : {1.0f, 0.0f, -0.9999999f, -1.0000001f, 5.0f}) {
+    tangents[13 * 4 + 3] = wrong;
+    expectOneFailure(13);
+    EXPECT_GT(compared().worstTangent, 1e5);
+    EXPECT_EQ(compared().worstTangentVertex, 13u);
+  }
+}
+
+TEST_F(CompareTest, AHandednessThatIsAMatterOfRoundingMayBeEither) {
+  expected.conditioning[13].handednessAmbiguous = true;
+  for (const float either : {1.0f, -1.0f}) {
+    tangents[13 * 4 + 3] = either;
+    EXPECT_TRUE(compared().passed());
+  }
+  for (const float wrong : {0.0f, 0.9999999f}) {
+    tangents[13 * 4 + 3] = wrong;
+    expectOneFailure(13);
+  }
+}
+
+TEST_F(CompareTest, ABadlyAlignedTangentNeedOnlyBeOfUnitLength) {
+  for (reference::Conditioning& conditioning : expected.conditioning) {
+    conditioning.normalRotatedOnly = false;
+  }
+  expected.conditioning[8].tangentAlignment = 0.5e-3;
+  tangents[8 * 4] = -1;
+  EXPECT_TRUE(compared().passed());
+  tangents[8 * 4 + 3] = -1;
+  expectOneFailure(8);
+  tangents[8 * 4 + 3] = 1;
+  tangents[8 * 4] = 1.00001f;
+  expectOneFailure(8);
+  tangents[8 * 4] = 0;
+  expectOneFailure(8, Method::linear);
+}
+
+TEST_F(CompareTest, AZeroTangentStaysZeroAndKeepsItsHandedness) {
+  expected.tangents[8] = {0, 0, 0, 1};
+  expectOneFailure(8);
+  tangents[8 * 4] = 0;
+  EXPECT_TRUE(compared().passed());
+  tangents[8 * 4 + 3] = -1;
+  expectOneFailure(8);
+}
+
+TEST_F(CompareTest, WhereDisplacementsCancelADirectionItIsZeroOrOfUnitLength) {
+  reference::Conditioning& conditioning = expected.conditioning[4];
+  const auto passesWithLength = [&](float length) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      normals[4 * 3 + i] = i == 0 ? length : 0;
+      tangents[4 * 4 + i] = i == 1 ? length : 0;
+    }
+    const bool passes = compared().passed();
+    EXPECT_EQ(compared(Method::linear).passed(), passes);
+    return passes;
+  };
+  // Off by a twentieth: any unit vector. By all of its length: also zero.
+  conditioning.normalRounding = conditioning.tangentRounding = 0.051 / u;
+  EXPECT_TRUE(passesWithLength(1));
+  EXPECT_FALSE(passesWithLength(0));
+  conditioning.normalRounding = conditioning.tangentRounding = 1.001 / u;
+  EXPECT_TRUE(passesWithLength(0));
+  EXPECT_FALSE(passesWithLength(0.5f));
+  expected.normals[4] = {0, 0, 0};
+  expected.tangents[4] = {0, 0, 0, 1};
+  conditioning.normalRounding = conditioning.tangentRounding = HUGE_VAL;
+  EXPECT_TRUE(passesWithLength(1));
+  EXPECT_TRUE(passesWithLength(0));
+  EXPECT_FALSE(passesWithLength(0.5f));
 }
 
 }  // namespace
