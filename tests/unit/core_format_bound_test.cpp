@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -43,6 +44,12 @@ class Directions {
   std::mt19937_64 engine_{1};
   std::normal_distribution<double> normal_;
 };
+
+std::vector<VertexFormat> formatsThat(bool (*are)(VertexFormat)) {
+  std::vector<VertexFormat> formats;
+  std::copy_if(allVertexFormats.begin(), allVertexFormats.end(), std::back_inserter(formats), are);
+  return formats;
+}
 
 bool isFloat(VertexFormat format) {
   return formatName(format).starts_with("float32");
@@ -85,9 +92,10 @@ TEST(FormatBounds, FollowFromTheFormats) {
                    std::hypot(1 / 65534.0 + 8 * u, 3 / 65534.0 + 44 * u));
 }
 
-struct DirectionFormat : public ::testing::TestWithParam<VertexFormat> {};
+struct RoundedNormal : public ::testing::TestWithParam<VertexFormat> {};
+struct RoundedTangent : public ::testing::TestWithParam<VertexFormat> {};
 
-TEST_P(DirectionFormat, AMillionNormalsAreInsideTheBoundAndSomeAreNearIt) {
+TEST_P(RoundedNormal, AMillionAreInsideTheBoundAndSomeAreNearIt) {
   const VertexFormat format = GetParam();
   Directions directions;
   double worst = 0;
@@ -102,9 +110,8 @@ TEST_P(DirectionFormat, AMillionNormalsAreInsideTheBoundAndSomeAreNearIt) {
   EXPECT_GT(share, 0.8);
 }
 
-TEST_P(DirectionFormat, AMillionTangentsAreInsideTheBoundAndSomeAreNearIt) {
+TEST_P(RoundedTangent, AMillionAreInsideTheBoundAndSomeAreNearIt) {
   const VertexFormat format = GetParam();
-  if (!isTangentFormat(format)) return;  // a normal's alone
   Directions directions;
   double worst = 0;
   for (int trial = 0; trial < 1000000; ++trial) {
@@ -121,12 +128,13 @@ TEST_P(DirectionFormat, AMillionTangentsAreInsideTheBoundAndSomeAreNearIt) {
   EXPECT_GT(share, 0.8);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rounded, DirectionFormat,
-                         ::testing::Values(VertexFormat::float16x3, VertexFormat::float16x4,
-                                           VertexFormat::snorm16x3, VertexFormat::snorm16x4,
-                                           VertexFormat::snorm8x3, VertexFormat::snorm8x4,
-                                           VertexFormat::octahedral16x2,
-                                           VertexFormat::octahedral8x2),
+bool isRoundedTangent(VertexFormat format) {
+  return isTangentFormat(format) && !isFloat(format);
+}
+INSTANTIATE_TEST_SUITE_P(
+    All, RoundedNormal,
+    ::testing::ValuesIn(formatsThat([](VertexFormat format) { return !isFloat(format); })), nameOf);
+INSTANTIATE_TEST_SUITE_P(All, RoundedTangent, ::testing::ValuesIn(formatsThat(isRoundedTangent)),
                          nameOf);
 
 // As a kernel does it: no intermediate is better than float32.
@@ -252,15 +260,19 @@ struct OneVertex {
   Box box{{-1, -1, -1}, {1, 1, 1}};
 };
 
-struct CompareFormat : public ::testing::TestWithParam<VertexFormat> {};
+struct ComparePosition : public ::testing::TestWithParam<VertexFormat> {};
+struct CompareNormal : public ::testing::TestWithParam<VertexFormat> {};
+struct CompareTangent : public ::testing::TestWithParam<VertexFormat> {};
+struct CompareFourth : public ::testing::TestWithParam<VertexFormat> {};
+struct CompareLength : public ::testing::TestWithParam<VertexFormat> {};
+struct CompareFinite : public ::testing::TestWithParam<VertexFormat> {};
 
 /// Moves what is expected to a given share of the bound away from what is stored.
 Double3 awayFrom(const Double3& stored, double distanceAway) {
   return {stored[0] + distanceAway * 0.6, stored[1], stored[2] + distanceAway * 0.8};
 }
 
-TEST_P(CompareFormat, APositionIsHeldToItsOwnBound) {
-  if (!isPositionFormat(GetParam())) return;
+TEST_P(ComparePosition, APositionIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
@@ -283,7 +295,7 @@ TEST_P(CompareFormat, APositionIsHeldToItsOwnBound) {
   }
 }
 
-TEST_P(CompareFormat, ANormalIsHeldToItsOwnBound) {
+TEST_P(CompareNormal, ANormalIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
@@ -299,8 +311,7 @@ TEST_P(CompareFormat, ANormalIsHeldToItsOwnBound) {
   }
 }
 
-TEST_P(CompareFormat, ATangentIsHeldToItsOwnBound) {
-  if (!isTangentFormat(GetParam())) return;
+TEST_P(CompareTangent, ATangentIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
@@ -317,8 +328,7 @@ TEST_P(CompareFormat, ATangentIsHeldToItsOwnBound) {
   }
 }
 
-TEST_P(CompareFormat, AWrongHandednessIsFound) {
-  if (!isTangentFormat(GetParam())) return;
+TEST_P(CompareTangent, AWrongHandednessIsFound) {
   for (const double handedness : {1.0, -1.0}) {
     OneVertex vertex;
     vertex.expected.tangents[0][3] = handedness;
@@ -335,8 +345,7 @@ TEST_P(CompareFormat, AWrongHandednessIsFound) {
 }
 
 // The smallest step that the format has away from ±1.
-TEST_P(CompareFormat, AHandednessThatIsNotWholeIsFound) {
-  if (!hasFourComponents(GetParam())) return;
+TEST_P(CompareFourth, AHandednessThatIsNotWholeIsFound) {
   OneVertex vertex;
   vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, GetParam());
   const std::size_t lastComponent = vertex.tangentBytes.size() / 4 * 3;
@@ -348,8 +357,7 @@ TEST_P(CompareFormat, AHandednessThatIsNotWholeIsFound) {
   EXPECT_FALSE(vertex.passes());
 }
 
-TEST_P(CompareFormat, FourthComponentsMustBeFilled) {
-  if (!hasFourComponents(GetParam())) return;
+TEST_P(CompareFourth, FourthComponentsMustBeFilled) {
   for (const bool ofPosition : {true, false}) {
     if (ofPosition && !isPositionFormat(GetParam())) continue;
     OneVertex vertex;
@@ -363,7 +371,7 @@ TEST_P(CompareFormat, FourthComponentsMustBeFilled) {
   }
 }
 
-TEST_P(CompareFormat, AZeroDirectionStaysZeroOrIsUpInAnOctahedron) {
+TEST_P(CompareNormal, AZeroDirectionStaysZeroOrIsUpInAnOctahedron) {
   OneVertex vertex;
   vertex.expected.normals[0] = {0, 0, 0};
   vertex.expected.tangents[0] = {0, 0, 0, 1};
@@ -379,8 +387,7 @@ TEST_P(CompareFormat, AZeroDirectionStaysZeroOrIsUpInAnOctahedron) {
   EXPECT_FALSE(vertex.passes());
 }
 
-TEST_P(CompareFormat, WhereOnlyTheLengthCanBeSaidTheFormatIsAllowedFor) {
-  if (isOctahedral(GetParam())) return;  // of unit length whatever is stored
+TEST_P(CompareLength, WhereOnlyTheLengthCanBeSaidTheFormatIsAllowedFor) {
   OneVertex vertex;
   vertex.expected.conditioning[0].normalAlignment = 0;
   vertex.expected.conditioning[0].tangentAlignment = 0;
@@ -403,8 +410,7 @@ TEST_P(CompareFormat, WhereOnlyTheLengthCanBeSaidTheFormatIsAllowedFor) {
   }
 }
 
-TEST_P(CompareFormat, NumbersThatAreNotFiniteFail) {
-  if (!isFloat(GetParam()) && !isHalf(GetParam())) return;
+TEST_P(CompareFinite, NumbersThatAreNotFiniteFail) {
   const double infinity = std::numeric_limits<double>::infinity();
   const Double3 infinite{0, infinity, 0};
   for (const Method method : allMethods) {
@@ -427,7 +433,24 @@ TEST_P(CompareFormat, NumbersThatAreNotFiniteFail) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, CompareFormat, ::testing::ValuesIn(allVertexFormats), nameOf);
+// What is octahedral is of unit length whatever is stored.
+bool hasALength(VertexFormat format) {
+  return !isOctahedral(format);
+}
+bool canBeInfinite(VertexFormat format) {
+  return isFloat(format) || isHalf(format);
+}
+INSTANTIATE_TEST_SUITE_P(All, ComparePosition, ::testing::ValuesIn(formatsThat(isPositionFormat)),
+                         nameOf);
+INSTANTIATE_TEST_SUITE_P(All, CompareNormal, ::testing::ValuesIn(formatsThat(isNormalFormat)),
+                         nameOf);
+INSTANTIATE_TEST_SUITE_P(All, CompareTangent, ::testing::ValuesIn(formatsThat(isTangentFormat)),
+                         nameOf);
+INSTANTIATE_TEST_SUITE_P(All, CompareFourth, ::testing::ValuesIn(formatsThat(hasFourComponents)),
+                         nameOf);
+INSTANTIATE_TEST_SUITE_P(All, CompareLength, ::testing::ValuesIn(formatsThat(hasALength)), nameOf);
+INSTANTIATE_TEST_SUITE_P(All, CompareFinite, ::testing::ValuesIn(formatsThat(canBeInfinite)),
+                         nameOf);
 
 TEST(CompareHalf, APositionMayOverflowWhereTheReferenceDoes) {
   const double infinity = std::numeric_limits<double>::infinity();
