@@ -1,5 +1,8 @@
 // Normals in the reference: inverse transpose, sign under a mirror, unit length, zero stays zero.
 
+#include <algorithm>
+
+#include "dermis/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -162,6 +165,65 @@ TEST(ReferenceNormals, AlignmentIsTheCofactorsLengthOverTheLargestSingularValueS
   EXPECT_TRUE(skinned(mesh, rigid, Method::dualQuaternion).conditioning[0].normalRotatedOnly);
   EXPECT_FALSE(skinned(mesh, rigid, Method::linear).conditioning[0].normalRotatedOnly);
   EXPECT_NEAR(skinned(mesh, rigid, Method::linear).conditioning[0].normalAlignment, 1, 1e-6);
+}
+
+TEST(ReferenceNormals, AlignmentCountsWhatTheJointsCancel) {
+  // M = 0.75 · 1 + 0.25 · half a turn about z = diag(0.5, 0.5, 1); adjᵀ = diag(0.5, 0.5, 0.25).
+  const std::array turns{JointMatrix{}, jointOf(diagonalMatrix(-1, -1, 1)),
+                         jointOf(diagonalMatrix(1, -1, -1)), jointOf(diagonalMatrix(-1, 1, -1))};
+  OwnedMesh half = vertexWithNormal({0, 0, 1}, {{0, 0.75f}, {1, 0.25f}});
+  EXPECT_NEAR(skinned(half, turns, Method::linear).conditioning[0].normalAlignment, 0.25, 1e-15);
+  // 19/64 of no turn and 15/64 of each half turn leave M = 4/64 · 1, of joints of size 1.
+  OwnedMesh little = vertexWithNormal({0, 0, 1}, {{0, 19}, {1, 15}, {2, 15}, {3, 15}});
+  const double left = 4.0 / 64;
+  EXPECT_NEAR(skinned(little, turns, Method::linear).conditioning[0].normalAlignment, left, 1e-15);
+}
+
+/// Linear blending by equal weights as a kernel does it: each operation rounded to float32.
+std::array<float, 3> normalInFloat(std::span<const JointMatrix> pose, const float* bind) {
+  glm::vec3 rows[3] = {};
+  for (const JointMatrix& joint : pose) {
+    for (int row = 0; row < 3; ++row) {
+      const auto& entries = joint.m[row];
+      rows[row] += 0.25f * glm::vec3(entries[0], entries[1], entries[2]);
+    }
+  }
+  const glm::vec3 n(bind[0], bind[1], bind[2]);
+  const glm::vec3 first = glm::cross(rows[1], rows[2]);
+  glm::vec3 turned(glm::dot(first, n), glm::dot(glm::cross(rows[2], rows[0]), n),
+                   glm::dot(glm::cross(rows[0], rows[1]), n));
+  if (glm::dot(rows[0], first) < 0) turned = -turned;
+  turned /= glm::length(turned);
+  return {turned.x, turned.y, turned.z};
+}
+
+// Half turns about three axes and none, nearly: what is left of their sum is a small M whose
+// entries are no more exact than those of its joints.
+TEST(ReferenceNormals, AFloatKernelIsInsideTheBoundWhereJointsCancel) {
+  RigRandom random(11);
+  int compared = 0;
+  double worst = 0;
+  for (int rig = 0; rig < 4000; ++rig) {
+    const glm::dmat3 base = rotationAbout(random.direction(), random.between(0, pi));
+    const double apart = std::exp2(random.between(-8, 0));
+    std::vector<JointMatrix> pose;
+    for (const glm::dmat3& turn : {glm::dmat3(1.0), diagonalMatrix(1, -1, -1),
+                                   diagonalMatrix(-1, 1, -1), diagonalMatrix(-1, -1, 1)}) {
+      const glm::dmat3 astray = rotationAbout(random.direction(), apart * random.between(0, 1));
+      pose.push_back(jointOf(astray * turn * base));
+    }
+    OwnedMesh mesh =
+        vertexWithNormal(random.direction(), {{0, 1.0f}, {1, 1.0f}, {2, 1.0f}, {3, 1.0f}});
+    const reference::SkinnedMesh expected = skinned(mesh, pose, Method::linear);
+    const double bound = normalBound(Method::linear, expected.conditioning[0]);
+    if (bound < 0) continue;
+    ++compared;
+    const std::array<float, 3> n = normalInFloat(pose, mesh.normals.data());
+    const glm::dvec3 error = glm::dvec3(n[0], n[1], n[2]) - toVector(expected.normals[0]);
+    worst = std::max(worst, glm::length(error) / bound);
+  }
+  EXPECT_LE(worst, 1);
+  EXPECT_GT(compared, 2000);
 }
 
 // Flattened along it, a normal keeps its line, but not a side that could be compared.

@@ -34,9 +34,10 @@ struct Conditioning {
   double positionRounding = 0;
   double normalRounding = 0;
   double tangentRounding = 0;
-  double normalAlignment =
-      1;  ///< |adjᵀ(M) n| / (σ_max² |n|), M the blended 3×3 and σ_max its largest singular value
-  double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|)
+  /// |adjᵀ(M) n| / (max σ_j σ_max |n|), M the blended 3×3 and σ_max its largest singular value:
+  /// where joints cancel in a blend, what is left was rounded at the size of the joints.
+  double normalAlignment = 1;
+  double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|), likewise
   bool normalRotatedOnly =
       true;  ///< dual quaternions with rigid joints: directions pass through no 3×3
   bool handednessAmbiguous =

@@ -126,6 +126,9 @@ struct BlendedMatrix {
         largest(singularValues(matrix).values[0]),
         stretch(largestOfJoints) {}
 
+  /// Whether the sign of the determinant is a matter of rounding.
+  bool isFlat() const { return std::abs(determinant) <= 1e-5 * stretch * largest * largest; }
+
   dmat3 m;
   double determinant;
   double largest;  ///< its largest singular value
@@ -140,9 +143,9 @@ dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
   const double inputLength = glm::length(normal);
   if (inputLength == 0) return result;  // stays zero, exactly
   conditioning.normalAlignment =
-      largest > 0 ? glm::length(result) / (largest * largest * inputLength) : 0;
+      largest > 0 ? glm::length(result) / (largest * stretch * inputLength) : 0;
   // Where the determinant is a matter of rounding, so is the side that the normal points to.
-  if (std::abs(determinant) <= 1e-5 * largest * largest * largest) conditioning.normalAlignment = 0;
+  if (matrix.isFlat()) conditioning.normalAlignment = 0;
   if (glm::length(result) == 0) return normal;  // of rank 1 or 0: any direction will do
   return determinant < 0 ? -result : result;
 }
@@ -161,8 +164,7 @@ dvec3 transformTangent(const BlendedMatrix& matrix, const dvec3& tangent,
 /// A mirror turns a tangent frame's handedness over.
 double transformHandedness(const BlendedMatrix& matrix, double handedness,
                            Conditioning& conditioning) {
-  conditioning.handednessAmbiguous =
-      std::abs(matrix.determinant) <= 1e-5 * matrix.stretch * matrix.largest * matrix.largest;
+  conditioning.handednessAmbiguous = matrix.isFlat();
   return matrix.determinant < 0 ? -handedness : handedness;
 }
 
