@@ -13,50 +13,103 @@ using uint = std::uint32_t;
 #define DERMIS_CONSTANT const uint
 #endif
 
-// Bindings of descriptor set 0. The palette kernel reads MATRICES and writes PALETTES; the skin
-// kernel reads MESHES and, as the palette, PALETTES (dual quaternions) or MATRICES (linear), and
-// writes OUTPUT. Four storage buffers each.
+// Bindings of descriptor set 0: storage buffers. The palette kernel reads MATRICES, writes PALETTES
+// and clears RESULTS; the skin kernel reads MESHES and, as the palette, PALETTES (dual quaternions)
+// or the joint matrices (linear), writes one buffer for each attribute, and RESULTS. A device with
+// only the four storage buffers a stage that Vulkan guarantees has the first BINDING_COUNT_LEAST:
+// all attributes go to POSITIONS there, and there are no results.
 DERMIS_CONSTANT BINDING_TABLES = 0u;
 DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
 DERMIS_CONSTANT BINDING_PALETTES =
     2u;  // palette kernel: written; skin kernel: palettes or joint matrices
-DERMIS_CONSTANT BINDING_OUTPUT = 3u;  // skin kernel only
-DERMIS_CONSTANT BINDING_COUNT = 4u;
+DERMIS_CONSTANT BINDING_POSITIONS = 3u;
+DERMIS_CONSTANT BINDING_COUNT_LEAST = 4u;
+DERMIS_CONSTANT BINDING_NORMALS = 4u;
+DERMIS_CONSTANT BINDING_TANGENTS = 5u;
+DERMIS_CONSTANT BINDING_PREVIOUS = 6u;
+DERMIS_CONSTANT BINDING_RESULTS = 7u;
+DERMIS_CONSTANT BINDING_COUNT = 8u;
 
 // Specialisation constants.
 DERMIS_CONSTANT CONSTANT_WORKGROUP_SIZE = 0u;
 DERMIS_CONSTANT CONSTANT_METHOD = 1u;
-DERMIS_CONSTANT CONSTANT_NORMALS = 2u;
-DERMIS_CONSTANT CONSTANT_INFLUENCES = 3u;  // 1, 2, 4, or 0 for any number
-DERMIS_CONSTANT CONSTANT_INSTANCES = 4u;   // instances per invocation
-DERMIS_CONSTANT CONSTANT_COUNT = 5u;
+DERMIS_CONSTANT CONSTANT_INFLUENCES = 2u;  // 1, 2, 4, or 0 for any number
+DERMIS_CONSTANT CONSTANT_INSTANCES = 3u;   // instances per invocation
+DERMIS_CONSTANT CONSTANT_POSITION_FORMAT = 4u;
+DERMIS_CONSTANT CONSTANT_NORMAL_FORMAT = 5u;
+DERMIS_CONSTANT CONSTANT_TANGENT_FORMAT = 6u;
+DERMIS_CONSTANT CONSTANT_POSITION_UNIT = 7u;  // bytes of one store: 4, 2 or 1
+DERMIS_CONSTANT CONSTANT_NORMAL_UNIT = 8u;
+DERMIS_CONSTANT CONSTANT_TANGENT_UNIT = 9u;
+DERMIS_CONSTANT CONSTANT_PREVIOUS_UNIT = 10u;
+DERMIS_CONSTANT CONSTANT_MOTION = 11u;
+DERMIS_CONSTANT CONSTANT_MORPHS = 12u;  // 0 or 1
+DERMIS_CONSTANT CONSTANT_BOUNDS = 13u;  // 0 or 1
+DERMIS_CONSTANT CONSTANT_COUNT = 14u;
 
 DERMIS_CONSTANT METHOD_LINEAR = 0u;
 DERMIS_CONSTANT METHOD_DUAL_QUATERNION = 1u;
 
+// The numbers of VertexFormat.
+DERMIS_CONSTANT FORMAT_NONE = 0u;
+DERMIS_CONSTANT FORMAT_FLOAT32X3 = 1u;
+DERMIS_CONSTANT FORMAT_FLOAT32X4 = 2u;
+DERMIS_CONSTANT FORMAT_FLOAT16X3 = 3u;
+DERMIS_CONSTANT FORMAT_FLOAT16X4 = 4u;
+DERMIS_CONSTANT FORMAT_SNORM16X3 = 5u;
+DERMIS_CONSTANT FORMAT_SNORM16X4 = 6u;
+DERMIS_CONSTANT FORMAT_SNORM8X3 = 7u;
+DERMIS_CONSTANT FORMAT_SNORM8X4 = 8u;
+DERMIS_CONSTANT FORMAT_OCTAHEDRAL16X2 = 9u;
+DERMIS_CONSTANT FORMAT_OCTAHEDRAL8X2 = 10u;
+
+// The numbers of Motion.
+DERMIS_CONSTANT MOTION_NONE = 0u;
+DERMIS_CONSTANT MOTION_KEPT = 1u;
+DERMIS_CONSTANT MOTION_RESKINNED = 2u;
+
 // Packed mesh: a header, then sections at word offsets from the blob's start.
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
-DERMIS_CONSTANT MESH_VERSION = 1u;
+DERMIS_CONSTANT MESH_VERSION = 2u;
 DERMIS_CONSTANT MESH_HEADER_MAGIC = 0u;
 DERMIS_CONSTANT MESH_HEADER_VERSION = 1u;
-DERMIS_CONSTANT MESH_HEADER_CHECKSUM = 2u;  // FNV-1a, by words, of all that follow it
+DERMIS_CONSTANT MESH_HEADER_CHECKSUM =
+    2u;  // of all words that follow it: hash = rotl((hash ^ word) * 16777619, 15) from 2166136261
 DERMIS_CONSTANT MESH_HEADER_WORDS_TOTAL = 3u;
 DERMIS_CONSTANT MESH_HEADER_VERTEX_COUNT = 4u;
 DERMIS_CONSTANT MESH_HEADER_REQUIRED_JOINTS = 5u;
 DERMIS_CONSTANT MESH_HEADER_MAX_INFLUENCES = 6u;
-DERMIS_CONSTANT MESH_HEADER_POSITIONS = 7u;  // word offset: 3 floats a vertex
-DERMIS_CONSTANT MESH_HEADER_NORMALS = 8u;    // likewise, 0 where there are none
-DERMIS_CONSTANT MESH_HEADER_BLOCKS = 9u;     // word offset: BLOCK_WORDS words a block
-DERMIS_CONSTANT MESH_HEADER_WORDS = 12u;
+DERMIS_CONSTANT MESH_HEADER_POSITIONS = 7u;      // 3 floats a vertex
+DERMIS_CONSTANT MESH_HEADER_NORMALS = 8u;        // likewise, 0 where there are none
+DERMIS_CONSTANT MESH_HEADER_TANGENTS = 9u;       // 4 floats a vertex, 0 where there are none
+DERMIS_CONSTANT MESH_HEADER_FIRSTS = 10u;        // vertices + 1 words: each vertex' first influence
+DERMIS_CONSTANT MESH_HEADER_INFLUENCES = 11u;    // INFLUENCE_WORDS each; an even offset
+DERMIS_CONSTANT MESH_HEADER_MORPHS = 12u;        // MORPH_WORDS a morph target
+DERMIS_CONSTANT MESH_HEADER_MORPH_COUNT = 13u;
+DERMIS_CONSTANT MESH_HEADER_WORDS = 16u;
 
-// Influences are stored in blocks of 64 vertices. A block has as many slots as its most-influenced
-// vertex has influences: first `slots` rows of 64 float weights, then (slots + 1) / 2 rows of 64
-// pairs of 16-bit joint indices, the even slot in the low half. Slot 0 is the pivot. A slot of
-// weight 0 is empty; slot 0 empty means that the vertex stays in bind pose.
-DERMIS_CONSTANT BLOCK_VERTICES = 64u;
-DERMIS_CONSTANT BLOCK_OFFSET = 0u;  // word offset of the rows from the blob's start
-DERMIS_CONSTANT BLOCK_SLOTS = 1u;
-DERMIS_CONSTANT BLOCK_WORDS = 2u;
+// Influences stand vertex by vertex, as many as each has. The first of a vertex is its pivot; a
+// vertex without influences stays in bind pose.
+DERMIS_CONSTANT INFLUENCE_WEIGHT = 0u;  // float; those of a vertex sum to exactly 1
+DERMIS_CONSTANT INFLUENCE_JOINT = 1u;
+DERMIS_CONSTANT INFLUENCE_WORDS = 2u;
+
+// A morph target displaces some vertices of some blocks of MORPH_BLOCK_VERTICES: a record a block,
+// from the first such block to the last, with a mask of the displaced vertices and the place of the
+// first one's displacement; those of the others follow. A displacement has 3 floats for each
+// attribute of the target, in the order of MORPH_HAS_*.
+DERMIS_CONSTANT MORPH_FIRST_BLOCK = 0u;
+DERMIS_CONSTANT MORPH_BLOCK_COUNT = 1u;
+DERMIS_CONSTANT MORPH_BLOCKS = 2u;  // word offset of the block records
+DERMIS_CONSTANT MORPH_ATTRIBUTES = 3u;
+DERMIS_CONSTANT MORPH_WORDS = 4u;
+DERMIS_CONSTANT MORPH_HAS_POSITIONS = 1u;
+DERMIS_CONSTANT MORPH_HAS_NORMALS = 2u;
+DERMIS_CONSTANT MORPH_HAS_TANGENTS = 4u;
+DERMIS_CONSTANT MORPH_BLOCK_VERTICES = 64u;
+DERMIS_CONSTANT MORPH_BLOCK_MASK = 0u;          // 2 words, the low one first
+DERMIS_CONSTANT MORPH_BLOCK_DISPLACEMENTS = 2u;  // word offset
+DERMIS_CONSTANT MORPH_BLOCK_WORDS = 3u;
 
 // Table record of a palette. Offsets into the matrices and palettes buffers count 16-byte units.
 DERMIS_CONSTANT PALETTE_MATRICES = 0u;  // the first joint matrix: 3 units each
@@ -80,24 +133,56 @@ DERMIS_CONSTANT GROUP_VERTEX_END = 3u;
 DERMIS_CONSTANT GROUP_VERTEX_GROUPS = 4u;  // workgroups that cover the vertices once
 DERMIS_CONSTANT GROUP_FIRST_INSTANCE = 5u;
 DERMIS_CONSTANT GROUP_INSTANCE_COUNT = 6u;
-DERMIS_CONSTANT GROUP_POSITION_STRIDE = 7u;  // words
-DERMIS_CONSTANT GROUP_NORMAL_STRIDE = 8u;    // words
+DERMIS_CONSTANT GROUP_POSITION_STRIDE = 7u;  // bytes, as the following
+DERMIS_CONSTANT GROUP_NORMAL_STRIDE = 8u;
+DERMIS_CONSTANT GROUP_TANGENT_STRIDE = 9u;
+DERMIS_CONSTANT GROUP_PREVIOUS_STRIDE = 10u;
 DERMIS_CONSTANT GROUP_WORDS = 12u;
 
-// Table record of an instance. Output offsets are words from the start of the output range that the
+// Table record of an instance. Output offsets are bytes from the start of the output range that the
 // dispatch writes, for the group's first vertex.
 DERMIS_CONSTANT INSTANCE_PALETTE =
     0u;  // unit of the palette's status, or of the first joint matrix for linear
 DERMIS_CONSTANT INSTANCE_JOINTS = 1u;  // joints of the palette
-DERMIS_CONSTANT INSTANCE_POSITIONS = 2u;
-DERMIS_CONSTANT INSTANCE_NORMALS = 3u;
-DERMIS_CONSTANT INSTANCE_WORDS = 4u;
+DERMIS_CONSTANT INSTANCE_FLAGS = 2u;
+DERMIS_CONSTANT INSTANCE_EXTENSION = 3u;  // word offset of its extension in the tables, where it has one
+DERMIS_CONSTANT INSTANCE_POSITIONS = 4u;
+DERMIS_CONSTANT INSTANCE_NORMALS = 5u;
+DERMIS_CONSTANT INSTANCE_TANGENTS = 6u;
+DERMIS_CONSTANT INSTANCE_PREVIOUS = 7u;
+DERMIS_CONSTANT INSTANCE_WORDS = 8u;
+
+DERMIS_CONSTANT INSTANCE_RESTARTS = 1u;  // previous positions are the current ones
+DERMIS_CONSTANT INSTANCE_SETTLES = 2u;   // not skinned; previous positions become the current ones
+
+// What only some instances have.
+DERMIS_CONSTANT EXTENSION_PREVIOUS_PALETTE = 0u;  // as INSTANCE_PALETTE
+DERMIS_CONSTANT EXTENSION_PREVIOUS_JOINTS = 1u;
+DERMIS_CONSTANT EXTENSION_MORPHS = 2u;  // word offset of the active morph targets in the tables
+DERMIS_CONSTANT EXTENSION_MORPH_COUNT = 3u;
+DERMIS_CONSTANT EXTENSION_PREVIOUS_MORPHS = 4u;
+DERMIS_CONSTANT EXTENSION_PREVIOUS_MORPH_COUNT = 5u;
+DERMIS_CONSTANT EXTENSION_RESULT = 6u;  // word offset in the results
+DERMIS_CONSTANT EXTENSION_CENTRE = 8u;  // of the box of snorm16 positions: 3 floats
+DERMIS_CONSTANT EXTENSION_INVERSE = 12u;  // 1 / half its size: 3 floats
+DERMIS_CONSTANT EXTENSION_WORDS = 16u;
+
+// An active morph target.
+DERMIS_CONSTANT ACTIVE_TARGET = 0u;
+DERMIS_CONSTANT ACTIVE_WEIGHT = 1u;  // float
+DERMIS_CONSTANT ACTIVE_WORDS = 2u;
+
+// What is found out about an instance's skinned positions, as InstanceResult has it.
+DERMIS_CONSTANT RESULT_MIN = 0u;  // 3 ordered numbers
+DERMIS_CONSTANT RESULT_CLAMPED = 3u;
+DERMIS_CONSTANT RESULT_MAX = 4u;  // likewise
+DERMIS_CONSTANT RESULT_WORDS = 8u;
 
 // Push constants, by word.
 DERMIS_CONSTANT PUSH_FIRST_RECORD = 0u;
 DERMIS_CONSTANT PUSH_RECORD_COUNT = 1u;
 DERMIS_CONSTANT PUSH_WORKGROUP_COUNT = 2u;
-DERMIS_CONSTANT PUSH_INSTANCE_RECORDS = 3u;
+DERMIS_CONSTANT PUSH_INSTANCE_RECORDS = 3u;  // palette kernel: the number of results to clear
 DERMIS_CONSTANT PUSH_WORDS = 4u;
 
 #ifdef __cplusplus

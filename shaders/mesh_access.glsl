@@ -1,32 +1,33 @@
 // How a packed mesh is read. Needs abi.h.
 
-layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Meshes { uint meshes[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Meshes { uint meshes[]; };
 
 vec3 meshVector(uint word) {
   return vec3(uintBitsToFloat(meshes[word]), uintBitsToFloat(meshes[word + 1u]), uintBitsToFloat(meshes[word + 2u]));
 }
 
+// The word at which a section begins.
+uint meshSection(uint mesh, uint header) { return mesh + meshes[mesh + header]; }
+
 // Where the influences of one vertex stand.
-struct InfluenceRows {
-  uint weights;  // word of slot 0's weight
-  uint joints;   // word of slots 0 and 1's joints
-  uint slots;    // of the block; those of this vertex may be fewer
+struct Influences {
+  uint word;
+  uint count;
 };
 
-InfluenceRows influenceRows(uint mesh, uint vertex) {
-  uint block = mesh + meshes[mesh + MESH_HEADER_BLOCKS] + (vertex / BLOCK_VERTICES) * BLOCK_WORDS;
-  InfluenceRows rows;
-  rows.slots = meshes[block + BLOCK_SLOTS];
-  rows.weights = mesh + meshes[block + BLOCK_OFFSET] + vertex % BLOCK_VERTICES;
-  rows.joints = rows.weights + rows.slots * BLOCK_VERTICES;
-  return rows;
+Influences influencesOf(uint mesh, uint vertex) {
+  uint firsts = meshSection(mesh, MESH_HEADER_FIRSTS) + vertex;
+  uint first = meshes[firsts];
+  Influences influences;
+  influences.word = meshSection(mesh, MESH_HEADER_INFLUENCES) + first * INFLUENCE_WORDS;
+  influences.count = meshes[firsts + 1u] - first;
+  return influences;
 }
 
-float influenceWeight(InfluenceRows rows, uint slot) {
-  return uintBitsToFloat(meshes[rows.weights + slot * BLOCK_VERTICES]);
+float influenceWeight(Influences influences, uint slot) {
+  return uintBitsToFloat(meshes[influences.word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT]);
 }
 
-uint influenceJoint(InfluenceRows rows, uint slot) {
-  uint pair = meshes[rows.joints + (slot / 2u) * BLOCK_VERTICES];
-  return slot % 2u == 0u ? pair & 0xffffu : pair >> 16u;
+uint influenceJoint(Influences influences, uint slot) {
+  return meshes[influences.word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT];
 }

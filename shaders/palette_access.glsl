@@ -1,7 +1,7 @@
 // How the palette is read. Dual quaternions: a status unit, then rotation and dual part of each joint, then the
 // scale/shear parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
 
-layout(set = 0, binding = BINDING_PALETTES, std430) readonly buffer Palettes { uvec4 palettes[]; };
+layout(set = 0, binding = BINDING_PALETTES, std430) restrict readonly buffer Palettes { uvec4 palettes[]; };
 
 vec4 paletteUnit(uint unit) { return uintBitsToFloat(palettes[unit]); }
 

@@ -1,6 +1,6 @@
 // The tables of a batch and this dispatch's place in them. Needs abi.h.
 
-layout(set = 0, binding = BINDING_TABLES, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = BINDING_TABLES, std430) restrict readonly buffer Tables { uint tables[]; };
 
 layout(push_constant) uniform Push { uint push[PUSH_WORDS]; };
 

@@ -19,9 +19,10 @@ ExitStatus listDevices() {
                info.unusable.empty() ? "usable" : "not usable: " + info.unusable);
     fmt::print(
         "   storage buffers of {} MiB, {} a stage; {} workgroups a dimension; push descriptors: "
-        "{}\n",
+        "{}; stores of 2 bytes: {}, of 1 byte: {}\n",
         info.maxStorageBufferRange >> 20, info.storageBuffersPerStage, info.maxWorkgroupCount,
-        info.pushDescriptors ? "yes" : "no");
+        info.pushDescriptors ? "yes" : "no", info.storage16Bit ? "yes" : "no",
+        info.storage8Bit ? "yes" : "no");
   }
   return ExitStatus::done;
 }

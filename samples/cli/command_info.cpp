@@ -29,8 +29,8 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["tangents"] = !primitive.tangents.empty();
   json["morphTargets"] = primitive.morphTargets.size();
   json["influencesStored"] = primitive.influencesPerVertex();
-  json["influencesUsed"] = part.mesh ? part.mesh->packed().maxInfluences() : 0;
-  json["jointsUsed"] = part.mesh ? part.mesh->packed().requiredJoints() : 0;
+  json["influencesUsed"] = part.mesh ? part.mesh->packed().info().maxInfluences : 0;
+  json["jointsUsed"] = part.mesh ? part.mesh->packed().info().requiredJoints : 0;
   json["joints"] = scene.model->skins[part.source.skin].joints.size();
   json["packedBytes"] = part.mesh ? part.mesh->packed().bytes().size() : 0;
   json["problems"] = Json::array();

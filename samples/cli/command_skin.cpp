@@ -1,10 +1,18 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <regex>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "batch_runner.h"
 #include "commands.h"
@@ -30,63 +38,104 @@ struct SkinOptions {
   bool strict = false;
 };
 
-/// Positions and, where a mesh has them, normals of every part; parts without influences are left
-/// as they are.
-using SkinParts = std::function<Result<std::vector<samples::SkinnedVertices>>(
-    const std::vector<std::vector<JointMatrix>>& palettes)>;
+/// One part in one pose.
+struct SkinnedPart {
+  std::vector<float> positions;  ///< 3 a vertex
+  std::vector<float> normals;    ///< 3 a vertex, or empty
+  std::vector<float> tangents;   ///< 4 a vertex, or empty
+};
 
-samples::SkinnedVertices bindPose(const ScenePart& part) {
-  return {part.primitive->positions, part.primitive->normals, {}};
+/// Every part of the scene in a pose. Tangents where they are wanted and a mesh has them.
+using SkinParts = std::function<Result<std::vector<SkinnedPart>>(const ScenePose& pose)>;
+
+/// Adds to the first three of every `components` values.
+void addDisplacements(std::vector<float>& values, std::size_t components,
+                      const std::vector<float>& displacements, float weight) {
+  for (std::size_t i = 0; i / 3 * components < values.size() && i < displacements.size(); ++i)
+    values[i / 3 * components + i % 3] += weight * displacements[i];
 }
 
-std::vector<float> toFloats(const std::vector<reference::Double3>& vectors) {
+/// A part without influences: morphed, but where it is.
+SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs) {
+  SkinnedPart skinned{part.primitive->positions, part.primitive->normals, part.primitive->tangents};
+  for (const MorphWeight& morph : morphs) {
+    const gltf::MorphTarget& target = part.primitive->morphTargets[morph.target];
+    addDisplacements(skinned.positions, 3, target.positions, morph.weight);
+    addDisplacements(skinned.normals, 3, target.normals, morph.weight);
+    addDisplacements(skinned.tangents, 4, target.tangents, morph.weight);
+  }
+  return skinned;
+}
+
+template <typename Vector>
+std::vector<float> toFloats(const std::vector<Vector>& vectors) {
   std::vector<float> floats;
-  floats.reserve(vectors.size() * 3);
-  for (const reference::Double3& vector : vectors) {
+  floats.reserve(vectors.size() * std::tuple_size_v<Vector>);
+  for (const Vector& vector : vectors) {
     for (const double value : vector) floats.push_back(static_cast<float>(value));
   }
   return floats;
 }
 
 SkinParts referenceSkinner(const Scene& scene, Method method) {
-  return [&scene, method](const std::vector<std::vector<JointMatrix>>& palettes)
-             -> Result<std::vector<samples::SkinnedVertices>> {
-    std::vector<samples::SkinnedVertices> all;
-    for (const ScenePart& part : scene.parts) {
+  return [&scene, method](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
+    std::vector<SkinnedPart> all;
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
       if (part.mesh == nullptr) {
-        all.push_back(bindPose(part));
+        all.push_back(bindPose(part, pose.morphs[index]));
         continue;
       }
       const Result<reference::SkinnedMesh> skinned =
-          reference::skin(part.mesh->view(), palettes[part.source.skin], method);
+          reference::skin(part.mesh->view(), pose.palette(part), method, pose.morphs[index]);
       if (!skinned) return skinned.error();
-      all.push_back({toFloats(skinned->positions), toFloats(skinned->normals), {}});
+      all.push_back(
+          {toFloats(skinned->positions), toFloats(skinned->normals), toFloats(skinned->tangents)});
     }
     return all;
   };
 }
 
-SkinParts deviceSkinner(const Scene& scene, Method method, samples::Device& device,
+SkinnedPart fromDevice(samples::SkinnedVertices&& vertices) {
+  SkinnedPart part{std::move(vertices.positions), std::move(vertices.normals), {}};
+  const std::vector<std::byte>& tangents =
+      vertices.streams[static_cast<std::size_t>(Stream::tangents)];
+  part.tangents.resize(tangents.size() / sizeof(float));
+  if (!tangents.empty()) std::memcpy(part.tangents.data(), tangents.data(), tangents.size());
+  return part;
+}
+
+SkinParts deviceSkinner(const Scene& scene, Method method, bool tangents, samples::Device& device,
                         vulkan::Context& context) {
-  return [&scene, method, &device, &context](const std::vector<std::vector<JointMatrix>>& palettes)
-             -> Result<std::vector<samples::SkinnedVertices>> {
+  samples::RunOptions options;
+  options.countUntouched = false;
+  if (tangents) options.output.tangents = VertexFormat::float32x4;
+  return [&scene, method, options, &device,
+          &context](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
     std::vector<samples::SkinRequest> requests;
-    for (const ScenePart& part : scene.parts) {
-      if (part.mesh != nullptr)
-        requests.push_back({&part.mesh->packed(), palettes[part.source.skin], true, method});
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      if (part.mesh == nullptr) continue;
+      samples::SkinRequest& request = requests.emplace_back();
+      request.mesh = &part.mesh->packed();
+      request.palette = pose.palette(part);
+      request.method = method;
+      request.morphs = pose.morphs[index];
     }
-    Result<samples::BatchResult> result = samples::runBatch(device, context, requests);
+    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
     if (!result) return result.error();
-    std::vector<samples::SkinnedVertices> all;
+    std::vector<SkinnedPart> all;
     std::size_t next = 0;
-    for (const ScenePart& part : scene.parts) {
-      all.push_back(part.mesh != nullptr ? std::move(result->instances[next++]) : bindPose(part));
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      all.push_back(part.mesh != nullptr ? fromDevice(std::move(result->instances[next++]))
+                                         : bindPose(part, pose.morphs[index]));
     }
     return all;
   };
 }
 
-OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> skinned) {
+OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
   OutputMesh mesh;
   mesh.materials = scene.model->materials;
   for (std::size_t index = 0; index < scene.parts.size(); ++index) {
@@ -96,8 +145,12 @@ OutputMesh assemble(const Scene& scene, std::vector<samples::SkinnedVertices> sk
     part.primitive = from.primitive;
     part.positions = std::move(skinned[index].positions);
     part.normals = std::move(skinned[index].normals);
-    if (part.normals.empty())
+    if (!part.normals.empty()) {
+      part.tangents = std::move(skinned[index].tangents);
+    } else {
+      // glTF 2.0, 3.7.2.1: without normals tangents are ignored, and both are computed.
       part.normals = computeNormals(part.positions, from.primitive->triangles);
+    }
   }
   return mesh;
 }
@@ -162,8 +215,7 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
   Progress progress("skinning", count);
   for (std::uint32_t frame = 0; frame < count; ++frame) {
     const double time = options.time + frame / options.framesPerSecond;
-    Result<std::vector<samples::SkinnedVertices>> skinned =
-        skinParts(scenePalettes(scene, clip, time));
+    Result<std::vector<SkinnedPart>> skinned = skinParts(scenePose(scene, clip, time));
     if (!skinned) return reportDeviceError(skinned.error());
     const OutputMesh mesh = assemble(scene, std::move(*skinned));
     if (const std::size_t bad = countNonFinite(mesh); bad != 0) {
@@ -205,8 +257,9 @@ ExitStatus skin(const SkinOptions& options) {
   deviceOptions.device = options.device;
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
   if (!open) return reportDeviceError(open.error());
+  const bool tangents = holdsTangents(*outputFormat(options.output));
   return writePoses(options, *scene, *clip,
-                    deviceSkinner(*scene, method, *open->device, open->context));
+                    deviceSkinner(*scene, method, tangents, *open->device, open->context));
 }
 
 }  // namespace

@@ -15,22 +15,40 @@ struct VerifyOptions {
   std::string device = "auto";
   std::string json;
   std::string junit;
+  bool random = false;
   bool strict = false;
 };
 
-/// Fills `verification`; what it returns is a failure of the device.
+/// Fills `verification`; what it returns is a failure of the device. The ways to store are shared
+/// out among the poses, so that each comes once.
 Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
+                         std::span<const samples::OutputCase> outputs,
                          ModelVerification& verification) {
   const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
   Progress progress(verification.model, poses.size());
-  for (const PoseToVerify& pose : poses) {
-    Result<std::vector<VerifiedCase>> cases = verifyPose(device, context, scene, pose);
+  for (std::size_t index = 0; index < poses.size(); ++index) {
+    const std::size_t first = outputs.size() * index / poses.size();
+    const std::size_t end = outputs.size() * (index + 1) / poses.size();
+    const PoseToVerify& before = poses[(index + poses.size() - 1) % poses.size()];
+    Result<std::vector<VerifiedCase>> cases = verifyPose(
+        device, context, scene, poses[index], before, outputs.subspan(first, end - first));
     if (!cases) return cases.error();
     verification.cases.insert(verification.cases.end(), std::make_move_iterator(cases->begin()),
                               std::make_move_iterator(cases->end()));
     progress.step();
   }
   return {};
+}
+
+Result<ModelVerification> verifyRandom(samples::Device& device, vulkan::Context& context) {
+  ModelVerification verification{"random meshes", {}, {}};
+  const std::vector<samples::RandomCase> cases = samples::randomCases(context.limits());
+  Progress progress(verification.model, cases.size());
+  Result<std::vector<VerifiedCase>> verified =
+      verifyRandomMeshes(device, context, cases, [&progress] { progress.step(); });
+  if (!verified) return verified.error();
+  verification.cases = std::move(*verified);
+  return verification;
 }
 
 /// Why there is nothing to verify in a model, or empty.
@@ -69,6 +87,13 @@ ExitStatus verify(const VerifyOptions& options) {
 
   ExitStatus status = ExitStatus::done;
   std::vector<ModelVerification> models;
+  if (options.random || options.models.empty()) {
+    Result<ModelVerification> verified = verifyRandom(*open->device, open->context);
+    if (!verified) return reportDeviceError(verified.error());
+    if (verified->failures() != 0) status = ExitStatus::verificationFailed;
+    models.push_back(std::move(*verified));
+  }
+  const std::vector<samples::OutputCase> outputs = samples::outputCases(open->context.limits());
   for (const std::string& model : options.models) {
     models.push_back({model, {}, {}});
     Result<Scene> scene = loadScene(model, options.strict);
@@ -83,7 +108,8 @@ ExitStatus verify(const VerifyOptions& options) {
       status = reportError(ExitStatus::badInput, models.back().error);
       continue;
     }
-    if (Result<void> verified = verifyModel(*open->device, open->context, *scene, models.back());
+    if (Result<void> verified =
+            verifyModel(*open->device, open->context, *scene, outputs, models.back());
         !verified) {
       return reportDeviceError(verified.error());
     }
@@ -103,10 +129,13 @@ ExitStatus verify(const VerifyOptions& options) {
 
 Run addVerify(CLI::App& app) {
   CLI::App* command = app.add_subcommand("verify",
-                                         "Skin with every method on the device, the work cut up in "
-                                         "several ways, and compare with the reference");
+                                         "Skin on the device with every method, format and way to "
+                                         "cut up the work, and compare with the reference");
   const auto options = std::make_shared<VerifyOptions>();
-  command->add_option("MODEL", options->models, "A .gltf or .glb file, or several")->required();
+  command->add_option("MODEL", options->models,
+                      "A .gltf or .glb file, or several; none: random meshes");
+  command->add_flag("--random", options->random,
+                    "Verify random meshes too: methods x inputs x outputs, by pairs");
   command->add_option("--device", options->device,
                       "auto, a number of 'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write every case with its errors");

@@ -43,21 +43,51 @@ int putPositions(GlbBuffer& buffer, const std::vector<float>& positions) {
   return accessor;
 }
 
-/// glTF 2.0, 3.7.2.1: normals are of unit length. One that is but for rounding stays as it is.
-std::vector<float> unitNormals(const std::vector<float>& normals) {
+using Vector = std::array<double, 3>;
+
+Vector vectorAt(const std::vector<float>& values, std::size_t first) {
+  return {double{values[first]}, double{values[first + 1]}, double{values[first + 2]}};
+}
+
+double lengthOf(const Vector& v) {
+  return std::hypot(v[0], v[1], v[2]);
+}
+
+/// Makes the three floats from `first` on a unit vector: in their direction or, where they have
+/// none, in that of the fallback, which has one. One that is of unit length but for rounding stays
+/// as it is.
+void makeUnit(std::vector<float>& values, std::size_t first, const Vector& fallback) {
   constexpr double tolerance = 1e-4;
-  std::vector<float> unit = normals;
-  for (std::size_t i = 0; i + 2 < unit.size(); i += 3) {
-    const double length =
-        std::hypot(double{normals[i]}, double{normals[i + 1]}, double{normals[i + 2]});
-    if (std::abs(length - 1) <= tolerance) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double fallback = axis == 2 ? 1 : 0;
-      unit[i + axis] =
-          static_cast<float>(length > 0 ? double{normals[i + axis]} / length : fallback);
-    }
+  Vector direction = vectorAt(values, first);
+  double length = lengthOf(direction);
+  if (std::abs(length - 1) <= tolerance) return;
+  if (!(length > 0) || !std::isfinite(length)) {
+    direction = fallback;
+    length = lengthOf(fallback);
   }
-  return unit;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    values[first + axis] = static_cast<float>(direction[axis] / length);
+}
+
+/// glTF 2.0, 3.7.2.1: normals are of unit length.
+std::vector<float> unitNormals(std::vector<float> normals) {
+  for (std::size_t i = 0; i + 2 < normals.size(); i += 3) makeUnit(normals, i, {0, 0, 1});
+  return normals;
+}
+
+/// Some vector at right angles to a unit vector.
+Vector squareTo(const Vector& n) {
+  return std::abs(n[0]) < 0.5 ? Vector{0, n[2], -n[1]} : Vector{-n[2], 0, n[0]};
+}
+
+/// glTF 2.0, 3.7.2.1: tangents are of unit length, their handedness is 1 or -1.
+std::vector<float> unitTangents(std::vector<float> tangents, const std::vector<float>& normals) {
+  for (std::size_t vertex = 0; vertex * 4 < tangents.size(); ++vertex) {
+    makeUnit(tangents, vertex * 4, squareTo(vectorAt(normals, vertex * 3)));
+    float& handedness = tangents[vertex * 4 + 3];
+    handedness = handedness < 0 ? -1.0f : 1.0f;
+  }
+  return tangents;
 }
 
 std::vector<float> finiteTexcoords(std::vector<float> texcoords) {
@@ -89,7 +119,11 @@ Json putPrimitive(GlbBuffer& buffer, const OutputPart& part) {
   const gltf::Primitive& primitive = *part.primitive;
   Json attributes;
   attributes["POSITION"] = putPositions(buffer, part.positions);
-  attributes["NORMAL"] = putVertices(buffer, unitNormals(part.normals), "VEC3", 3);
+  const std::vector<float> normals = unitNormals(part.normals);
+  attributes["NORMAL"] = putVertices(buffer, normals, "VEC3", 3);
+  if (!part.tangents.empty() && !primitive.triangles.empty()) {
+    attributes["TANGENT"] = putVertices(buffer, unitTangents(part.tangents, normals), "VEC4", 4);
+  }
   for (std::size_t set = 0; set < primitive.texcoords.size(); ++set) {
     attributes["TEXCOORD_" + std::to_string(set)] =
         putVertices(buffer, finiteTexcoords(primitive.texcoords[set]), "VEC2", 2);

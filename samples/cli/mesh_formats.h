@@ -20,11 +20,13 @@ std::string plyFile(const OutputMesh& mesh);
 /// material library: glTF's factors are not those of MTL.
 std::string objFile(const OutputMesh& mesh);
 
-/// Binary glTF 2.0: a node and a mesh of one primitive a part, with POSITION, NORMAL, every
-/// TEXCOORD_n, COLOR_0, and the factors of its material. A part without triangles becomes points,
-/// so that no vertex is lost. What glTF forbids is mended: a normal is made as long as 1 (0 0 1
-/// where it is zero), colours and factors are clamped, a texture coordinate that is not finite is
-/// 0. Positions must be finite. Empty where the file would be larger than 4 GiB.
+/// Binary glTF 2.0: a node and a mesh of one primitive a part, with POSITION, NORMAL, TANGENT,
+/// every TEXCOORD_n, COLOR_0, and the factors of its material. A part without triangles becomes
+/// points, so that no vertex is lost, and leaves its tangents out. What glTF forbids is mended: a
+/// normal is made as long as 1 (0 0 1 where it is zero), a tangent likewise (square to the normal
+/// where it is zero or not finite) with a handedness of 1 or -1, colours and factors are clamped, a
+/// texture coordinate that is not finite is 0. Positions and normals must be finite. Empty where
+/// the file would be larger than 4 GiB.
 std::vector<std::byte> glbFile(const OutputMesh& mesh);
 
 }  // namespace dermis::cli

@@ -42,6 +42,10 @@ bool holdsNonFinite(OutputFormat format) {
   return format == OutputFormat::ply;
 }
 
+bool holdsTangents(OutputFormat format) {
+  return format == OutputFormat::glb;
+}
+
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh) {
   if (format == OutputFormat::glb) {

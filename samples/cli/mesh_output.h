@@ -21,6 +21,7 @@ struct OutputPart {
   const gltf::Primitive* primitive = nullptr;
   std::vector<float> positions;  ///< 3 a vertex, in the scene's space
   std::vector<float> normals;    ///< 3 a vertex
+  std::vector<float> tangents;   ///< 4 a vertex, the last the handedness; or empty
 };
 
 struct OutputMesh {
@@ -43,6 +44,9 @@ std::size_t countNonFinite(const OutputMesh& mesh);
 /// Only PLY stores floats as they are. glTF forbids what is not finite, and few readers of OBJ know
 /// how to spell it.
 bool holdsNonFinite(OutputFormat format);
+
+/// Only GLB: for the others tangents need not be skinned.
+bool holdsTangents(OutputFormat format);
 
 /// Writes a file whole or not at all: where it stops half-way, it is removed. Fails with `ioError`,
 /// and with `limitExceeded` where the format cannot hold so large a mesh. What is not finite must

@@ -50,7 +50,6 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
            std::shared_ptr<const PreparedMesh>>
       prepared;
   std::uint64_t vertices = 0;
-  std::size_t morphed = 0;
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     ScenePart part;
     part.source = source;
@@ -58,7 +57,6 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
     part.name = fmt::format("node {}{}, {}", source.node, quoted(model.nodes[source.node].name),
                             part.primitive->name);
     vertices += part.primitive->vertexCount;
-    if (!part.primitive->morphTargets.empty()) ++morphed;
     if (part.primitive->influences.empty()) {
       scene.notes.push_back(fmt::format("{} has no JOINTS_0: its {} vertices stay in bind pose",
                                         part.name, part.primitive->vertexCount));
@@ -85,9 +83,6 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
                              "command takes",
                              path.filename().string(), vertices, mostVertices)};
   }
-  if (morphed != 0)
-    scene.notes.push_back(
-        fmt::format("{} primitives have morph targets, which are not skinned yet", morphed));
   return scene;
 }
 
@@ -101,15 +96,23 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
                            model.clips.size())};
 }
 
-std::vector<std::vector<JointMatrix>> scenePalettes(const Scene& scene, std::uint32_t clip,
-                                                    double time) {
+ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
   const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
-  std::vector<std::vector<JointMatrix>> palettes(scene.model->skins.size());
+  ScenePose pose;
+  pose.palettes.resize(scene.model->skins.size());
   for (const ScenePart& part : scene.parts) {
-    std::vector<JointMatrix>& palette = palettes[part.source.skin];
+    std::vector<JointMatrix>& palette = pose.palettes[part.source.skin];
     if (palette.empty()) palette = gltf::palette(*scene.model, part.source.skin, globals);
+    std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
+    const std::vector<float> weights =
+        gltf::morphWeights(*scene.model, part.source.node, clip, time);
+    // A primitive may have fewer targets than its mesh names.
+    const std::size_t targets = part.primitive->morphTargets.size();
+    for (std::uint32_t target = 0; target < weights.size() && target < targets; ++target) {
+      if (weights[target] != 0) morphs.push_back({target, weights[target]});
+    }
   }
-  return palettes;
+  return pose;
 }
 
 }  // namespace dermis::cli

@@ -39,8 +39,16 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict);
 Result<std::uint32_t> chooseClip(const gltf::Model& model,
                                  const std::optional<std::string>& wanted);
 
-/// The palettes of all skins that the scene's parts use, by skin index; others stay empty.
-std::vector<std::vector<JointMatrix>> scenePalettes(const Scene& scene, std::uint32_t clip,
-                                                    double time);
+/// A scene at one time.
+struct ScenePose {
+  std::vector<std::vector<JointMatrix>> palettes;  ///< by skin; empty where no part uses it
+  std::vector<std::vector<MorphWeight>> morphs;    ///< by part: the active morph targets
+
+  const std::vector<JointMatrix>& palette(const ScenePart& part) const {
+    return palettes[part.source.skin];
+  }
+};
+
+ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time);
 
 }  // namespace dermis::cli

@@ -2,60 +2,124 @@
 
 #include <fmt/format.h>
 
-#include <bit>
+#include <array>
 
 namespace dermis::cli {
 namespace {
 
-struct VariantToVerify {
-  Tuning tuning;
-  bool normals = true;
-  std::string name() const {
-    return fmt::format("{} invocations, {} instances each, {}", tuning.workgroupSize,
-                       tuning.instancesPerInvocation, normals ? "normals" : "positions only");
-  }
-};
-
 /// The first is the one that others must equal to the bit.
-const std::vector<VariantToVerify>& variantsToVerify() {
-  static const std::vector<VariantToVerify> variants{
-      {{}, true}, {{8, 1}, true}, {{32, 3}, true}, {{128, 16}, true}, {{}, false}};
-  return variants;
+constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
+
+std::string name(const Tuning& tuning) {
+  return fmt::format("{} invocations, {} instances each", tuning.workgroupSize,
+                     tuning.instancesPerInvocation);
 }
 
-std::uint64_t countDifferingFloats(const std::vector<float>& a, const std::vector<float>& b) {
-  std::uint64_t count = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (std::bit_cast<std::uint32_t>(a[i]) != std::bit_cast<std::uint32_t>(b[i])) ++count;
+/// What is skinned together in one pose, and from which pose it moves.
+struct PoseBatch {
+  ScenePose now, before;
+  std::vector<samples::InstanceToVerify> instances;
+  std::vector<const ScenePart*> parts;  ///< of the instances
+  std::vector<reference::SkinnedMesh> expected, expectedBefore;
+
+  PoseBatch(const Scene& scene, const PoseToVerify& pose, const PoseToVerify& previous)
+      : now(scenePose(scene, pose.clip, pose.time)),
+        before(scenePose(scene, previous.clip, previous.time)) {
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      if (part.mesh == nullptr) continue;
+      for (const Method method : allMethods) {
+        instances.push_back({&part.mesh->packed(), now.palette(part), before.palette(part),
+                             now.morphs[index], before.morphs[index], method, nullptr, nullptr});
+        parts.push_back(&part);
+      }
+    }
   }
-  return count;
-}
+  PoseBatch(const PoseBatch&) = delete;
+  PoseBatch& operator=(const PoseBatch&) = delete;
 
-AttributeView viewOf(const std::vector<float>& vectors) {
-  return floatAttribute(vectors.data(), static_cast<std::uint32_t>(vectors.size() / 3), 3);
-}
+  /// What must come out, of all instances.
+  Result<void> skinReference() {
+    for (std::size_t index = 0; index < instances.size(); ++index) {
+      const samples::InstanceToVerify& instance = instances[index];
+      const MeshView mesh = parts[index]->mesh->view();
+      Result<reference::SkinnedMesh> skinned =
+          reference::skin(mesh, instance.palette, instance.method, instance.morphs);
+      if (!skinned) return skinned.error();
+      Result<reference::SkinnedMesh> skinnedBefore =
+          reference::skin(mesh, instance.previousPalette, instance.method, instance.previousMorphs);
+      if (!skinnedBefore) return skinnedBefore.error();
+      expected.push_back(std::move(*skinned));
+      expectedBefore.push_back(std::move(*skinnedBefore));
+    }
+    for (std::size_t index = 0; index < instances.size(); ++index) {
+      instances[index].expected = &expected[index];
+      instances[index].expectedBefore = &expectedBefore[index];
+    }
+    return {};
+  }
 
-/// What is skinned once and compared with every variant.
-struct Expected {
-  const ScenePart* part;
-  Method method;
-  reference::SkinnedMesh skinned;
+  VerifiedCase newCase(std::size_t index, const PoseToVerify& pose, std::string variant) const {
+    VerifiedCase verified;
+    verified.part = parts[index]->name;
+    verified.method = methodName(instances[index].method);
+    verified.pose = pose.name;
+    verified.variant = std::move(variant);
+    return verified;
+  }
 };
+
+/// Positions, normals and tangents as float32, with every tuning: not a bit may change.
+Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
+                           const PoseBatch& batch, const PoseToVerify& pose,
+                           std::vector<VerifiedCase>& cases) {
+  std::vector<samples::SkinRequest> requests;
+  for (const samples::InstanceToVerify& instance : batch.instances) {
+    samples::SkinRequest& request = requests.emplace_back();
+    request.mesh = instance.packed;
+    request.palette = instance.palette;
+    request.method = instance.method;
+    request.morphs = instance.morphs;
+  }
+  std::vector<samples::SkinnedVertices> first;
+  for (const Tuning& tuning : tunings) {
+    samples::RunOptions options;
+    options.tuning = tuning;
+    options.output.tangents = VertexFormat::float32x4;
+    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
+    if (!result) return result.error();
+    for (std::size_t index = 0; index < requests.size(); ++index) {
+      const samples::SkinnedVertices& skinned = result->instances[index];
+      const Result<Comparison> comparison =
+          compare(batch.expected[index], skinned.view(), requests[index].method);
+      if (!comparison) return comparison.error();
+      VerifiedCase verified = batch.newCase(index, pose, name(tuning));
+      verified.comparison = *comparison;
+      verified.status = skinned.status;
+      if (!first.empty() && skinned.streams != first[index].streams)
+        verified.wrong = "the result is not to the bit that of " + name(tunings[0]);
+      cases.push_back(std::move(verified));
+    }
+    if (first.empty()) first = std::move(result->instances);
+  }
+  return {};
+}
 
 }  // namespace
 
 std::string VerifiedCase::failure() const {
+  std::string text;
   if (comparison.failures != 0) {
-    return fmt::format(
+    text = fmt::format(
         "{} vertices are outside their bound, the first is {}; positions reach {:.3g} of the bound "
-        "(vertex {}), normals "
-        "{:.3g} (vertex {})",
+        "(vertex {}), normals {:.3g} (vertex {}), tangents {:.3g} (vertex {})",
         comparison.failures, comparison.firstFailure, comparison.worstPosition,
-        comparison.worstPositionVertex, comparison.worstNormal, comparison.worstNormalVertex);
+        comparison.worstPositionVertex, comparison.worstNormal, comparison.worstNormalVertex,
+        comparison.worstTangent, comparison.worstTangentVertex);
   }
-  if (differingFloats != 0)
-    return fmt::format("{} floats differ from the first variant's", differingFloats);
-  return {};
+  if (!wrong.empty()) text += (text.empty() ? "" : "; ") + wrong;
+  if (text.empty() && !passed()) text = "no vertex could be compared";
+  return text;
 }
 
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
@@ -72,50 +136,50 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
 }
 
 Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
-                                             const Scene& scene, const PoseToVerify& pose) {
-  const std::vector<std::vector<JointMatrix>> palettes = scenePalettes(scene, pose.clip, pose.time);
-  std::vector<Expected> expected;
-  std::vector<samples::SkinRequest> requests;
-  for (const ScenePart& part : scene.parts) {
-    if (part.mesh == nullptr) continue;
-    const std::vector<JointMatrix>& palette = palettes[part.source.skin];
-    for (const Method method : allMethods) {
-      Result<reference::SkinnedMesh> skinned = reference::skin(part.mesh->view(), palette, method);
-      if (!skinned) return skinned.error();
-      expected.push_back({&part, method, std::move(*skinned)});
-      requests.push_back({&part.mesh->packed(), palette, true, method});
-    }
-  }
-
+                                             const Scene& scene, const PoseToVerify& pose,
+                                             const PoseToVerify& before,
+                                             std::span<const samples::OutputCase> outputs) {
+  PoseBatch batch(scene, pose, before);
+  if (Result<void> done = batch.skinReference(); !done) return done.error();
   std::vector<VerifiedCase> cases;
-  std::vector<samples::SkinnedVertices> first;
-  for (const VariantToVerify& variant : variantsToVerify()) {
-    samples::RunOptions options;
-    options.tuning = variant.tuning;
-    options.normals = variant.normals;
-    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
-    if (!result) return result.error();
-    for (std::size_t index = 0; index < expected.size(); ++index) {
-      const samples::SkinnedVertices& skinned = result->instances[index];
-      Result<Comparison> comparison = compare(expected[index].skinned, viewOf(skinned.positions),
-                                              viewOf(skinned.normals), expected[index].method);
-      if (!comparison) return comparison.error();
-      VerifiedCase verified{expected[index].part->name,
-                            std::string(methodName(expected[index].method)),
-                            pose.name,
-                            variant.name(),
-                            *comparison,
-                            skinned.status,
-                            0};
-      if (!first.empty()) {
-        verified.differingFloats = countDifferingFloats(skinned.positions, first[index].positions) +
-                                   countDifferingFloats(skinned.normals, first[index].normals);
-      }
-      cases.push_back(std::move(verified));
+  if (Result<void> done = verifyTunings(device, context, batch, pose, cases); !done)
+    return done.error();
+  for (const samples::OutputCase& output : outputs) {
+    Result<std::vector<samples::VerifiedInstance>> verified =
+        samples::verifyBatch(device, context, batch.instances, output);
+    if (!verified) return verified.error();
+    for (std::size_t index = 0; index < verified->size(); ++index) {
+      VerifiedCase& added = cases.emplace_back(batch.newCase(index, pose, output.name()));
+      added.comparison = (*verified)[index].comparison;
+      added.status = (*verified)[index].status;
+      added.wrong = std::move((*verified)[index].wrong);
     }
-    if (first.empty()) first = std::move(result->instances);
   }
   return cases;
+}
+
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::Device& device,
+                                                     vulkan::Context& context,
+                                                     std::span<const samples::RandomCase> cases,
+                                                     const std::function<void()>& done) {
+  std::vector<VerifiedCase> all;
+  for (const samples::RandomCase& random : cases) {
+    Result<std::vector<samples::VerifiedInstance>> verified =
+        samples::verifyRandomCase(device, context, random);
+    if (!verified) return verified.error();
+    for (std::size_t index = 0; index < verified->size(); ++index) {
+      VerifiedCase& added = all.emplace_back();
+      added.part = random.inputName();
+      added.method = methodName(random.method);
+      added.pose = fmt::format("instance {}", index);
+      added.variant = random.output.name();
+      added.comparison = (*verified)[index].comparison;
+      added.status = (*verified)[index].status;
+      added.wrong = std::move((*verified)[index].wrong);
+    }
+    done();
+  }
+  return all;
 }
 
 }  // namespace dermis::cli

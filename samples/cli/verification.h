@@ -1,29 +1,29 @@
 // Every method and variant on the device, against the reference.
 #pragma once
 
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "batch_runner.h"
 #include "dermis/accuracy.h"
 #include "skinned_scene.h"
+#include "verification_product.h"
 
 namespace dermis::cli {
 
-/// One primitive in one pose with one method and variant.
+/// One primitive in one pose with one method, stored in one way.
 struct VerifiedCase {
   std::string part;
   std::string method;
   std::string pose;     ///< "rest pose", "clip 0 'walk' at 0.341 s"
-  std::string variant;  ///< "64 invocations, 4 instances each, normals"
+  std::string variant;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
   Comparison comparison;
   PaletteStatus status;
-  /// Floats that differ in any bit from the first variant's: none may.
-  std::uint64_t differingFloats = 0;
+  std::string wrong;  ///< what else is wrong; empty where nothing is
 
   bool passed() const {
-    return comparison.passed() && differingFloats == 0 &&
-           comparison.compared + comparison.onlyFinite != 0;
+    return comparison.passed() && wrong.empty() && comparison.compared + comparison.onlyFinite != 0;
   }
   std::string failure() const;  ///< a sentence, where it did not pass
 };
@@ -37,8 +37,18 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, two times within, and its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// All parts with all methods in one batch, once for each variant.
+/// All parts with all methods in one batch, once for each way to cut up the work (which must not
+/// change a bit) and once for each of these ways to store the result. Motion goes from `before`.
 Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
-                                             const Scene& scene, const PoseToVerify& pose);
+                                             const Scene& scene, const PoseToVerify& pose,
+                                             const PoseToVerify& before,
+                                             std::span<const samples::OutputCase> outputs);
+
+/// The product of methods, inputs and outputs over random meshes, by pairs. `done` is called after
+/// each combination.
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::Device& device,
+                                                     vulkan::Context& context,
+                                                     std::span<const samples::RandomCase> cases,
+                                                     const std::function<void()>& done);
 
 }  // namespace dermis::cli

@@ -2,54 +2,18 @@
 
 #include <algorithm>
 #include <cstring>
-#include <map>
 
 #include "dermis/vulkan/scope.h"
 
 namespace dermis::samples {
 namespace {
 
-constexpr std::byte poison{0xa5};
-
-/// Everything that stands in one mesh buffer, one matrices buffer and one output buffer.
-struct Layout {
-  std::map<const PackedMesh*, std::uint64_t> meshOffsets;
-  std::vector<Palette> palettes;
-  std::vector<Job> jobs;
-  std::uint64_t meshesSize = 0, matricesSize = 0, outputSize = 0;
-  std::vector<std::uint64_t> matrixOffsets;
-};
-
-Layout layOut(std::span<const SkinRequest> requests, const RunOptions& options) {
-  Layout layout;
-  for (const SkinRequest& request : requests) {
-    const auto [entry, isNew] = layout.meshOffsets.try_emplace(request.mesh, layout.meshesSize);
-    if (isNew) layout.meshesSize += request.mesh->bytes().size();
-
-    Palette palette;
-    palette.jointCount = static_cast<std::uint32_t>(request.palette.size());
-    palette.matrixOffset = layout.matricesSize;
-    palette.mayScale = request.mayScale;
-    layout.matricesSize += request.palette.size_bytes();
-    layout.palettes.push_back(palette);
-
-    const bool normals = options.normals && request.mesh->hasNormals();
-    const std::uint32_t stride = std::max(options.stride, normals ? 24u : 12u);
-    Job job;
-    job.mesh = request.mesh->info();
-    job.meshOffset = entry->second;
-    job.palette = static_cast<std::uint32_t>(layout.palettes.size() - 1);
-    job.method = request.method;
-    job.positions = {layout.outputSize, stride};
-    if (normals) job.normals = {layout.outputSize + 12, stride};
-    layout.jobs.push_back(job);
-    layout.outputSize += std::uint64_t{request.mesh->vertexCount()} * stride;
-  }
-  return layout;
-}
+constexpr std::array<BufferRole, streamCount> outputRoles{BufferRole::positions,
+                                                          BufferRole::normals, BufferRole::tangents,
+                                                          BufferRole::previousPositions};
 
 struct Buffers {
-  MappedBuffer meshes, matrices, tables, palettes, output;
+  MappedBuffer meshes, matrices, tables, palettes, results;
 };
 
 Result<Buffers> makeBuffers(Device& device, const Plan& plan) {
@@ -58,9 +22,9 @@ Result<Buffers> makeBuffers(Device& device, const Plan& plan) {
                                      {&buffers.matrices, BufferRole::matrices},
                                      {&buffers.tables, BufferRole::tables},
                                      {&buffers.palettes, BufferRole::palettes},
-                                     {&buffers.output, BufferRole::output}}) {
+                                     {&buffers.results, BufferRole::results}}) {
     const BufferRequirement requirement = plan.buffer(role);
-    const bool readBack = role == BufferRole::output || role == BufferRole::palettes;
+    const bool readBack = role == BufferRole::results || role == BufferRole::palettes;
     Result<MappedBuffer> made =
         MappedBuffer::create(device, requirement.size, requirement.usage, readBack);
     if (!made) return made.error();
@@ -69,15 +33,14 @@ Result<Buffers> makeBuffers(Device& device, const Plan& plan) {
   return buffers;
 }
 
-void fill(const Layout& layout, std::span<const SkinRequest> requests, const Buffers& buffers) {
+void fill(const BatchLayout& layout, const Buffers& buffers) {
   for (const auto& [mesh, offset] : layout.meshOffsets) {
     std::memcpy(buffers.meshes.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
   }
-  for (std::size_t index = 0; index < requests.size(); ++index) {
+  for (std::size_t index = 0; index < layout.palettes.size(); ++index) {
     std::memcpy(buffers.matrices.bytes().data() + layout.palettes[index].matrixOffset,
-                requests[index].palette.data(), requests[index].palette.size_bytes());
+                layout.poses[index].data(), layout.poses[index].size_bytes());
   }
-  std::ranges::fill(buffers.output.bytes(), poison);
 }
 
 void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
@@ -95,6 +58,7 @@ Result<void> submit(Device& device, const vulkan::Context& context, const Plan& 
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   device.functions().BeginCommandBuffer(commandBuffer, &begin);
+  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
   Result<void> done = context.record(commandBuffer, plan, bindings);
   recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
   device.functions().EndCommandBuffer(commandBuffer);
@@ -103,63 +67,138 @@ Result<void> submit(Device& device, const vulkan::Context& context, const Plan& 
   return done;
 }
 
-void readVector(std::span<const std::byte> bytes, std::uint64_t offset, std::vector<float>& out) {
-  float vector[3];
-  std::memcpy(vector, bytes.data() + offset, sizeof(vector));
-  out.insert(out.end(), vector, vector + 3);
+/// A tightly packed copy of one attribute of one instance.
+std::vector<std::byte> copyAttribute(std::span<const std::byte> output,
+                                     const OutputAttribute& attribute, std::uint32_t vertices) {
+  const std::size_t size = formatSize(attribute.format);
+  std::vector<std::byte> copy(size * vertices);
+  for (std::size_t vertex = 0; size != 0 && vertex < vertices; ++vertex) {
+    std::memcpy(copy.data() + vertex * size,
+                output.data() + attribute.offset + vertex * attribute.stride, size);
+  }
+  return copy;
 }
 
-BatchResult readBack(const Layout& layout, const Plan& plan, const Buffers& buffers) {
-  BatchResult result;
-  result.dispatches = plan.dispatches().size();
-  const std::span<const std::byte> output = buffers.output.bytes();
-  for (const Job& job : layout.jobs) {
-    SkinnedVertices skinned;
-    const std::uint64_t used = job.normals.stride != 0 ? 24 : 12;
-    for (std::uint64_t vertex = 0; vertex < job.mesh.vertexCount; ++vertex) {
-      const std::uint64_t offset = job.positions.offset + vertex * job.positions.stride;
-      readVector(output, offset, skinned.positions);
-      if (job.normals.stride != 0) readVector(output, offset + 12, skinned.normals);
-      for (std::uint64_t byte = used; byte < job.positions.stride; ++byte) {
-        if (output[offset + byte] != poison) ++result.untouchedBytesChanged;
-      }
-    }
-    if (const std::uint64_t status = plan.statusOffset(job.palette); status != Plan::noStatus) {
-      std::memcpy(&skinned.status, buffers.palettes.bytes().data() + status,
-                  sizeof(skinned.status));
-    }
-    result.instances.push_back(std::move(skinned));
-  }
-  return result;
+/// The first three floats of every element.
+std::vector<float> floatsOf(const std::vector<std::byte>& bytes, VertexFormat format) {
+  std::vector<float> floats;
+  if (format != VertexFormat::float32x3 && format != VertexFormat::float32x4) return floats;
+  const std::size_t size = formatSize(format);
+  floats.resize(bytes.size() / size * 3);
+  for (std::size_t element = 0; element * size < bytes.size(); ++element)
+    std::memcpy(floats.data() + element * 3, bytes.data() + element * size, 12);
+  return floats;
 }
 
 }  // namespace
 
-Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
-                             std::span<const SkinRequest> requests, const RunOptions& options) {
-  const Layout layout = layOut(requests, options);
-  Batch batch;
-  batch.palettes = layout.palettes;
-  batch.jobs = layout.jobs;
-  batch.meshesSize = layout.meshesSize;
-  batch.matricesSize = layout.matricesSize;
-  batch.outputSize = layout.outputSize;
-  Plan plan;
-  if (Result<void> planned = makePlan(batch, context.limits(), options.tuning, plan); !planned)
-    return planned.error();
-  if (Result<void> ready = context.prepare(plan.variants()); !ready) return ready.error();
+SkinnedAttribute SkinnedVertices::attribute(Stream stream) const {
+  const auto index = static_cast<std::size_t>(stream);
+  const std::uint32_t size = formatSize(formats[index]);
+  if (size == 0) return {};
+  return {streams[index].data(), static_cast<std::uint32_t>(streams[index].size() / size), size,
+          formats[index]};
+}
 
-  Result<Buffers> buffers = makeBuffers(device, plan);
+SkinnedView SkinnedVertices::view() const {
+  return {attribute(Stream::positions), attribute(Stream::normals), attribute(Stream::tangents),
+          box};
+}
+
+Result<void> BatchRunner::makeOutputs(const Plan& plan) {
+  for (std::size_t stream = 0; stream < (layout_.oneOutput ? 1 : streamCount); ++stream) {
+    const BufferRequirement requirement = plan.buffer(outputRoles[stream]);
+    if (outputs_[stream].bytes().size() == requirement.size) continue;
+    Result<MappedBuffer> made =
+        MappedBuffer::create(device_, requirement.size, requirement.usage, true);
+    if (!made) return made.error();
+    outputs_[stream] = std::move(*made);
+    std::ranges::fill(outputs_[stream].bytes(), options_.poison);
+  }
+  return {};
+}
+
+vulkan::OutputBuffers BatchRunner::outputRanges() const {
+  if (layout_.oneOutput) return vulkan::OutputBuffers::oneBuffer(outputs_[0].range());
+  return {outputs_[0].range(), outputs_[1].range(), outputs_[2].range(), outputs_[3].range()};
+}
+
+std::uint64_t BatchRunner::countChangedBytes() const {
+  std::uint64_t changed = 0;
+  std::array<std::vector<bool>, streamCount> written;
+  for (std::size_t buffer = 0; buffer < streamCount; ++buffer)
+    written[buffer].resize(outputs_[buffer].bytes().size());
+  for (const Job& job : layout_.jobs) {
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const OutputAttribute attribute = attributeOf(job, stream);
+      std::vector<bool>& marks = written[layout_.oneOutput ? 0 : stream];
+      for (std::uint64_t vertex = 0; vertex < job.mesh.vertexCount; ++vertex) {
+        for (std::uint64_t byte = 0; byte < formatSize(attribute.format); ++byte)
+          marks[static_cast<std::size_t>(attribute.offset + vertex * attribute.stride + byte)] =
+              true;
+      }
+    }
+  }
+  for (std::size_t buffer = 0; buffer < streamCount; ++buffer) {
+    const std::span<const std::byte> bytes = outputs_[buffer].bytes();
+    for (std::size_t byte = 0; byte < bytes.size(); ++byte) {
+      if (!written[buffer][byte] && bytes[byte] != options_.poison) ++changed;
+    }
+  }
+  return changed;
+}
+
+BatchResult BatchRunner::readBack(const Plan& plan, const MappedBuffer& palettes,
+                                  const MappedBuffer& results) const {
+  BatchResult result;
+  result.dispatches = plan.dispatches().size();
+  for (std::uint32_t index = 0; index < layout_.jobs.size(); ++index) {
+    const Job& job = layout_.jobs[index];
+    SkinnedVertices skinned;
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const OutputAttribute attribute = attributeOf(job, stream);
+      skinned.formats[stream] = attribute.format;
+      skinned.streams[stream] = copyAttribute(outputs_[layout_.oneOutput ? 0 : stream].bytes(),
+                                              attribute, job.mesh.vertexCount);
+    }
+    skinned.positions = floatsOf(skinned.streams[0], skinned.formats[0]);
+    skinned.normals = floatsOf(skinned.streams[1], skinned.formats[1]);
+    skinned.box = job.box;
+    if (const std::uint64_t status = plan.statusOffset(job.palette); status != Plan::noStatus)
+      std::memcpy(&skinned.status, palettes.bytes().data() + status, sizeof(skinned.status));
+    if (const std::uint64_t place = plan.resultOffset(index); place != Plan::noResult)
+      std::memcpy(&skinned.result, results.bytes().data() + place, sizeof(skinned.result));
+    result.instances.push_back(std::move(skinned));
+  }
+  if (options_.countUntouched) result.untouchedBytesChanged = countChangedBytes();
+  return result;
+}
+
+Result<BatchResult> BatchRunner::run(std::span<const SkinRequest> requests) {
+  layout_ = layOutBatch(requests, options_.output);
+  Plan plan;
+  if (Result<void> planned = makePlan(layout_.batch(), context_.limits(), options_.tuning, plan);
+      !planned)
+    return planned.error();
+  if (Result<void> ready = context_.prepare(plan.variants()); !ready) return ready.error();
+
+  Result<Buffers> buffers = makeBuffers(device_, plan);
   if (!buffers) return buffers.error();
-  fill(layout, requests, *buffers);
+  if (Result<void> made = makeOutputs(plan); !made) return made.error();
+  fill(layout_, *buffers);
   if (Result<void> written = writeTables(plan, buffers->tables.bytes()); !written)
     return written.error();
-  Result<vulkan::Bindings> bindings = context.createBindings(
+  Result<vulkan::Bindings> bindings = context_.createBindings(
       {buffers->meshes.range(), buffers->matrices.range(), buffers->tables.range(),
-       buffers->palettes.range(), buffers->output.range()});
+       buffers->palettes.range(), outputRanges(), buffers->results.range()});
   if (!bindings) return bindings.error();
-  if (Result<void> done = submit(device, context, plan, *bindings); !done) return done.error();
-  return readBack(layout, plan, *buffers);
+  if (Result<void> done = submit(device_, context_, plan, *bindings); !done) return done.error();
+  return readBack(plan, buffers->palettes, buffers->results);
+}
+
+Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
+                             std::span<const SkinRequest> requests, const RunOptions& options) {
+  return BatchRunner(device, context, options).run(requests);
 }
 
 }  // namespace dermis::samples

@@ -43,6 +43,10 @@ Result<MappedBuffer> MappedBuffer::create(Device& device, std::uint64_t size,
   allocateInfo.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
   allocateInfo.allocationSize = requirements.size;
   allocateInfo.memoryTypeIndex = *type;
+  VkMemoryAllocateFlagsInfo flags{};
+  flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
+  flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+  if ((usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0) allocateInfo.pNext = &flags;
   if (const VkResult result =
           functions.AllocateMemory(device.handle(), &allocateInfo, nullptr, &buffer.memory_);
       result != VK_SUCCESS) {

@@ -101,8 +101,25 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
   info.maxStorageBufferRange = properties.limits.maxStorageBufferRange;
   info.maxWorkgroupCount = properties.limits.maxComputeWorkGroupCount[0];
   info.storageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
-  info.pushDescriptors =
-      hasExtension(deviceExtensions(functions, device), VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  const std::vector<VkExtensionProperties> extensions = deviceExtensions(functions, device);
+  info.pushDescriptors = hasExtension(extensions, VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  if (properties.apiVersion >= VK_API_VERSION_1_1) {
+    VkPhysicalDevice8BitStorageFeatures storage8Bit{};
+    storage8Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+    VkPhysicalDevice16BitStorageFeatures storage16Bit{};
+    storage16Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+    const bool has8Bit = hasExtension(extensions, VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
+    if (has8Bit) storage16Bit.pNext = &storage8Bit;
+    VkPhysicalDeviceFeatures2 features{};
+    features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    features.pNext = &storage16Bit;
+    functions.GetPhysicalDeviceFeatures2(device, &features);
+    info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
+    info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
+    const RayTracingFeatures rayTracing(functions, device, extensions);
+    info.accelerationStructures = rayTracing.accelerationStructures();
+    info.rayQueries = rayTracing.rayQueries();
+  }
   std::uint32_t family = 0;
   if (properties.apiVersion < VK_API_VERSION_1_1) {
     info.unusable = "it has no Vulkan 1.1";
@@ -135,7 +152,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options) {
   device->loader_ = *loader;
   if (Result<void> made = device->createInstance(options.validation); !made) return made.error();
   if (Result<void> chosen = device->choose(options.device); !chosen) return chosen.error();
-  if (Result<void> made = device->createDevice(options.pushDescriptors); !made) return made.error();
+  if (Result<void> made = device->createDevice(options); !made) return made.error();
   return device;
 }
 
@@ -241,12 +258,27 @@ Result<void> Device::choose(const std::string& wanted) {
   return {};
 }
 
-Result<void> Device::createDevice(bool pushDescriptors) {
+Result<void> Device::createDevice(const DeviceOptions& options) {
   if (!findComputeFamily(functions_, physicalDevice_, queueFamily_))
     return unusable("no compute queue");
   std::vector<const char*> extensions;
-  if (pushDescriptors && info_.pushDescriptors)
+  if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  storage16Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  storage8Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+  if (options.smallStorage && info_.storage16Bit) storage16Bit_.storageBuffer16BitAccess = VK_TRUE;
+  if (options.smallStorage && info_.storage8Bit) {
+    storage8Bit_.storageBuffer8BitAccess = VK_TRUE;
+    storage16Bit_.pNext = &storage8Bit_;
+    extensions.push_back(VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
+  }
+  if (options.rayTracing) {
+    rayTracing_ = RayTracingFeatures(functions_, physicalDevice_,
+                                     deviceExtensions(functions_, physicalDevice_));
+    void*& end = storage16Bit_.pNext != nullptr ? storage8Bit_.pNext : storage16Bit_.pNext;
+    end = rayTracing_.chain();
+    for (const char* extension : rayTracing_.extensions()) extensions.push_back(extension);
+  }
   enabledExtensions_.insert(enabledExtensions_.end(), extensions.begin(), extensions.end());
 
   const float priority = 1;
@@ -257,6 +289,7 @@ Result<void> Device::createDevice(bool pushDescriptors) {
   queueInfo.pQueuePriorities = &priority;
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+  info.pNext = &storage16Bit_;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
@@ -292,6 +325,7 @@ vulkan::DeviceDescription Device::description() const {
   description.getInstanceProcAddr = loader_->getInstanceProcAddr;
   description.apiVersion = VK_API_VERSION_1_1;
   description.enabledExtensions = enabledExtensions_;
+  description.enabledFeatures = &storage16Bit_;
   return description;
 }
 

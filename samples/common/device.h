@@ -9,6 +9,7 @@
 
 #include "dermis/result.h"
 #include "dermis/vulkan/context.h"
+#include "ray_tracing_features.h"
 #include "vulkan_functions.h"
 #include "vulkan_loader.h"
 
@@ -22,6 +23,10 @@ struct DeviceInfo {
   std::uint32_t maxWorkgroupCount = 0;
   std::uint32_t storageBuffersPerStage = 0;
   bool pushDescriptors = false;
+  bool storage16Bit = false;  ///< kernels can store 2 bytes
+  bool storage8Bit = false;   ///< ... and 1 byte
+  bool accelerationStructures = false;
+  bool rayQueries = false;
   std::string unusable;  ///< why Dermis cannot run on it; empty where it can
 };
 
@@ -32,6 +37,9 @@ struct DeviceOptions {
   bool validation = false;      ///< with the Khronos layer, core and synchronisation checks; fails
                                 ///< where there is none
   bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor where the device has it
+  bool smallStorage = true;     ///< enable stores of 1 and 2 bytes where the device has them
+  bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
+                                ///< queries where the device has them
 };
 
 /// Fails with `missingFeature` where there is no loader, or no instance can be made.
@@ -72,7 +80,7 @@ class Device {
   Device() = default;
   Result<void> createInstance(bool validation);
   Result<void> choose(const std::string& wanted);
-  Result<void> createDevice(bool pushDescriptors);
+  Result<void> createDevice(const DeviceOptions& options);
 
   static VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                                   VkDebugUtilsMessageTypeFlagsEXT types,
@@ -91,6 +99,9 @@ class Device {
   std::uint32_t queueFamily_ = 0;
   VkCommandPool commandPool_ = VK_NULL_HANDLE;
   std::vector<const char*> enabledExtensions_;
+  VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
+  VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
+  RayTracingFeatures rayTracing_;
   std::mutex messagesMutex_;
   std::vector<std::string> messages_;
 };

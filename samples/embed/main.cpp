@@ -95,11 +95,13 @@ Result<Comparison> check(const embed::Crowd& crowd, const MeshView& mesh, std::u
   constexpr std::uint32_t stride = sizeof(embed::SkinnedVertex);
   const std::byte* skinned =
       crowd.output.bytes().data() + std::size_t{instance} * vertexCount * stride;
-  const auto attribute = [&](std::size_t offset) {
-    return AttributeView{skinned + offset, vertexCount, stride, ComponentType::float32, 3};
+  const auto attribute = [&](std::size_t offset, VertexFormat format) {
+    return SkinnedAttribute{skinned + offset, vertexCount, stride, format};
   };
-  return compare(*expected, attribute(offsetof(embed::SkinnedVertex, position)),
-                 attribute(offsetof(embed::SkinnedVertex, normal)), Method::dualQuaternion);
+  SkinnedView view;
+  view.positions = attribute(offsetof(embed::SkinnedVertex, position), VertexFormat::float32x3);
+  view.normals = attribute(offsetof(embed::SkinnedVertex, normal), VertexFormat::octahedral16x2);
+  return compare(*expected, view, Method::dualQuaternion);
 }
 
 Result<void> run(samples::Device& engine) {

@@ -26,15 +26,17 @@ Result<void> planCrowd(Crowd& crowd) {
     job.mesh = crowd.mesh.info();
     job.palette = instance;
     job.method = Method::dualQuaternion;
-    job.positions = {firstVertex + offsetof(SkinnedVertex, position), sizeof(SkinnedVertex)};
-    job.normals = {firstVertex + offsetof(SkinnedVertex, normal), sizeof(SkinnedVertex)};
+    job.positions = {firstVertex + offsetof(SkinnedVertex, position), sizeof(SkinnedVertex),
+                     VertexFormat::float32x3};
+    job.normals = {firstVertex + offsetof(SkinnedVertex, normal), sizeof(SkinnedVertex),
+                   VertexFormat::octahedral16x2};
   }
   Batch batch;
   batch.palettes = crowd.palettes;
   batch.jobs = crowd.jobs;
   batch.meshesSize = crowd.mesh.bytes().size();
   batch.matricesSize = instanceCount * poseSize;
-  batch.outputSize = instanceCount * instanceSize;
+  batch.outputs = OutputSizes::oneBuffer(instanceCount * instanceSize);
   return makePlan(batch, crowd.context.limits(), crowd.context.tuning(), crowd.plan);
 }
 // [/plan]
@@ -44,7 +46,7 @@ Result<void> makeBuffer(samples::Device& engine, const Plan& plan, BufferRole ro
                         samples::MappedBuffer& buffer) {
   const BufferRequirement needs = plan.buffer(role);
   const VkBufferUsageFlags ownUsage =
-      role == BufferRole::output ? VK_BUFFER_USAGE_VERTEX_BUFFER_BIT : 0;
+      role == BufferRole::positions ? VK_BUFFER_USAGE_VERTEX_BUFFER_BIT : 0;
   Result<samples::MappedBuffer> made =
       samples::MappedBuffer::create(engine, needs.size, needs.usage | ownUsage);
   if (!made) return made.error();
@@ -76,7 +78,7 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
   if (Result<void> done = crowd.context.prepare(crowd.plan.variants()); !done) return done.error();
 
   for (const auto& [role, buffer] :
-       {std::pair{BufferRole::meshes, &crowd.meshes}, {BufferRole::output, &crowd.output}}) {
+       {std::pair{BufferRole::meshes, &crowd.meshes}, {BufferRole::positions, &crowd.output}}) {
     if (Result<void> done = makeBuffer(engine, crowd.plan, role, *buffer); !done)
       return done.error();
   }
@@ -89,9 +91,13 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
       if (Result<void> done = makeBuffer(engine, crowd.plan, role, *buffer); !done)
         return done.error();
     }
-    Result<vulkan::Bindings> bindings = crowd.context.createBindings(
-        {crowd.meshes.range(), frame.matrices.range(), frame.tables.range(), frame.palettes.range(),
-         crowd.output.range()});
+    Result<vulkan::Bindings> bindings =
+        crowd.context.createBindings({crowd.meshes.range(),
+                                      frame.matrices.range(),
+                                      frame.tables.range(),
+                                      frame.palettes.range(),
+                                      vulkan::OutputBuffers::oneBuffer(crowd.output.range()),
+                                      {}});
     if (!bindings) return bindings.error();
     frame.bindings = std::move(*bindings);
   }

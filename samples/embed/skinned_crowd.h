@@ -21,7 +21,9 @@ inline constexpr std::size_t framesInFlight = 2;
 /// A vertex as the engine's shaders read it. Dermis writes the first two attributes and leaves the
 /// bytes between alone.
 struct SkinnedVertex {
-  float position[3], normal[3], textureCoordinate[2];
+  float position[3];
+  std::int16_t normal[2];  ///< octahedral
+  float textureCoordinate[2];
 };
 
 /// What is rewritten each frame, and so needed once for every frame in flight.

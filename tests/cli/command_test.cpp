@@ -6,52 +6,23 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "dermis/method.h"
+#include "dermis_command.h"
 #include "ply.h"
-#include "run_command.h"
 #include "test_data.h"
-#include "test_device.h"
 
 namespace dermis::test {
 namespace {
 
 const std::string figure = std::string(DERMIS_SAMPLE_MODELS) + "/figure.glb";
 const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
-
-CommandResult dermis(std::vector<std::string> arguments,
-                     const std::vector<std::string>& environment = {}) {
-  arguments.insert(arguments.begin(), DERMIS_COMMAND);
-  return runCommand(arguments, environment);
-}
-
-std::string outFile(const std::string& name) {
-  return ::testing::TempDir() + "command_" + name;
-}
-
-void expectOneErrorLine(const CommandResult& result) {
-  std::size_t errors = 0;
-  std::istringstream lines(result.errors);
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("dermis: error: ")) {
-      ++errors;
-    } else {
-      EXPECT_TRUE(line.starts_with("dermis: warning: ") || line.starts_with("dermis: note: "))
-          << line;
-    }
-  }
-  EXPECT_EQ(errors, 1u) << result.errors;
-}
-
-/// Skips, or fails in CI, without a device.
-#define REQUIRE_DEVICE()                                 \
-  do {                                                   \
-    std::string reason;                                  \
-    if (testDevice(true, reason) == nullptr) {           \
-      ASSERT_FALSE(isContinuousIntegration()) << reason; \
-      GTEST_SKIP() << reason;                            \
-    }                                                    \
-  } while (false)
 
 TEST(CommandTest, WrongUsageEndsWithTwo) {
   const std::string out = outFile("usage.ply");
@@ -73,7 +44,6 @@ TEST(CommandTest, WrongUsageEndsWithTwo) {
       {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "0", "--device", "cpu"},
       {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "2", "--fps", "0", "--device",
        "cpu"},
-      {"verify"},
       {"verify", bar, "--device", "cpu"},
       {"info", bar, "--yaml"},
   };
@@ -290,23 +260,101 @@ TEST(CommandTest, DevicesListsTheDevice) {
   EXPECT_TRUE(result.output.starts_with("0  ")) << result.output;
 }
 
+std::string readText(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::size_t countOf(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t place = 0; (place = text.find(part, place)) != std::string::npos; ++place)
+    ++count;
+  return count;
+}
+
 TEST(CommandTest, VerifyReportsEveryCase) {
   REQUIRE_DEVICE();
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
   const CommandResult result = dermis({"verify", bar, figure, "--json", json, "--junit", junit});
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
-  std::ifstream file(json);
-  const nlohmann::json parsed = nlohmann::json::parse(file);
+  const nlohmann::json parsed = nlohmann::json::parse(readText(json));
   EXPECT_TRUE(parsed["passed"].get<bool>());
   EXPECT_EQ(parsed["models"].size(), 2u);
   for (const nlohmann::json& model : parsed["models"]) {
     for (const nlohmann::json& verified : model["cases"])
       EXPECT_GT(verified["vertices"].get<int>(), 0) << verified;
   }
-  std::ifstream xml(junit);
-  const std::string text((std::istreambuf_iterator<char>(xml)), std::istreambuf_iterator<char>());
+  const std::string text = readText(junit);
   EXPECT_NE(text.find("failures=\"0\" errors=\"0\""), std::string::npos);
   EXPECT_NE(text.find("classname=\"dermis.verify.dual_quaternion\""), std::string::npos);
+}
+
+TEST(CommandTest, VerifyWithoutAModelVerifiesRandomMeshes) {
+  REQUIRE_DEVICE();
+  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
+  const CommandResult result = dermis({"verify", "--json", json, "--junit", junit});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_TRUE(result.errors.empty()) << "no progress on a pipe: " << result.errors;
+  EXPECT_TRUE(result.output.starts_with("device  ")) << result.output;
+
+  const nlohmann::json parsed = nlohmann::json::parse(readText(json));
+  EXPECT_TRUE(parsed.at("passed").get<bool>());
+  ASSERT_EQ(parsed.at("models").size(), 1u);
+  EXPECT_EQ(parsed.at("models")[0].at("model"), "random meshes");
+  const nlohmann::json& cases = parsed.at("models")[0].at("cases");
+  std::string variants;
+  std::map<std::string, std::size_t> byMethod;
+  for (const nlohmann::json& verified : cases) {
+    EXPECT_TRUE(verified.at("passed").get<bool>()) << verified;
+    ++byMethod[verified.at("method").get<std::string>()];
+    variants += verified.at("variant").get<std::string>() + "\n";
+  }
+  EXPECT_EQ(byMethod.size(), allMethods.size());
+  for (const auto& [method, count] : byMethod) {
+    EXPECT_GE(count, 30u) << method;
+    EXPECT_EQ(countOf(result.output, "passed  random meshes  " + method + ": "), 1u)
+        << result.output;
+  }
+  for (const char* output : {"positions float32x3", "positions float16x4", "normals float32x3",
+                             "tangents float32x4", "previous kept", "previous reskinned"})
+    EXPECT_GE(countOf(variants, output), 1u) << output;
+
+  const std::string xml = readText(junit);
+  const std::string tests = "tests=\"" + std::to_string(cases.size()) + "\" failures=\"0\"";
+  EXPECT_EQ(countOf(xml, "<testsuite name=\"random meshes\" " + tests), 1u) << xml.substr(0, 300);
+  EXPECT_EQ(countOf(xml, "<testcase "), cases.size());
+}
+
+TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
+  REQUIRE_DEVICE();
+  const std::string json = outFile("verify.json");
+  const CommandResult result =
+      runOnTerminal({DERMIS_COMMAND, "verify", bar, "--random", "--json", json});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  const nlohmann::json parsed = nlohmann::json::parse(readText(json));
+  ASSERT_EQ(parsed.at("models").size(), 2u);
+  EXPECT_EQ(parsed.at("models")[0].at("model"), "random meshes");
+  EXPECT_EQ(parsed.at("models")[1].at("model"), bar);
+  for (const nlohmann::json& model : parsed.at("models")) EXPECT_FALSE(model.at("cases").empty());
+  // Each counts its own steps, and leaves a clean line behind.
+  EXPECT_GE(countOf(result.errors, "\rrandom meshes: "), 20u) << result.errors;
+  EXPECT_EQ(countOf(result.errors, "\r" + bar + ": "), 5u) << result.errors;
+  EXPECT_TRUE(result.errors.ends_with("\r\x1b[K")) << result.errors;
+  EXPECT_EQ(countOf(result.output, "\r"), 0u) << "results have no progress in them";
+}
+
+TEST(CommandTest, ProgressIsShownOnATerminalOnly) {
+  const std::vector<std::string> frames{"skin",     bar, "-o",       outFile("frame_%02d.ply"),
+                                        "--frames", "3", "--device", "cpu"};
+  std::vector<std::string> command{DERMIS_COMMAND};
+  command.insert(command.end(), frames.begin(), frames.end());
+  const CommandResult terminal = runOnTerminal(command);
+  EXPECT_EQ(terminal.status, 0);
+  EXPECT_EQ(terminal.output, "");
+  EXPECT_EQ(terminal.errors, "\rskinning: 1 of 3\rskinning: 2 of 3\rskinning: 3 of 3\r\x1b[K");
+  const CommandResult pipe = dermis(frames);
+  EXPECT_EQ(pipe.status, 0);
+  EXPECT_EQ(pipe.output + pipe.errors, "");
 }
 
 TEST(CommandTest, VerifyGoesOnAfterABadModel) {

@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "dermis_command.h"
 #include "glb.h"
 #include "gltf_builder.h"
 #include "obj.h"
 #include "ply.h"
-#include "run_command.h"
 #include "test_data.h"
 
 namespace dermis::test {
@@ -24,17 +24,11 @@ namespace {
 
 using Floats = std::vector<float>;
 
-/// Of the running test alone: others may run at the same time.
-std::string outFile(const std::string& name) {
-  return ::testing::TempDir() + "output_" +
-         ::testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
-}
-
 CommandResult skin(const std::string& model, const std::string& out,
                    const std::vector<std::string>& more = {}) {
-  std::vector<std::string> arguments{DERMIS_COMMAND, "skin", model, "-o", out, "--device", "cpu"};
+  std::vector<std::string> arguments{"skin", model, "-o", out, "--device", "cpu"};
   arguments.insert(arguments.end(), more.begin(), more.end());
-  return runCommand(arguments);
+  return dermis(arguments);
 }
 
 std::string writeModel(const std::string& name, const FileBuilder& file) {
@@ -194,6 +188,95 @@ TEST(OutputTest, MendsInAGlbWhatGltfForbids) {
   EXPECT_EQ(part.material.at("emissiveFactor"), Json::parse("[1.0, 0.0, 0.0]"));
   EXPECT_EQ(part.material.at("alphaCutoff"), 0.0);
   EXPECT_EQ(pose.obj.texcoords.at(0), (std::array<float, 2>{0, 0}));
+}
+
+/// The triangle with normals and tangents, both joints turned by a right angle about z: x becomes
+/// y, y becomes -x. A target displaces the first vertex' tangent.
+FileBuilder turnedTriangle() {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["NORMAL"] = file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  file.attributes()["TANGENT"] =
+      file.addFloats({1, 0, 0, 1, 0, 1, 0, -1, 0, 0.6f, 0.8f, 1}, "VEC4");
+  file.primitive()["targets"] = {
+      {{"TANGENT", file.addFloats({-1, 1, 0, 0, 0, 0, 0, 0, 0}, "VEC3")}}};
+  file.json["nodes"][1]["rotation"] = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};
+  return file;
+}
+
+void expectTangents(const GlbPart& part, const std::vector<std::array<float, 4>>& expected) {
+  ASSERT_EQ(part.tangents.size(), expected.size());
+  for (std::size_t vertex = 0; vertex < expected.size(); ++vertex) {
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_NEAR(part.tangents[vertex][i], expected[vertex][i], 1e-6f) << vertex << ", " << i;
+  }
+}
+
+TEST(OutputTest, TangentsAreSkinnedIntoAGlb) {
+  FileBuilder file = turnedTriangle();
+  const Pose pose = skinToAll(writeModel("turned.gltf", file));
+  expectSame(pose);
+  expectTangents(pose.glb.parts.at(0), {{0, 1, 0, 1}, {-1, 0, 0, -1}, {-0.6f, 0, 0.8f, 1}});
+  file.json["meshes"][0]["weights"] = {1};
+  expectTangents(skinToAll(writeModel("morphed.gltf", file)).glb.parts.at(0),
+                 {{-1, 0, 0, 1}, {-1, 0, 0, -1}, {-0.6f, 0, 0.8f, 1}});
+  // A mirror turns the handedness over.
+  file.json["nodes"][1]["scale"] = {1, 1, -1};
+  expectTangents(skinToAll(writeModel("mirrored.gltf", file)).glb.parts.at(0),
+                 {{-1, 0, 0, -1}, {-1, 0, 0, 1}, {-0.6f, 0, -0.8f, -1}});
+}
+
+TEST(OutputTest, TheDeviceSkinsTheSameTangents) {
+  REQUIRE_DEVICE();
+  FileBuilder file = turnedTriangle();
+  file.json["meshes"][0]["weights"] = {0.25};
+  const std::string model = writeModel("device.gltf", file);
+  ASSERT_EQ(dermis({"skin", model, "-o", outFile("device.glb")}).status, 0);
+  ASSERT_EQ(skin(model, outFile("cpu.glb")).status, 0);
+  const Glb expected = readGlb(outFile("cpu.glb"));
+  EXPECT_EQ(expected.parts.at(0).tangents.size(), 3u);
+  expectTangents(readGlb(outFile("device.glb")).parts.at(0), expected.parts.at(0).tangents);
+}
+
+TEST(OutputTest, APartWithoutInfluencesKeepsItsTangentsButForItsMorphs) {
+  FileBuilder file = turnedTriangle();
+  file.attributes().erase("JOINTS_0");
+  file.attributes().erase("WEIGHTS_0");
+  file.json["meshes"][0]["weights"] = {0.5};
+  const float root = std::sqrt(0.5f);
+  expectTangents(skinToAll(writeModel("bind.gltf", file)).glb.parts.at(0),
+                 {{root, root, 0, 1}, {0, 1, 0, -1}, {0, 0.6f, 0.8f, 1}});
+}
+
+// What has no direction gets one that is square to the normal; the validator wants the handedness
+// to be 1 or -1.
+TEST(OutputTest, TangentsThatCannotStandInAGlbAreMended) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  FileBuilder file = turnedTriangle();
+  file.primitive().erase("targets");
+  file.attributes()["TANGENT"] =
+      file.addFloats({0, 0, 0, 0.5f, 0, 30, 0, -7, nan, 0, 0, 1}, "VEC4");
+  const Pose pose = skinToAll(writeModel("mended.gltf", file));
+  const GlbPart& part = pose.glb.parts.at(0);
+  ASSERT_EQ(part.tangents.size(), 3u);
+  for (std::size_t vertex = 0; vertex < 3; ++vertex) {
+    const auto& t = part.tangents[vertex];
+    const auto& n = part.normals[vertex];
+    EXPECT_NEAR(t[0] * n[0] + t[1] * n[1] + t[2] * n[2], 0, 1e-6) << vertex;
+  }
+  EXPECT_EQ(part.tangents[0][3], 1);
+  EXPECT_EQ(part.tangents[1][3], -1);
+  EXPECT_NEAR(part.tangents[1][0], -1, 1e-6);
+}
+
+// glTF 2.0, 3.7.2.1: without normals they must be ignored; points have no use for them.
+TEST(OutputTest, TangentsWithoutNormalsOrTrianglesAreLeftOut) {
+  FileBuilder file = turnedTriangle();
+  file.primitive().erase("targets");
+  FileBuilder points = file;
+  points.primitive()["mode"] = 0;
+  EXPECT_TRUE(skinToAll(writeModel("points.gltf", points)).glb.parts.at(0).tangents.empty());
+  file.attributes().erase("NORMAL");
+  EXPECT_TRUE(skinToAll(writeModel("normals.gltf", file)).glb.parts.at(0).tangents.empty());
 }
 
 // The triangle's mesh with a second primitive before and after it: points without texture

@@ -1,7 +1,10 @@
 // libFuzzer: any bytes as a glTF file, without a folder, so that no file is opened. What loads is
-// sampled and viewed as well.
+// sampled, viewed, and packed or repaired as well.
 #include <dermis/gltf.h>
+#include <dermis/pack.h>
+#include <dermis/validate.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -9,30 +12,53 @@
 
 using namespace dermis;
 
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+/// A view makes sense, whatever the file says: only its values may be bad.
+void checkPrimitive(const gltf::Model& model, const gltf::SkinnedPrimitive& skinned) {
+  const gltf::Mesh& mesh = model.meshes[skinned.mesh];
+  const gltf::PrimitiveView view(mesh.primitives[skinned.primitive]);
+  const MeshView bindPose = view.mesh();
+  require(bindPose.vertexCount != 0);
+  require(bindPose.morphTargets.size() == mesh.morphTargetCount);
+  if (bindPose.influenceSets.empty()) return;
+  const auto joints = static_cast<std::uint32_t>(model.skins[skinned.skin].joints.size());
+  const MeshReport report = validate(bindPose, joints);
+  require(report.repairable());
+  require(pack(bindPose, joints).ok() == report.packable());
+  if (report.packable()) return;
+  const Result<RepairedMesh> repaired = repair(bindPose, joints);
+  require(repaired.ok() && pack(repaired->view(), joints).ok());
+}
+
+}  // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto result = gltf::loadFromMemory(std::as_bytes(std::span(data, size)), {});
   if (!result) {
     // An error has a sentence, on one line.
     const std::string& message = result.error().message;
-    if (message.empty() || message.find('\n') != std::string::npos) std::abort();
+    require(!message.empty() && message.find('\n') == std::string::npos);
     return 0;
   }
-  for (const gltf::SkinnedPrimitive& skinned : result->skinnedPrimitives) {
-    const gltf::Mesh& mesh = result->meshes[skinned.mesh];
-    const gltf::PrimitiveView view(mesh.primitives[skinned.primitive]);
-    if (view.mesh().vertexCount == 0) std::abort();
-    if (view.mesh().morphTargets.size() != mesh.morphTargetCount) std::abort();
-    const std::uint32_t clip = result->clips.empty() ? gltf::none : 0;
-    if (morphWeights(*result, skinned.node, clip, 0.5).size() != mesh.morphTargetCount)
-      std::abort();
+  const gltf::Model& model = *result;
+  // A hostile file may have very many primitives, clips and skins: a few of them will do.
+  for (std::size_t i = 0; i < std::min<std::size_t>(model.skinnedPrimitives.size(), 4); ++i) {
+    const gltf::SkinnedPrimitive& skinned = model.skinnedPrimitives[i];
+    checkPrimitive(model, skinned);
+    const std::uint32_t clip = model.clips.empty() ? gltf::none : 0;
+    require(gltf::morphWeights(model, skinned.node, clip, 0.5).size() ==
+            model.meshes[skinned.mesh].morphTargetCount);
   }
-  // A hostile file may have very many clips and skins: a few of them will do.
-  for (std::uint32_t clip = 0; clip < result->clips.size() && clip < 4; ++clip) {
-    const auto globals = gltf::nodeGlobals(*result, clip, result->clips[clip].duration / 2);
-    if (globals.size() != result->nodes.size()) std::abort();
-    for (std::uint32_t skin = 0; skin < result->skins.size() && skin < 4; ++skin) {
-      const auto palette = gltf::palette(*result, skin, globals);
-      if (palette.size() != result->skins[skin].joints.size()) std::abort();
+  for (std::uint32_t clip = 0; clip < model.clips.size() && clip < 4; ++clip) {
+    const auto globals = gltf::nodeGlobals(model, clip, model.clips[clip].duration / 2);
+    require(globals.size() == model.nodes.size());
+    for (std::uint32_t skin = 0; skin < model.skins.size() && skin < 4; ++skin) {
+      require(gltf::palette(model, skin, globals).size() == model.skins[skin].joints.size());
     }
   }
   return 0;

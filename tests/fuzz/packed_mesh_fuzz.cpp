@@ -1,50 +1,136 @@
-// libFuzzer: any bytes as a stored packed mesh. What is accepted must be safe to plan with.
+// libFuzzer: any bytes as a stored packed mesh. What is accepted must be safe to plan with and to
+// skin.
 
+#include <array>
+#include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
+#include <cstring>
 #include <span>
 #include <vector>
 
 #include "abi.h"
 #include "dermis/plan.h"
+#include "kernel_reads.h"
 
 using namespace dermis;
+using fuzz::require;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  // The checksum would stop nearly every input: it is put right, so that what lies behind it is
-  // attacked.
-  std::vector<std::uint32_t> words(size / 16 * 4);
-  for (std::size_t i = 0; i < words.size() * 4; ++i)
-    words[i / 4] |= std::uint32_t{data[i]} << (i % 4 * 8);
+namespace {
+
+constexpr std::uint32_t vertexCount = 150, jointCount = 9;
+
+/// A mesh with all that a blob may hold, and no reason to be refused.
+std::vector<std::uint32_t> makeGoodBlob() {
+  std::vector<float> positions, normals, tangents, weights;
+  std::vector<std::uint8_t> joints;
+  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+    const float f = static_cast<float>(vertex);
+    positions.insert(positions.end(), {f, std::sin(f), 1});
+    normals.insert(normals.end(), {0, 0, 1});
+    tangents.insert(tangents.end(), {1, 0, 0, -1});
+    for (std::uint32_t slot = 0; slot < 3; ++slot) {
+      joints.push_back(static_cast<std::uint8_t>((vertex + slot) % jointCount));
+      weights.push_back(slot <= vertex % 4 ? 0.25f : 0);
+    }
+  }
+  const std::vector<std::uint32_t> some{3, 4, 63, 64, 100, 149};
+  const InfluenceSet set{{joints.data(), vertexCount, 3, ComponentType::uint8, 3},
+                         floatAttribute(weights.data(), vertexCount, 3)};
+  std::array<MorphTargetView, 3> targets;
+  targets[0].positions = floatAttribute(positions.data(), vertexCount, 3);
+  targets[1].vertices = some;
+  targets[1].positions = floatAttribute(normals.data(), 6, 3);
+  targets[1].normals = floatAttribute(tangents.data(), 6, 3);
+  targets[1].tangents = floatAttribute(normals.data(), 6, 3);
+  MeshView mesh;
+  mesh.vertexCount = vertexCount;
+  mesh.positions = floatAttribute(positions.data(), vertexCount, 3);
+  mesh.normals = floatAttribute(normals.data(), vertexCount, 3);
+  mesh.tangents = floatAttribute(tangents.data(), vertexCount, 4);
+  mesh.influenceSets = {&set, 1};
+  mesh.morphTargets = targets;
+  const Result<PackedMesh> packed = pack(mesh, jointCount);
+  require(packed.ok());
+  std::vector<std::uint32_t> words(packed->bytes().size() / 4);
+  std::memcpy(words.data(), packed->bytes().data(), packed->bytes().size());
+  return words;
+}
+
+/// The good blob with some of its words changed: a place (2 bytes), a way, and a number.
+std::vector<std::uint32_t> changedBlob(std::span<const std::uint8_t> data) {
+  static const std::vector<std::uint32_t> good = makeGoodBlob();
+  std::vector<std::uint32_t> words = good;
+  for (; data.size() >= 7; data = data.subspan(7)) {
+    std::uint32_t& word = words[(data[0] | std::size_t{data[1]} << 8) % words.size()];
+    std::uint32_t number;
+    std::memcpy(&number, data.data() + 3, 4);
+    word = data[2] % 2 == 0 ? number : word + (number % 64 - 32);
+  }
+  return words;
+}
+
+/// All other bytes, with a header that says what they are.
+std::vector<std::uint32_t> blobOf(std::span<const std::uint8_t> data) {
+  std::vector<std::uint32_t> words(data.size() / 16 * 4);
+  if (!words.empty()) std::memcpy(words.data(), data.data(), words.size() * 4);
   if (words.size() > abi::MESH_HEADER_WORDS) {
     words[abi::MESH_HEADER_MAGIC] = abi::MESH_MAGIC;
     words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
     words[abi::MESH_HEADER_WORDS_TOTAL] = static_cast<std::uint32_t>(words.size());
-    std::uint32_t hash = 2166136261u;
-    for (std::size_t i = abi::MESH_HEADER_CHECKSUM + 1; i < words.size(); ++i)
-      hash = (hash ^ words[i]) * 16777619u;
-    words[abi::MESH_HEADER_CHECKSUM] = hash;
   }
+  return words;
+}
+
+/// The checksum would stop nearly every input: it is put right, so that what lies behind it is
+/// attacked.
+void putChecksumRight(std::vector<std::uint32_t>& words) {
+  if (words.size() <= abi::MESH_HEADER_CHECKSUM) return;
+  std::uint32_t hash = 2166136261u;
+  for (std::size_t i = abi::MESH_HEADER_CHECKSUM + 1; i < words.size(); ++i)
+    hash = std::rotl((hash ^ words[i]) * 16777619u, 15);
+  words[abi::MESH_HEADER_CHECKSUM] = hash;
+}
+
+/// A job with all attributes that the mesh claims to have, and its first and last morph target.
+void planWith(const MeshInfo& info) {
+  const Palette palette{info.requiredJoints, 0, true};
+  std::vector<MorphWeight> morphs;
+  if (info.morphTargetCount > 1) morphs.push_back({info.morphTargetCount - 1, 0.5f});
+  if (info.morphTargetCount > 0) morphs.push_back({0, -2});
+  constexpr std::uint32_t stride = 40;
+  Job job;
+  job.mesh = info;
+  job.positions = {0, stride, VertexFormat::float32x3};
+  if (info.hasNormals) job.normals = {12, stride, VertexFormat::float32x3};
+  if (info.hasTangents) job.tangents = {24, stride, VertexFormat::float32x4};
+  job.morphs = morphs;
+  Batch batch;
+  batch.palettes = {&palette, 1};
+  batch.jobs = {&job, 1};
+  batch.meshesSize = info.byteSize;
+  batch.matricesSize = std::uint64_t{info.requiredJoints} * sizeof(JointMatrix);
+  batch.outputs = OutputSizes::oneBuffer(std::uint64_t{info.vertexCount} * stride);
+  Plan plan;
+  require(makePlan(batch, {}, {}, plan).ok());
+  std::vector<std::byte> tables(plan.buffer(BufferRole::tables).size);
+  require(writeTables(plan, tables).ok());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const std::span<const std::uint8_t> rest(data + 1, size - 1);
+  std::vector<std::uint32_t> words = data[0] % 2 == 0 ? blobOf(rest) : changedBlob(rest);
+  putChecksumRight(words);
   const Result<PackedMesh> mesh = PackedMesh::fromBytes(std::as_bytes(std::span(words)));
-  if (!mesh) return 0;
-  // What the kernels will read of every vertex lies inside the blob.
-  const std::span<const std::byte> bytes = mesh->bytes();
-  const auto* blob = reinterpret_cast<const std::uint32_t*>(bytes.data());
-  volatile std::uint32_t sink = 0;
-  for (std::uint32_t vertex = 0; vertex < mesh->vertexCount(); ++vertex) {
-    sink = blob[blob[abi::MESH_HEADER_POSITIONS] + vertex * 3 + 2];
-    const std::uint32_t* block =
-        blob + blob[abi::MESH_HEADER_BLOCKS] + vertex / abi::BLOCK_VERTICES * abi::BLOCK_WORDS;
-    for (std::uint32_t slot = 0; slot < block[abi::BLOCK_SLOTS]; ++slot) {
-      const std::uint32_t* weights = blob + block[abi::BLOCK_OFFSET];
-      const std::uint32_t lane = vertex % abi::BLOCK_VERTICES;
-      sink = weights[slot * abi::BLOCK_VERTICES + lane];
-      const std::uint32_t pair =
-          weights[(block[abi::BLOCK_SLOTS] + slot / 2) * abi::BLOCK_VERTICES + lane];
-      if ((slot % 2 == 0 ? pair & 0xffffu : pair >> 16) >= mesh->requiredJoints()) std::abort();
-    }
+  if (!mesh) {
+    require(!mesh.error().message.empty());
+    return 0;
   }
-  static_cast<void>(sink);
+  fuzz::KernelReads(*mesh).readAll();
+  planWith(mesh->info());
   return 0;
 }

@@ -29,7 +29,7 @@ Comparison skinAndCompare(samples::Device& device, vulkan::Context& context, Own
   EXPECT_TRUE(packed.ok()) << (packed ? "" : packed.error().message);
   const samples::SkinRequest request{&*packed, pose, true, method};
   samples::RunOptions options;
-  options.stride = 32;
+  options.output.gap = 8;
   Result<samples::BatchResult> result = samples::runBatch(device, context, {&request, 1}, options);
   EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
   if (!result) return {};
@@ -37,9 +37,7 @@ Comparison skinAndCompare(samples::Device& device, vulkan::Context& context, Own
   const samples::SkinnedVertices& skinned = result->instances[0];
   Result<reference::SkinnedMesh> expected = reference::skin(mesh.view(), pose, method);
   EXPECT_TRUE(expected.ok());
-  Result<Comparison> comparison =
-      compare(*expected, floatAttribute(skinned.positions.data(), mesh.vertexCount(), 3),
-              floatAttribute(skinned.normals.data(), mesh.vertexCount(), 3), method);
+  Result<Comparison> comparison = compare(*expected, skinned.view(), method);
   EXPECT_TRUE(comparison.ok());
   return *comparison;
 }

@@ -25,7 +25,7 @@ TEST_F(LimitsTest, OutputLargerThanAStorageBufferRangeIsSplit) {
         {&packed[i % 2], poses[i], false, i % 3 == 0 ? Method::linear : Method::dualQuaternion});
   }
   samples::RunOptions options;
-  options.stride = 28;
+  options.output.gap = 4;
   const Result<samples::BatchResult> whole =
       samples::runBatch(device(), context(), requests, options);
   ASSERT_TRUE(whole.ok());

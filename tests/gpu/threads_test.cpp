@@ -65,14 +65,14 @@ class ThreadsTest : public DeviceTest {
     const Palette palette{10, 0, false};
     Job job;
     job.mesh = mesh.info();
-    job.positions = {0, 24};
-    job.normals = {12, 24};
+    job.positions = {0, 24, VertexFormat::float32x3};
+    job.normals = {12, 24, VertexFormat::float32x3};
     Batch batch;
     batch.palettes = {&palette, 1};
     batch.jobs = {&job, 1};
     batch.meshesSize = mesh.bytes().size();
     batch.matricesSize = pose.size() * sizeof(JointMatrix);
-    batch.outputSize = std::uint64_t{mesh.vertexCount()} * 24;
+    batch.outputs = OutputSizes::oneBuffer(std::uint64_t{mesh.vertexCount()} * 24);
     ASSERT_TRUE(makePlan(batch, context().limits(), {}, work.plan).ok());
     const auto make = [&](BufferRole role) {
       const BufferRequirement requirement = work.plan.buffer(role);
@@ -81,12 +81,16 @@ class ThreadsTest : public DeviceTest {
     work.matrices = make(BufferRole::matrices);
     work.tables = make(BufferRole::tables);
     work.palettes = make(BufferRole::palettes);
-    work.output = make(BufferRole::output);
+    work.output = make(BufferRole::positions);
     std::memcpy(work.matrices.bytes().data(), pose.data(), work.matrices.bytes().size());
     ASSERT_TRUE(writeTables(work.plan, work.tables.bytes()).ok());
     work.bindings.emplace(
-        *context().createBindings({meshes.range(), work.matrices.range(), work.tables.range(),
-                                   work.palettes.range(), work.output.range()}));
+        *context().createBindings({meshes.range(),
+                                   work.matrices.range(),
+                                   work.tables.range(),
+                                   work.palettes.range(),
+                                   vulkan::OutputBuffers::oneBuffer(work.output.range()),
+                                   {}}));
     work.commands.begin(device());
   }
 };

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
+#include <string>
+#include <vector>
 
+#include "abi.h"
 #include "dermis/vulkan/vulkan.h"
+#include "mock_batch.h"
 #include "mock_vulkan.h"
-#include "random_rig.h"
 
 namespace dermis::test {
 namespace {
@@ -31,46 +35,6 @@ const std::vector<std::string> neededFunctions{"vkGetDeviceProcAddr",
                                                "vkCmdPushConstants",
                                                "vkCmdPipelineBarrier",
                                                "vkCmdDispatch"};
-
-/// A batch of one mesh with both methods, and its plan.
-struct SmallBatch {
-  OwnedMesh mesh = randomMesh(1, 100, 4, 4);
-  PackedMesh packed = *pack(mesh.view(), 4);
-  Plan plan;
-
-  explicit SmallBatch(std::vector<Method> methods = {Method::linear, Method::dualQuaternion}) {
-    const Palette palette{4, 0, true};
-    std::vector<Job> jobs;
-    for (const Method method : methods) {
-      Job job;
-      job.mesh = packed.info();
-      job.method = method;
-      job.positions = {jobs.size() * 2400, 24};
-      job.normals = {jobs.size() * 2400 + 12, 24};
-      jobs.push_back(job);
-    }
-    Batch batch;
-    batch.palettes = {&palette, 1};
-    batch.jobs = jobs;
-    batch.meshesSize = packed.bytes().size();
-    batch.matricesSize = 4 * sizeof(JointMatrix);
-    batch.outputSize = jobs.size() * 2400;
-    EXPECT_TRUE(makePlan(batch, {}, {}, plan).ok());
-  }
-
-  vulkan::BatchBuffers buffers() const {
-    const auto range = [&](BufferRole role) {
-      const std::uint64_t size = plan.buffer(role).size;
-      return size == 0
-                 ? vulkan::BufferRange{}
-                 : vulkan::BufferRange{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, size};
-    };
-    return {range(BufferRole::meshes), range(BufferRole::matrices), range(BufferRole::tables),
-            range(BufferRole::palettes), range(BufferRole::output)};
-  }
-};
-
-const VkCommandBuffer commandBuffer = reinterpret_cast<VkCommandBuffer>(std::uintptr_t{80});
 
 TEST(ContextTest, EveryMissingEntryPointIsNamed) {
   for (const std::string& name : neededFunctions) {
@@ -123,26 +87,38 @@ TEST(ContextTest, MissingHandlesAndOldVersionsAreRefused) {
   refuses([](Description& d) { d.apiVersion = VK_API_VERSION_1_0; }, ErrorCode::missingFeature,
           "Vulkan 1.1");
   mock.limits.maxPerStageDescriptorStorageBuffers = 3;
-  refuses([](Description&) {}, ErrorCode::missingFeature, "storage buffers");
+  refuses([](Description&) {}, ErrorCode::missingFeature,
+          "3 storage buffers a stage, Dermis needs 4");
 }
 
+// Shader modules of which the device allows all, and the layouts.
 TEST(ContextTest, AFailedCreationLeavesNothingBehind) {
-  for (const char* function :
-       {"vkCreateShaderModule", "vkCreateDescriptorSetLayout", "vkCreatePipelineLayout"}) {
-    for (int failAfter = 0; failAfter < 2; ++failAfter) {
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  halves.storageBuffer16BitAccess = VK_TRUE;
+  VkPhysicalDevice8BitStorageFeatures bytes{};
+  bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+  bytes.storageBuffer8BitAccess = VK_TRUE;
+  bytes.pNext = &halves;
+  for (const auto& [function, calls] : {std::pair{"vkCreateShaderModule", 7},
+                                        {"vkCreateDescriptorSetLayout", 1},
+                                        {"vkCreatePipelineLayout", 1}}) {
+    for (int failAfter = 0; failAfter <= calls; ++failAfter) {
       MockVulkan mock;
       mock.failing = function;
       mock.failAfter = failAfter;
-      const Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-      if (failAfter == 0) {
-        ASSERT_FALSE(context.ok()) << function;
-        EXPECT_EQ(context.error().code, ErrorCode::vulkanError);
-        EXPECT_EQ(context.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY);
-        EXPECT_NE(context.error().message.find(function), std::string::npos);
+      vulkan::DeviceDescription description = mock.description();
+      description.enabledFeatures = &bytes;
+      {
+        const Result<vulkan::Context> context = vulkan::Context::create(description);
+        ASSERT_EQ(context.ok(), failAfter == calls) << function;
+        if (!context) {
+          EXPECT_EQ(context.error().code, ErrorCode::vulkanError);
+          EXPECT_EQ(context.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY);
+          EXPECT_NE(context.error().message.find(function), std::string::npos);
+        }
       }
-      if (!context) {
-        EXPECT_EQ(mock.aliveObjects(), 0) << function;
-      }
+      EXPECT_EQ(mock.aliveObjects(), 0) << function << ", after " << failAfter;
     }
   }
 }
@@ -154,7 +130,7 @@ TEST(ContextTest, EveryObjectUsesTheEnginesAllocatorAndIsDestroyed) {
   {
     Result<vulkan::Context> context = vulkan::Context::create(mock.description());
     ASSERT_TRUE(context.ok());
-    const SmallBatch batch;
+    const MockBatch batch = MockBatch::withBothMethods(context->limits());
     ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
     ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
     EXPECT_EQ(mock.alive["Pipeline"], 3) << "what exists is not built again";
@@ -167,127 +143,13 @@ TEST(ContextTest, EveryObjectUsesTheEnginesAllocatorAndIsDestroyed) {
   EXPECT_FALSE(mock.wrongAllocator);
 }
 
-TEST(ContextTest, RecordNeedsPreparedVariants) {
-  MockVulkan mock;
-  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  const SmallBatch batch;
-  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-  ASSERT_TRUE(bindings.ok());
-  const Result<void> early = context->record(commandBuffer, batch.plan, *bindings);
-  ASSERT_FALSE(early.ok());
-  EXPECT_EQ(early.error().code, ErrorCode::notPrepared);
-  EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-  EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
-}
-
-TEST(ContextTest, RecordsTheBarrierBetweenItsPassesAndNoOther) {
-  for (const bool push : {false, true}) {
-    MockVulkan mock;
-    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
-    Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-    const SmallBatch batch;
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-    const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-    ASSERT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
-    const std::string descriptors = push ? "push descriptors" : "bind sets";
-    // The palettes, the linear instance, which needs none, and the dual-quaternion one.
-    const std::vector<std::string> expected{
-        "bind pipeline", descriptors,      "push constants", "dispatch", "bind pipeline",
-        descriptors,     "push constants", "dispatch",       "barrier",  "bind pipeline",
-        descriptors,     "push constants", "dispatch"};
-    EXPECT_EQ(mock.commands, expected);
-    ASSERT_EQ(mock.bufferBarriers.size(), 1u);
-    EXPECT_TRUE(mock.memoryBarriers.empty());
-    EXPECT_EQ(mock.bufferBarriers[0].srcAccessMask,
-              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_WRITE_BIT));
-    EXPECT_EQ(mock.bufferBarriers[0].dstAccessMask,
-              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT));
-    EXPECT_EQ(mock.bufferBarriers[0].size, batch.plan.buffer(BufferRole::palettes).size);
-  }
-}
-
-TEST(ContextTest, LinearAloneNeedsNoPalettes) {
-  MockVulkan mock;
-  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  const SmallBatch batch({Method::linear});
-  EXPECT_EQ(batch.plan.buffer(BufferRole::palettes).size, 0u);
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-  ASSERT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
-  EXPECT_EQ(mock.commands,
-            (std::vector<std::string>{"bind pipeline", "bind sets", "push constants", "dispatch"}));
-}
-
-TEST(ContextTest, AnEmptyPlanRecordsNothing) {
-  MockVulkan mock;
-  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  const Plan plan;
-  const Result<vulkan::Bindings> bindings = context->createBindings({});
-  ASSERT_TRUE(bindings.ok());
-  EXPECT_TRUE(context->record(commandBuffer, plan, *bindings).ok());
-  EXPECT_TRUE(mock.commands.empty());
-}
-
-TEST(ContextTest, BuffersThatAreTooSmallOrMisalignedAreRefused) {
-  MockVulkan mock;
-  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  const SmallBatch batch;
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-  for (vulkan::BufferRange vulkan::BatchBuffers::*member :
-       {&vulkan::BatchBuffers::meshes, &vulkan::BatchBuffers::matrices,
-        &vulkan::BatchBuffers::tables, &vulkan::BatchBuffers::palettes,
-        &vulkan::BatchBuffers::output}) {
-    vulkan::BatchBuffers buffers = batch.buffers();
-    (buffers.*member).size -= 4;
-    const Result<vulkan::Bindings> smaller = context->createBindings(buffers);
-    ASSERT_TRUE(smaller.ok());
-    EXPECT_EQ(context->record(commandBuffer, batch.plan, *smaller).error().code,
-              ErrorCode::invalidArgument);
-    buffers = batch.buffers();
-    (buffers.*member).offset = 16;
-    EXPECT_EQ(context->createBindings(buffers).error().code, ErrorCode::invalidArgument);
-    buffers = batch.buffers();
-    (buffers.*member).size = VK_WHOLE_SIZE;
-    EXPECT_EQ(context->createBindings(buffers).error().code, ErrorCode::invalidArgument);
-  }
-  EXPECT_TRUE(mock.commands.empty());
-}
-
-TEST(ContextTest, APlanForOtherLimitsIsRefused) {
-  const SmallBatch batch;
-  MockVulkan mock;
-  mock.limits.maxStorageBufferRange = 1 << 28;
-  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-  const Result<void> recorded = context->record(commandBuffer, batch.plan, *bindings);
-  ASSERT_FALSE(recorded.ok());
-  EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
-  EXPECT_NE(recorded.error().message.find("other limits"), std::string::npos);
-  EXPECT_TRUE(mock.commands.empty());
-}
-
-TEST(ContextTest, BindingsOfAnotherContextAreRefused) {
-  MockVulkan mock;
-  Result<vulkan::Context> one = vulkan::Context::create(mock.description());
-  Result<vulkan::Context> other = vulkan::Context::create(mock.description());
-  const SmallBatch batch;
-  ASSERT_TRUE(one->prepare(batch.plan.variants()).ok());
-  const Result<vulkan::Bindings> bindings = other->createBindings(batch.buffers());
-  EXPECT_EQ(one->record(commandBuffer, batch.plan, *bindings).error().code,
-            ErrorCode::invalidArgument);
-  EXPECT_EQ(one->record(commandBuffer, batch.plan, vulkan::Bindings()).error().code,
-            ErrorCode::invalidArgument);
-}
-
 TEST(ContextTest, AFailureWhileBindingOrPreparingIsAnErrorAndLeaksNothing) {
-  const SmallBatch batch;
   for (const char* function :
        {"vkCreateDescriptorPool", "vkAllocateDescriptorSets", "vkCreateComputePipelines"}) {
     MockVulkan mock;
     {
       Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+      const MockBatch batch = MockBatch::withBothMethods(context->limits());
       mock.failing = function;
       const bool prepared = context->prepare(batch.plan.variants()).ok();
       const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
@@ -301,75 +163,264 @@ TEST(ContextTest, AFailureWhileBindingOrPreparingIsAnErrorAndLeaksNothing) {
   }
 }
 
-TEST(ScopeTest, OutputScopesNameTheConsumer) {
-  using namespace vulkan;
-  for (const Consumer consumer :
-       {Consumer::vertexInput, Consumer::vertexShader, Consumer::compute,
-        Consumer::accelerationStructureBuild, Consumer::transfer, Consumer::hostRead}) {
-    const Dependency dependency = outputScope(consumer);
-    EXPECT_EQ(dependency.source.stages,
-              static_cast<VkPipelineStageFlags>(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
-    EXPECT_EQ(dependency.source.accesses, static_cast<VkAccessFlags>(VK_ACCESS_SHADER_WRITE_BIT));
-    EXPECT_NE(dependency.destination.stages, 0u);
-    EXPECT_NE(dependency.destination.accesses, 0u);
-    // The release makes available, the acquire makes visible; the other halves are empty.
-    EXPECT_EQ(outputScope(consumer, QueueTransfer::release).destination.accesses, 0u);
-    EXPECT_EQ(outputScope(consumer, QueueTransfer::release).source.accesses,
-              dependency.source.accesses);
-    EXPECT_EQ(outputScope(consumer, QueueTransfer::acquire).source.accesses, 0u);
-    EXPECT_EQ(outputScope(consumer, QueueTransfer::acquire).destination.accesses,
-              dependency.destination.accesses);
-  }
-  const VkBufferMemoryBarrier barrier =
-      bufferBarrier(outputScope(Consumer::vertexInput, QueueTransfer::release),
-                    reinterpret_cast<VkBuffer>(std::uintptr_t{5}), 16, 32, 1, 2);
-  EXPECT_EQ(barrier.srcQueueFamilyIndex, 1u);
-  EXPECT_EQ(barrier.dstQueueFamilyIndex, 2u);
-  EXPECT_EQ(barrier.offset, 16u);
-  EXPECT_EQ(barrier.size, 32u);
+// ---- What the device can do
+
+DeviceLimits limitsWith(const void* enabledFeatures) {
+  MockVulkan mock;
+  vulkan::DeviceDescription description = mock.description();
+  description.enabledFeatures = enabledFeatures;
+  const Result<vulkan::Context> context = vulkan::Context::create(description);
+  EXPECT_TRUE(context.ok());
+  return context->limits();
 }
 
-TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
-  using namespace vulkan;
-  for (const PreviousUse writer :
-       {PreviousUse::hostWrite, PreviousUse::transferWrite, PreviousUse::computeWrite}) {
-    EXPECT_NE(inputScope(writer).source.accesses, 0u);
-    EXPECT_EQ(inputScope(writer).destination.accesses,
-              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT));
+/// The structures that an engine may have chained, none of them enabling anything that is used; and
+/// some that Dermis does not know, of which every word is true.
+struct FeatureChain {
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  VkPhysicalDevice8BitStorageFeatures bytes{};
+  VkPhysicalDeviceVulkan11Features vulkan11{};
+  VkPhysicalDeviceVulkan12Features vulkan12{};
+  VkPhysicalDeviceFeatures2 features2{};
+  VkPhysicalDeviceVariablePointersFeatures pointers{};
+  std::vector<VkBaseOutStructure*> order;
+
+  FeatureChain() {
+    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+    vulkan11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
+    vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    features2.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    pointers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VARIABLE_POINTERS_FEATURES;
+    // Neighbours of the members that are meant.
+    halves.uniformAndStorageBuffer16BitAccess = vulkan11.uniformAndStorageBuffer16BitAccess =
+        VK_TRUE;
+    halves.storagePushConstant16 = vulkan11.storagePushConstant16 = VK_TRUE;
+    bytes.uniformAndStorageBuffer8BitAccess = vulkan12.uniformAndStorageBuffer8BitAccess = VK_TRUE;
+    vulkan12.drawIndirectCount = vulkan12.samplerMirrorClampToEdge = VK_TRUE;
+    features2.features.robustBufferAccess = features2.features.fullDrawIndexUint32 = VK_TRUE;
+    pointers.variablePointersStorageBuffer = pointers.variablePointers = VK_TRUE;
+    order = {base(halves),   base(bytes),     base(vulkan11),
+             base(vulkan12), base(features2), base(pointers)};
+    std::sort(order.begin(), order.end());
   }
-  for (const PreviousUse reader :
-       {PreviousUse::vertexInput, PreviousUse::vertexShader, PreviousUse::compute,
-        PreviousUse::accelerationStructureBuild, PreviousUse::transfer}) {
-    EXPECT_NE(inputScope(reader).source.stages, 0u);
-    EXPECT_EQ(inputScope(reader).source.accesses, 0u);
-    EXPECT_EQ(inputScope(reader).destination.stages,
-              static_cast<VkPipelineStageFlags>(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
+  FeatureChain(const FeatureChain&) = delete;
+  FeatureChain& operator=(const FeatureChain&) = delete;
+
+  template <typename Structure>
+  static VkBaseOutStructure* base(Structure& structure) {
+    return reinterpret_cast<VkBaseOutStructure*>(&structure);
   }
-  const Dependency both =
-      inputScope(PreviousUse::transferWrite) | inputScope(PreviousUse::vertexInput);
-  EXPECT_EQ(both.source.stages,
-            static_cast<VkPipelineStageFlags>(VK_PIPELINE_STAGE_TRANSFER_BIT |
-                                              VK_PIPELINE_STAGE_VERTEX_INPUT_BIT));
-  EXPECT_EQ(memoryBarrier(both).srcAccessMask,
-            static_cast<VkAccessFlags>(VK_ACCESS_TRANSFER_WRITE_BIT));
+  const void* chain() {
+    for (std::size_t i = 0; i < order.size(); ++i)
+      order[i]->pNext = i + 1 < order.size() ? order[i + 1] : nullptr;
+    return order[0];
+  }
+};
+
+TEST(ContextTest, WithoutFeaturesWordsAreStored) {
+  EXPECT_FALSE(limitsWith(nullptr).storage16Bit);
+  EXPECT_FALSE(limitsWith(nullptr).storage8Bit);
 }
 
-TEST(KernelsTest, SpirvAndConstantsAreThereWithoutADevice) {
-  for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
-    const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(kernel);
-    ASSERT_GT(spirv.size(), 5u);
-    EXPECT_EQ(spirv[0], 0x07230203u);
-    EXPECT_EQ(spirv[1], 0x00010300u) << "SPIR-V 1.3, which Vulkan 1.1 takes";
+TEST(ContextTest, FeaturesAreFoundInAnyOrderOfTheChain) {
+  FeatureChain features;
+  const auto expectAll = [&](bool halves, bool bytes) {
+    std::sort(features.order.begin(), features.order.end());
+    int orders = 0;
+    do {
+      // All 720 orders of each are more than is needed.
+      if (orders++ % 7 != 0) continue;
+      const DeviceLimits limits = limitsWith(features.chain());
+      ASSERT_EQ(limits.storage16Bit, halves);
+      ASSERT_EQ(limits.storage8Bit, bytes);
+    } while (std::next_permutation(features.order.begin(), features.order.end()));
+    ASSERT_EQ(orders, 720);
+  };
+  expectAll(false, false);
+  for (VkBool32* enabled :
+       {&features.halves.storageBuffer16BitAccess, &features.vulkan11.storageBuffer16BitAccess}) {
+    *enabled = VK_TRUE;
+    expectAll(true, false);
+    *enabled = VK_FALSE;
   }
+  for (VkBool32* enabled :
+       {&features.bytes.storageBuffer8BitAccess, &features.vulkan12.storageBuffer8BitAccess}) {
+    *enabled = VK_TRUE;
+    expectAll(false, true);
+    features.vulkan11.storageBuffer16BitAccess = VK_TRUE;
+    expectAll(true, true);
+    features.vulkan11.storageBuffer16BitAccess = *enabled = VK_FALSE;
+  }
+}
+
+TEST(ContextTest, LimitsAreTheDevices) {
+  MockVulkan mock;
+  mock.limits.maxStorageBufferRange = 0xffffffffu;
+  mock.limits.minStorageBufferOffsetAlignment = 64;
+  mock.limits.maxComputeWorkGroupCount[0] = 1000;
+  mock.limits.maxComputeWorkGroupCount[1] = 70000;
+  mock.limits.maxPerStageDescriptorStorageBuffers = 35;
+  const Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+  DeviceLimits expected;
+  expected.maxStorageBufferRange = 0xfffffffcu;  // whole words
+  expected.minStorageBufferOffsetAlignment = 64;
+  expected.maxWorkgroupCountX = 1000;
+  expected.maxWorkgroupCountY = 70000;
+  expected.maxStorageBuffersPerStage = 35;
+  EXPECT_TRUE(context->limits() == expected);
+}
+
+TEST(ContextTest, LayoutsHaveEightBindingsWhereTheDeviceAllowsThem) {
+  for (const std::uint32_t allowed : {4u, 5u, 7u, 8u, 9u, 0xffffffffu}) {
+    for (const bool push : {false, true}) {
+      MockVulkan mock;
+      mock.limits.maxPerStageDescriptorStorageBuffers = allowed;
+      if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
+      ASSERT_TRUE(vulkan::Context::create(mock.description()).ok());
+      ASSERT_EQ(mock.setLayouts.size(), 1u);
+      const std::vector<VkDescriptorSetLayoutBinding>& bindings = mock.setLayouts[0].bindings;
+      ASSERT_EQ(bindings.size(), allowed >= 8 ? 8u : 4u) << allowed;
+      for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {
+        EXPECT_EQ(bindings[binding].binding, binding);
+        EXPECT_EQ(bindings[binding].descriptorType, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
+        EXPECT_EQ(bindings[binding].descriptorCount, 1u);
+      }
+      EXPECT_EQ(mock.setLayouts[0].flags != 0, push);
+    }
+  }
+}
+
+/// The modules that a device like this gets: their code, in any order.
+std::set<const std::uint32_t*> modulesOf(std::uint32_t storageBuffers, bool halves, bool bytes) {
+  FeatureChain features;
+  features.halves.storageBuffer16BitAccess = halves ? VK_TRUE : VK_FALSE;
+  features.bytes.storageBuffer8BitAccess = bytes ? VK_TRUE : VK_FALSE;
+  MockVulkan mock;
+  mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
+  vulkan::DeviceDescription description = mock.description();
+  description.enabledFeatures = features.chain();
+  EXPECT_TRUE(vulkan::Context::create(description).ok());
+  const std::set<const std::uint32_t*> modules(mock.modules.begin(), mock.modules.end());
+  EXPECT_EQ(modules.size(), mock.modules.size()) << "one is created twice";
+  return modules;
+}
+
+const std::uint32_t* codeOf(Kernel kernel, std::uint32_t storageBuffers, std::uint8_t unit = 4,
+                            bool extras = false) {
   Variant variant;
-  variant.workgroupSize = 32;
+  variant.kernel = kernel;
+  variant.units[2] = unit;
+  variant.bounds = extras;
+  DeviceLimits limits = richLimits();
+  limits.maxStorageBuffersPerStage = storageBuffers;
+  return vulkan::kernelSpirv(variant, limits).data();
+}
+
+// A module that uses a feature must not be created where it is not enabled.
+TEST(ContextTest, ModulesAreCreatedWhereTheFeaturesAllow) {
+  using Modules = std::set<const std::uint32_t*>;
+  const Modules words{codeOf(Kernel::palette, 8), codeOf(Kernel::skin, 8),
+                      codeOf(Kernel::skin, 8, 4, true)};
+  EXPECT_EQ(words.size(), 3u) << "results have a module of their own";
+  EXPECT_EQ(modulesOf(8, false, false), words);
+  EXPECT_EQ(modulesOf(8, false, true), words) << "bytes need halves too";
+  Modules halves = words;
+  halves.insert({codeOf(Kernel::skin, 8, 2), codeOf(Kernel::skin, 8, 2, true)});
+  EXPECT_EQ(modulesOf(8, true, false), halves);
+  Modules bytes = halves;
+  bytes.insert({codeOf(Kernel::skin, 8, 1), codeOf(Kernel::skin, 8, 1, true)});
+  EXPECT_EQ(modulesOf(8, true, true), bytes);
+  const Modules few{codeOf(Kernel::palette, 4), codeOf(Kernel::skin, 4)};
+  for (const bool enabled : {false, true}) {
+    EXPECT_EQ(modulesOf(4, enabled, enabled), few);
+    EXPECT_EQ(modulesOf(7, enabled, enabled), few);
+  }
+}
+
+TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
+  MockVulkan mock;
+  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+  for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{1, 2}) {
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      Variant variant;
+      variant.units[stream] = unit;
+      const Result<void> prepared = context->prepare({&variant, 1});
+      ASSERT_FALSE(prepared.ok());
+      EXPECT_EQ(prepared.error().code, ErrorCode::missingFeature);
+      EXPECT_NE(prepared.error().message.find("storageBuffer16BitAccess"), std::string::npos);
+    }
+  }
+  EXPECT_EQ(mock.alive["Pipeline"], 0);
+}
+
+// ---- Kernels as data
+
+TEST(KernelsTest, SpirvIsThereWithoutADevice) {
+  std::set<const std::uint32_t*> modules;
+  for (const std::uint32_t storageBuffers : {4u, 8u}) {
+    DeviceLimits limits = richLimits();
+    limits.maxStorageBuffersPerStage = storageBuffers;
+    for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
+      for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{1, 2, 4}) {
+        Variant variant;
+        variant.kernel = kernel;
+        variant.units[3] = unit;
+        const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
+        ASSERT_GT(spirv.size(), 5u);
+        EXPECT_EQ(spirv[0], 0x07230203u);
+        EXPECT_EQ(spirv[1], 0x00010300u) << "SPIR-V 1.3, which Vulkan 1.1 takes";
+        modules.insert(spirv.data());
+      }
+    }
+  }
+  EXPECT_EQ(modules.size(), 6u) << "two of palettes, words, halves, bytes, one output";
+}
+
+TEST(KernelsTest, TheSmallestUnitChoosesTheModule) {
+  const auto code = [](std::array<std::uint8_t, streamCount> units) {
+    Variant variant;
+    variant.units = units;
+    return vulkan::kernelSpirv(variant, richLimits()).data();
+  };
+  EXPECT_EQ(code({4, 2, 4, 4}), code({2, 2, 2, 2}));
+  EXPECT_EQ(code({4, 2, 1, 4}), code({1, 1, 1, 1}));
+  EXPECT_NE(code({4, 4, 4, 4}), code({4, 4, 4, 2}));
+  EXPECT_NE(code({4, 4, 4, 1}), code({4, 4, 4, 2}));
+}
+
+TEST(KernelsTest, ConstantsStandAtTheirIds) {
+  Variant variant;
+  variant.method = Method::linear;
+  variant.positions = VertexFormat::snorm16x4;
+  variant.normals = VertexFormat::octahedral8x2;
+  variant.tangents = VertexFormat::snorm8x4;
+  variant.units = {4, 2, 1, 2};
+  variant.motion = Motion::reskinned;
+  variant.morphs = true;
+  variant.bounds = true;
   variant.influences = 4;
-  variant.instancesPerInvocation = 2;
-  variant.normals = true;
+  variant.instancesPerInvocation = 3;
+  variant.workgroupSize = 32;
   const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
-  EXPECT_EQ(constants.count, 5u);
-  EXPECT_TRUE(std::ranges::equal(std::span(constants.values).first(5),
-                                 std::array<std::uint32_t, 5>{32, 1, 1, 4, 2}));
+  ASSERT_EQ(constants.count, abi::CONSTANT_COUNT);
+  const std::pair<std::uint32_t, std::uint32_t> expected[] = {
+      {abi::CONSTANT_WORKGROUP_SIZE, 32},
+      {abi::CONSTANT_METHOD, abi::METHOD_LINEAR},
+      {abi::CONSTANT_INFLUENCES, 4},
+      {abi::CONSTANT_INSTANCES, 3},
+      {abi::CONSTANT_POSITION_FORMAT, abi::FORMAT_SNORM16X4},
+      {abi::CONSTANT_NORMAL_FORMAT, abi::FORMAT_OCTAHEDRAL8X2},
+      {abi::CONSTANT_TANGENT_FORMAT, abi::FORMAT_SNORM8X4},
+      {abi::CONSTANT_POSITION_UNIT, 4},
+      {abi::CONSTANT_NORMAL_UNIT, 2},
+      {abi::CONSTANT_TANGENT_UNIT, 1},
+      {abi::CONSTANT_PREVIOUS_UNIT, 2},
+      {abi::CONSTANT_MOTION, abi::MOTION_RESKINNED},
+      {abi::CONSTANT_MORPHS, 1},
+      {abi::CONSTANT_BOUNDS, 1}};
+  ASSERT_EQ(std::size(expected), abi::CONSTANT_COUNT);
+  for (const auto& [id, value] : expected) EXPECT_EQ(constants.values[id], value) << id;
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "mock_vulkan.h"
 
+#include <algorithm>
+#include <cstring>
+
 namespace dermis::test {
 namespace {
 
@@ -9,7 +12,10 @@ std::uint64_t nextHandle = 1;
 template <typename Handle>
 VkResult create(const char* function, const char* kind, const VkAllocationCallbacks* allocator,
                 Handle* handle) {
-  if (mock->failing == function && mock->failAfter-- <= 0) return mock->failure;
+  if (mock->failing == function && mock->failAfter-- <= 0) {
+    *handle = reinterpret_cast<Handle>(std::uintptr_t{0xbad});  // undefined: not to be destroyed
+    return mock->failure;
+  }
   if (allocator != mock->allocator) mock->wrongAllocator = true;
   *handle = reinterpret_cast<Handle>(nextHandle++);
   ++mock->alive[kind];
@@ -23,10 +29,25 @@ void destroy(const char* kind, const VkAllocationCallbacks* allocator, Handle ha
   --mock->alive[kind];
 }
 
+void remember(const VkShaderModuleCreateInfo& info, VkShaderModule module) {
+  mock->modules.push_back(info.pCode);
+  mock->codeOfModule[module] = info.pCode;
+}
+void remember(const VkDescriptorSetLayoutCreateInfo& info, VkDescriptorSetLayout) {
+  mock->setLayouts.push_back({info.flags, {info.pBindings, info.pBindings + info.bindingCount}});
+}
+void remember(const VkPipelineLayoutCreateInfo&, VkPipelineLayout) {}
+void remember(const VkDescriptorPoolCreateInfo& info, VkDescriptorPool) {
+  mock->setsInPool = info.maxSets;
+  mock->descriptorsInPool = info.pPoolSizes[0].descriptorCount;
+}
+
 #define MOCK_CREATE(name, Info, Handle)                                                            \
-  VkResult VKAPI_CALL create##name(VkDevice, const Info*, const VkAllocationCallbacks* allocator,  \
-                                   Handle* handle) {                                               \
-    return create("vkCreate" #name, #name, allocator, handle);                                     \
+  VkResult VKAPI_CALL create##name(VkDevice, const Info* info,                                     \
+                                   const VkAllocationCallbacks* allocator, Handle* handle) {       \
+    const VkResult result = create("vkCreate" #name, #name, allocator, handle);                    \
+    if (result == VK_SUCCESS) remember(*info, *handle);                                            \
+    return result;                                                                                 \
   }                                                                                                \
   void VKAPI_CALL destroy##name(VkDevice, Handle handle, const VkAllocationCallbacks* allocator) { \
     destroy(#name, allocator, handle);                                                             \
@@ -37,10 +58,13 @@ MOCK_CREATE(PipelineLayout, VkPipelineLayoutCreateInfo, VkPipelineLayout)
 MOCK_CREATE(DescriptorPool, VkDescriptorPoolCreateInfo, VkDescriptorPool)
 
 VkResult VKAPI_CALL createComputePipelines(VkDevice, VkPipelineCache, std::uint32_t,
-                                           const VkComputePipelineCreateInfo*,
+                                           const VkComputePipelineCreateInfo* info,
                                            const VkAllocationCallbacks* allocator,
                                            VkPipeline* pipeline) {
-  return create("vkCreateComputePipelines", "Pipeline", allocator, pipeline);
+  const VkResult result = create("vkCreateComputePipelines", "Pipeline", allocator, pipeline);
+  if (result == VK_SUCCESS)
+    mock->codeOfPipeline[*pipeline] = mock->codeOfModule.at(info->stage.module);
+  return result;
 }
 void VKAPI_CALL destroyPipeline(VkDevice, VkPipeline pipeline,
                                 const VkAllocationCallbacks* allocator) {
@@ -53,8 +77,15 @@ VkResult VKAPI_CALL allocateDescriptorSets(VkDevice, const VkDescriptorSetAlloca
     sets[i] = reinterpret_cast<VkDescriptorSet>(nextHandle++);
   return VK_SUCCESS;
 }
-void VKAPI_CALL updateDescriptorSets(VkDevice, std::uint32_t, const VkWriteDescriptorSet*,
-                                     std::uint32_t, const VkCopyDescriptorSet*) {}
+void write(const VkWriteDescriptorSet& descriptor, MockDescriptors& descriptors) {
+  const VkDescriptorBufferInfo& info = *descriptor.pBufferInfo;
+  descriptors[descriptor.dstBinding] = {info.buffer, info.offset, info.range};
+}
+void VKAPI_CALL updateDescriptorSets(VkDevice, std::uint32_t count,
+                                     const VkWriteDescriptorSet* writes, std::uint32_t,
+                                     const VkCopyDescriptorSet*) {
+  for (std::uint32_t i = 0; i < count; ++i) write(writes[i], mock->sets[writes[i].dstSet]);
+}
 
 void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
                                             VkPhysicalDeviceProperties* properties) {
@@ -63,21 +94,28 @@ void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
   properties->limits = mock->limits;
 }
 
-void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline) {
+void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline pipeline) {
+  mock->next.code = mock->codeOfPipeline.at(pipeline);
   mock->commands.push_back(point == VK_PIPELINE_BIND_POINT_COMPUTE ? "bind pipeline"
                                                                    : "bind graphics pipeline");
 }
 void VKAPI_CALL cmdBindDescriptorSets(VkCommandBuffer, VkPipelineBindPoint, VkPipelineLayout,
-                                      std::uint32_t, std::uint32_t, const VkDescriptorSet*,
+                                      std::uint32_t, std::uint32_t, const VkDescriptorSet* set,
                                       std::uint32_t, const std::uint32_t*) {
+  mock->next.descriptors = mock->sets.at(*set);
   mock->commands.push_back("bind sets");
 }
 void VKAPI_CALL cmdPushDescriptorSet(VkCommandBuffer, VkPipelineBindPoint, VkPipelineLayout,
-                                     std::uint32_t, std::uint32_t, const VkWriteDescriptorSet*) {
+                                     std::uint32_t, std::uint32_t count,
+                                     const VkWriteDescriptorSet* writes) {
+  mock->next.descriptors.clear();
+  for (std::uint32_t i = 0; i < count; ++i) write(writes[i], mock->next.descriptors);
   mock->commands.push_back("push descriptors");
 }
 void VKAPI_CALL cmdPushConstants(VkCommandBuffer, VkPipelineLayout, VkShaderStageFlags,
-                                 std::uint32_t, std::uint32_t, const void*) {
+                                 std::uint32_t, std::uint32_t size, const void* values) {
+  std::memcpy(mock->next.constants.data(), values,
+              std::min<std::size_t>(size, sizeof(mock->next.constants)));
   mock->commands.push_back("push constants");
 }
 void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags, VkPipelineStageFlags,
@@ -89,7 +127,10 @@ void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags, VkPipe
   mock->memoryBarriers.insert(mock->memoryBarriers.end(), memory, memory + memoryCount);
   mock->bufferBarriers.insert(mock->bufferBarriers.end(), buffers, buffers + bufferCount);
 }
-void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t, std::uint32_t, std::uint32_t) {
+void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t x, std::uint32_t y, std::uint32_t) {
+  mock->next.groupCountX = x;
+  mock->next.groupCountY = y;
+  mock->dispatches.push_back(mock->next);
   mock->commands.push_back("dispatch");
 }
 
@@ -141,7 +182,7 @@ MockVulkan::MockVulkan() {
   limits.maxStorageBufferRange = 1 << 27;
   limits.minStorageBufferOffsetAlignment = 256;
   limits.maxComputeWorkGroupCount[0] = limits.maxComputeWorkGroupCount[1] = 65535;
-  limits.maxPerStageDescriptorStorageBuffers = 4;
+  limits.maxPerStageDescriptorStorageBuffers = 8;
 }
 
 MockVulkan::~MockVulkan() {

@@ -3,6 +3,7 @@
 // or allocate memory with.
 #pragma once
 
+#include <array>
 #include <map>
 #include <set>
 #include <string>
@@ -11,6 +12,28 @@
 #include "dermis/vulkan/context.h"
 
 namespace dermis::test {
+
+/// What a binding refers to.
+struct MockDescriptor {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0, range = 0;
+
+  friend bool operator==(const MockDescriptor&, const MockDescriptor&) = default;
+};
+using MockDescriptors = std::map<std::uint32_t, MockDescriptor>;  ///< by binding
+
+/// A dispatch, and the state in which it was recorded.
+struct MockDispatch {
+  const std::uint32_t* code = nullptr;  ///< of the pipeline's module
+  MockDescriptors descriptors;
+  std::array<std::uint32_t, 4> constants{};
+  std::uint32_t groupCountX = 0, groupCountY = 0;
+};
+
+struct MockSetLayout {
+  VkDescriptorSetLayoutCreateFlags flags = 0;
+  std::vector<VkDescriptorSetLayoutBinding> bindings;
+};
 
 struct MockVulkan {
   MockVulkan();
@@ -34,6 +57,17 @@ struct MockVulkan {
   std::vector<VkMemoryBarrier> memoryBarriers;
   std::vector<VkBufferMemoryBarrier> bufferBarriers;
   bool wrongAllocator = false;  ///< an object came or went without the engine's allocator
+
+  std::vector<const std::uint32_t*> modules;  ///< the code of each that was created
+  std::vector<MockSetLayout> setLayouts;
+  std::vector<MockDispatch> dispatches;
+  std::map<VkDescriptorSet, MockDescriptors> sets;
+  std::uint32_t setsInPool = 0, descriptorsInPool = 0;
+
+  // The state of the command buffer, and what handles stand for.
+  std::map<VkShaderModule, const std::uint32_t*> codeOfModule;
+  std::map<VkPipeline, const std::uint32_t*> codeOfPipeline;
+  MockDispatch next;
 
   int aliveObjects() const;
 };

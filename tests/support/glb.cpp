@@ -9,6 +9,7 @@
 #include <iterator>
 #include <set>
 #include <stdexcept>
+#include <string>
 
 namespace dermis::test {
 namespace {
@@ -96,11 +97,12 @@ std::vector<float> floats(const Container& file, std::size_t index, const std::s
   return values;
 }
 
-std::vector<std::array<float, 3>> vectors(const Container& file, std::size_t index,
-                                          std::set<std::size_t>& used) {
-  const std::vector<float> values = floats(file, index, "VEC3", used);
-  std::vector<std::array<float, 3>> all(values.size() / 3);
-  for (std::size_t i = 0; i < values.size(); ++i) all[i / 3][i % 3] = values[i];
+template <std::size_t width>
+std::vector<std::array<float, width>> vectors(const Container& file, std::size_t index,
+                                              std::set<std::size_t>& used) {
+  const std::vector<float> values = floats(file, index, "VEC" + std::to_string(width), used);
+  std::vector<std::array<float, width>> all(values.size() / width);
+  for (std::size_t i = 0; i < values.size(); ++i) all[i / width][i % width] = values[i];
   return all;
 }
 
@@ -147,6 +149,16 @@ void checkMaterial(const json& material) {
   EXPECT_GE(material.value("alphaCutoff", 0.0), 0.0);
 }
 
+void checkTangents(const GlbPart& part) {
+  if (part.tangents.empty()) return;
+  EXPECT_EQ(part.tangents.size(), part.positions.size());
+  EXPECT_NE(part.mode, 0) << "tangents of points";
+  for (const auto& t : part.tangents) {
+    EXPECT_NEAR(std::hypot(t[0], t[1], t[2]), 1, 5e-4);
+    EXPECT_TRUE(t[3] == 1 || t[3] == -1) << t[3];
+  }
+}
+
 GlbPart readPart(const Container& file, const json& node, std::set<std::size_t>& used) {
   for (const char* property : {"matrix", "translation", "rotation", "scale", "skin", "children"}) {
     EXPECT_FALSE(node.contains(property)) << property;
@@ -160,10 +172,12 @@ GlbPart readPart(const Container& file, const json& node, std::set<std::size_t>&
   for (const auto& [name, accessor] : primitive.at("attributes").items()) {
     const auto index = accessor.get<std::size_t>();
     if (name == "POSITION") {
-      part.positions = vectors(file, index, used);
+      part.positions = vectors<3>(file, index, used);
       checkBounds(file.document.at("accessors").at(index), part.positions);
     } else if (name == "NORMAL") {
-      part.normals = vectors(file, index, used);
+      part.normals = vectors<3>(file, index, used);
+    } else if (name == "TANGENT") {
+      part.tangents = vectors<4>(file, index, used);
     } else {
       const std::string type = name.starts_with("TEXCOORD_") ? "VEC2" : "VEC4";
       part.others[name] = floats(file, index, type, used);
@@ -174,6 +188,7 @@ GlbPart readPart(const Container& file, const json& node, std::set<std::size_t>&
     EXPECT_EQ(values.size(), part.positions.size() * (name == "COLOR_0" ? 4 : 2)) << name;
   }
   for (const auto& n : part.normals) EXPECT_NEAR(std::hypot(n[0], n[1], n[2]), 1, 5e-4);
+  checkTangents(part);
   if (part.others.contains("COLOR_0")) {
     for (const float level : part.others["COLOR_0"]) EXPECT_TRUE(level >= 0 && level <= 1) << level;
   }

@@ -18,6 +18,7 @@ struct GlbPart {
   std::string name;
   int mode = 0;
   std::vector<std::array<float, 3>> positions, normals;
+  std::vector<std::array<float, 4>> tangents;        ///< or none
   std::map<std::string, std::vector<float>> others;  ///< TEXCOORD_n and COLOR_0, side by side
   std::vector<std::uint32_t> indices;
   nlohmann::json material;  ///< null where it has none

@@ -1,5 +1,6 @@
 #include "run_command.h"
 
+#include <pty.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -39,6 +40,13 @@ std::string readAll(std::FILE* file) {
   _exit(127);
 }
 
+/// The exit status, or -1.
+int wait(pid_t child) {
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
 }  // namespace
 
 CommandResult runCommand(const std::vector<std::string>& command,
@@ -47,9 +55,26 @@ CommandResult runCommand(const std::vector<std::string>& command,
   std::FILE* errors = std::tmpfile();
   const pid_t child = fork();
   if (child == 0) execute(command, environment, fileno(output), fileno(errors));
-  int status = 0;
-  waitpid(child, &status, 0);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readAll(output), readAll(errors)};
+  const int status = wait(child);
+  return {status, readAll(output), readAll(errors)};
+}
+
+CommandResult runOnTerminal(const std::vector<std::string>& command) {
+  CommandResult result;
+  int master = -1, terminal = -1;
+  if (openpty(&master, &terminal, nullptr, nullptr, nullptr) != 0) return result;
+  std::FILE* output = std::tmpfile();
+  const pid_t child = fork();
+  if (child == 0) execute(command, {}, fileno(output), terminal);
+  close(terminal);
+  char buffer[4096];
+  // Ends with an error, when the child has closed the terminal.
+  for (ssize_t count = 0; (count = read(master, buffer, sizeof(buffer))) > 0;)
+    result.errors.append(buffer, static_cast<std::size_t>(count));
+  close(master);
+  result.status = wait(child);
+  result.output = readAll(output);
+  return result;
 }
 
 }  // namespace dermis::test

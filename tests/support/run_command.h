@@ -16,4 +16,7 @@ struct CommandResult {
 CommandResult runCommand(const std::vector<std::string>& command,
                          const std::vector<std::string>& environment = {});
 
+/// The same with a terminal for standard error.
+CommandResult runOnTerminal(const std::vector<std::string>& command);
+
 }  // namespace dermis::test

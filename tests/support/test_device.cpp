@@ -28,11 +28,8 @@ class DestroyDevices : public ::testing::Environment {
     ::testing::AddGlobalTestEnvironment(new DestroyDevices);
 
 void tryToCreate(bool pushDescriptors, Attempt& attempt) {
-  samples::DeviceOptions options;
-  options.validation = true;
+  samples::DeviceOptions options = testDeviceOptions();
   options.pushDescriptors = pushDescriptors;
-  const char* wanted = std::getenv("DERMIS_TEST_DEVICE");
-  if (wanted != nullptr) options.device = wanted;
   Result<samples::OpenDevice> device = samples::openDevice(options);
   if (device) {
     attempt.device.emplace(std::move(*device));
@@ -42,6 +39,14 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
 }
 
 }  // namespace
+
+samples::DeviceOptions testDeviceOptions() {
+  samples::DeviceOptions options;
+  options.validation = true;
+  const char* wanted = std::getenv("DERMIS_TEST_DEVICE");
+  if (wanted != nullptr) options.device = wanted;
+  return options;
+}
 
 samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason) {
   Attempt& attempt = attempts[pushDescriptors ? 1 : 0];

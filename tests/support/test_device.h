@@ -11,6 +11,9 @@
 
 namespace dermis::test {
 
+/// With the validation layer, on the device that the environment variable DERMIS_TEST_DEVICE names.
+samples::DeviceOptions testDeviceOptions();
+
 /// The device of this process, made once for each choice; null where there is none, and then
 /// `reason` says why.
 samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason);

@@ -1,10 +1,13 @@
-// Reads a packed mesh as the comments of shaders/abi.h lay it out, without the library's code.
+// Reads a packed mesh as the comments of shaders/abi.h lay it out, without the library's code. Its
+// accessors throw where they would leave the blob.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +18,13 @@ namespace dermis::test {
 struct BlobInfluence {
   std::uint32_t joint;
   float weight;
+};
+
+/// What a morph target adds to one vertex; zeros for attributes that it does not displace.
+struct BlobDisplacement {
+  std::array<float, 3> position{}, normal{}, tangent{};
+
+  friend bool operator==(const BlobDisplacement&, const BlobDisplacement&) = default;
 };
 
 class Blob {
@@ -36,25 +46,68 @@ class Blob {
   float normal(std::uint32_t vertex, std::uint32_t component) const {
     return number(std::size_t{word(abi::MESH_HEADER_NORMALS)} + vertex * 3 + component);
   }
-  std::uint32_t slotsOfBlock(std::uint32_t block) const {
-    return word(blockRecord(block) + abi::BLOCK_SLOTS);
+  float tangent(std::uint32_t vertex, std::uint32_t component) const {
+    return number(std::size_t{word(abi::MESH_HEADER_TANGENTS)} + vertex * 4 + component);
   }
-  /// What stands in a slot of a vertex, used or not.
-  BlobInfluence slot(std::uint32_t vertex, std::uint32_t slot) const {
-    const std::uint32_t block = vertex / abi::BLOCK_VERTICES, lane = vertex % abi::BLOCK_VERTICES;
-    const std::size_t rows = word(blockRecord(block) + abi::BLOCK_OFFSET);
-    const std::size_t pairs = rows + std::size_t{slotsOfBlock(block)} * abi::BLOCK_VERTICES;
-    const std::uint32_t pair = word(pairs + std::size_t{slot / 2} * abi::BLOCK_VERTICES + lane);
-    return {slot % 2 == 0 ? pair & 0xffffu : pair >> 16,
-            number(rows + std::size_t{slot} * abi::BLOCK_VERTICES + lane)};
+
+  /// The word at which a vertex' influences are counted from; that of the next ends them.
+  std::size_t firstOf(std::uint32_t vertex) const {
+    return std::size_t{word(abi::MESH_HEADER_FIRSTS)} + vertex;
   }
-  /// The influences of a vertex: its slots up to the first of weight 0.
+  std::size_t influenceWord(std::uint32_t influence) const {
+    return word(abi::MESH_HEADER_INFLUENCES) + std::size_t{influence} * abi::INFLUENCE_WORDS;
+  }
   std::vector<BlobInfluence> influences(std::uint32_t vertex) const {
     std::vector<BlobInfluence> result;
-    for (std::uint32_t i = 0; i < slotsOfBlock(vertex / abi::BLOCK_VERTICES); ++i) {
-      if (slot(vertex, i).weight == 0) break;
-      result.push_back(slot(vertex, i));
+    for (std::uint32_t i = word(firstOf(vertex)); i < word(firstOf(vertex + 1)); ++i) {
+      result.push_back({word(influenceWord(i) + abi::INFLUENCE_JOINT),
+                        number(influenceWord(i) + abi::INFLUENCE_WEIGHT)});
     }
+    return result;
+  }
+
+  std::uint32_t morphCount() const { return word(abi::MESH_HEADER_MORPH_COUNT); }
+  std::size_t morphRecord(std::uint32_t target) const {
+    return word(abi::MESH_HEADER_MORPHS) + std::size_t{target} * abi::MORPH_WORDS;
+  }
+  std::uint32_t morphAttributes(std::uint32_t target) const {
+    return word(morphRecord(target) + abi::MORPH_ATTRIBUTES);
+  }
+  /// The record of a block, counted from the target's first.
+  std::size_t morphBlock(std::uint32_t target, std::uint32_t block) const {
+    return word(morphRecord(target) + abi::MORPH_BLOCKS) +
+           std::size_t{block} * abi::MORPH_BLOCK_WORDS;
+  }
+  /// Nothing where the target leaves the vertex alone.
+  std::optional<BlobDisplacement> displacement(std::uint32_t target, std::uint32_t vertex) const {
+    const std::uint32_t firstBlock = word(morphRecord(target) + abi::MORPH_FIRST_BLOCK);
+    const std::uint32_t blockCount = word(morphRecord(target) + abi::MORPH_BLOCK_COUNT);
+    const std::uint32_t vertexBlock = vertex / abi::MORPH_BLOCK_VERTICES;
+    if (vertexBlock < firstBlock || vertexBlock - firstBlock >= blockCount) return std::nullopt;
+    const std::size_t block = morphBlock(target, vertexBlock - firstBlock);
+    const auto isDisplaced = [&](std::uint32_t lane) {
+      return (word(block + abi::MORPH_BLOCK_MASK + lane / 32) >> lane % 32 & 1u) != 0;
+    };
+    const std::uint32_t lane = vertex % abi::MORPH_BLOCK_VERTICES;
+    if (!isDisplaced(lane)) return std::nullopt;
+    std::size_t before = 0;
+    for (std::uint32_t other = 0; other < lane; ++other) before += isDisplaced(other) ? 1u : 0u;
+
+    const std::uint32_t attributes = morphAttributes(target);
+    std::size_t each = 0;
+    for (const std::uint32_t attribute : {1u, 2u, 4u})
+      each += (attributes & attribute) != 0 ? 3u : 0u;
+    std::size_t place = word(block + abi::MORPH_BLOCK_DISPLACEMENTS) + before * each;
+    const auto next = [&](std::uint32_t attribute) {
+      std::array<float, 3> vector{};
+      if ((attributes & attribute) == 0) return vector;
+      for (float& component : vector) component = number(place++);
+      return vector;
+    };
+    BlobDisplacement result;
+    result.position = next(abi::MORPH_HAS_POSITIONS);
+    result.normal = next(abi::MORPH_HAS_NORMALS);
+    result.tangent = next(abi::MORPH_HAS_TANGENTS);
     return result;
   }
 
@@ -64,15 +117,12 @@ class Blob {
     for (std::size_t i = abi::MESH_HEADER_CHECKSUM + 1; i < words_.size(); ++i) {
       hash ^= words_[i];
       hash *= 0x01000193u;
+      hash = hash << 15 | hash >> 17;
     }
     words_.at(abi::MESH_HEADER_CHECKSUM) = hash;
   }
 
  private:
-  std::size_t blockRecord(std::uint32_t block) const {
-    return std::size_t{word(abi::MESH_HEADER_BLOCKS)} + std::size_t{block} * abi::BLOCK_WORDS;
-  }
-
   std::vector<std::uint32_t> words_;
 };
 

@@ -11,6 +11,9 @@ namespace {
 
 TEST(Mesh, ComponentsHaveTheSizeOfTheirType) {
   EXPECT_EQ(componentSize(ComponentType::float32), 4u);
+  EXPECT_EQ(componentSize(ComponentType::float16), 2u);
+  EXPECT_EQ(componentSize(ComponentType::snorm8), 1u);
+  EXPECT_EQ(componentSize(ComponentType::snorm16), 2u);
   EXPECT_EQ(componentSize(ComponentType::unorm8), 1u);
   EXPECT_EQ(componentSize(ComponentType::unorm16), 2u);
   EXPECT_EQ(componentSize(ComponentType::uint8), 1u);

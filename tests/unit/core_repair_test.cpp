@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "dermis/pack.h"
 #include "dermis/types.h"
@@ -121,6 +125,148 @@ TEST(Repair, ElementsThatAreNotFiniteBecomeZeroAsAWhole) {
   }
   EXPECT_TRUE(validate(mended, 10).findings.empty());
 }
+
+TEST(Repair, PositionsLoseTheirScaleAndOffset) {
+  OwnedMesh mesh = goodMesh();
+  std::vector<std::int16_t> stored(6 * 4, 16384);
+  stored[2 * 4 + 1] = -32768;
+  MeshView view = mesh.view();
+  view.positions = {stored.data(), 6, 8, ComponentType::snorm16, 4};
+  view.positionScale = {2, 3, 4};
+  view.positionOffset = {0.5f, -0.25f, 100};
+  const RepairedMesh result = repaired(view, 10);
+  const MeshView mended = result.view();
+  EXPECT_EQ(mended.positions.type, ComponentType::float32);
+  EXPECT_EQ(mended.positions.components, 3u);
+  EXPECT_EQ(mended.positionScale, (std::array<float, 3>{1, 1, 1}));
+  EXPECT_EQ(mended.positionOffset, (std::array<float, 3>{0, 0, 0}));
+  const double part = 16384 / 32767.0;
+  EXPECT_EQ(valueAt<float>(mended.positions, 2, 0), static_cast<float>(part * 2 + 0.5));
+  EXPECT_EQ(valueAt<float>(mended.positions, 2, 1), -3.25f);
+  EXPECT_EQ(valueAt<float>(mended.positions, 2, 2), static_cast<float>(part * 4 + 100));
+  const PackedMesh before = *pack(view, 10), after = *pack(mended, 10);
+  EXPECT_TRUE(std::ranges::equal(before.bytes(), after.bytes()));
+}
+
+TEST(Repair, APositionThatOverflowsByItsScaleBecomesZero) {
+  OwnedMesh mesh = goodMesh();
+  mesh.positions[1 * 3 + 2] = 3e38f;
+  MeshView view = mesh.view();
+  view.positionScale = {2, 2, 2};
+  const RepairedMesh result = repaired(view, 10);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(valueAt<float>(result.view().positions, 1, i), 0.0f);
+    EXPECT_EQ(valueAt<float>(result.view().positions, 2, i), 2 * mesh.positions[2 * 3 + i]);
+  }
+}
+
+TEST(Repair, AFourthComponentThatIsNotReadIsLeftOut) {
+  OwnedMesh mesh = goodMesh();
+  const std::vector<float> values(6 * 4, 2.0f);
+  std::vector<float> withNan = values;
+  withNan[4 * 4 + 3] = nan;
+  MeshView view = mesh.view();
+  view.positions = view.normals = floatAttribute(withNan.data(), 6, 4);
+  const RepairedMesh result = repaired(view, 10);
+  EXPECT_TRUE(result.report().findings.empty());
+  EXPECT_EQ(result.view().positions.components, 3u);
+  EXPECT_EQ(valueAt<float>(result.view().positions, 4, 2), 2.0f);
+  EXPECT_EQ(valueAt<float>(result.view().normals, 4, 2), 2.0f);
+}
+
+// ---- Morph targets
+
+/// A dense target and a sparse one, with everything; and one with nothing.
+struct OwnedTargets {
+  std::vector<float> dense, sparse;
+  std::vector<std::int16_t> shorts;
+  std::vector<std::uint32_t> vertices{1, 4};
+  std::vector<MorphTargetView> views{3};
+
+  OwnedTargets() {
+    for (int i = 0; i < 18; ++i) {
+      dense.push_back(static_cast<float>(i) + 0.5f);
+      shorts.push_back(static_cast<std::int16_t>(i * 1000));
+    }
+    for (int i = 0; i < 6; ++i) sparse.push_back(static_cast<float>(i) - 3.25f);
+    views[0].positions = {shorts.data(), 6, 6, ComponentType::snorm16, 3};
+    views[0].positionScale = {1, 2, 3};
+    views[0].normals = floatAttribute(dense.data(), 6, 3);
+    views[1].vertices = vertices;
+    views[1].positions = floatAttribute(sparse.data(), 2, 3);
+    views[1].tangents = floatAttribute(sparse.data(), 2, 3);
+  }
+  OwnedTargets(const OwnedTargets&) = delete;
+  OwnedTargets& operator=(const OwnedTargets&) = delete;
+};
+
+TEST(Repair, MorphTargetsAreKept) {
+  OwnedMesh mesh = goodMesh();
+  const std::vector<float> tangents(6 * 4, 0.5f);
+  const OwnedTargets targets;
+  MeshView view = mesh.view();
+  view.tangents = floatAttribute(tangents.data(), 6, 4);
+  view.morphTargets = targets.views;
+  const PackedMesh before = *pack(view, 10);
+  const RepairedMesh result = repaired(view, 10);
+  EXPECT_TRUE(result.report().findings.empty());
+  const MeshView mended = result.view();
+  ASSERT_EQ(mended.morphTargets.size(), 3u);
+  EXPECT_EQ(mended.morphTargets[0].positionScale, (std::array<float, 3>{1, 1, 1}));
+  EXPECT_FALSE(mended.morphTargets[0].tangents);
+  EXPECT_TRUE(std::ranges::equal(mended.morphTargets[1].vertices, targets.vertices));
+  EXPECT_FALSE(mended.morphTargets[1].normals);
+  EXPECT_FALSE(mended.morphTargets[2].positions);
+  EXPECT_TRUE(std::ranges::equal(before.bytes(), pack(mended, 10)->bytes()));
+}
+
+TEST(Repair, DisplacementsThatAreNotFiniteBecomeZeroAsAWhole) {
+  OwnedMesh mesh = goodMesh();
+  OwnedTargets targets;
+  targets.dense[2 * 3 + 1] = infinity;
+  targets.sparse[1 * 3 + 2] = nan;
+  MeshView view = mesh.view();
+  view.morphTargets = targets.views;
+  const RepairedMesh result = repaired(view, 10);
+  EXPECT_EQ(result.report().find(Problem::nonFiniteMorph)->count, 2u);
+  const MeshView mended = result.view();
+  EXPECT_TRUE(validate(mended, 10).findings.empty());
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(valueAt<float>(mended.morphTargets[0].normals, 2, i), 0.0f);
+    EXPECT_EQ(valueAt<float>(mended.morphTargets[0].normals, 3, i), targets.dense[3 * 3 + i]);
+    // Its position is finite: it stays.
+    EXPECT_NE(valueAt<float>(mended.morphTargets[0].positions, 2, i), 0.0f);
+    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].positions, 1, i), 0.0f);
+    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].tangents, 1, i), 0.0f);
+    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].positions, 0, i), targets.sparse[i]);
+  }
+}
+
+TEST(Repair, MorphTargetsWhoseVerticesMakeNoSenseAreRefused) {
+  OwnedMesh mesh = goodMesh();
+  OwnedTargets targets;
+  targets.vertices[1] = 6;
+  MeshView view = mesh.view();
+  view.morphTargets = targets.views;
+  const Result<RepairedMesh> result = repair(view, 10);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::invalidMesh);
+  EXPECT_NE(result.error().message.find("morph target 1"), std::string::npos);
+}
+
+TEST(Repair, MorphTargetsDoNotNeedTheMesh) {
+  OwnedMesh mesh = goodMesh();
+  auto targets = std::make_unique<OwnedTargets>();
+  MeshView view = mesh.view();
+  view.morphTargets = targets->views;
+  const PackedMesh before = *pack(view, 10);
+  RepairedMesh first = repaired(view, 10);
+  targets.reset();
+  const RepairedMesh moved = std::move(first);
+  EXPECT_TRUE(std::ranges::equal(before.bytes(), pack(moved.view(), 10)->bytes()));
+}
+
+// ---- Influences
 
 TEST(Repair, SetsAndFormatsBecomeOne) {
   OwnedMesh mesh = goodMesh();

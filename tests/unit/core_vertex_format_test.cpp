@@ -206,8 +206,8 @@ TEST(VertexFormats, OctahedralTangentsCountTheirSecondComponentFromOne) {
   for (const auto& [format, largest] : {std::pair{VertexFormat::octahedral8x2, 127},
                                         std::pair{VertexFormat::octahedral16x2, 32767}}) {
     for (const int sign : {-1, 1}) {
-      const auto expectTangent = [&](int x, int y, const Three& expected) {
-        const Four tangent = decoded(format, x, sign * y);
+      const auto expectTangent = [&, stored = format](int x, int y, const Three& expected) {
+        const Four tangent = decoded(stored, x, sign * y);
         expectNear({tangent[0], tangent[1], tangent[2]}, expected);
         EXPECT_EQ(tangent[3], sign);
       };

@@ -103,7 +103,4 @@ struct SkinnedView {
 Result<Comparison> compare(const reference::SkinnedMesh& expected, const SkinnedView& actual,
                            Method method);
 
-Result<Comparison> compare(const reference::SkinnedMesh& expected, const AttributeView& positions,
-                           const AttributeView& normals, Method method);
-
 }  // namespace dermis

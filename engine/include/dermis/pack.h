@@ -22,7 +22,9 @@ struct MeshInfo {
   std::uint32_t requiredJoints =
       0;  ///< the fewest joints of a palette for this mesh: its largest joint index + 1
   std::uint32_t maxInfluences = 0;  ///< the most influences of one vertex
+  std::uint32_t morphTargetCount = 0;
   bool hasNormals = false;
+  bool hasTangents = false;
 };
 
 /// A packed mesh owns a blob of little-endian 32-bit words. It is relocatable (offsets count from
@@ -41,13 +43,7 @@ class PackedMesh {
   std::span<const std::byte> bytes() const { return std::as_bytes(std::span(words_)); }
 
   MeshInfo info() const;
-
-  std::uint32_t vertexCount() const;
-  /// The fewest joints that a palette for this mesh may have: its largest joint index + 1.
-  std::uint32_t requiredJoints() const;
-  /// The largest number of influences of one vertex.
-  std::uint32_t maxInfluences() const;
-  bool hasNormals() const;
+  std::uint32_t vertexCount() const { return info().vertexCount; }
 
  private:
   friend Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
@@ -55,10 +51,12 @@ class PackedMesh {
   std::vector<std::uint32_t> words_;
 };
 
-/// Packs a mesh for palettes of `jointCount` joints. Per vertex: weights of one joint added up,
-/// zero weights dropped, the pivot chosen (the strongest influence, the lowest joint index on a
-/// tie) and stored first, the rest by falling weight; weights normalised in double precision,
-/// rounded to float32 so that their sum is as near to 1 as float allows. O(vertices × influences).
+/// Packs a mesh for palettes of `jointCount` joints. Per vertex: attributes as float32; weights of
+/// one joint added up, zero weights dropped, the pivot chosen (the strongest influence, the lowest
+/// joint index on a tie) and stored first, the rest by falling weight; weights normalised in double
+/// precision and rounded to float32 so that they sum to exactly 1. A vertex takes 8 bytes for each
+/// influence that it has. Of morph targets the displaced vertices are stored.
+/// O(vertices × influences + displacements).
 /// Fails with `invalidMesh` where `validate` reports a problem that is `refusedByPack`, with that
 /// finding's sentence, and with `limitExceeded` above 2^32 words.
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);

@@ -3,16 +3,20 @@
 // for that is here and in vulkan/kernels.h.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/pack.h"
 #include "dermis/result.h"
 #include "dermis/types.h"
+#include "dermis/vertex_format.h"
 
 namespace dermis {
 
@@ -23,9 +27,21 @@ struct DeviceLimits {
   std::uint32_t minStorageBufferOffsetAlignment = 256;           ///< bytes, a power of two
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
+  /// Storage buffers that one kernel may see. With fewer than `storageBuffersWanted` all attributes
+  /// must go to one buffer, near to each other, in whole words, without bounds or snorm16
+  /// positions.
+  std::uint32_t maxStorageBuffersPerStage = 4;
+  /// Whether kernels may store 2 bytes, 1 byte (VkPhysicalDevice16BitStorageFeatures::
+  /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
+  /// Without, attributes must fill whole words.
+  bool storage16Bit = false;
+  bool storage8Bit = false;
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
+
+/// Tables, meshes, palettes, the four attributes, results.
+inline constexpr std::uint32_t storageBuffersWanted = 8;
 
 /// How the work is cut up. It changes the speed, never a bit of the result.
 struct Tuning {
@@ -45,23 +61,90 @@ struct Palette {
 };
 
 /// Where one attribute of the skinned vertices goes: vertex v to `offset + v * stride` in the
-/// output buffer.
+/// output buffer of that attribute. Bytes between attributes are never touched.
+///
+/// Offset, stride and the format's size are multiples of 4. With `DeviceLimits::storage16Bit` they
+/// may be multiples of 2 and, where `storage8Bit` is there too, any number.
 struct OutputAttribute {
-  std::uint64_t offset = 0;  ///< bytes, a multiple of 4
-  std::uint32_t stride =
-      0;  ///< bytes, a multiple of 4, at least 12; 0 where the attribute is not wanted
+  std::uint64_t offset = 0;                  ///< bytes
+  std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`
+  VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not wanted
+};
+
+/// Where previous positions, for motion vectors, come from.
+enum class Motion : std::uint8_t {
+  none,
+  /// What stood in the output before: the positions of the last time that this instance was
+  /// skinned. Costs a read and a write; the output must live from frame to frame.
+  kept,
+  /// Skinned again from the palette and morph weights of that time: costs a second skinning, but
+  /// nothing has to be kept but the pose.
+  reskinned,
 };
 
 /// One instance: a mesh, a palette and the places its skinned vertices go to. No two jobs of a
-/// batch may write the same byte; that is not checked. Bytes between the attributes are never
-/// touched.
+/// batch may write the same byte; that is not checked.
 struct Job {
   MeshInfo mesh;  ///< `PackedMesh::info` of the mesh whose bytes stand in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
   std::uint32_t palette = 0;     ///< index into `Batch::palettes`
   Method method = Method::dualQuaternion;
-  OutputAttribute positions;  ///< float32 × 3; always written
-  OutputAttribute normals;    ///< float32 × 3, unit length; only for a mesh that has normals
+
+  OutputAttribute positions;  ///< `isPositionFormat`; always wanted
+  OutputAttribute normals;    ///< of unit length; only for a mesh that has normals
+  OutputAttribute tangents;   ///< of unit length; only for a mesh that has tangents
+  /// The box that positions in snorm16 are relative to; its sides must be longer than 1e-38. The
+  /// engine's, or `skinnedBounds` of the pose (bounds.h).
+  Box box;
+
+  /// Active morph targets in any order, none twice; those of weight 0 are skipped. `makePlan`
+  /// copies them. Only these cost time, however many the mesh has.
+  std::span<const MorphWeight> morphs;
+
+  Motion motion = Motion::none;
+  /// In the format of `positions`, whose own is not looked at. With `Motion::kept`, snorm16 keeps
+  /// the box of the time it was written in.
+  OutputAttribute previousPositions;
+  /// reskinned: index into `Batch::palettes`, with as many joints as the mesh needs.
+  std::uint32_t previousPalette = 0;
+  std::span<const MorphWeight> previousMorphs;  ///< reskinned: the weights of that time
+  /// Previous positions are the current ones: on an instance's first frame, and after a teleport.
+  bool restartsMotion = false;
+  /// The instance is not skinned; its previous positions become those that stand in the output. For
+  /// the first frame in which an instance is not updated: it no longer moves.
+  bool settles = false;
+
+  /// The box of the skinned positions is wanted: `Plan::resultOffset`.
+  bool bounds = false;
+};
+
+/// What the skin kernel finds out about one instance; it stands in the results buffer. Only for
+/// jobs that ask for bounds, or have positions in snorm16.
+///
+/// Extremes are reduced by integer atomics: they are stored as numbers in the order of the floats,
+/// to which `box` turns them. A shader does it with
+/// `uintBitsToFloat((n & 0x80000000u) != 0u ? n & 0x7fffffffu : ~n)`.
+struct InstanceResult {
+  std::uint32_t orderedMin[3] = {0xffffffffu, 0xffffffffu, 0xffffffffu};
+  std::uint32_t clampedVertices = 0;  ///< those outside `Job::box`
+  std::uint32_t orderedMax[3] = {0, 0, 0};
+  std::uint32_t reserved = 0;
+
+  /// The exact box of the skinned float32 positions, before conversion to their format, NaNs left
+  /// out. Nothing for an instance that has none, did not ask for bounds, or settled.
+  std::optional<Box> box() const;
+};
+static_assert(sizeof(InstanceResult) == 32);
+
+/// Bytes of the output buffers, by attribute. Several may be one buffer.
+struct OutputSizes {
+  std::uint64_t positions = 0;
+  std::uint64_t normals = 0;
+  std::uint64_t tangents = 0;
+  std::uint64_t previousPositions = 0;
+
+  /// All attributes in one buffer.
+  static constexpr OutputSizes oneBuffer(std::uint64_t size) { return {size, size, size, size}; }
 };
 
 /// Everything that one `record` skins, and the sizes of the buffers it works on.
@@ -70,19 +153,31 @@ struct Batch {
   std::span<const Job> jobs;
   std::uint64_t meshesSize = 0;    ///< bytes of the mesh buffer
   std::uint64_t matricesSize = 0;  ///< bytes of the matrices buffer
-  std::uint64_t outputSize = 0;    ///< bytes of the output buffer
+  OutputSizes outputs;
 };
 
 enum class Kernel : std::uint8_t { palette, skin };
 
-/// One specialisation of a kernel: what a pipeline is built from.
+/// The four attributes of an output, in the order of the arrays below.
+enum class Stream : std::uint8_t { positions, normals, tangents, previousPositions };
+inline constexpr std::size_t streamCount = 4;
+
+/// One specialisation of a kernel: what a pipeline is built from. All but `kernel` and
+/// `workgroupSize` is the skin kernel's.
 struct Variant {
   Kernel kernel = Kernel::skin;
-  Method method = Method::dualQuaternion;  ///< skin only
-  bool normals = false;                    ///< skin only
-  /// skin only: 1, 2, 4, or 0 for any number of influences a vertex.
+  Method method = Method::dualQuaternion;
+  VertexFormat positions = VertexFormat::float32x3;
+  VertexFormat normals = VertexFormat::none;
+  VertexFormat tangents = VertexFormat::none;
+  /// Bytes that one store writes to each stream: 4, 2 or 1.
+  std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
+  Motion motion = Motion::none;
+  bool morphs = false;
+  bool bounds = false;
+  /// 1, 2, 4, or 0 for any number of influences a vertex.
   std::uint8_t influences = 0;
-  std::uint8_t instancesPerInvocation = 1;  ///< skin only
+  std::uint8_t instancesPerInvocation = 1;
   std::uint16_t workgroupSize = 64;
 
   friend bool operator==(const Variant&, const Variant&) = default;
@@ -90,12 +185,26 @@ struct Variant {
   std::uint64_t key() const;
 };
 
-/// Every variant that a plan with this tuning may need: for an engine that cannot foresee its
-/// batches, to hand to `Context::prepare` while loading.
-std::vector<Variant> everyVariant(const Tuning& tuning);
+/// Whether the kernel writes `InstanceResult`: for bounds, and positions in snorm16.
+bool hasResults(const Variant& variant);
+
+/// Every variant that jobs with the outputs, motion and bounds of this one may need, whatever their
+/// mesh, method, palette and morph targets: for an engine that cannot foresee its batches but knows
+/// its vertex layouts, to hand to `Context::prepare` while loading.
+std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning);
 
 /// The buffers of a batch.
-enum class BufferRole : std::uint8_t { meshes, matrices, tables, palettes, output };
+enum class BufferRole : std::uint8_t {
+  meshes,
+  matrices,
+  tables,
+  palettes,
+  results,
+  positions,
+  normals,
+  tangents,
+  previousPositions
+};
 
 struct BufferRequirement {
   std::uint64_t size = 0;       ///< bytes, at least
@@ -113,18 +222,22 @@ struct DispatchConstants {
   std::uint32_t instanceRecords = 0;  ///< word offset of the instance records in the tables
 };
 
+/// The part of an output buffer that a dispatch writes.
+struct OutputWindow {
+  std::uint32_t index = 0;   ///< counts the windows of that buffer
+  std::uint64_t offset = 0;  ///< bytes at which it begins; 0 unless the buffer is larger than a
+                             ///< storage buffer range may be
+};
+
 struct Dispatch {
   Variant variant;
   std::uint32_t groupCountX = 0;
   std::uint32_t groupCountY = 0;
   DispatchConstants constants;
-  /// The palette kernel writes what the skin kernel reads: a memory barrier stands before this
-  /// dispatch.
+  /// It reads what the palette kernel wrote, or adds to results that the palette kernel cleared: a
+  /// memory barrier stands before this dispatch.
   bool afterPalettes = false;
-  /// The output range it writes begins at this byte of the output buffer (0 unless the output is
-  /// larger than a storage buffer range may be); `outputWindow` counts those ranges.
-  std::uint64_t outputOffset = 0;
-  std::uint32_t outputWindow = 0;
+  std::array<OutputWindow, streamCount> windows;
 };
 
 /// How many bytes lie between the beginnings of two output ranges on a device with these limits. A
@@ -155,13 +268,17 @@ class Plan {
   std::span<const Dispatch> dispatches() const;
   /// The variants that the dispatches use, each once: what `Context::prepare` must have built.
   std::span<const Variant> variants() const;
-  /// What the buffer of that role must be. Meshes, matrices and output: as large as the batch said
-  /// they are. Tables and palettes: as large as this plan needs.
+  /// What the buffer of that role must be. Meshes, matrices and outputs: as large as the batch said
+  /// they are. Tables, palettes and results: as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
   /// Bytes into the palettes buffer at which the `PaletteStatus` of a palette stands; `noStatus`
   /// where no dual-quaternion job uses that palette.
   std::uint64_t statusOffset(std::uint32_t palette) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
+  /// Bytes into the results buffer at which the `InstanceResult` of a job stands; `noResult` where
+  /// it has none. Results stand in the order of their jobs, without gaps.
+  std::uint64_t resultOffset(std::uint32_t job) const;
+  static constexpr std::uint64_t noResult = ~std::uint64_t{0};
 
   /// The limits that the plan was made for.
   const DeviceLimits& limits() const;
@@ -176,15 +293,16 @@ class Plan {
   std::unique_ptr<State> state_;
 };
 
-/// Turns a batch into dispatches: one for all palettes, then one for each combination of method and
-/// attributes (and output range). O(palettes + jobs), no Vulkan call. An empty batch gives an empty
-/// plan.
+/// Turns a batch into dispatches: one for all palettes, then one for each combination of method,
+/// formats, motion and the like (and output range). O(palettes + jobs + morph weights), no Vulkan
+/// call. An empty batch gives an empty plan.
 ///
 /// Fails with `invalidArgument` where a job or palette breaks a rule written above (the sentence
 /// names it by its index), among them: a palette with fewer joints than the mesh needs, normals
-/// wanted of a mesh that has none, a range outside its buffer; and with `limitExceeded` where one
-/// vertex's attributes lie further apart than a device's storage buffer range allows. The plan is
-/// then empty.
+/// wanted of a mesh that has none, a range outside its buffer; with `missingFeature` where an
+/// attribute does not fill whole words and the device cannot store less; and with `limitExceeded`
+/// where a vertex' attribute, or a buffer, does not fit a device's storage buffer range. The plan
+/// is then empty.
 Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                       Plan& out);
 

@@ -19,10 +19,12 @@ enum class Problem : std::uint8_t {
   countMismatch,    ///< an attribute's count is not the vertex count
   strideTooSmall,   ///< an attribute's stride is less than its element
   wrongFormat,      ///< a component type or number that the attribute may not have
+  morphVertices,    ///< a morph target's vertices do not rise, or lie outside the mesh
   // Values that `pack` refuses and `repair` mends.
   nonFinitePosition,
   nonFiniteNormal,
   nonFiniteTangent,
+  nonFiniteMorph,   ///< a displacement of a morph target
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
   jointOutOfRange,  ///< with a weight that is not 0
@@ -35,7 +37,7 @@ enum class Problem : std::uint8_t {
 /// One kind of problem in one mesh.
 struct Finding {
   Problem problem = Problem::emptyMesh;
-  std::uint64_t count = 0;        ///< Vertices that have it; 1 for what concerns the views.
+  std::uint64_t count = 0;  ///< Vertices that have it, or morph displacements; 1 for the views.
   std::uint32_t firstVertex = 0;  ///< The first of them.
   std::string message;  ///< A sentence with the first place: "mesh 'Fox', vertex 17: joint 31 is
                         ///< outside …".
@@ -57,10 +59,10 @@ bool refusedByPack(Problem problem);
 /// A short name for a kind, as in reports: "joint out of range".
 const char* problemName(Problem problem);
 
-/// Looks at every vertex: O(vertices × influences). `jointCount` is the number of joints of the
-/// palettes that the mesh will be skinned with, at most `maxPaletteJoints`. Sums of weights count
-/// as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of the official
-/// glTF validator), or when the stored integers sum to 255 or 65535 exactly.
+/// Looks at every vertex: O(vertices × influences + displacements). `jointCount` is the number of
+/// joints of the palettes that the mesh will be skinned with, at most `maxPaletteJoints`. Sums of
+/// weights count as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of
+/// the official glTF validator), or when the stored integers sum to 255 or 65535 exactly.
 MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
 /// A copy of a mesh with its bad values mended. Owns its memory; movable, not copyable.
@@ -71,8 +73,9 @@ class RepairedMesh {
   RepairedMesh(const RepairedMesh&) = delete;
   RepairedMesh& operator=(const RepairedMesh&) = delete;
 
-  /// The mended mesh: float32 attributes, one influence set of uint32 joints and float32 weights.
-  /// Valid as long as this object lives and is neither moved nor assigned to.
+  /// The mended mesh: float32 attributes without scale or offset, one influence set of uint32
+  /// joints and float32 weights. Valid as long as this object lives and is neither moved nor
+  /// assigned to.
   MeshView view() const;
   /// What was found before: every finding that `refusedByPack` has been mended.
   const MeshReport& report() const { return report_; }
@@ -86,12 +89,19 @@ class RepairedMesh {
   std::vector<float> positions_, normals_, tangents_, weights_;
   std::vector<std::uint32_t> joints_;
   std::vector<InfluenceSet> sets_;
+  struct Morph {
+    std::vector<std::uint32_t> vertices;
+    std::vector<float> positions, normals, tangents;
+  };
+  std::vector<Morph> morphs_;
+  std::vector<MorphTargetView> morphViews_;
   MeshReport report_;
 };
 
 /// Mends what `validate` finds: influences with a weight that is negative or not finite, or a joint
-/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal or
-/// tangent that is not finite becomes 0. Fails with `invalidMesh` where the views make no sense.
+/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal, tangent
+/// or displacement that is not finite becomes 0. Fails with `invalidMesh` where the views make no
+/// sense.
 Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
 
 }  // namespace dermis

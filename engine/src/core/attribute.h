@@ -2,6 +2,8 @@
 // by its own means.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -34,9 +36,61 @@ inline std::uint32_t loadUnsigned(const AttributeView& view, std::uint32_t eleme
     case ComponentType::uint32:
       return loadComponent<std::uint32_t>(view, element, component);
     default:
-      break;
+      return 0;
   }
-  return 0;
+}
+
+/// IEEE 754 binary16, which float32 holds exactly.
+inline float fromHalf(std::uint16_t half) {
+  const std::uint32_t sign = std::uint32_t{half & 0x8000u} << 16;
+  const std::uint32_t exponent = (half >> 10) & 0x1fu, mantissa = half & 0x3ffu;
+  if (exponent == 0) {
+    const float magnitude = static_cast<float>(mantissa) * 0x1p-24f;
+    return sign != 0 ? -magnitude : magnitude;
+  }
+  const std::uint32_t bits =
+      exponent == 0x1f ? 0x7f800000u | mantissa << 13 : (exponent + 112) << 23 | mantissa << 13;
+  return std::bit_cast<float>(sign | bits);
+}
+
+/// A component of a position, normal, tangent or morph displacement: integers by their largest
+/// value, no less than -1.
+inline double loadReal(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
+  switch (view.type) {
+    case ComponentType::float32:
+      return static_cast<double>(loadComponent<float>(view, element, component));
+    case ComponentType::float16:
+      return static_cast<double>(fromHalf(loadComponent<std::uint16_t>(view, element, component)));
+    case ComponentType::snorm8:
+      return std::max(loadComponent<std::int8_t>(view, element, component) / 127.0, -1.0);
+    case ComponentType::snorm16:
+      return std::max(loadComponent<std::int16_t>(view, element, component) / 32767.0, -1.0);
+    case ComponentType::unorm8:
+      return loadUnsigned(view, element, component) / 255.0;
+    case ComponentType::unorm16:
+      return loadUnsigned(view, element, component) / 65535.0;
+    default:
+      return loadUnsigned(view, element, component);
+  }
+}
+
+/// The same, rounded once to what kernels read.
+inline float loadFloat(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
+  return static_cast<float>(loadReal(view, element, component));
+}
+
+/// A component of a position in bind pose.
+inline float loadPosition(const MeshView& mesh, std::uint32_t vertex, std::uint32_t component) {
+  return static_cast<float>(loadReal(mesh.positions, vertex, component) *
+                                static_cast<double>(mesh.positionScale[component]) +
+                            static_cast<double>(mesh.positionOffset[component]));
+}
+
+/// A component of a morph target's displacement of a position; `element` counts the target's own.
+inline float loadMorphPosition(const MorphTargetView& target, std::uint32_t element,
+                               std::uint32_t component) {
+  return static_cast<float>(loadReal(target.positions, element, component) *
+                            static_cast<double>(target.positionScale[component]));
 }
 
 /// A weight times 65535. In these units weights that are stored as integers are integers, whose

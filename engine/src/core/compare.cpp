@@ -269,17 +269,4 @@ Result<Comparison> compare(const SkinnedMesh& expected, const SkinnedView& actua
   return checker.result;
 }
 
-Result<Comparison> compare(const SkinnedMesh& expected, const AttributeView& positions,
-                           const AttributeView& normals, Method method) {
-  const auto attribute = [](const AttributeView& view) {
-    const bool floats = view.type == ComponentType::float32 && view.components >= 3;
-    return SkinnedAttribute{view.data, view.count, view.stride,
-                            floats ? VertexFormat::float32x3 : VertexFormat::none};
-  };
-  SkinnedView actual;
-  actual.positions = attribute(positions);
-  actual.normals = attribute(normals);
-  return compare(expected, actual, method);
-}
-
 }  // namespace dermis

@@ -7,21 +7,46 @@
 namespace dermis {
 namespace {
 
-/// A tightly packed copy in which an element with a NaN or an infinity is 0.
-std::vector<float> copyFinite(const AttributeView& view) {
+/// Tightly packed vectors in which one with a NaN or an infinity is 0. `load(element, component)`
+/// gives a float.
+template <typename Load>
+std::vector<float> copyFinite(std::uint32_t count, std::uint32_t components, Load load) {
   std::vector<float> copy;
-  if (!view) return copy;
-  copy.reserve(std::size_t{view.count} * view.components);
-  for (std::uint32_t vertex = 0; vertex < view.count; ++vertex) {
+  copy.reserve(std::size_t{count} * components);
+  for (std::uint32_t element = 0; element < count; ++element) {
     bool finite = true;
-    for (std::uint32_t component = 0; component < view.components; ++component) {
-      finite &= std::isfinite(loadComponent<float>(view, vertex, component));
-    }
-    for (std::uint32_t component = 0; component < view.components; ++component) {
-      copy.push_back(finite ? loadComponent<float>(view, vertex, component) : 0.0f);
-    }
+    for (std::uint32_t component = 0; component < components; ++component)
+      finite &= std::isfinite(load(element, component));
+    for (std::uint32_t component = 0; component < components; ++component)
+      copy.push_back(finite ? load(element, component) : 0.0f);
   }
   return copy;
+}
+
+std::vector<float> copyFinite(const AttributeView& view, std::uint32_t components) {
+  if (!view) return {};
+  return copyFinite(view.count, components, [&](std::uint32_t element, std::uint32_t component) {
+    return loadFloat(view, element, component);
+  });
+}
+
+std::vector<float> copyFinitePositions(const MeshView& mesh) {
+  return copyFinite(mesh.vertexCount, 3, [&](std::uint32_t vertex, std::uint32_t component) {
+    return loadPosition(mesh, vertex, component);
+  });
+}
+
+std::vector<float> copyFiniteDisplacements(const MorphTargetView& target) {
+  if (!target.positions) return {};
+  return copyFinite(target.positions.count, 3, [&](std::uint32_t element, std::uint32_t component) {
+    return loadMorphPosition(target, element, component);
+  });
+}
+
+AttributeView viewOf(const std::vector<float>& values, std::uint32_t components) {
+  if (values.empty()) return {};
+  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                        components);
 }
 
 bool isGoodInfluence(double weight, std::uint32_t joint, std::uint32_t jointCount) {
@@ -34,10 +59,11 @@ MeshView RepairedMesh::view() const {
   MeshView mesh;
   mesh.name = name_;
   mesh.vertexCount = vertexCount_;
-  mesh.positions = floatAttribute(positions_.data(), vertexCount_, 3);
-  if (!normals_.empty()) mesh.normals = floatAttribute(normals_.data(), vertexCount_, 3);
-  if (!tangents_.empty()) mesh.tangents = floatAttribute(tangents_.data(), vertexCount_, 4);
+  mesh.positions = viewOf(positions_, 3);
+  mesh.normals = viewOf(normals_, 3);
+  mesh.tangents = viewOf(tangents_, 4);
   mesh.influenceSets = sets_;
+  mesh.morphTargets = morphViews_;
   return mesh;
 }
 
@@ -48,9 +74,22 @@ Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
   RepairedMesh repaired;
   repaired.name_ = mesh.name;
   repaired.vertexCount_ = mesh.vertexCount;
-  repaired.positions_ = copyFinite(mesh.positions);
-  repaired.normals_ = copyFinite(mesh.normals);
-  repaired.tangents_ = copyFinite(mesh.tangents);
+  repaired.positions_ = copyFinitePositions(mesh);
+  repaired.normals_ = copyFinite(mesh.normals, 3);
+  repaired.tangents_ = copyFinite(mesh.tangents, 4);
+  for (const MorphTargetView& target : mesh.morphTargets) {
+    repaired.morphs_.push_back({{target.vertices.begin(), target.vertices.end()},
+                                copyFiniteDisplacements(target),
+                                copyFinite(target.normals, 3),
+                                copyFinite(target.tangents, 3)});
+  }
+  for (const RepairedMesh::Morph& morph : repaired.morphs_) {
+    MorphTargetView& view = repaired.morphViews_.emplace_back();
+    view.vertices = morph.vertices;
+    view.positions = viewOf(morph.positions, 3);
+    view.normals = viewOf(morph.normals, 3);
+    view.tangents = viewOf(morph.tangents, 3);
+  }
 
   std::uint32_t slots = 0;
   for (const InfluenceSet& set : mesh.influenceSets) slots += set.weights.components;

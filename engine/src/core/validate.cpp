@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <tuple>
 
 #include "attribute.h"
 #include "dermis/types.h"
@@ -26,10 +27,16 @@ class Findings {
 
   template <typename MakeText>
   void addVertex(Problem problem, std::uint32_t vertex, MakeText&& makeText) {
-    Finding& finding = findings_[static_cast<std::size_t>(problem)];
+    const Finding& finding = findings_[static_cast<std::size_t>(problem)];
     // Several influences of one vertex may have the same problem: it counts once.
     if (finding.count != 0 && lastVertex_[static_cast<std::size_t>(problem)] == vertex) return;
     lastVertex_[static_cast<std::size_t>(problem)] = vertex;
+    addEach(problem, vertex, makeText);
+  }
+
+  template <typename MakeText>
+  void addEach(Problem problem, std::uint32_t vertex, MakeText&& makeText) {
+    Finding& finding = findings_[static_cast<std::size_t>(problem)];
     if (finding.count++ == 0) {
       finding.firstVertex = vertex;
       finding.message = prefix_ + ", vertex " + std::to_string(vertex) + ": " + makeText();
@@ -54,20 +61,23 @@ class Findings {
 
 struct AttributeRule {
   const char* name;
-  std::uint32_t components;  ///< 0: any number
+  std::uint32_t fewest, most;  ///< components
   bool (*allows)(ComponentType);
 };
 
+constexpr std::uint32_t anyNumber = 0xffffffffu;
+
 bool isFloat(ComponentType type) {
-  return type == ComponentType::float32;
+  return type == ComponentType::float32 || type == ComponentType::float16;
 }
 bool isPositionType(ComponentType type) {
-  return isFloat(type) || type == ComponentType::float16 || type == ComponentType::snorm16 ||
-         type == ComponentType::unorm16;
+  return isFloat(type) || type == ComponentType::snorm16 || type == ComponentType::unorm16;
 }
 bool isDirectionType(ComponentType type) {
-  return isFloat(type) || type == ComponentType::float16 || type == ComponentType::snorm8 ||
-         type == ComponentType::snorm16;
+  return isFloat(type) || type == ComponentType::snorm8 || type == ComponentType::snorm16;
+}
+bool isDisplacementType(ComponentType type) {
+  return isFloat(type) || type == ComponentType::snorm16;
 }
 bool isJointType(ComponentType type) {
   return type == ComponentType::uint8 || type == ComponentType::uint16 ||
@@ -78,21 +88,19 @@ bool isWeightType(ComponentType type) {
          type == ComponentType::unorm16;
 }
 
-bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32_t vertexCount,
-               Findings& findings) {
+bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32_t count,
+               const char* elements, Findings& findings) {
   const std::string name = rule.name;
-  if (!rule.allows(view.type) || view.components == 0 ||
-      (rule.components != 0 && view.components != rule.components &&
-       (rule.components != 3 || view.components != 4))) {
+  if (!rule.allows(view.type) || view.components < rule.fewest || view.components > rule.most) {
     findings.addView(
         Problem::wrongFormat,
         name + " have a component type or number of components that they may not have");
     return false;
   }
-  if (view.count != vertexCount) {
+  if (view.count != count) {
     findings.addView(Problem::countMismatch, "there are " + std::to_string(view.count) + " " +
-                                                 name + " for " + std::to_string(vertexCount) +
-                                                 " vertices");
+                                                 name + " for " + std::to_string(count) + " " +
+                                                 elements);
     return false;
   }
   const std::uint64_t size = std::uint64_t{view.components} * componentSize(view.type);
@@ -105,33 +113,49 @@ bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32
   return true;
 }
 
-bool checkViews(const MeshView& mesh, Findings& findings) {
-  if (mesh.vertexCount == 0) {
-    findings.addView(Problem::emptyMesh, "it has no vertices");
-    return false;
+bool checkMorphTarget(const MorphTargetView& target, std::size_t index, std::uint32_t vertexCount,
+                      Findings& findings) {
+  const std::string name = "morph target " + std::to_string(index);
+  for (std::size_t i = 0; i < target.vertices.size(); ++i) {
+    if (target.vertices[i] >= vertexCount ||
+        (i > 0 && target.vertices[i] <= target.vertices[i - 1])) {
+      findings.addView(Problem::morphVertices,
+                       name + " displaces vertex " + std::to_string(target.vertices[i]) +
+                           ", which lies outside the mesh or does not come after the one before");
+      return false;
+    }
   }
-  if (!mesh.positions) {
-    findings.addView(Problem::emptyMesh, "it has no positions");
-    return false;
+  const auto count =
+      target.vertices.empty() ? vertexCount : static_cast<std::uint32_t>(target.vertices.size());
+  bool good = true;
+  for (const auto& [view, what, allows] :
+       {std::tuple{&target.positions, "position", &isDisplacementType},
+        {&target.normals, "normal", &isDirectionType},
+        {&target.tangents, "tangent", &isDirectionType}}) {
+    if (!*view) continue;
+    const std::string displacements = std::string(what) + " displacements of " + name;
+    good &= checkView(*view, {displacements.c_str(), 3, 4, allows}, count, "displaced vertices",
+                      findings);
   }
-  bool good =
-      checkView(mesh.positions, {"positions", 3, isPositionType}, mesh.vertexCount, findings);
-  if (mesh.normals)
-    good &= checkView(mesh.normals, {"normals", 3, isDirectionType}, mesh.vertexCount, findings);
-  if (mesh.tangents)
-    good &= checkView(mesh.tangents, {"tangents", 4, isDirectionType}, mesh.vertexCount, findings);
+  return good;
+}
+
+bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
   if (mesh.influenceSets.empty()) {
     findings.addView(Problem::noInfluenceSets, "it has no joints and weights");
     return false;
   }
+  bool good = true;
   for (const InfluenceSet& set : mesh.influenceSets) {
     if (!set.joints || !set.weights) {
       findings.addView(Problem::noInfluenceSets,
                        "an influence set lacks its joints or its weights");
       return false;
     }
-    good &= checkView(set.joints, {"joints", 0, isJointType}, mesh.vertexCount, findings);
-    good &= checkView(set.weights, {"weights", 0, isWeightType}, mesh.vertexCount, findings);
+    good &= checkView(set.joints, {"joints", 1, anyNumber, isJointType}, mesh.vertexCount,
+                      "vertices", findings);
+    good &= checkView(set.weights, {"weights", 1, anyNumber, isWeightType}, mesh.vertexCount,
+                      "vertices", findings);
     if (set.joints.components != set.weights.components) {
       findings.addView(Problem::wrongFormat,
                        "an influence set has " + std::to_string(set.joints.components) +
@@ -143,19 +167,71 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
   return good;
 }
 
-bool isFiniteElement(const AttributeView& view, std::uint32_t vertex) {
-  if (view.type != ComponentType::float32) return true;
-  for (std::uint32_t component = 0; component < view.components; ++component) {
-    if (!std::isfinite(loadComponent<float>(view, vertex, component))) return false;
+bool checkViews(const MeshView& mesh, Findings& findings) {
+  if (mesh.vertexCount == 0) {
+    findings.addView(Problem::emptyMesh, "it has no vertices");
+    return false;
+  }
+  if (!mesh.positions) {
+    findings.addView(Problem::emptyMesh, "it has no positions");
+    return false;
+  }
+  const auto check = [&](const AttributeView& view, const AttributeRule& rule) {
+    return !view || checkView(view, rule, mesh.vertexCount, "vertices", findings);
+  };
+  bool good = check(mesh.positions, {"positions", 3, 4, isPositionType});
+  good &= check(mesh.normals, {"normals", 3, 4, isDirectionType});
+  good &= check(mesh.tangents, {"tangents", 4, 4, isDirectionType});
+  for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {
+    good &= checkMorphTarget(mesh.morphTargets[index], index, mesh.vertexCount, findings);
+  }
+  return checkInfluenceSets(mesh, findings) && good;
+}
+
+bool isFiniteElement(const AttributeView& view, std::uint32_t element, std::uint32_t components) {
+  for (std::uint32_t component = 0; component < components; ++component) {
+    if (!std::isfinite(loadFloat(view, element, component))) return false;
   }
   return true;
 }
 
-void checkAttribute(const AttributeView& view, Problem problem, const char* name,
-                    std::uint32_t vertex, Findings& findings) {
-  if (!view || isFiniteElement(view, vertex)) return;
+bool isFinitePosition(const MeshView& mesh, std::uint32_t vertex) {
+  for (std::uint32_t component = 0; component < 3; ++component) {
+    if (!std::isfinite(loadPosition(mesh, vertex, component))) return false;
+  }
+  return true;
+}
+
+void checkDirection(const AttributeView& view, std::uint32_t components, Problem problem,
+                    const char* name, std::uint32_t vertex, Findings& findings) {
+  if (!view || isFiniteElement(view, vertex, components)) return;
   findings.addVertex(problem, vertex,
                      [&] { return std::string("the ") + name + " is not finite"; });
+}
+
+bool isFiniteDisplacement(const MorphTargetView& target, std::uint32_t element) {
+  for (std::uint32_t component = 0; component < 3; ++component) {
+    if (target.positions && !std::isfinite(loadMorphPosition(target, element, component)))
+      return false;
+    if (target.normals && !std::isfinite(loadFloat(target.normals, element, component)))
+      return false;
+    if (target.tangents && !std::isfinite(loadFloat(target.tangents, element, component)))
+      return false;
+  }
+  return true;
+}
+
+void checkDisplacements(const MorphTargetView& target, std::size_t index, std::uint32_t vertexCount,
+                        Findings& findings) {
+  const auto count =
+      target.vertices.empty() ? vertexCount : static_cast<std::uint32_t>(target.vertices.size());
+  for (std::uint32_t element = 0; element < count; ++element) {
+    if (isFiniteDisplacement(target, element)) continue;
+    findings.addEach(
+        Problem::nonFiniteMorph, target.vertices.empty() ? element : target.vertices[element], [&] {
+          return "its displacement by morph target " + std::to_string(index) + " is not finite";
+        });
+  }
 }
 
 /// What the weights of a vertex must sum to for each way of storing them.
@@ -244,12 +320,16 @@ const char* problemName(Problem problem) {
       return "stride too small";
     case Problem::wrongFormat:
       return "wrong format";
+    case Problem::morphVertices:
+      return "morph target's vertices";
     case Problem::nonFinitePosition:
       return "position not finite";
     case Problem::nonFiniteNormal:
       return "normal not finite";
     case Problem::nonFiniteTangent:
       return "tangent not finite";
+    case Problem::nonFiniteMorph:
+      return "displacement not finite";
     case Problem::nonFiniteWeight:
       return "weight not finite";
     case Problem::negativeWeight:
@@ -273,7 +353,7 @@ bool MeshReport::packable() const {
 
 bool MeshReport::repairable() const {
   return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.problem <= Problem::wrongFormat;
+    return finding.problem <= Problem::morphVertices;
   });
 }
 
@@ -291,10 +371,16 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
   const std::uint32_t joints = std::min(jointCount, maxPaletteJoints);
   std::vector<std::uint32_t> used;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
-    checkAttribute(mesh.positions, Problem::nonFinitePosition, "position", vertex, findings);
-    checkAttribute(mesh.normals, Problem::nonFiniteNormal, "normal", vertex, findings);
-    checkAttribute(mesh.tangents, Problem::nonFiniteTangent, "tangent", vertex, findings);
+    if (!isFinitePosition(mesh, vertex)) {
+      findings.addVertex(Problem::nonFinitePosition, vertex,
+                         [] { return std::string("the position is not finite"); });
+    }
+    checkDirection(mesh.normals, 3, Problem::nonFiniteNormal, "normal", vertex, findings);
+    checkDirection(mesh.tangents, 4, Problem::nonFiniteTangent, "tangent", vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
+  }
+  for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {
+    checkDisplacements(mesh.morphTargets[index], index, mesh.vertexCount, findings);
   }
   return findings.take();
 }

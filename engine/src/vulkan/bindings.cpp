@@ -36,6 +36,10 @@ Result<void> checkRange(const BufferRange& range, const char* name, const Device
   return {};
 }
 
+bool isSame(const BufferRange& a, const BufferRange& b) {
+  return a.buffer == b.buffer && a.offset == b.offset && a.size == b.size;
+}
+
 VkDescriptorBufferInfo infoOf(const BufferRange& range) {
   return {range.buffer, range.offset, range.size};
 }
@@ -47,34 +51,96 @@ Bindings::State::~State() {
     context->table.destroyDescriptorPool(context->device, pool, context->allocator);
 }
 
+const BufferRange& Bindings::State::output(std::size_t stream) const {
+  const OutputBuffers& outputs = buffers.outputs;
+  switch (static_cast<Stream>(stream)) {
+    case Stream::normals:
+      return outputs.normals;
+    case Stream::tangents:
+      return outputs.tangents;
+    case Stream::previousPositions:
+      return outputs.previousPositions;
+    default:
+      return outputs.positions;
+  }
+}
+
 BoundBuffers Bindings::State::paletteKernel() const {
+  const auto orElse = [](const BufferRange& range, const BufferRange& other) {
+    return infoOf(range.buffer != VK_NULL_HANDLE ? range : other);
+  };
   BoundBuffers bound{};
   bound[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound[abi::BINDING_MESHES] = infoOf(buffers.matrices);
-  bound[abi::BINDING_PALETTES] = infoOf(buffers.palettes);
+  bound[abi::BINDING_MESHES] = orElse(buffers.matrices, buffers.tables);
+  bound[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
+  if (context->bindingCount() == abi::BINDING_COUNT)
+    bound[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
   return bound;
 }
 
-BoundBuffers Bindings::State::skinKernel(Method method, std::uint32_t window,
-                                         const DeviceLimits& limits) const {
+BoundBuffers Bindings::State::skinKernel(Method method, const Windows& windows) const {
   BoundBuffers bound{};
   bound[abi::BINDING_TABLES] = infoOf(buffers.tables);
   bound[abi::BINDING_MESHES] = infoOf(buffers.meshes);
   bound[abi::BINDING_PALETTES] =
       infoOf(method == Method::linear ? buffers.matrices : buffers.palettes);
-  bound[abi::BINDING_OUTPUT] = infoOf(buffers.output);
-  if (buffers.output.buffer != VK_NULL_HANDLE) {
-    const std::uint64_t begin = window * windowStep;
-    bound[abi::BINDING_OUTPUT].offset += begin;
-    bound[abi::BINDING_OUTPUT].range =
-        std::min(buffers.output.size - begin, limits.maxStorageBufferRange);
+  const bool oneOutput = context->bindingCount() != abi::BINDING_COUNT;
+  for (std::size_t stream = 0; stream < (oneOutput ? 1 : streamCount); ++stream) {
+    const BufferRange& range = output(stream);
+    VkDescriptorBufferInfo& info = bound[abi::BINDING_POSITIONS + stream];
+    info = infoOf(range);
+    if (range.buffer == VK_NULL_HANDLE) {
+      if (stream != 0) info = bound[abi::BINDING_POSITIONS];
+      continue;
+    }
+    const std::uint64_t begin = std::min(windows[stream], windowCount(stream) - 1) * windowStep;
+    info.offset += begin;
+    info.range = std::min(range.size - begin, context->limits.maxStorageBufferRange);
+  }
+  // Not to an output: a layer would see results read there that another dispatch wrote.
+  if (!oneOutput) {
+    bound[abi::BINDING_RESULTS] =
+        infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : buffers.tables);
   }
   return bound;
 }
 
-std::uint32_t Bindings::State::windowCount() const {
-  if (buffers.output.size <= context->limits.maxStorageBufferRange) return 1;
-  return static_cast<std::uint32_t>((buffers.output.size + windowStep - 1) / windowStep);
+std::uint32_t Bindings::State::windowCount(std::size_t stream) const {
+  const std::uint64_t size = output(stream).size;
+  if (size <= context->limits.maxStorageBufferRange) return 1;
+  return static_cast<std::uint32_t>((size + windowStep - 1) / windowStep);
+}
+
+std::uint32_t Bindings::State::mostWindows() const {
+  std::uint32_t most = 1;
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    most = std::max(most, windowCount(stream));
+  return most;
+}
+
+bool writesStream(const Variant& variant, std::size_t stream) {
+  if (variant.kernel != Kernel::skin) return false;
+  switch (static_cast<Stream>(stream)) {
+    case Stream::normals:
+      return variant.normals != VertexFormat::none;
+    case Stream::tangents:
+      return variant.tangents != VertexFormat::none;
+    case Stream::previousPositions:
+      return variant.motion != Motion::none;
+    default:
+      return true;
+  }
+}
+
+std::optional<std::uint32_t> Bindings::State::commonWindow(const Dispatch& dispatch) const {
+  std::uint32_t common = 0;
+  for (const OutputWindow& window : dispatch.windows) common = std::max(common, window.index);
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (writesStream(dispatch.variant, stream) && windowCount(stream) > 1 &&
+        dispatch.windows[stream].index != common)
+      return std::nullopt;
+  }
+  return common;
 }
 
 Bindings::Bindings() = default;
@@ -84,13 +150,30 @@ Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
 Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   const State& context = *state_;
-  for (const auto& [range, name, mayBeLarger] : {std::tuple{&buffers.meshes, "meshes", false},
-                                                 {&buffers.matrices, "matrices", false},
-                                                 {&buffers.tables, "tables", false},
-                                                 {&buffers.palettes, "palettes", false},
-                                                 {&buffers.output, "output", true}}) {
+  const OutputBuffers& outputs = buffers.outputs;
+  for (const auto& [range, name, mayBeLarger] :
+       {std::tuple{&buffers.meshes, "meshes", false},
+        {&buffers.matrices, "matrices", false},
+        {&buffers.tables, "tables", false},
+        {&buffers.palettes, "palettes", false},
+        {&buffers.results, "results", false},
+        {&outputs.positions, "outputs.positions", true},
+        {&outputs.normals, "outputs.normals", true},
+        {&outputs.tangents, "outputs.tangents", true},
+        {&outputs.previousPositions, "outputs.previousPositions", true}}) {
     if (Result<void> good = checkRange(*range, name, context.limits, mayBeLarger); !good)
       return good.error();
+  }
+  if (context.bindingCount() != abi::BINDING_COUNT) {
+    for (const BufferRange* range :
+         {&outputs.normals, &outputs.tangents, &outputs.previousPositions}) {
+      if (range->buffer != VK_NULL_HANDLE && !isSame(*range, outputs.positions)) {
+        return Error{ErrorCode::limitExceeded,
+                     "BatchBuffers::outputs: on a device with " +
+                         std::to_string(context.limits.maxStorageBuffersPerStage) +
+                         " storage buffers a stage all attributes go to one buffer"};
+      }
+    }
   }
 
   Bindings bindings;
@@ -101,9 +184,10 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   state.windowStep = outputWindowStep(context.limits);
   if (context.pushesDescriptors()) return bindings;
 
-  const std::uint32_t windows = state.windowCount();
+  const std::uint32_t windows = state.mostWindows();
   const std::uint32_t setCount = 1 + windows * 2;
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, setCount * abi::BINDING_COUNT};
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                                  setCount * context.bindingCount()};
   VkDescriptorPoolCreateInfo poolInfo{};
   poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
   poolInfo.maxSets = setCount;
@@ -139,7 +223,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
     for (const Method method : {Method::linear, Method::dualQuaternion}) {
       Variant variant;
       variant.method = method;
-      update(state.skinKernel(method, window, context.limits),
+      update(state.skinKernel(method, {window, window, window, window}),
              state.sets[Bindings::State::setIndex(variant, window)]);
     }
   }

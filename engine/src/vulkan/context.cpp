@@ -28,6 +28,33 @@ Result<void> checkDescription(const DeviceDescription& description) {
   return {};
 }
 
+/// The storage features among the structures of a pNext chain.
+void readFeatures(const void* chain, DeviceLimits& limits) {
+  for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
+       next = next->pNext) {
+    switch (next->sType) {
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES:
+        limits.storage16Bit |= reinterpret_cast<const VkPhysicalDevice16BitStorageFeatures*>(next)
+                                   ->storageBuffer16BitAccess == VK_TRUE;
+        break;
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES:
+        limits.storage16Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan11Features*>(next)
+                                   ->storageBuffer16BitAccess == VK_TRUE;
+        break;
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES:
+        limits.storage8Bit |= reinterpret_cast<const VkPhysicalDevice8BitStorageFeatures*>(next)
+                                  ->storageBuffer8BitAccess == VK_TRUE;
+        break;
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES:
+        limits.storage8Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)
+                                  ->storageBuffer8BitAccess == VK_TRUE;
+        break;
+      default:
+        break;
+    }
+  }
+}
+
 }  // namespace
 
 Context::State::~State() {
@@ -40,14 +67,14 @@ Context::State::~State() {
 
 Result<void> Context::State::createLayouts() {
   std::array<VkDescriptorSetLayoutBinding, abi::BINDING_COUNT> bindings{};
-  for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {
+  for (std::uint32_t binding = 0; binding < bindingCount(); ++binding) {
     bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
                          nullptr};
   }
   VkDescriptorSetLayoutCreateInfo setInfo{};
   setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   if (pushesDescriptors()) setInfo.flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR;
-  setInfo.bindingCount = static_cast<std::uint32_t>(bindings.size());
+  setInfo.bindingCount = bindingCount();
   setInfo.pBindings = bindings.data();
   if (const VkResult result =
           table.createDescriptorSetLayout(device, &setInfo, allocator, &setLayout);
@@ -94,16 +121,18 @@ Result<Context> Context::create(const DeviceDescription& description) {
       static_cast<std::uint32_t>(properties.limits.minStorageBufferOffsetAlignment);
   state.limits.maxWorkgroupCountX = properties.limits.maxComputeWorkGroupCount[0];
   state.limits.maxWorkgroupCountY = properties.limits.maxComputeWorkGroupCount[1];
-  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT) {
+  state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
+  readFeatures(description.enabledFeatures, state.limits);
+  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +
                      std::to_string(properties.limits.maxPerStageDescriptorStorageBuffers) +
                      " storage buffers a stage, Dermis needs " +
-                     std::to_string(abi::BINDING_COUNT)};
+                     std::to_string(abi::BINDING_COUNT_LEAST)};
   }
 
   if (Result<void> good = state.createLayouts(); !good) return good.error();
-  state.pipelines = std::make_unique<Pipelines>(state.table, description);
+  state.pipelines = std::make_unique<Pipelines>(state.table, description, state.limits);
   if (Result<void> good = state.pipelines->create(); !good) return good.error();
   return context;
 }

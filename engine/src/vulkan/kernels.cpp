@@ -1,5 +1,7 @@
 #include "dermis/vulkan/kernels.h"
 
+#include <algorithm>
+
 #include "abi.h"
 #include "dermis_kernels.h"
 
@@ -8,23 +10,61 @@ namespace dermis::vulkan {
 static_assert(abi::CONSTANT_COUNT <= SpecializationConstants().values.size());
 static_assert(abi::METHOD_LINEAR == static_cast<std::uint32_t>(Method::linear));
 static_assert(abi::METHOD_DUAL_QUATERNION == static_cast<std::uint32_t>(Method::dualQuaternion));
+static_assert(abi::FORMAT_NONE == static_cast<std::uint32_t>(VertexFormat::none));
+static_assert(abi::FORMAT_FLOAT32X3 == static_cast<std::uint32_t>(VertexFormat::float32x3));
+static_assert(abi::FORMAT_FLOAT32X4 == static_cast<std::uint32_t>(VertexFormat::float32x4));
+static_assert(abi::FORMAT_FLOAT16X3 == static_cast<std::uint32_t>(VertexFormat::float16x3));
+static_assert(abi::FORMAT_FLOAT16X4 == static_cast<std::uint32_t>(VertexFormat::float16x4));
+static_assert(abi::FORMAT_SNORM16X3 == static_cast<std::uint32_t>(VertexFormat::snorm16x3));
+static_assert(abi::FORMAT_SNORM16X4 == static_cast<std::uint32_t>(VertexFormat::snorm16x4));
+static_assert(abi::FORMAT_SNORM8X3 == static_cast<std::uint32_t>(VertexFormat::snorm8x3));
+static_assert(abi::FORMAT_SNORM8X4 == static_cast<std::uint32_t>(VertexFormat::snorm8x4));
+static_assert(abi::FORMAT_OCTAHEDRAL16X2 ==
+              static_cast<std::uint32_t>(VertexFormat::octahedral16x2));
+static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexFormat::octahedral8x2));
+static_assert(abi::MOTION_NONE == static_cast<std::uint32_t>(Motion::none));
+static_assert(abi::MOTION_KEPT == static_cast<std::uint32_t>(Motion::kept));
+static_assert(abi::MOTION_RESKINNED == static_cast<std::uint32_t>(Motion::reskinned));
+static_assert(sizeof(InstanceResult) == abi::RESULT_WORDS * 4);
 static_assert(sizeof(DispatchConstants) == abi::PUSH_WORDS * 4);
 static_assert(sizeof(PaletteStatus) == 16 && abi::STATUS_TWO_PHASE == 0 &&
               abi::STATUS_NON_RIGID == 1 && abi::STATUS_UNDECLARED_SCALE == 2 &&
               abi::STATUS_NON_FINITE == 3);
 
-std::span<const std::uint32_t> kernelSpirv(Kernel kernel) {
-  return kernel == Kernel::palette ? kernels::palette_spirv : kernels::skin_spirv;
+std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
+  const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
+  if (variant.kernel == Kernel::palette)
+    return oneOutput ? kernels::palette_one_output_spirv : kernels::palette_spirv;
+  if (oneOutput) return kernels::skin_one_output_spirv;
+  const bool extras = variant.motion != Motion::none || hasResults(variant);
+  switch (*std::min_element(variant.units.begin(), variant.units.end())) {
+    case 1:
+      return extras ? kernels::skin_extras_bytes_spirv : kernels::skin_bytes_spirv;
+    case 2:
+      return extras ? kernels::skin_extras_halves_spirv : kernels::skin_halves_spirv;
+    default:
+      return extras ? kernels::skin_extras_spirv : kernels::skin_spirv;
+  }
 }
 
 SpecializationConstants specializationConstants(const Variant& variant) {
   SpecializationConstants constants;
   constants.count = abi::CONSTANT_COUNT;
-  constants.values[abi::CONSTANT_WORKGROUP_SIZE] = variant.workgroupSize;
-  constants.values[abi::CONSTANT_METHOD] = static_cast<std::uint32_t>(variant.method);
-  constants.values[abi::CONSTANT_NORMALS] = variant.normals ? 1u : 0u;
-  constants.values[abi::CONSTANT_INFLUENCES] = variant.influences;
-  constants.values[abi::CONSTANT_INSTANCES] = variant.instancesPerInvocation;
+  const auto set = [&constants](std::uint32_t id, auto value) {
+    constants.values[id] = static_cast<std::uint32_t>(value);
+  };
+  set(abi::CONSTANT_WORKGROUP_SIZE, variant.workgroupSize);
+  set(abi::CONSTANT_METHOD, variant.method);
+  set(abi::CONSTANT_INFLUENCES, variant.influences);
+  set(abi::CONSTANT_INSTANCES, variant.instancesPerInvocation);
+  set(abi::CONSTANT_POSITION_FORMAT, variant.positions);
+  set(abi::CONSTANT_NORMAL_FORMAT, variant.normals);
+  set(abi::CONSTANT_TANGENT_FORMAT, variant.tangents);
+  for (std::uint32_t stream = 0; stream < streamCount; ++stream)
+    set(abi::CONSTANT_POSITION_UNIT + stream, variant.units[stream]);
+  set(abi::CONSTANT_MOTION, variant.motion);
+  set(abi::CONSTANT_MORPHS, variant.morphs);
+  set(abi::CONSTANT_BOUNDS, variant.bounds);
   return constants;
 }
 

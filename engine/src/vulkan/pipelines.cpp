@@ -11,29 +11,61 @@ namespace dermis::vulkan {
 Pipelines::~Pipelines() {
   for (const auto& [key, pipeline] : pipelines_)
     table_.destroyPipeline(device_, pipeline, allocator_);
-  table_.destroyShaderModule(device_, paletteModule_, allocator_);
-  table_.destroyShaderModule(device_, skinModule_, allocator_);
+  for (const Module& module : modules_)
+    table_.destroyShaderModule(device_, module.module, allocator_);
+}
+
+Result<void> Pipelines::createModule(const Variant& variant) {
+  const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
+  VkShaderModuleCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+  info.codeSize = spirv.size_bytes();
+  info.pCode = spirv.data();
+  Module module{spirv.data(), VK_NULL_HANDLE};
+  if (const VkResult result = table_.createShaderModule(device_, &info, allocator_, &module.module);
+      result != VK_SUCCESS) {
+    return vulkanError("vkCreateShaderModule", result);
+  }
+  modules_.push_back(module);
+  return {};
 }
 
 Result<void> Pipelines::create() {
-  for (const auto& [kernel, module] :
-       {std::pair{Kernel::palette, &paletteModule_}, {Kernel::skin, &skinModule_}}) {
-    const std::span<const std::uint32_t> spirv = kernelSpirv(kernel);
-    VkShaderModuleCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    info.codeSize = spirv.size_bytes();
-    info.pCode = spirv.data();
-    if (const VkResult result = table_.createShaderModule(device_, &info, allocator_, module);
-        result != VK_SUCCESS) {
-      *module = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
-      return vulkanError("vkCreateShaderModule", result);
+  Variant palette;
+  palette.kernel = Kernel::palette;
+  if (Result<void> made = createModule(palette); !made) return made;
+  const bool oneOutput = limits_.maxStorageBuffersPerStage < storageBuffersWanted;
+  const std::uint8_t leastUnit = oneOutput || !limits_.storage16Bit ? 4
+                                 : !limits_.storage8Bit             ? 2
+                                                                    : 1;
+  for (const Motion motion : {Motion::none, Motion::kept}) {
+    for (std::uint8_t unit = 4; unit >= leastUnit; unit /= 2) {
+      Variant variant;
+      variant.motion = motion;
+      variant.units[0] = unit;
+      if (moduleOf(variant) != VK_NULL_HANDLE) continue;
+      if (Result<void> made = createModule(variant); !made) return made;
     }
   }
   return {};
 }
 
+VkShaderModule Pipelines::moduleOf(const Variant& variant) const {
+  const std::uint32_t* code = kernelSpirv(variant, limits_).data();
+  for (const Module& module : modules_) {
+    if (module.code == code) return module.module;
+  }
+  return VK_NULL_HANDLE;
+}
+
 Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
   if (find(variant) != VK_NULL_HANDLE) return {};
+  const VkShaderModule module = moduleOf(variant);
+  if (module == VK_NULL_HANDLE) {
+    return Error{ErrorCode::missingFeature,
+                 "a variant that stores less than a word at a time needs storageBuffer16BitAccess "
+                 "and, for single bytes, storageBuffer8BitAccess"};
+  }
 
   const SpecializationConstants constants = specializationConstants(variant);
   std::array<VkSpecializationMapEntry, constants.values.size()> entries{};
@@ -48,7 +80,7 @@ Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = moduleOf(variant.kernel);
+  info.stage.module = module;
   info.stage.pName = "main";
   info.stage.pSpecializationInfo = &specialization;
   info.layout = layout;

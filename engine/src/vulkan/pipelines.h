@@ -5,6 +5,7 @@
 #include <shared_mutex>
 #include <span>
 #include <unordered_map>
+#include <vector>
 
 #include <vulkan/vulkan_core.h>
 
@@ -16,8 +17,10 @@ namespace dermis::vulkan {
 
 class Pipelines {
  public:
-  Pipelines(const DispatchTable& table, const DeviceDescription& description)
+  Pipelines(const DispatchTable& table, const DeviceDescription& description,
+            const DeviceLimits& limits)
       : table_(table),
+        limits_(limits),
         device_(description.device),
         cache_(description.pipelineCache),
         allocator_(description.allocator) {}
@@ -25,7 +28,7 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Creates the shader modules.
+  /// Creates the shader modules that the device can have.
   Result<void> create();
 
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
@@ -34,16 +37,19 @@ class Pipelines {
   VkPipeline find(const Variant& variant) const;
 
  private:
-  VkShaderModule moduleOf(Kernel kernel) const {
-    return kernel == Kernel::palette ? paletteModule_ : skinModule_;
-  }
+  Result<void> createModule(const Variant& variant);
+  VkShaderModule moduleOf(const Variant& variant) const;
 
   const DispatchTable& table_;
+  const DeviceLimits& limits_;
   VkDevice device_;
   VkPipelineCache cache_;
   const VkAllocationCallbacks* allocator_;
-  VkShaderModule paletteModule_ = VK_NULL_HANDLE;
-  VkShaderModule skinModule_ = VK_NULL_HANDLE;
+  struct Module {
+    const std::uint32_t* code = nullptr;
+    VkShaderModule module = VK_NULL_HANDLE;
+  };
+  std::vector<Module> modules_;
   mutable std::shared_mutex mutex_;
   std::unordered_map<std::uint64_t, VkPipeline> pipelines_;
 };

@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <array>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
@@ -17,21 +20,45 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
                                                std::to_string(given)};
 }
 
-/// The palettes that the palette kernel wrote become visible to the skin kernel.
+/// What the palette kernel wrote becomes visible to the skin kernel, which adds to the results.
 void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
-                          const BufferRange& palettes) {
-  VkBufferMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
-  barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.buffer = palettes.buffer;
-  barrier.offset = palettes.offset;
-  barrier.size = palettes.size;
+                          const BatchBuffers& buffers) {
+  std::array<VkBufferMemoryBarrier, 2> barriers{};
+  std::uint32_t count = 0;
+  for (const auto& [range, accesses] :
+       {std::pair{&buffers.palettes, VkAccessFlags{VK_ACCESS_SHADER_READ_BIT}},
+        {&buffers.results, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}}) {
+    if (range->buffer == VK_NULL_HANDLE) continue;
+    VkBufferMemoryBarrier& barrier = barriers[count++];
+    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
+    barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+    barrier.dstAccessMask = accesses;
+    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.buffer = range->buffer;
+    barrier.offset = range->offset;
+    barrier.size = range->size;
+  }
   table.cmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-                           VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 0, nullptr, 1, &barrier, 0,
-                           nullptr);
+                           VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 0, nullptr, count,
+                           barriers.data(), 0, nullptr);
+}
+
+std::string describe(const Variant& variant) {
+  if (variant.kernel == Kernel::palette) return "the palette kernel";
+  std::string text = "the variant of " + std::string(methodName(variant.method)) +
+                     " with positions as " + std::string(formatName(variant.positions));
+  if (variant.normals != VertexFormat::none)
+    text += ", normals as " + std::string(formatName(variant.normals));
+  if (variant.tangents != VertexFormat::none)
+    text += ", tangents as " + std::string(formatName(variant.tangents));
+  if (variant.motion != Motion::none) text += ", previous positions";
+  if (variant.morphs) text += ", morph targets";
+  if (variant.bounds) text += ", bounds";
+  return text + ", for " +
+         (variant.influences == 0 ? std::string("any number of")
+                                  : std::to_string(variant.influences)) +
+         " influences";
 }
 
 class Label {
@@ -57,6 +84,59 @@ class Label {
 
 }  // namespace
 
+Result<void> Bindings::State::checkBuffers(const Plan& plan) const {
+  for (const auto& [role, range, name] : {std::tuple{BufferRole::meshes, &buffers.meshes, "meshes"},
+                                          {BufferRole::matrices, &buffers.matrices, "matrices"},
+                                          {BufferRole::tables, &buffers.tables, "tables"},
+                                          {BufferRole::palettes, &buffers.palettes, "palettes"},
+                                          {BufferRole::results, &buffers.results, "results"}}) {
+    if (Result<void> good = checkBuffer(plan, role, *range, name); !good) return good;
+  }
+  static constexpr std::array<std::pair<BufferRole, const char*>, streamCount> outputs{
+      {{BufferRole::positions, "positions"},
+       {BufferRole::normals, "normals"},
+       {BufferRole::tangents, "tangents"},
+       {BufferRole::previousPositions, "previous positions"}}};
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    const bool isWritten =
+        std::any_of(plan.variants().begin(), plan.variants().end(),
+                    [&](const Variant& variant) { return writesStream(variant, stream); });
+    if (!isWritten) continue;
+    if (Result<void> good =
+            checkBuffer(plan, outputs[stream].first, output(stream), outputs[stream].second);
+        !good)
+      return good;
+  }
+  return {};
+}
+
+Result<void> Bindings::State::checkVariants(const Plan& plan) const {
+  for (const Variant& variant : plan.variants()) {
+    if (context->pipelines->find(variant) == VK_NULL_HANDLE)
+      return Error{ErrorCode::notPrepared, describe(variant) + " has not been prepared"};
+  }
+  return {};
+}
+
+Result<void> Bindings::State::check(const Plan& plan) const {
+  if (Result<void> good = checkBuffers(plan); !good) return good;
+  if (!plan.dispatches().empty() && plan.limits() != context->limits) {
+    return Error{
+        ErrorCode::invalidArgument,
+        "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
+  }
+  if (Result<void> good = checkVariants(plan); !good) return good;
+  if (context->pushesDescriptors()) return {};
+  for (const Dispatch& dispatch : plan.dispatches()) {
+    if (!commonWindow(dispatch)) {
+      return Error{ErrorCode::limitExceeded,
+                   "the attributes of an instance lie in different windows of outputs that are "
+                   "larger than a storage buffer range: that needs VK_KHR_push_descriptor"};
+    }
+  }
+  return {};
+}
+
 Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
                              const Bindings& bindings) const {
   const State& context = *state_;
@@ -64,54 +144,31 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
     return Error{ErrorCode::invalidArgument, "the bindings were not made by this context"};
   }
   const Bindings::State& bound = *bindings.state_;
-  const BatchBuffers& buffers = bound.buffers;
-  for (const auto& [role, range, name] : {std::tuple{BufferRole::meshes, &buffers.meshes, "meshes"},
-                                          {BufferRole::matrices, &buffers.matrices, "matrices"},
-                                          {BufferRole::tables, &buffers.tables, "tables"},
-                                          {BufferRole::palettes, &buffers.palettes, "palettes"},
-                                          {BufferRole::output, &buffers.output, "output"}}) {
-    if (Result<void> good = checkBuffer(plan, role, *range, name); !good) return good;
-  }
-  if (!plan.dispatches().empty() && plan.limits() != context.limits) {
-    return Error{
-        ErrorCode::invalidArgument,
-        "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
-  }
-  for (const Variant& variant : plan.variants()) {
-    if (context.pipelines->find(variant) == VK_NULL_HANDLE) {
-      return Error{ErrorCode::notPrepared,
-                   variant.kernel == Kernel::palette
-                       ? std::string("the palette kernel has not been prepared")
-                       : "the variant of " + std::string(methodName(variant.method)) +
-                             (variant.normals ? " with" : " without") + " normals for " +
-                             (variant.influences == 0 ? std::string("any number of")
-                                                      : std::to_string(variant.influences)) +
-                             " influences has not been prepared"};
-    }
-  }
+  if (Result<void> good = bound.check(plan); !good) return good;
 
   const DispatchTable& table = context.table;
   const Label label(table, commandBuffer, "dermis: skin a batch");
   bool palettesVisible = false;
   for (const Dispatch& dispatch : plan.dispatches()) {
     if (dispatch.afterPalettes && !palettesVisible) {
-      recordPaletteBarrier(table, commandBuffer, buffers.palettes);
+      recordPaletteBarrier(table, commandBuffer, bound.buffers);
       palettesVisible = true;
     }
     const bool isPalette = dispatch.variant.kernel == Kernel::palette;
     table.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
                           context.pipelines->find(dispatch.variant));
     if (context.pushesDescriptors()) {
+      Windows windows;
+      for (std::size_t stream = 0; stream < streamCount; ++stream)
+        windows[stream] = dispatch.windows[stream].index;
       const BoundBuffers kernelBuffers =
-          isPalette
-              ? bound.paletteKernel()
-              : bound.skinKernel(dispatch.variant.method, dispatch.outputWindow, context.limits);
+          isPalette ? bound.paletteKernel() : bound.skinKernel(dispatch.variant.method, windows);
       const DescriptorWrites writes(kernelBuffers);
       table.cmdPushDescriptorSet(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
                                  context.pipelineLayout, 0, writes.count(), writes.data());
     } else {
       const VkDescriptorSet set =
-          bound.sets[Bindings::State::setIndex(dispatch.variant, dispatch.outputWindow)];
+          bound.sets[Bindings::State::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
       table.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
                                   context.pipelineLayout, 0, 1, &set, 0, nullptr);
     }

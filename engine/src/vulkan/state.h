@@ -3,8 +3,10 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "abi.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"
 #include "vulkan/dispatch_table.h"
@@ -17,6 +19,10 @@ struct Context::State {
       : device(description.device), allocator(description.allocator) {}
   ~State();
 
+  std::uint32_t bindingCount() const {
+    return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::BINDING_COUNT_LEAST
+                                                                   : abi::BINDING_COUNT;
+  }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
 
@@ -29,8 +35,11 @@ struct Context::State {
   std::unique_ptr<Pipelines> pipelines;
 };
 
-/// The buffers behind the four bindings of a kernel, by binding number.
-using BoundBuffers = std::array<VkDescriptorBufferInfo, 4>;
+/// The buffers behind the bindings of a kernel, by binding number.
+using BoundBuffers = std::array<VkDescriptorBufferInfo, abi::BINDING_COUNT>;
+
+/// The windows of the four outputs that a kernel sees.
+using Windows = std::array<std::uint32_t, streamCount>;
 
 struct Bindings::State {
   ~State();
@@ -39,20 +48,37 @@ struct Bindings::State {
   BatchBuffers buffers;
   std::uint64_t windowStep = 0;
 
-  /// Which buffers each kernel sees. `window` counts the output ranges.
-  BoundBuffers paletteKernel() const;
-  BoundBuffers skinKernel(Method method, std::uint32_t window, const DeviceLimits& limits) const;
+  const BufferRange& output(std::size_t stream) const;
+  std::uint32_t windowCount(std::size_t stream) const;
 
-  // Without push descriptors: a set for the palette kernel, then for each output range one a kind
-  // of palette.
+  /// Which buffers each kernel sees. What a variant does not use is bound to something that it
+  /// uses: a descriptor that the module names must be valid.
+  BoundBuffers paletteKernel() const;
+  BoundBuffers skinKernel(Method method, const Windows& windows) const;
+
+  // Without push descriptors: a set for the palette kernel, then for each window one a kind of
+  // palette, all outputs at windows of one number.
   VkDescriptorPool pool = VK_NULL_HANDLE;
   std::vector<VkDescriptorSet> sets;
 
-  std::uint32_t windowCount() const;
+  std::uint32_t mostWindows() const;
   static std::size_t setIndex(const Variant& variant, std::uint32_t window) {
     if (variant.kernel == Kernel::palette) return 0;
     return 1 + std::size_t{window} * 2 + (variant.method == Method::linear ? 0 : 1);
   }
+  /// The number of the windows in which a dispatch writes all that it writes; nothing where they
+  /// differ.
+  std::optional<std::uint32_t> commonWindow(const Dispatch& dispatch) const;
+
+  /// Whether a plan can be recorded with these buffers and the pipelines that there are.
+  Result<void> check(const Plan& plan) const;
+
+ private:
+  Result<void> checkBuffers(const Plan& plan) const;
+  Result<void> checkVariants(const Plan& plan) const;
 };
+
+/// Whether a kernel writes an attribute.
+bool writesStream(const Variant& variant, std::size_t stream);
 
 }  // namespace dermis::vulkan

@@ -15,16 +15,29 @@ struct BufferRange {
   VkDeviceSize size = 0;  ///< bytes; VK_WHOLE_SIZE is not allowed here
 };
 
+/// The buffers that skinned vertices go to, by attribute. Several may be the same. Each may be
+/// larger than a storage buffer range.
+struct OutputBuffers {
+  BufferRange positions;
+  BufferRange normals;
+  BufferRange tangents;
+  BufferRange previousPositions;
+
+  /// All attributes in one buffer.
+  static OutputBuffers oneBuffer(const BufferRange& range) { return {range, range, range, range}; }
+};
+
 /// The buffers of a batch, each with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT; `Plan::buffer` tells their
-/// sizes. The engine owns them. One that a plan does not need may be left empty: meshes and output
+/// sizes. The engine owns them. One that a plan does not need may be left empty: meshes and outputs
 /// only where there is no job at all, matrices and tables likewise, palettes where no job uses dual
-/// quaternions.
+/// quaternions, results where no job has any, an attribute's output where no job wants it.
 struct BatchBuffers {
   BufferRange meshes;    ///< packed meshes at the jobs' `meshOffset`
   BufferRange matrices;  ///< joint matrices at the palettes' `matrixOffset`
   BufferRange tables;    ///< what `writeTables` wrote
   BufferRange palettes;  ///< scratch: written and read by `record`
-  BufferRange output;    ///< where skinned vertices go; may be larger than a storage buffer range
+  OutputBuffers outputs;
+  BufferRange results;  ///< what `record` finds out: `InstanceResult` at `Plan::resultOffset`
 };
 
 /// Descriptor sets for one set of buffers, made by `Context::createBindings`. It must outlive every

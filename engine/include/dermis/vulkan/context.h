@@ -30,6 +30,11 @@ struct DeviceDescription {
   /// Instance extensions that work on the device may be named too: VK_EXT_debug_utils, for names
   /// and labels.
   std::span<const char* const> enabledExtensions;
+  /// The features that were enabled: the structures that hung in VkDeviceCreateInfo::pNext, as they
+  /// were. Used where enabled: storageBuffer16BitAccess and storageBuffer8BitAccess, of
+  /// VkPhysicalDevice16BitStorageFeatures, VkPhysicalDevice8BitStorageFeatures, or
+  /// VkPhysicalDeviceVulkan11Features and ...12Features. Read by `create` only.
+  const void* enabledFeatures = nullptr;
   /// Every pipeline is built with it, where given; the engine stores and loads it.
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;
   /// Used for every object that Dermis creates, where given; must outlive the Context.
@@ -63,7 +68,8 @@ class Context {
   Result<void> prepare(std::span<const Variant> variants);
 
   /// Makes the descriptor sets for a set of buffers. Fails with `invalidArgument` (misaligned, no
-  /// size), `limitExceeded` (larger than a storage buffer range where that is not allowed) or
+  /// size), `limitExceeded` (larger than a storage buffer range where that is not allowed;
+  /// different outputs on a device with fewer than `storageBuffersWanted` a stage) or
   /// `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
@@ -76,8 +82,10 @@ class Context {
   /// plan stand in the tables buffer when the GPU gets there, and keeps the bindings until the GPU
   /// is done.
   ///
-  /// Fails with `notPrepared` where a variant of the plan has no pipeline, and with
-  /// `invalidArgument` where a buffer is smaller than the plan needs; nothing is recorded then.
+  /// Fails with `notPrepared` where a variant of the plan has no pipeline, with `invalidArgument`
+  /// where a buffer is smaller than the plan needs, and with `limitExceeded` where, without
+  /// VK_KHR_push_descriptor, the attributes of an instance lie in different windows of outputs that
+  /// are larger than a storage buffer range; nothing is recorded then.
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 

@@ -1,8 +1,9 @@
 // The kernels as data, for an engine that issues the dispatches of a plan with its own RHI. Needs
 // no Vulkan device.
 //
-// Descriptor set 0 of every kernel has four storage buffers; binding numbers, records and push
-// constants are in shaders/abi.h, which compiles as C++.
+// Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers or, on a device that
+// has fewer a stage, four; binding numbers, records and push constants are in shaders/abi.h, which
+// compiles as C++.
 #pragma once
 
 #include <array>
@@ -13,8 +14,10 @@
 
 namespace dermis::vulkan {
 
-/// SPIR-V 1.3, entry point "main". The memory is static.
-std::span<const std::uint32_t> kernelSpirv(Kernel kernel);
+/// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
+/// memory is static: variants with one module get the same span. A module that stores less than a
+/// word needs the features that `DeviceLimits` tells of.
+std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits);
 
 /// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
 /// 1, 4 bytes each.

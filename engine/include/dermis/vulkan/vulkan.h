@@ -1,6 +1,7 @@
 // All of dermis::vulkan.
 #pragma once
 
+#include "dermis/vulkan/acceleration_structure.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/kernels.h"

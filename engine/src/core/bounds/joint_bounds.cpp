@@ -28,7 +28,7 @@ struct Influence {
 
 /// A component of a position or a displacement as it is stored.
 double loadStored(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
-  return static_cast<double>(loadComponent<float>(view, element, component));
+  return static_cast<double>(loadFloat(view, element, component));
 }
 
 glm::dvec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {

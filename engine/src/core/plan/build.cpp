@@ -1,10 +1,11 @@
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <string>
+#include <tuple>
 
 #include "abi.h"
 #include "plan/check.h"
+#include "plan/outputs.h"
 #include "plan/state.h"
 #include "plan/variant.h"
 
@@ -15,6 +16,13 @@ std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
   return (value + divisor - 1) / divisor;
 }
 
+bool hasActiveMorphs(const Job& job) {
+  const auto isActive = [](const MorphWeight& morph) { return morph.weight != 0; };
+  return std::any_of(job.morphs.begin(), job.morphs.end(), isActive) ||
+         (job.motion == Motion::reskinned &&
+          std::any_of(job.previousMorphs.begin(), job.previousMorphs.end(), isActive));
+}
+
 }  // namespace
 
 void Plan::State::clear() {
@@ -22,7 +30,10 @@ void Plan::State::clear() {
   variants.clear();
   tables.clear();
   paletteUnits.clear();
-  palettesSize = meshesSize = matricesSize = outputSize = 0;
+  results.clear();
+  resultCount = 0;
+  palettesSize = meshesSize = matricesSize = 0;
+  outputs = {};
   instanceCount = 0;
   vertexCount = 0;
   groups.clear();
@@ -30,28 +41,44 @@ void Plan::State::clear() {
   groupOf.clear();
 }
 
-void Plan::State::addPiece(const Job& job, std::uint32_t jobIndex, GroupKey key) {
+void Plan::State::addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key,
+                           const Variant& variant) {
   // Neighbouring jobs mostly belong together: look there before asking the map.
   std::uint32_t group = pieces.empty() ? notUsed : pieces.back().group;
   if (group == notUsed || !(groups[group].key == key)) {
     const auto [entry, isNew] = groupOf.try_emplace(key, static_cast<std::uint32_t>(groups.size()));
     group = entry->second;
-    if (isNew) groups.push_back({key, job.mesh.maxInfluences, 0, 0, 0});
+    if (isNew) groups.push_back({key, variant, job.mesh.maxInfluences, 0, 0, 0});
   }
   ++groups[group].instances;
   pieces.push_back({group, jobIndex});
 }
 
-Result<void> Plan::State::gatherPieces(const Batch& batch) {
+Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning) {
+  const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
+  results.reserve(batch.jobs.size());
   for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
     const Job& job = batch.jobs[index];
-    if (Result<void> good = checkJob(batch, job, index); !good) return good;
-    if (Result<void> cut = cutIntoRuns(job, index, batch.outputSize, limits, runs); !cut)
-      return cut;
+    if (Result<void> good = checkJob(batch, job, index, limits); !good) return good;
+    results.push_back(hasResult(job) ? resultCount++ : notUsed);
+
+    Variant variant = outputVariant(job);
+    variant.morphs = hasActiveMorphs(job);
+    variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
+    variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+    const OutputStreams streams = outputStreams(job);
+    GroupKey key;
+    key.mesh = job.meshOffset;
+    key.variant = variant.key();
+    for (std::size_t stream = 0; stream < streamCount; ++stream)
+      key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
+    cutIntoRuns(streams, job.mesh.vertexCount, sizes, limits, runs);
     for (const VertexRun& run : runs) {
-      addPiece(job, static_cast<std::uint32_t>(index),
-               {job.meshOffset, run.window, run.firstVertex, run.vertexEnd, job.positions.stride,
-                job.normals.stride, job.method});
+      key.windows = run.windows;
+      key.firstVertex = run.firstVertex;
+      key.vertexEnd = run.vertexEnd;
+      if (Result<void> good = checkWindows(streams, run.windows, index, limits); !good) return good;
+      addPiece(job, static_cast<std::uint32_t>(index), key, variant);
     }
     ++instanceCount;
     vertexCount += job.mesh.vertexCount;
@@ -87,7 +114,9 @@ Result<void> Plan::State::placePalettes(const Batch& batch, const Tuning& tuning
   }
   paletteUnits.assign(batch.palettes.size(), notUsed);
   for (const Job& job : batch.jobs) {
-    if (job.method != Method::linear) paletteUnits[job.palette] = 0;
+    if (job.method == Method::linear) continue;
+    paletteUnits[job.palette] = 0;
+    if (job.motion == Motion::reskinned) paletteUnits[job.previousPalette] = 0;
   }
   std::uint64_t units = 0;
   std::uint32_t records = 0;
@@ -113,36 +142,33 @@ Result<void> Plan::State::placePalettes(const Batch& batch, const Tuning& tuning
             std::to_string(limits.maxStorageBufferRange) +
             " bytes; a batch of fewer of them would fit"};
   }
-  if (records == 0) return {};
-  Variant variant;
-  variant.kernel = Kernel::palette;
-  variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
-  return addDispatch(variant, records, {0, records, 0, 0});
+  if (records == 0 && resultCount == 0) return {};
+  // Behind the workgroups of the palettes come those that clear the results.
+  return addDispatch(paletteVariant(tuning), records + divideUp(resultCount, tuning.workgroupSize),
+                     {0, records, 0, resultCount});
 }
 
-Result<void> Plan::State::placeGroups(const Batch& batch, const Tuning& tuning) {
-  const auto variantOrder = [&](std::uint32_t index) {
-    const GroupKey& key = groups[index].key;
-    return std::array<std::uint32_t, 3>{key.window, static_cast<std::uint32_t>(key.method),
-                                        key.normalStride != 0 ? 1u : 0u};
+Result<void> Plan::State::placeGroups(const Tuning& tuning) {
+  const auto dispatchOrder = [&](std::uint32_t index) {
+    return std::tie(groups[index].key.windows, groups[index].key.variant);
   };
   order.resize(groups.size());
   for (std::uint32_t index = 0; index < order.size(); ++index) order[index] = index;
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return variantOrder(a) < variantOrder(b);
+    return dispatchOrder(a) < dispatchOrder(b);
   });
 
   const std::size_t groupRecords = tables.size();
   tables.resize(groupRecords + groups.size() * abi::GROUP_WORDS, 0u);
   const auto instanceRecords = static_cast<std::uint32_t>(tables.size());
-  const bool afterPalettes = !dispatches.empty();
+  const bool palettesRun = !dispatches.empty();
 
   std::uint32_t firstInstance = 0;
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin;
     std::uint64_t workgroups = 0;
     std::uint32_t maxInfluences = 0;
-    for (; end < order.size() && variantOrder(order[end]) == variantOrder(order[begin]); ++end) {
+    for (; end < order.size() && dispatchOrder(order[end]) == dispatchOrder(order[begin]); ++end) {
       Group& group = groups[order[end]];
       group.firstInstance = firstInstance;
       firstInstance += group.instances;
@@ -159,52 +185,25 @@ Result<void> Plan::State::placeGroups(const Batch& batch, const Tuning& tuning) 
       record[abi::GROUP_VERTEX_GROUPS] = static_cast<std::uint32_t>(vertexGroups);
       record[abi::GROUP_FIRST_INSTANCE] = group.firstInstance;
       record[abi::GROUP_INSTANCE_COUNT] = group.instances;
-      record[abi::GROUP_POSITION_STRIDE] = group.key.positionStride / 4;
-      record[abi::GROUP_NORMAL_STRIDE] = group.key.normalStride / 4;
+      std::copy(group.key.strides.begin(), group.key.strides.end(),
+                record + abi::GROUP_POSITION_STRIDE);
     }
-    const GroupKey& key = groups[order[begin]].key;
-    Variant variant;
-    variant.method = key.method;
-    variant.normals = key.normalStride != 0;
+    const Group& group = groups[order[begin]];
+    Variant variant = group.variant;
     variant.influences = influenceClass(maxInfluences);
-    variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
-    variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
     const DispatchConstants constants{
         static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
         static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
     if (Result<void> good = addDispatch(variant, workgroups, constants); !good) return good;
-    dispatches.back().outputWindow = key.window;
-    dispatches.back().outputOffset = key.window * outputWindowStep(limits);
-    dispatches.back().afterPalettes = afterPalettes && key.method != Method::linear;
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const std::uint32_t window = group.key.windows[stream];
+      dispatches.back().windows[stream] = {window, window * outputWindowStep(limits)};
+    }
+    dispatches.back().afterPalettes =
+        palettesRun && (variant.method != Method::linear || hasResults(variant));
     begin = end;
   }
-  writeInstances(batch, instanceRecords);
   return {};
-}
-
-void Plan::State::writeInstances(const Batch& batch, std::uint32_t firstRecord) {
-  const std::uint64_t step = outputWindowStep(limits);
-  tables.resize(firstRecord + pieces.size() * abi::INSTANCE_WORDS);
-  for (const Piece& piece : pieces) {
-    Group& group = groups[piece.group];
-    const Job& job = batch.jobs[piece.job];
-    const Palette& palette = batch.palettes[job.palette];
-    const std::uint64_t windowBegin = group.key.window * step;
-    const auto wordOffset = [&](const OutputAttribute& attribute) {
-      const std::uint64_t offset =
-          attribute.offset + std::uint64_t{group.key.firstVertex} * attribute.stride;
-      return static_cast<std::uint32_t>((offset - windowBegin) / 4);
-    };
-    std::uint32_t* record =
-        &tables[firstRecord +
-                std::size_t{group.firstInstance + group.filled++} * abi::INSTANCE_WORDS];
-    record[abi::INSTANCE_PALETTE] =
-        job.method == Method::linear ? static_cast<std::uint32_t>(palette.matrixOffset / unitBytes)
-                                     : paletteUnits[job.palette];
-    record[abi::INSTANCE_JOINTS] = palette.jointCount;
-    record[abi::INSTANCE_POSITIONS] = wordOffset(job.positions);
-    record[abi::INSTANCE_NORMALS] = job.normals.stride != 0 ? wordOffset(job.normals) : 0u;
-  }
 }
 
 Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& deviceLimits,
@@ -214,11 +213,12 @@ Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& deviceLi
   if (Result<void> good = checkTuning(tuning); !good) return good;
   meshesSize = batch.meshesSize;
   matricesSize = batch.matricesSize;
-  outputSize = batch.outputSize;
+  outputs = batch.outputs;
   if (batch.jobs.size() > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
-  if (Result<void> good = gatherPieces(batch); !good) return good;
+  if (Result<void> good = gatherPieces(batch, tuning); !good) return good;
   if (Result<void> good = placePalettes(batch, tuning); !good) return good;
-  if (Result<void> good = placeGroups(batch, tuning); !good) return good;
+  if (Result<void> good = placeGroups(tuning); !good) return good;
+  writeInstances(batch, static_cast<std::uint32_t>(tables.size()));
   if (tables.size() * 4 > limits.maxStorageBufferRange) {
     return Error{ErrorCode::limitExceeded,
                  "the tables of the batch are larger than a storage buffer range; split it"};

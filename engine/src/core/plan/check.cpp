@@ -1,6 +1,7 @@
 #include "plan/check.h"
 
 #include <bit>
+#include <cmath>
 #include <string>
 
 namespace dermis {
@@ -8,26 +9,134 @@ namespace {
 
 constexpr std::uint64_t matrixAlignment = 16;
 
-/// Whether `count` elements of `stride` bytes from `offset` on end inside `size` bytes.
-bool isInside(const OutputAttribute& attribute, std::uint32_t count, std::uint64_t size) {
-  const std::uint64_t length = std::uint64_t{count - 1} * attribute.stride + outputAttributeSize;
-  return attribute.offset <= size && length <= size - attribute.offset;
+Result<void> checkFormat(bool isAllowed, VertexFormat format, const char* name, std::size_t index) {
+  if (isAllowed) return {};
+  return invalid(jobName(index) + ": its " + name + " cannot be stored as " +
+                 std::string(formatName(format)));
 }
 
-Result<void> checkAttribute(const OutputAttribute& attribute, const char* name,
-                            std::uint32_t vertexCount, std::uint64_t outputSize,
-                            std::size_t index) {
-  if (attribute.offset % 4 != 0 || attribute.stride % 4 != 0 ||
-      attribute.stride < outputAttributeSize) {
-    return invalid(jobName(index) + ": the offset " + std::to_string(attribute.offset) +
-                   " and stride " + std::to_string(attribute.stride) + " of its " + name +
-                   " must be multiples of 4, the stride at least 12");
+Result<void> checkFormats(const Job& job, std::size_t index) {
+  if (Result<void> good = checkFormat(isPositionFormat(job.positions.format), job.positions.format,
+                                      "positions", index);
+      !good)
+    return good;
+  if (Result<void> good = checkFormat(
+          job.normals.format == VertexFormat::none || isNormalFormat(job.normals.format),
+          job.normals.format, "normals", index);
+      !good)
+    return good;
+  return checkFormat(
+      job.tangents.format == VertexFormat::none || isTangentFormat(job.tangents.format),
+      job.tangents.format, "tangents", index);
+}
+
+Result<void> checkStream(const OutputStream& stream, const char* name, std::uint32_t vertexCount,
+                         std::uint64_t bufferSize, std::size_t index, const DeviceLimits& limits) {
+  const std::string place = jobName(index) + ": the offset " + std::to_string(stream.offset) +
+                            ", stride " + std::to_string(stream.stride) + " and size " +
+                            std::to_string(stream.size) + " of its " + name;
+  if (stream.stride < stream.size) {
+    return invalid(place + ": the stride must be at least the size");
   }
-  if (!isInside(attribute, vertexCount, outputSize)) {
-    return invalid(jobName(index) + ": its " + name + " end outside the output buffer of " +
-                   std::to_string(outputSize) + " bytes");
+  const std::uint8_t unit = storeUnit(stream);
+  if (unit != 4 && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+    return Error{ErrorCode::missingFeature, place + " must be multiples of 4 on a device with " +
+                                                std::to_string(limits.maxStorageBuffersPerStage) +
+                                                " storage buffers a stage"};
+  }
+  if (unit == 2 && !limits.storage16Bit) {
+    return Error{ErrorCode::missingFeature,
+                 place + " must be multiples of 4, or storageBuffer16BitAccess enabled"};
+  }
+  if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
+    return Error{ErrorCode::missingFeature,
+                 place +
+                     " must be multiples of 4, or storageBuffer8BitAccess "
+                     "and storageBuffer16BitAccess enabled"};
+  }
+  const std::uint64_t length = std::uint64_t{vertexCount - 1} * stream.stride + stream.size;
+  if (stream.offset > bufferSize || length > bufferSize - stream.offset) {
+    return invalid(jobName(index) + ": its " + name + " end outside their output buffer of " +
+                   std::to_string(bufferSize) + " bytes");
   }
   return {};
+}
+
+Result<void> checkStreams(const Batch& batch, const Job& job, std::size_t index,
+                          const DeviceLimits& limits) {
+  const OutputStreams streams = outputStreams(job);
+  const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (streams[stream].size == 0) continue;
+    if (Result<void> good = checkStream(streams[stream], streamName(stream), job.mesh.vertexCount,
+                                        sizes[stream], index, limits);
+        !good)
+      return good;
+  }
+  return {};
+}
+
+Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
+                         std::size_t index) {
+  std::uint32_t highest = 0;
+  for (std::size_t i = 0; i < morphs.size(); ++i) {
+    const std::uint32_t target = morphs[i].target;
+    if (target >= targetCount) {
+      return invalid(jobName(index) + ": there is no morph target " + std::to_string(target) +
+                     " among the " + std::to_string(targetCount) + " of its mesh");
+    }
+    if (!std::isfinite(morphs[i].weight)) {
+      return invalid(jobName(index) + ": the weight of morph target " + std::to_string(target) +
+                     " is not finite");
+    }
+    // Mostly they stand in order; then nothing needs to be searched.
+    if (i == 0 || target > highest) {
+      highest = target;
+      continue;
+    }
+    for (std::size_t other = 0; other < i; ++other) {
+      if (morphs[other].target == target)
+        return invalid(jobName(index) + " has morph target " + std::to_string(target) + " twice");
+    }
+  }
+  return {};
+}
+
+bool isBox(const Box& box) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(box.min[axis]) || !std::isfinite(box.max[axis]) ||
+        !(box.max[axis] > box.min[axis]) || !std::isfinite(2 / (box.max[axis] - box.min[axis])))
+      return false;
+  }
+  return true;
+}
+
+Result<void> checkPaletteOf(const Batch& batch, const Job& job, std::uint32_t palette,
+                            std::size_t index) {
+  if (palette >= batch.palettes.size()) {
+    return invalid(jobName(index) + ": there is no palette " + std::to_string(palette) + " among " +
+                   std::to_string(batch.palettes.size()));
+  }
+  if (batch.palettes[palette].jointCount < job.mesh.requiredJoints) {
+    return invalid(jobName(index) + ": its mesh needs a palette of " +
+                   std::to_string(job.mesh.requiredJoints) + " joints, palette " +
+                   std::to_string(palette) + " has " +
+                   std::to_string(batch.palettes[palette].jointCount));
+  }
+  return {};
+}
+
+Result<void> checkMotion(const Batch& batch, const Job& job, std::size_t index) {
+  if (job.motion > Motion::reskinned)
+    return invalid(jobName(index) + ": its motion is not one of Motion");
+  if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
+    return invalid(jobName(index) +
+                   " settles or restarts its motion, but has no previous positions");
+  }
+  if (job.motion != Motion::reskinned) return {};
+  if (Result<void> good = checkPaletteOf(batch, job, job.previousPalette, index); !good)
+    return good;
+  return checkMorphs(job.previousMorphs, job.mesh.morphTargetCount, index);
 }
 
 }  // namespace
@@ -40,7 +149,8 @@ std::string jobName(std::size_t index) {
   return "job " + std::to_string(index);
 }
 
-Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index) {
+Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index,
+                      const DeviceLimits& limits) {
   if (job.mesh.vertexCount == 0) return invalid(jobName(index) + " has no mesh");
   if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
       job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
@@ -48,29 +158,44 @@ Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index) {
                    " bytes cannot stand at byte " + std::to_string(job.meshOffset) +
                    " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
-  if (job.palette >= batch.palettes.size()) {
-    return invalid(jobName(index) + ": there is no palette " + std::to_string(job.palette) +
-                   " among " + std::to_string(batch.palettes.size()));
-  }
-  if (batch.palettes[job.palette].jointCount < job.mesh.requiredJoints) {
-    return invalid(jobName(index) + ": its mesh needs a palette of " +
-                   std::to_string(job.mesh.requiredJoints) + " joints, palette " +
-                   std::to_string(job.palette) + " has " +
-                   std::to_string(batch.palettes[job.palette].jointCount));
-  }
+  if (Result<void> good = checkPaletteOf(batch, job, job.palette, index); !good) return good;
   if (methodName(job.method) == "unknown")
     return invalid(jobName(index) + ": its method is not one of Method");
-  if (job.normals.stride != 0 && !job.mesh.hasNormals) {
+  if (Result<void> good = checkFormats(job, index); !good) return good;
+  if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
     return invalid(jobName(index) + " wants normals, its mesh has none");
-  }
-  const std::uint32_t vertices = job.mesh.vertexCount;
-  if (Result<void> good =
-          checkAttribute(job.positions, "positions", vertices, batch.outputSize, index);
-      !good) {
+  if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
+    return invalid(jobName(index) + " wants tangents, its mesh has none");
+  if (Result<void> good = checkMotion(batch, job, index); !good) return good;
+  if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, index); !good)
     return good;
+  if (isSnormPosition(job.positions.format) && !isBox(job.box)) {
+    return invalid(jobName(index) +
+                   ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
-  if (job.normals.stride == 0) return {};
-  return checkAttribute(job.normals, "normals", vertices, batch.outputSize, index);
+  if (hasResult(job) && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+    return Error{ErrorCode::limitExceeded,
+                 jobName(index) + " wants bounds, or positions in snorm16: on a device with " +
+                     std::to_string(limits.maxStorageBuffersPerStage) +
+                     " storage buffers a stage there are none"};
+  }
+  return checkStreams(batch, job, index, limits);
+}
+
+Result<void> checkWindows(const OutputStreams& streams,
+                          const std::array<std::uint32_t, streamCount>& windows, std::size_t index,
+                          const DeviceLimits& limits) {
+  if (limits.maxStorageBuffersPerStage >= storageBuffersWanted) return {};
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (streams[stream].size != 0 && windows[stream] != windows[0]) {
+      return Error{ErrorCode::limitExceeded,
+                   jobName(index) + ": its " + streamName(stream) +
+                       " lie too far from its positions for a device with " +
+                       std::to_string(limits.maxStorageBuffersPerStage) +
+                       " storage buffers a stage"};
+    }
+  }
+  return {};
 }
 
 Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index) {

@@ -1,5 +1,6 @@
 #include "dermis/plan.h"
 
+#include <bit>
 #include <cstring>
 #include <string>
 
@@ -12,7 +13,21 @@ namespace {
 constexpr std::uint32_t storageBufferUsage = 0x20;   // VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
 constexpr std::uint32_t transferTargetUsage = 0x02;  // VK_BUFFER_USAGE_TRANSFER_DST_BIT
 
+float fromOrdered(std::uint32_t bits) {
+  return std::bit_cast<float>((bits & 0x80000000u) != 0 ? bits & 0x7fffffffu : ~bits);
+}
+
 }  // namespace
+
+std::optional<Box> InstanceResult::box() const {
+  Box box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (orderedMin[axis] > orderedMax[axis]) return std::nullopt;
+    box.min[axis] = fromOrdered(orderedMin[axis]);
+    box.max[axis] = fromOrdered(orderedMax[axis]);
+  }
+  return box;
+}
 
 Plan::Plan() : state_(std::make_unique<State>()) {}
 Plan::~Plan() = default;
@@ -41,6 +56,11 @@ std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
   return state_->paletteUnits[palette] * unitBytes;
 }
 
+std::uint64_t Plan::resultOffset(std::uint32_t job) const {
+  if (job >= state_->results.size() || state_->results[job] == notUsed) return noResult;
+  return state_->results[job] * std::uint64_t{sizeof(InstanceResult)};
+}
+
 BufferRequirement Plan::buffer(BufferRole role) const {
   // What the host fills may be staged: written to another buffer, and copied.
   constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
@@ -54,8 +74,17 @@ BufferRequirement Plan::buffer(BufferRole role) const {
       return {state_->tables.size() * 4, alignment, filled, true, true};
     case BufferRole::palettes:
       return {state_->palettesSize, alignment, storageBufferUsage, true, false};
-    case BufferRole::output:
-      return {state_->outputSize, alignment, storageBufferUsage, false, false};
+    case BufferRole::results:
+      return {state_->resultCount * std::uint64_t{sizeof(InstanceResult)}, alignment,
+              storageBufferUsage, true, false};
+    case BufferRole::positions:
+      return {state_->outputs.positions, alignment, storageBufferUsage, false, false};
+    case BufferRole::normals:
+      return {state_->outputs.normals, alignment, storageBufferUsage, false, false};
+    case BufferRole::tangents:
+      return {state_->outputs.tangents, alignment, storageBufferUsage, false, false};
+    case BufferRole::previousPositions:
+      return {state_->outputs.previousPositions, alignment, storageBufferUsage, false, false};
   }
   return {};
 }

@@ -1,6 +1,7 @@
 // What a plan consists of, and how it is made.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <unordered_map>
 #include <vector>
@@ -15,13 +16,12 @@ inline constexpr std::uint32_t notUsed = 0xffffffffu;
 
 /// One mesh with one output layout, in one dispatch; the instances follow in the instance table.
 struct GroupKey {
-  std::uint64_t mesh = 0;  ///< bytes into the mesh buffer
-  std::uint32_t window = 0;
+  std::uint64_t mesh = 0;     ///< bytes into the mesh buffer
+  std::uint64_t variant = 0;  ///< its key
+  std::array<std::uint32_t, streamCount> windows{};
+  std::array<std::uint32_t, streamCount> strides{};
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;
-  std::uint32_t positionStride = 0;
-  std::uint32_t normalStride = 0;
-  Method method = Method::linear;
 
   friend bool operator==(const GroupKey&, const GroupKey&) = default;
 };
@@ -29,18 +29,20 @@ struct GroupKey {
 struct GroupKeyHash {
   std::size_t operator()(const GroupKey& key) const {
     std::uint64_t hash = key.mesh;
-    for (const std::uint64_t part :
-         {std::uint64_t{key.window} << 32 | key.firstVertex,
-          std::uint64_t{key.vertexEnd} << 8 | static_cast<std::uint64_t>(key.method),
-          std::uint64_t{key.positionStride} << 32 | key.normalStride}) {
+    const auto add = [&hash](std::uint64_t part) {
       hash = (std::rotl(hash, 29) ^ part) * 0x9e3779b97f4a7c15u;
-    }
+    };
+    add(key.variant);
+    for (std::size_t stream = 0; stream < streamCount; ++stream)
+      add(std::uint64_t{key.windows[stream]} << 32 | key.strides[stream]);
+    add(std::uint64_t{key.firstVertex} << 32 | key.vertexEnd);
     return static_cast<std::size_t>(hash ^ (hash >> 32));
   }
 };
 
 struct Group {
   GroupKey key;
+  Variant variant;  ///< of its dispatch, but for the influences
   std::uint32_t maxInfluences = 0;
   std::uint32_t instances = 0;
   std::uint32_t firstInstance = 0;
@@ -57,11 +59,15 @@ struct Piece {
 struct Plan::State {
   std::vector<Dispatch> dispatches;
   std::vector<Variant> variants;
-  std::vector<std::uint32_t> tables;  ///< palette records, group records, instance records
+  /// Palette records, group records, instance records, then extensions and active morph targets.
+  std::vector<std::uint32_t> tables;
   std::vector<std::uint32_t>
       paletteUnits;  ///< where each palette stands in the palettes buffer, or notUsed
+  std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed
+  std::uint32_t resultCount = 0;
   std::uint64_t palettesSize = 0;
-  std::uint64_t meshesSize = 0, matricesSize = 0, outputSize = 0;
+  std::uint64_t meshesSize = 0, matricesSize = 0;
+  OutputSizes outputs;
   DeviceLimits limits;
   std::uint32_t instanceCount = 0;
   std::uint64_t vertexCount = 0;
@@ -71,19 +77,24 @@ struct Plan::State {
   std::vector<VertexRun> runs;
   std::vector<Piece> pieces;
   std::vector<std::uint32_t> order;
+  std::vector<MorphWeight> sortedMorphs;
   std::unordered_map<GroupKey, std::uint32_t, GroupKeyHash> groupOf;
 
   void clear();
   Result<void> build(const Batch& batch, const DeviceLimits& deviceLimits, const Tuning& tuning);
 
  private:
-  Result<void> gatherPieces(const Batch& batch);
-  void addPiece(const Job& job, std::uint32_t jobIndex, GroupKey key);
+  Result<void> gatherPieces(const Batch& batch, const Tuning& tuning);
+  void addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key,
+                const Variant& variant);
   Result<void> placePalettes(const Batch& batch, const Tuning& tuning);
-  Result<void> placeGroups(const Batch& batch, const Tuning& tuning);
-  void writeInstances(const Batch& batch, std::uint32_t firstRecord);
+  Result<void> placeGroups(const Tuning& tuning);
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
                            const DispatchConstants& constants);
+  void writeInstances(const Batch& batch, std::uint32_t firstRecord);
+  std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
+  std::uint32_t appendExtension(const Batch& batch, std::uint32_t jobIndex);
+  std::array<std::uint32_t, 2> appendMorphs(std::span<const MorphWeight> morphs);
 };
 
 }  // namespace dermis

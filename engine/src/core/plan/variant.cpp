@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "plan/outputs.h"
+
 namespace dermis {
 namespace {
 
@@ -16,23 +18,46 @@ std::uint8_t influenceClass(std::uint32_t maxInfluences) {
   }
   return 0;
 }
-std::uint64_t Variant::key() const {
-  return static_cast<std::uint64_t>(kernel) | static_cast<std::uint64_t>(method) << 4 |
-         static_cast<std::uint64_t>(normals) << 12 | static_cast<std::uint64_t>(influences) << 16 |
-         static_cast<std::uint64_t>(instancesPerInvocation) << 24 |
-         static_cast<std::uint64_t>(workgroupSize) << 32;
+
+Variant paletteVariant(const Tuning& tuning) {
+  Variant variant;
+  variant.kernel = Kernel::palette;
+  variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+  return variant;
 }
 
-std::vector<Variant> everyVariant(const Tuning& tuning) {
-  const auto workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
-  std::vector<Variant> variants{
-      {Kernel::palette, Method::dualQuaternion, false, 0, 1, workgroupSize}};
+std::uint64_t Variant::key() const {
+  std::uint64_t key = 0;
+  const auto add = [&key](auto value, unsigned bits) {
+    key = key << bits | static_cast<std::uint64_t>(value);
+  };
+  add(kernel, 2);
+  add(method, 4);
+  add(positions, 4);
+  add(normals, 4);
+  add(tangents, 4);
+  for (const std::uint8_t unit : units) add(unit / 2, 2);
+  add(motion, 2);
+  add(morphs, 1);
+  add(bounds, 1);
+  add(influences, 4);
+  add(instancesPerInvocation, 8);
+  add(workgroupSize, 16);
+  return key;
+}
+
+std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning) {
+  std::vector<Variant> variants{paletteVariant(tuning)};
+  Variant variant = outputVariant(job);
+  variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
+  variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
   for (const Method method : allMethods) {
-    for (const bool normals : {false, true}) {
+    for (const bool morphs : {false, true}) {
       for (const std::uint8_t influences : influenceClasses) {
-        variants.push_back({Kernel::skin, method, normals, influences,
-                            static_cast<std::uint8_t>(tuning.instancesPerInvocation),
-                            workgroupSize});
+        variant.method = method;
+        variant.morphs = morphs;
+        variant.influences = influences;
+        variants.push_back(variant);
       }
     }
   }

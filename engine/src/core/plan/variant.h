@@ -10,4 +10,6 @@ namespace dermis {
 /// The `Variant::influences` for a mesh whose vertices have at most so many.
 std::uint8_t influenceClass(std::uint32_t maxInfluences);
 
+Variant paletteVariant(const Tuning& tuning);
+
 }  // namespace dermis

@@ -2,24 +2,26 @@
 // ("windows").
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "dermis/plan.h"
+#include "plan/outputs.h"
 
 namespace dermis {
 
-/// Vertices of one job whose output lies in one window.
+/// Vertices of one job of which each attribute lies in one window of its buffer.
 struct VertexRun {
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;
-  std::uint32_t window = 0;
+  std::array<std::uint32_t, streamCount> windows{};
 };
 
-/// Cuts a job's vertices into runs. Fails with `limitExceeded` where the attributes of one vertex
-/// lie too far apart.
-Result<void> cutIntoRuns(const Job& job, std::size_t jobIndex, std::uint64_t outputSize,
-                         const DeviceLimits& limits, std::vector<VertexRun>& runs);
+/// Cuts a job's vertices into runs. Attributes that lie near to each other get windows of one
+/// number.
+void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
+                 const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
+                 std::vector<VertexRun>& runs);
 
 }  // namespace dermis

@@ -98,8 +98,10 @@ void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influe
       if (weight != 0) influences.push_back({readJoint(set.joints, vertex, slot), weight});
     }
   }
-  std::stable_sort(influences.begin(), influences.end(),
-                   [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
+  // By weight too: whatever the order of the slots, duplicates add up to the same.
+  std::sort(influences.begin(), influences.end(), [](const Influence& a, const Influence& b) {
+    return a.joint != b.joint ? a.joint < b.joint : a.stored < b.stored;
+  });
   double sum = 0;
   std::size_t kept = 0;
   for (const Influence& influence : influences) {

@@ -1,6 +1,7 @@
 #include "dermis/reference.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -195,7 +196,8 @@ Vertex skinLinear(std::span<const Joint> joints, std::span<const Influence> infl
 /// Kavan et al. 2007, algorithm 1, with the pivot of greatest weight; two-phase scale and shear.
 Vertex skinDualQuaternion(std::span<const Joint> joints, std::span<const Influence> influences,
                           const Vertex& vertex, Conditioning& conditioning) {
-  const dvec4 pivot = joints[influences[pivotOf(influences)].joint].real;
+  const Influence& strongest = influences[pivotOf(influences)];
+  const dvec4 pivot = joints[strongest.joint].real;
   dvec4 real(0.0), dual(0.0);
   dmat3 scaleShear(0.0);
   bool kernelsScale = false;
@@ -210,6 +212,8 @@ Vertex skinDualQuaternion(std::span<const Joint> joints, std::span<const Influen
     kernelsScale |= !joint.rigidForKernels;
   }
   const double norm = glm::length(real);
+  // No summand points away from the pivot: dot(real, pivot) ≥ its weight. NaN is let through.
+  assert(!(norm < strongest.weight * (1 - 1e-9)));
   real /= norm;
   dual /= norm;
 

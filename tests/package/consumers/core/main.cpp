@@ -1,11 +1,14 @@
-// Packs, plans and skins with dermis::core, and prints numbers for everything that crosses the
-// interface: two builds of this program must print the same.
+// Packs, bounds, plans and skins with dermis::core, and prints numbers for everything that crosses
+// the interface: two builds of this program must print the same.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
-#include <numeric>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "dermis/dermis.h"
@@ -28,23 +31,64 @@ void print(const char* name, std::uint64_t value) {
   std::printf("%s %016llx\n", name, static_cast<unsigned long long>(value));
 }
 
-struct Vertex {
-  float position[3], normal[3], weights[3];
+/// A vertex as the engine's assets have it.
+struct BindVertex {
+  float position[3], normal[3], tangent[4], weights[3];
   std::uint8_t joints[3];
 };
 
-std::vector<Vertex> makeVertices() {
-  std::vector<Vertex> vertices(vertexCount);
-  for (std::uint32_t i = 0; i < vertexCount; ++i) {
-    const float f = static_cast<float>(i);
-    vertices[i] = {{std::sin(f), 0.01f * f, std::cos(f)},
-                   {std::sin(f), 0, std::cos(f)},
-                   {0.5f, 0.25f, 0.125f * static_cast<float>(i % 3)},
-                   {static_cast<std::uint8_t>(i % 5), static_cast<std::uint8_t>(i % 4),
-                    static_cast<std::uint8_t>(i % 3)}};
+/// A vertex as the engine draws it: 20 bytes, all of them filled by Dermis.
+struct SkinnedVertex {
+  std::int16_t position[4];  ///< within a box that every instance has for itself
+  std::int8_t normal[4];
+  std::int16_t tangent[4];
+};
+
+/// A ring of columns, with a morph target that lifts every fourth vertex and turns its normal.
+struct Model {
+  std::vector<BindVertex> vertices{vertexCount};
+  std::vector<std::uint32_t> lifted;
+  std::vector<float> lift, turn;
+  InfluenceSet influences;
+  MorphTargetView morphTarget;
+
+  Model() {
+    for (std::uint32_t i = 0; i < vertexCount; ++i) {
+      const float f = static_cast<float>(i);
+      vertices[i] = {{std::sin(f), 0.01f * f, std::cos(f)},
+                     {std::sin(f), 0, std::cos(f)},
+                     {std::cos(f), 0, -std::sin(f), i % 2 == 0 ? 1.0f : -1.0f},
+                     {0.5f, 0.25f, 0.125f * static_cast<float>(i % 3)},
+                     {static_cast<std::uint8_t>(i % 5), static_cast<std::uint8_t>(i % 4),
+                      static_cast<std::uint8_t>(i % 3)}};
+      if (i % 4 != 0) continue;
+      lifted.push_back(i);
+      lift.insert(lift.end(), {0, 0.5f, 0});
+      turn.insert(turn.end(), {0, 0.25f, 0});
+    }
   }
-  return vertices;
-}
+
+  /// Valid while the model lives and stays where it is.
+  MeshView view() {
+    constexpr std::uint32_t stride = sizeof(BindVertex);
+    const BindVertex& first = vertices[0];
+    influences.joints = {first.joints, vertexCount, stride, ComponentType::uint8, 3};
+    influences.weights = floatAttribute(first.weights, vertexCount, 3, stride);
+    const auto displaced = static_cast<std::uint32_t>(lifted.size());
+    morphTarget.vertices = lifted;
+    morphTarget.positions = floatAttribute(lift.data(), displaced, 3);
+    morphTarget.normals = floatAttribute(turn.data(), displaced, 3);
+    MeshView mesh;
+    mesh.name = "ring";
+    mesh.vertexCount = vertexCount;
+    mesh.positions = floatAttribute(first.position, vertexCount, 3, stride);
+    mesh.normals = floatAttribute(first.normal, vertexCount, 3, stride);
+    mesh.tangents = floatAttribute(first.tangent, vertexCount, 4, stride);
+    mesh.influenceSets = {&influences, 1};
+    mesh.morphTargets = {&morphTarget, 1};
+    return mesh;
+  }
+};
 
 std::vector<JointMatrix> makePose() {
   std::vector<JointMatrix> pose(jointCount);
@@ -57,11 +101,28 @@ std::vector<JointMatrix> makePose() {
 }
 
 void printSizes() {
-  std::printf("sizes %zu %zu %zu %zu %zu %zu %zu %zu %zu %zu %zu %zu %zu\n", sizeof(JointMatrix),
-              sizeof(AttributeView), sizeof(MeshView), sizeof(PackedMesh), sizeof(Palette),
-              sizeof(Job), sizeof(Batch), sizeof(Dispatch), sizeof(Plan), sizeof(Comparison),
-              sizeof(reference::Conditioning), sizeof(reference::SkinnedMesh),
-              sizeof(RepairedMesh));
+  for (const std::size_t size : {sizeof(JointMatrix),
+                                 sizeof(AttributeView),
+                                 sizeof(MorphTargetView),
+                                 sizeof(MeshView),
+                                 sizeof(MeshInfo),
+                                 sizeof(PackedMesh),
+                                 sizeof(Palette),
+                                 sizeof(OutputAttribute),
+                                 sizeof(Job),
+                                 sizeof(Batch),
+                                 sizeof(Variant),
+                                 sizeof(Dispatch),
+                                 sizeof(Plan),
+                                 sizeof(InstanceResult),
+                                 sizeof(JointBounds),
+                                 sizeof(SkinnedView),
+                                 sizeof(Comparison),
+                                 sizeof(reference::Conditioning),
+                                 sizeof(reference::SkinnedMesh),
+                                 sizeof(RepairedMesh)})
+    std::printf("%zu ", size);
+  std::printf("bytes\n");
 }
 
 /// Rounded, for the arithmetic of GLM is the engine's own.
@@ -78,81 +139,171 @@ void printGlm() {
               static_cast<double>(joint.m[2][3]), static_cast<double>(back[3].y));
 }
 
-int fail(const Error& error) {
-  std::printf("%s: %s\n", std::string(errorCodeName(error.code)).c_str(), error.message.c_str());
-  return 1;
+Error wrong(const char* what) {
+  return {ErrorCode::invalidData, what};
 }
 
-}  // namespace
+void printBox(const Box& box) {
+  std::printf("box");
+  for (int axis = 0; axis < 3; ++axis) {
+    std::printf(" %.9g..%.9g", static_cast<double>(box.min[axis]),
+                static_cast<double>(box.max[axis]));
+  }
+  std::printf("\n");
+}
 
-int main() {
+bool holds(const Box& box, const reference::Double3& point) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!(box.min[axis] <= point[axis] && point[axis] <= box.max[axis])) return false;
+  }
+  return true;
+}
+
+/// One instance a method, each with a box of its own, in the vertices that the engine draws.
+Result<void> planBatch(const MeshInfo& info, const Box& box) {
+  const Palette palette{jointCount, 0, true};
+  const MorphWeight morph{0, 0.75f};
+  std::vector<Job> jobs;
+  for (const Method method : allMethods) {
+    const std::uint64_t first = jobs.size() * vertexCount * sizeof(SkinnedVertex);
+    const auto attribute = [first](std::size_t offset, VertexFormat format) {
+      return OutputAttribute{first + offset, sizeof(SkinnedVertex), format};
+    };
+    Job& job = jobs.emplace_back();
+    job.mesh = info;
+    job.method = method;
+    job.positions = attribute(offsetof(SkinnedVertex, position), VertexFormat::snorm16x4);
+    job.normals = attribute(offsetof(SkinnedVertex, normal), VertexFormat::snorm8x4);
+    job.tangents = attribute(offsetof(SkinnedVertex, tangent), VertexFormat::snorm16x4);
+    job.box = box;
+    job.morphs = {&morph, 1};
+    job.bounds = true;
+  }
+  Batch batch;
+  batch.palettes = {&palette, 1};
+  batch.jobs = jobs;
+  batch.meshesSize = info.byteSize;
+  batch.matricesSize = jointCount * sizeof(JointMatrix);
+  batch.outputs = OutputSizes::oneBuffer(jobs.size() * vertexCount * sizeof(SkinnedVertex));
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  const Tuning tuning;
+  Plan plan;
+  if (Result<void> done = makePlan(batch, limits, tuning, plan); !done) return done;
+  std::vector<std::byte> tables(plan.buffer(BufferRole::tables).size);
+  if (Result<void> done = writeTables(plan, tables); !done) return done;
+  std::printf("%zu dispatches of %zu variants, results at %llu\n", plan.dispatches().size(),
+              plan.variants().size(), static_cast<unsigned long long>(plan.resultOffset(1)));
+  print("tables", hashOf(tables));
+
+  // What an engine prepares that knows nothing but its vertex.
+  const std::vector<Variant> foreseen = everyVariant(jobs[0], tuning);
+  for (const Variant& variant : plan.variants()) {
+    if (std::find(foreseen.begin(), foreseen.end(), variant) == foreseen.end())
+      return wrong("everyVariant does not foresee a variant of the plan");
+  }
+  return {};
+}
+
+/// `value` from -1 to 1 as a normalised integer.
+template <typename Integer>
+Integer toSnorm(double value) {
+  return static_cast<Integer>(std::lround(value * std::numeric_limits<Integer>::max()));
+}
+
+/// What a kernel would write, from the reference's vertices.
+std::vector<SkinnedVertex> quantize(const reference::SkinnedMesh& skinned, const Box& box) {
+  std::vector<SkinnedVertex> vertices(vertexCount);
+  for (std::size_t i = 0; i < vertexCount; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double low = box.min[axis], high = box.max[axis];
+      const double centre = (low + high) / 2, half = (high - low) / 2;
+      vertices[i].position[axis] =
+          toSnorm<std::int16_t>((skinned.positions[i][axis] - centre) / half);
+      vertices[i].normal[axis] = toSnorm<std::int8_t>(skinned.normals[i][axis]);
+      vertices[i].tangent[axis] = toSnorm<std::int16_t>(skinned.tangents[i][axis]);
+    }
+    vertices[i].position[3] = 32767;
+    vertices[i].tangent[3] = toSnorm<std::int16_t>(skinned.tangents[i][3]);
+  }
+  return vertices;
+}
+
+/// Skins by the reference, stores that as an engine would, and holds it against the contract.
+Result<void> skinAndCompare(const MeshView& mesh, const Box& box, std::span<const JointMatrix> pose,
+                            Method method) {
+  const MorphWeight morph{0, 0.75f};
+  const Result<reference::SkinnedMesh> skinned = reference::skin(mesh, pose, method, {&morph, 1});
+  if (!skinned) return skinned.error();
+  print(std::string(methodName(method)).c_str(),
+        hashOf(std::as_bytes(std::span(skinned->positions))) ^
+            hashOf(std::as_bytes(std::span(skinned->normals))) ^
+            hashOf(std::as_bytes(std::span(skinned->tangents))));
+  double bounds = 0;
+  for (const reference::Conditioning& conditioning : skinned->conditioning) {
+    bounds += positionBound(method, conditioning) + normalBound(method, conditioning) +
+              tangentBound(method, conditioning);
+  }
+  std::printf("bounds %.17g\n", bounds);
+  for (const reference::Double3& position : skinned->positions) {
+    if (!holds(box, position)) return wrong("skinnedBounds does not hold every vertex");
+  }
+
+  const std::vector<SkinnedVertex> stored = quantize(*skinned, box);
+  const auto attribute = [](const void* data, VertexFormat format) {
+    return SkinnedAttribute{data, vertexCount, sizeof(SkinnedVertex), format};
+  };
+  const SkinnedView view{attribute(stored[0].position, VertexFormat::snorm16x4),
+                         attribute(stored[0].normal, VertexFormat::snorm8x4),
+                         attribute(stored[0].tangent, VertexFormat::snorm16x4), box};
+  const Result<Comparison> comparison = compare(*skinned, view, method);
+  if (!comparison) return comparison.error();
+  std::printf("compared %llu, %llu clamped, worst %.9g %.9g %.9g\n",
+              static_cast<unsigned long long>(comparison->compared),
+              static_cast<unsigned long long>(comparison->clamped), comparison->worstPosition,
+              comparison->worstNormal, comparison->worstTangent);
+  const std::array<double, 3> first =
+      decodePosition(VertexFormat::snorm16x4, stored[0].position, box);
+  std::printf("first vertex %.9g %.9g %.9g\n", first[0], first[1], first[2]);
+  if (comparison->compared != vertexCount || comparison->clamped != 0)
+    return wrong("not every vertex was compared");
+  if (!comparison->passed()) return wrong("what was stored is outside its bounds");
+  return {};
+}
+
+Result<void> run() {
   printSizes();
   printGlm();
-
-  const std::vector<Vertex> vertices = makeVertices();
-  const Vertex& first = vertices[0];
-  constexpr std::uint32_t stride = sizeof(Vertex);
-  InfluenceSet influences;
-  influences.joints = {first.joints, vertexCount, stride, ComponentType::uint8, 3};
-  influences.weights = {first.weights, vertexCount, stride, ComponentType::float32, 3};
-  MeshView mesh;
-  mesh.name = "mesh";
-  mesh.vertexCount = vertexCount;
-  mesh.positions = {first.position, vertexCount, stride, ComponentType::float32, 3};
-  mesh.normals = {first.normal, vertexCount, stride, ComponentType::float32, 3};
-  mesh.influenceSets = {&influences, 1};
+  Model model;
+  const MeshView mesh = model.view();
   for (const Finding& finding : validate(mesh, jointCount).findings)
     std::printf("%s: %llu\n", problemName(finding.problem),
                 static_cast<unsigned long long>(finding.count));
 
   const Result<PackedMesh> packed = pack(mesh, jointCount);
-  if (!packed) return fail(packed.error());
+  if (!packed) return packed.error();
   print("packed", hashOf(packed->bytes()));
   const Result<PackedMesh> loaded = PackedMesh::fromBytes(packed->bytes());
-  if (!loaded) return fail(loaded.error());
-
-  const Palette palette{jointCount, 0, true};
-  std::vector<Job> jobs(3);
-  for (std::uint32_t index = 0; index < jobs.size(); ++index) {
-    jobs[index].mesh = loaded->info();
-    jobs[index].method = index == 1 ? Method::linear : Method::dualQuaternion;
-    jobs[index].positions = {std::uint64_t{index} * vertexCount * 24, 24};
-    jobs[index].normals = {std::uint64_t{index} * vertexCount * 24 + 12, 24};
-  }
-  Batch batch;
-  batch.palettes = {&palette, 1};
-  batch.jobs = jobs;
-  batch.meshesSize = loaded->bytes().size();
-  batch.matricesSize = jointCount * sizeof(JointMatrix);
-  batch.outputSize = std::uint64_t{jobs.size()} * vertexCount * 24;
-  Plan planned;
-  if (Result<void> done = makePlan(batch, DeviceLimits{}, Tuning{}, planned); !done)
-    return fail(done.error());
-  std::vector<std::byte> tables(planned.buffer(BufferRole::tables).size);
-  if (Result<void> done = writeTables(planned, tables); !done) return fail(done.error());
-  std::printf("dispatches %zu\n", planned.dispatches().size());
-  print("tables", hashOf(tables));
+  if (!loaded) return loaded.error();
+  const Result<JointBounds> bounds = jointBounds(mesh, jointCount);
+  if (!bounds) return bounds.error();
 
   const std::vector<JointMatrix> pose = makePose();
   for (const Method method : allMethods) {
-    const Result<reference::SkinnedMesh> skinned = reference::skin(mesh, pose, method);
-    if (!skinned) return fail(skinned.error());
-    print(std::string(methodName(method)).c_str(),
-          hashOf(std::as_bytes(std::span(skinned->positions))) ^
-              hashOf(std::as_bytes(std::span(skinned->normals))));
-    double bounds = 0;
-    for (const reference::Conditioning& conditioning : skinned->conditioning)
-      bounds += positionBound(method, conditioning) + normalBound(method, conditioning);
-    std::printf("bounds %.17g\n", bounds);
-
-    std::vector<float> rounded;
-    for (const reference::Double3& position : skinned->positions)
-      for (const double coordinate : position) rounded.push_back(static_cast<float>(coordinate));
-    const Result<Comparison> comparison =
-        compare(*skinned, floatAttribute(rounded.data(), vertexCount, 3), {}, method);
-    if (!comparison) return fail(comparison.error());
-    std::printf("compared %llu, %s\n", static_cast<unsigned long long>(comparison->compared),
-                comparison->passed() ? "passed" : "failed");
+    const Box box = skinnedBounds(*bounds, pose, method);
+    printBox(box);
+    if (Result<void> done = planBatch(loaded->info(), box); !done) return done;
+    if (Result<void> done = skinAndCompare(mesh, box, pose, method); !done) return done;
   }
-  return 0;
+  return {};
+}
+
+}  // namespace
+
+int main() {
+  const Result<void> done = run();
+  if (done) return 0;
+  std::printf("%s: %s\n", std::string(errorCodeName(done.error().code)).c_str(),
+              done.error().message.c_str());
+  return 1;
 }

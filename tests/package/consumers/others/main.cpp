@@ -1,13 +1,19 @@
-// Compiles the installed kernels at run time, and reads glTF from memory.
+// Compiles the installed kernels at run time, and reads glTF from memory: a skinned and morphed
+// triangle, viewed, packed and skinned.
 //
 //   others_consumer SHADERS
 
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <string_view>
+#include <vector>
 
 #include "abi.h"
 #include "dermis/gltf.h"
+#include "dermis/pack.h"
+#include "dermis/plan.h"
+#include "dermis/reference.h"
 #include "dermis/shader_compiler.h"
 
 namespace {
@@ -23,16 +29,52 @@ Result<gltf::Model> read(std::string_view text) {
   return gltf::loadFromMemory(std::as_bytes(std::span(text)), {});
 }
 
+/// Positions, joints and weights of three vertices, which are their own displacements too; the
+/// joint stands at z = 3.
+constexpr std::string_view triangle =
+    R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],)"
+    R"("nodes":[{"mesh":0,"skin":0},{"translation":[0,0,3]}],"skins":[{"joints":[1]}],)"
+    R"("meshes":[{"weights":[0.5],"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":1,)"
+    R"("WEIGHTS_0":2},"targets":[{"POSITION":0}]}]}],"buffers":[{"byteLength":96,)"
+    R"("uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA)"
+    R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAA"}],)"
+    R"("bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12},)"
+    R"({"buffer":0,"byteOffset":48,"byteLength":48}],"accessors":[{"bufferView":0,)"
+    R"("componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},)"
+    R"({"bufferView":1,"componentType":5121,"count":3,"type":"VEC4"},)"
+    R"({"bufferView":2,"componentType":5126,"count":3,"type":"VEC4"}]})";
+
+/// Whether every vertex of the triangle is half as far out again, at z = 3.
+Result<bool> skinTriangle() {
+  const Result<gltf::Model> model = read(triangle);
+  if (!model) return model.error();
+  const gltf::SkinnedPrimitive& skinned = model->skinnedPrimitives.at(0);
+  const gltf::PrimitiveView view(model->meshes[skinned.mesh].primitives[skinned.primitive]);
+  const Result<PackedMesh> packed = pack(view.mesh(), 1);
+  if (!packed) return packed.error();
+  const std::vector<JointMatrix> palette = gltf::palette(*model, skinned.skin, gltf::none, 0);
+  const std::vector<float> weights = gltf::morphWeights(*model, skinned.node, gltf::none, 0);
+  const MorphWeight morph{0, weights.at(0)};
+  const auto vertices = reference::skin(view.mesh(), palette, Method::dualQuaternion, {&morph, 1});
+  if (!vertices) return vertices.error();
+  const std::vector<reference::Double3> expected{{0, 0, 3}, {1.5, 0, 3}, {0, 1.5, 3}};
+  return packed->info().morphTargetCount == 1 && vertices->positions == expected;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   ShaderCompiler compiler;
-  for (const char* kernel : {"palette.comp", "skin.comp"}) {
-    const auto words = compiler.compileFile(std::filesystem::path(argv[1]) / kernel);
+  std::size_t kernels = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(argv[1])) {
+    if (entry.path().extension() != ".comp") continue;
+    const auto words = compiler.compileFile(entry.path());
     if (!words) return fail(words.error());
-    std::printf("%s: %zu words\n", kernel, words->size());
+    ++kernels;
   }
+  std::printf("%zu kernels\n", kernels);
+  if (kernels < 2) return 2;
   ShaderSource broken;
   broken.name = "broken.comp";
   broken.text = "#version 450\nvoid main() { nonsense }\n";
@@ -40,12 +82,11 @@ int main(int argc, char** argv) {
   if (refused || refused.error().code != ErrorCode::shaderError) return 3;
   std::printf("%s\n", refused.error().message.c_str());
 
-  const Result<gltf::Model> model =
-      read(R"({"asset": {"version": "2.0"}, "nodes": [{"name": "root"}]})");
-  if (!model) return fail(model.error());
-  if (model->nodes.size() != 1 || gltf::nodeGlobals(*model, gltf::none, 0).size() != 1) return 4;
+  const Result<bool> right = skinTriangle();
+  if (!right) return fail(right.error());
+  if (!*right) return 4;
   const Result<gltf::Model> nonsense = read("{");
   if (nonsense) return 5;
   std::printf("%s\n", nonsense.error().message.c_str());
-  return abi::BINDING_COUNT == 4 ? 0 : 6;
+  return abi::BINDING_COUNT == storageBuffersWanted ? 0 : 6;
 }

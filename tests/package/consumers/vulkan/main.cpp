@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "dermis/dermis.h"
 #include "dermis/vulkan/vulkan.h"
@@ -23,25 +24,43 @@ bool refuses(const vulkan::DeviceDescription& description, ErrorCode code) {
   return context.error().code == code;
 }
 
+/// What an engine with a vertex of 16 bytes asks for while loading, and the modules of its
+/// pipelines.
+bool hasKernels() {
+  Job job;
+  job.positions = {0, 16, VertexFormat::float16x4};
+  job.normals = {8, 16, VertexFormat::octahedral16x2};
+  job.tangents = {12, 16, VertexFormat::octahedral16x2};
+  const std::vector<Variant> variants = everyVariant(job, Tuning{});
+  std::printf("%zu variants\n", variants.size());
+  for (const std::uint32_t buffers : {storageBuffersWanted, 4u}) {
+    DeviceLimits limits;
+    limits.maxStorageBuffersPerStage = buffers;
+    for (const Variant& variant : variants) {
+      const std::span<const std::uint32_t> words = vulkan::kernelSpirv(variant, limits);
+      if (words.size() < 100 || words[0] != 0x07230203u) return false;
+      const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
+      if (constants.count == 0 || constants.values[0] != variant.workgroupSize) return false;
+    }
+  }
+  return !variants.empty();
+}
+
 }  // namespace
 
 int main() {
-  for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
-    const std::span<const std::uint32_t> words = vulkan::kernelSpirv(kernel);
-    if (words.size() < 100 || words[0] != 0x07230203u) return 1;
-  }
-  if (vulkan::specializationConstants(Variant{}).values[0] != Variant{}.workgroupSize) return 2;
+  if (!hasKernels()) return 1;
   if (vulkan::outputScope(vulkan::Consumer::vertexInput).destination.accesses !=
       VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT)
-    return 3;
+    return 2;
 
   vulkan::DeviceDescription description;
-  if (!refuses(description, ErrorCode::invalidArgument)) return 4;
+  if (!refuses(description, ErrorCode::invalidArgument)) return 3;
   int anything = 0;  // handles are never looked into
   description.instance = reinterpret_cast<VkInstance>(&anything);
   description.physicalDevice = reinterpret_cast<VkPhysicalDevice>(&anything);
   description.device = reinterpret_cast<VkDevice>(&anything);
   description.getInstanceProcAddr = knowsNothing;
-  if (!refuses(description, ErrorCode::missingEntryPoint)) return 5;
+  if (!refuses(description, ErrorCode::missingEntryPoint)) return 4;
   return 0;
 }

@@ -6,7 +6,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-namespace dermis::test {
+namespace dermis::samples {
 namespace {
 
 class Random {
@@ -51,7 +51,67 @@ glm::dmat3 scaleShear(Random& random, Rigidity rigidity) {
   return rigidity == Rigidity::mirrored ? symmetric * -1.0 : symmetric;
 }
 
+void append(std::vector<float>& values, const glm::dvec3& vector, double scale = 1) {
+  for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(scale * vector[i]));
+}
+
+AttributeView vectors(const std::vector<float>& values, std::uint32_t components) {
+  if (values.empty()) return {};
+  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                        components);
+}
+
 }  // namespace
+
+MeshView OwnedMesh::view() {
+  MeshView mesh;
+  mesh.name = name;
+  mesh.vertexCount = vertexCount();
+  mesh.positions = vectors(positions, 3);
+  mesh.normals = vectors(normals, 3);
+  mesh.tangents = vectors(tangents, 4);
+  set.joints = {joints.data(), vertexCount(), influencesPerVertex * 4, ComponentType::uint32,
+                influencesPerVertex};
+  set.weights = floatAttribute(weights.data(), vertexCount(), influencesPerVertex);
+  mesh.influenceSets = {&set, 1};
+  morphViews.clear();
+  for (const OwnedMorph& morph : morphs) {
+    MorphTargetView& target = morphViews.emplace_back();
+    target.vertices = morph.vertices;
+    target.positions = vectors(morph.positions, 3);
+    target.normals = vectors(morph.normals, 3);
+    target.tangents = vectors(morph.tangents, 3);
+  }
+  mesh.morphTargets = morphViews;
+  return mesh;
+}
+
+void addTangents(OwnedMesh& mesh, std::uint32_t seed) {
+  Random random(seed);
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
+    append(mesh.tangents, random.direction());
+    mesh.tangents.push_back(random.below(2) == 0 ? -1.0f : 1.0f);
+  }
+}
+
+void addMorphs(OwnedMesh& mesh, std::uint32_t seed, std::uint32_t count) {
+  Random random(seed);
+  for (std::uint32_t target = 0; target < count; ++target) {
+    OwnedMorph& morph = mesh.morphs.emplace_back();
+    for (std::uint32_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
+      if (random.below(3) != 0 && !(vertex == 0 && target == 0)) continue;
+      morph.vertices.push_back(vertex);
+      append(morph.positions, random.direction(), 0.3);
+      if (!mesh.normals.empty()) append(morph.normals, random.direction(), 0.3);
+      if (!mesh.tangents.empty()) append(morph.tangents, random.direction(), 0.3);
+    }
+    // An empty list of vertices would mean all of them.
+    if (morph.vertices.empty()) {
+      morph.vertices = {0};
+      append(morph.positions, random.direction(), 0.3);
+    }
+  }
+}
 
 OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                      std::uint32_t influences, bool normals) {
@@ -88,4 +148,4 @@ std::vector<JointMatrix> randomPose(std::uint32_t seed, std::uint32_t jointCount
   return pose;
 }
 
-}  // namespace dermis::test
+}  // namespace dermis::samples

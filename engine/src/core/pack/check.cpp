@@ -1,0 +1,132 @@
+#include "pack/check.h"
+
+#include <bit>
+
+#include "abi.h"
+#include "dermis/types.h"
+
+namespace dermis {
+namespace {
+
+/// Whether `count` words from `offset` on lie behind the header and inside the blob.
+bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t total) {
+  return offset >= abi::MESH_HEADER_WORDS && offset <= total && count <= total - offset;
+}
+
+Result<void> checkInfluences(std::span<const std::uint32_t> words) {
+  const std::uint64_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
+  const std::uint32_t offset = words[abi::MESH_HEADER_INFLUENCES];
+  if (!isSection(words[abi::MESH_HEADER_FIRSTS], vertices + 1, words.size()) || offset % 2 != 0) {
+    return damagedBlob("its header does not fit its sections");
+  }
+  const std::span<const std::uint32_t> firsts =
+      words.subspan(words[abi::MESH_HEADER_FIRSTS], static_cast<std::size_t>(vertices) + 1);
+  for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+    if (firsts[vertex] > firsts[vertex + 1] ||
+        firsts[vertex + 1] - firsts[vertex] > words[abi::MESH_HEADER_MAX_INFLUENCES]) {
+      return damagedBlob("the influences of vertex " + std::to_string(vertex) +
+                         " do not follow those before");
+    }
+  }
+  const std::uint64_t count = firsts[static_cast<std::size_t>(vertices)];
+  if (!isSection(offset, count * abi::INFLUENCE_WORDS, words.size())) {
+    return damagedBlob("its influences lie outside the blob");
+  }
+  for (std::uint64_t influence = 0; influence < count; ++influence) {
+    const std::size_t record = static_cast<std::size_t>(offset + influence * abi::INFLUENCE_WORDS);
+    if (words[record + abi::INFLUENCE_JOINT] >= words[abi::MESH_HEADER_REQUIRED_JOINTS]) {
+      return damagedBlob("influence " + std::to_string(influence) +
+                         " has a joint index above its largest");
+    }
+  }
+  return {};
+}
+
+/// Checks a target whose blocks begin at word `behind` or later, and moves that behind them: as the
+/// blocks of two targets do not overlap, all targets together take no longer than the blob is.
+Result<void> checkMorph(std::span<const std::uint32_t> words, std::uint32_t target,
+                        std::uint64_t& behind) {
+  const std::uint32_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
+  const std::size_t record =
+      words[abi::MESH_HEADER_MORPHS] + std::size_t{target} * abi::MORPH_WORDS;
+  const std::uint64_t firstBlock = words[record + abi::MORPH_FIRST_BLOCK];
+  const std::uint64_t blockCount = words[record + abi::MORPH_BLOCK_COUNT];
+  const std::uint32_t attributes = words[record + abi::MORPH_ATTRIBUTES];
+  if (blockCount == 0) return {};
+  const std::uint64_t allBlocks =
+      (std::uint64_t{vertices} + abi::MORPH_BLOCK_VERTICES - 1) / abi::MORPH_BLOCK_VERTICES;
+  if (firstBlock + blockCount > allBlocks || attributes > 7 ||
+      !isSection(words[record + abi::MORPH_BLOCKS], blockCount * abi::MORPH_BLOCK_WORDS,
+                 words.size())) {
+    return damagedBlob("morph target " + std::to_string(target) + " lies outside the blob");
+  }
+  if (words[record + abi::MORPH_BLOCKS] < behind)
+    return damagedBlob("morph target " + std::to_string(target) + " overlaps the one before");
+  behind = words[record + abi::MORPH_BLOCKS] + blockCount * abi::MORPH_BLOCK_WORDS;
+  const std::uint64_t displacementWords =
+      std::uint64_t{3} * static_cast<std::uint32_t>(std::popcount(attributes));
+  for (std::uint64_t block = 0; block < blockCount; ++block) {
+    const std::size_t entry = static_cast<std::size_t>(words[record + abi::MORPH_BLOCKS] +
+                                                       block * abi::MORPH_BLOCK_WORDS);
+    const std::uint64_t displaced = static_cast<std::uint64_t>(std::popcount(words[entry])) +
+                                    static_cast<std::uint64_t>(std::popcount(words[entry + 1]));
+    if (displaced != 0 && !isSection(words[entry + abi::MORPH_BLOCK_DISPLACEMENTS],
+                                     displaced * displacementWords, words.size())) {
+      return damagedBlob("displacements of morph target " + std::to_string(target) +
+                         " lie outside the blob");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::uint32_t checksumOfBlob(std::span<const std::uint32_t> words) {
+  std::uint32_t hash = 2166136261u;
+  for (const std::uint32_t word : words.subspan(abi::MESH_HEADER_CHECKSUM + 1))
+    hash = std::rotl((hash ^ word) * 16777619u, 15);
+  return hash;
+}
+
+Error damagedBlob(const std::string& what) {
+  return {ErrorCode::invalidData, "packed mesh: " + what};
+}
+
+Result<void> checkBlob(std::span<const std::uint32_t> words) {
+  if (words.size() < abi::MESH_HEADER_WORDS || words[abi::MESH_HEADER_MAGIC] != abi::MESH_MAGIC) {
+    return damagedBlob("the bytes do not begin with the header of a packed mesh");
+  }
+  if (words[abi::MESH_HEADER_VERSION] != abi::MESH_VERSION) {
+    return Error{ErrorCode::unsupportedVersion,
+                 "packed mesh: version " + std::to_string(words[abi::MESH_HEADER_VERSION]) +
+                     ", this library reads version " + std::to_string(abi::MESH_VERSION)};
+  }
+  if (words[abi::MESH_HEADER_WORDS_TOTAL] != words.size()) {
+    return damagedBlob("it has " + std::to_string(words.size() * 4) + " bytes, its header says " +
+                       std::to_string(std::uint64_t{words[abi::MESH_HEADER_WORDS_TOTAL]} * 4));
+  }
+  if (checksumOfBlob(words) != words[abi::MESH_HEADER_CHECKSUM])
+    return damagedBlob("the checksum does not match");
+
+  const std::uint64_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
+  const auto isAttribute = [&](std::uint32_t header, std::uint64_t components) {
+    return words[header] == 0 || isSection(words[header], vertices * components, words.size());
+  };
+  if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPaletteJoints ||
+      words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 || words[abi::MESH_HEADER_POSITIONS] == 0 ||
+      !isAttribute(abi::MESH_HEADER_POSITIONS, 3) || !isAttribute(abi::MESH_HEADER_NORMALS, 3) ||
+      !isAttribute(abi::MESH_HEADER_TANGENTS, 4) ||
+      !isSection(words[abi::MESH_HEADER_MORPHS],
+                 std::uint64_t{words[abi::MESH_HEADER_MORPH_COUNT]} * abi::MORPH_WORDS,
+                 words.size())) {
+    return damagedBlob("its header does not fit its sections");
+  }
+  if (Result<void> good = checkInfluences(words); !good) return good;
+  std::uint64_t behind = 0;
+  for (std::uint32_t target = 0; target < words[abi::MESH_HEADER_MORPH_COUNT]; ++target) {
+    if (Result<void> good = checkMorph(words, target, behind); !good) return good;
+  }
+  return {};
+}
+
+}  // namespace dermis

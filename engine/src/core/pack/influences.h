@@ -1,0 +1,21 @@
+// The influences of a vertex as kernels read them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dermis/mesh.h"
+
+namespace dermis {
+
+struct PackedInfluence {
+  std::uint32_t joint = 0;
+  double weight = 0;  ///< a float32's value
+};
+
+/// The influences of a vertex: those of one joint added up, none of weight 0; the pivot first, the
+/// rest by falling weight. The weights sum to exactly 1; empty where the vertex has none.
+void packInfluences(const MeshView& mesh, std::uint32_t vertex,
+                    std::vector<PackedInfluence>& influences);
+
+}  // namespace dermis

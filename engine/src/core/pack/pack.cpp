@@ -1,0 +1,150 @@
+#include "dermis/pack.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <string>
+
+#include "abi.h"
+#include "attribute.h"
+#include "dermis/types.h"
+#include "dermis/validate.h"
+#include "pack/check.h"
+#include "pack/influences.h"
+#include "pack/morphs.h"
+
+namespace dermis {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "packed meshes are little-endian words");
+
+constexpr std::uint64_t mostWords = 0xffffffffu;
+
+std::uint32_t offsetOf(const std::vector<std::uint32_t>& words) {
+  return static_cast<std::uint32_t>(words.size());
+}
+
+std::uint32_t appendPositions(const MeshView& mesh, std::vector<std::uint32_t>& words) {
+  const std::uint32_t offset = offsetOf(words);
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
+    for (std::uint32_t component = 0; component < 3; ++component)
+      words.push_back(std::bit_cast<std::uint32_t>(loadPosition(mesh, vertex, component)));
+  }
+  return offset;
+}
+
+/// 0 where the mesh has none.
+std::uint32_t appendDirections(const AttributeView& view, std::uint32_t components,
+                               std::vector<std::uint32_t>& words) {
+  if (!view) return 0;
+  const std::uint32_t offset = offsetOf(words);
+  for (std::uint32_t vertex = 0; vertex < view.count; ++vertex) {
+    for (std::uint32_t component = 0; component < components; ++component)
+      words.push_back(std::bit_cast<std::uint32_t>(loadFloat(view, vertex, component)));
+  }
+  return offset;
+}
+
+void appendInfluences(const MeshView& mesh, std::vector<std::uint32_t>& words) {
+  const std::size_t firsts = words.size();
+  words[abi::MESH_HEADER_FIRSTS] = offsetOf(words);
+  words.resize(firsts + std::size_t{mesh.vertexCount} + 1);
+  words.resize(words.size() + words.size() % 2, 0u);
+  const std::size_t offset = words.size();
+  words[abi::MESH_HEADER_INFLUENCES] = offsetOf(words);
+  std::vector<PackedInfluence> influences;
+  std::uint32_t requiredJoints = 1, maxInfluences = 0;
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
+    words[firsts + vertex] =
+        static_cast<std::uint32_t>((words.size() - offset) / abi::INFLUENCE_WORDS);
+    packInfluences(mesh, vertex, influences);
+    for (const PackedInfluence& influence : influences) {
+      words.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(influence.weight)));
+      words.push_back(influence.joint);
+      requiredJoints = std::max(requiredJoints, influence.joint + 1);
+    }
+    maxInfluences = std::max(maxInfluences, static_cast<std::uint32_t>(influences.size()));
+  }
+  words[firsts + mesh.vertexCount] =
+      static_cast<std::uint32_t>((words.size() - offset) / abi::INFLUENCE_WORDS);
+  words[abi::MESH_HEADER_REQUIRED_JOINTS] = requiredJoints;
+  words[abi::MESH_HEADER_MAX_INFLUENCES] = maxInfluences;
+}
+
+/// An upper limit of the words that a mesh takes, before any is written.
+std::uint64_t wordsNeeded(const MeshView& mesh) {
+  std::uint64_t perVertex = 3 + (mesh.normals ? 3u : 0u) + (mesh.tangents ? 4u : 0u) + 1;
+  for (const InfluenceSet& set : mesh.influenceSets)
+    perVertex += std::uint64_t{set.weights.components} * abi::INFLUENCE_WORDS;
+  std::uint64_t words = abi::MESH_HEADER_WORDS + mesh.vertexCount * perVertex;
+  for (const MorphTargetView& target : mesh.morphTargets) {
+    const std::uint64_t displaced =
+        target.vertices.empty() ? mesh.vertexCount : target.vertices.size();
+    words += abi::MORPH_WORDS + displaced * 9 + mesh.vertexCount / 16;
+  }
+  return words;
+}
+
+}  // namespace
+
+Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
+  if (jointCount == 0 || jointCount > maxPaletteJoints) {
+    return Error{ErrorCode::invalidArgument, "mesh '" + std::string(mesh.name) +
+                                                 "': a palette has 1 to " +
+                                                 std::to_string(maxPaletteJoints) +
+                                                 " joints, not " + std::to_string(jointCount)};
+  }
+  const MeshReport report = validate(mesh, jointCount);
+  for (const Finding& finding : report.findings) {
+    if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
+  }
+
+  if (wordsNeeded(mesh) > mostWords) {
+    return Error{ErrorCode::limitExceeded,
+                 "mesh '" + std::string(mesh.name) + "': packed, it might be larger than 16 GiB"};
+  }
+
+  PackedMesh packed;
+  std::vector<std::uint32_t>& words = packed.words_;
+  words.assign(abi::MESH_HEADER_WORDS, 0u);
+  words[abi::MESH_HEADER_MAGIC] = abi::MESH_MAGIC;
+  words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
+  words[abi::MESH_HEADER_VERTEX_COUNT] = mesh.vertexCount;
+  words[abi::MESH_HEADER_POSITIONS] = appendPositions(mesh, words);
+  words[abi::MESH_HEADER_NORMALS] = appendDirections(mesh.normals, 3, words);
+  words[abi::MESH_HEADER_TANGENTS] = appendDirections(mesh.tangents, 4, words);
+  appendInfluences(mesh, words);
+  words[abi::MESH_HEADER_MORPHS] = appendMorphs(mesh, words);
+  words[abi::MESH_HEADER_MORPH_COUNT] = static_cast<std::uint32_t>(mesh.morphTargets.size());
+  while (words.size() % (packedMeshAlignment / 4) != 0) words.push_back(0);
+
+  words[abi::MESH_HEADER_WORDS_TOTAL] = offsetOf(words);
+  words[abi::MESH_HEADER_CHECKSUM] = checksumOfBlob(words);
+  return packed;
+}
+
+Result<PackedMesh> PackedMesh::fromBytes(std::span<const std::byte> bytes) {
+  if (bytes.size() % packedMeshAlignment != 0) {
+    return damagedBlob("its length of " + std::to_string(bytes.size()) +
+                       " bytes is not a multiple of " + std::to_string(packedMeshAlignment));
+  }
+  PackedMesh packed;
+  packed.words_.resize(bytes.size() / 4);
+  if (!bytes.empty()) std::memcpy(packed.words_.data(), bytes.data(), bytes.size());
+  if (const Result<void> good = checkBlob(packed.words_); !good) return good.error();
+  return packed;
+}
+
+MeshInfo PackedMesh::info() const {
+  MeshInfo info;
+  info.byteSize = bytes().size();
+  info.vertexCount = words_[abi::MESH_HEADER_VERTEX_COUNT];
+  info.requiredJoints = words_[abi::MESH_HEADER_REQUIRED_JOINTS];
+  info.maxInfluences = words_[abi::MESH_HEADER_MAX_INFLUENCES];
+  info.morphTargetCount = words_[abi::MESH_HEADER_MORPH_COUNT];
+  info.hasNormals = words_[abi::MESH_HEADER_NORMALS] != 0;
+  info.hasTangents = words_[abi::MESH_HEADER_TANGENTS] != 0;
+  return info;
+}
+
+}  // namespace dermis

@@ -1,0 +1,66 @@
+// Where everything of a batch stands: meshes, palettes, and skinned vertices in any format and
+// arrangement.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "dermis/plan.h"
+#include "dermis/types.h"
+
+namespace dermis::samples {
+
+/// One instance: its mesh, pose and method. Spans refer to the caller's memory.
+struct SkinRequest {
+  const PackedMesh* mesh = nullptr;
+  std::span<const JointMatrix> palette;
+  bool mayScale = true;
+  Method method = Method::dualQuaternion;
+  std::span<const MorphWeight> morphs = {};
+  Box box = {};  ///< where positions are stored as snorm16
+  // Where there is motion.
+  std::span<const JointMatrix> previousPalette = {};  ///< empty: the same palette
+  std::span<const MorphWeight> previousMorphs = {};
+  bool restartsMotion = false;
+  bool settles = false;
+};
+
+enum class Arrangement : std::uint8_t {
+  interleaved,  ///< attribute by attribute for each vertex, in one buffer
+  planar,       ///< each attribute of an instance on its own, in one buffer
+  separate,     ///< in a buffer for each attribute
+};
+
+/// How skinned vertices are stored. Normals and tangents are written where a mesh has them.
+struct OutputLayout {
+  VertexFormat positions = VertexFormat::float32x3;
+  VertexFormat normals = VertexFormat::float32x3;
+  VertexFormat tangents = VertexFormat::none;
+  Motion motion = Motion::none;
+  bool bounds = false;
+  Arrangement arrangement = Arrangement::interleaved;
+  std::uint32_t gap = 0;  ///< bytes after the attributes of each vertex that must stay as they are
+};
+
+struct BatchLayout {
+  std::map<const PackedMesh*, std::uint64_t>
+      meshOffsets;  ///< Meshes that are one object stand once.
+  std::vector<Palette> palettes;
+  std::vector<std::span<const JointMatrix>> poses;  ///< of the palettes
+  std::vector<Job> jobs;                            ///< of the requests
+  std::uint64_t meshesSize = 0, matricesSize = 0;
+  OutputSizes outputs;
+  bool oneOutput = true;
+
+  Batch batch() const { return {palettes, jobs, meshesSize, matricesSize, outputs}; }
+};
+
+BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output);
+
+/// An attribute of a job, by `Stream`; `none` where it is not written.
+OutputAttribute attributeOf(const Job& job, std::size_t stream);
+
+}  // namespace dermis::samples

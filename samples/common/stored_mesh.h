@@ -1,0 +1,45 @@
+// A mesh in the formats in which meshes come: halves, normalised integers, any interleaving.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/mesh.h"
+#include "random_rig.h"
+
+namespace dermis::samples {
+
+struct InputFormats {
+  ComponentType positions = ComponentType::float32;
+  ComponentType directions = ComponentType::float32;  ///< normals, tangents and their displacements
+  ComponentType joints = ComponentType::uint32;
+  ComponentType weights = ComponentType::float32;
+  std::uint32_t setSize = 4;  ///< influences a set; as many sets as are needed
+  std::uint32_t gap = 0;      ///< bytes after each element
+};
+
+/// Owns the bytes. Movable: views point into vectors.
+class StoredMesh {
+ public:
+  /// Positions lie within 2 of the origin.
+  StoredMesh(const OwnedMesh& mesh, const InputFormats& formats);
+
+  /// Valid while this object lives and is not assigned to.
+  MeshView view() const;
+
+ private:
+  AttributeView store(const std::vector<float>& values, std::uint32_t components,
+                      ComponentType type, double scale);
+
+  std::uint32_t vertexCount_ = 0;
+  InputFormats formats_;
+  std::vector<std::vector<std::byte>> arrays_;
+  std::vector<std::vector<std::uint32_t>> morphVertices_;
+  AttributeView positions_, normals_, tangents_;
+  std::vector<InfluenceSet> sets_;
+  std::vector<MorphTargetView> morphs_;
+};
+
+}  // namespace dermis::samples

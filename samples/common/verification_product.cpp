@@ -1,0 +1,241 @@
+#include "verification_product.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "pairwise.h"
+
+namespace dermis::samples {
+namespace {
+
+constexpr std::array positionFormats{VertexFormat::float32x3, VertexFormat::float32x4,
+                                     VertexFormat::float16x3, VertexFormat::float16x4,
+                                     VertexFormat::snorm16x3, VertexFormat::snorm16x4};
+constexpr std::array normalFormats{
+    VertexFormat::none,           VertexFormat::float32x3,    VertexFormat::float32x4,
+    VertexFormat::float16x3,      VertexFormat::float16x4,    VertexFormat::snorm16x3,
+    VertexFormat::snorm16x4,      VertexFormat::snorm8x3,     VertexFormat::snorm8x4,
+    VertexFormat::octahedral16x2, VertexFormat::octahedral8x2};
+constexpr std::array tangentFormats{VertexFormat::none,         VertexFormat::float32x4,
+                                    VertexFormat::float16x4,    VertexFormat::snorm16x4,
+                                    VertexFormat::snorm8x4,     VertexFormat::octahedral16x2,
+                                    VertexFormat::octahedral8x2};
+constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
+                                  Arrangement::separate};
+constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
+constexpr std::array motions{Motion::none, Motion::kept, Motion::reskinned};
+constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3}, {128, 16}}};
+
+constexpr std::array methods = allMethods;
+constexpr std::array rigidities{Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
+                                Rigidity::mirrored, Rigidity::mirroredAlongOneAxis};
+constexpr std::array<std::uint32_t, 6> vertexCounts{1, 7, 64, 65, 257, 1234};
+constexpr std::array<std::uint32_t, 4> jointCounts{1, 3, 40, 300};
+constexpr std::array<std::uint32_t, 6> influenceCounts{1, 2, 4, 7, 17, 64};
+constexpr std::array<std::uint32_t, 3> morphCounts{0, 1, 5};
+constexpr std::array positionTypes{ComponentType::float32, ComponentType::float16,
+                                   ComponentType::snorm16, ComponentType::unorm16};
+constexpr std::array directionTypes{ComponentType::float32, ComponentType::float16,
+                                    ComponentType::snorm8, ComponentType::snorm16};
+constexpr std::array jointTypes{ComponentType::uint8, ComponentType::uint16, ComponentType::uint32};
+constexpr std::array weightTypes{ComponentType::float32, ComponentType::unorm8,
+                                 ComponentType::unorm16};
+constexpr std::array<std::uint32_t, 3> setSizes{1, 4, 5};
+constexpr std::array<std::uint32_t, 2> inputGaps{0, 3};
+
+/// Takes one value after another out of a combination.
+class Choice {
+ public:
+  explicit Choice(const std::vector<std::uint32_t>& combination) : combination_(combination) {}
+  template <typename Values>
+  auto of(const Values& values) {
+    return values[combination_[next_++]];
+  }
+
+ private:
+  const std::vector<std::uint32_t>& combination_;
+  std::size_t next_ = 0;
+};
+
+template <typename... Values>
+std::vector<std::uint32_t> countsOf(const Values&... values) {
+  return {static_cast<std::uint32_t>(values.size())...};
+}
+
+std::vector<std::uint32_t> outputCounts() {
+  constexpr std::array<bool, 2> either{};
+  return countsOf(positionFormats, normalFormats, tangentFormats, arrangements, gaps, motions,
+                  either, tunings);
+}
+
+OutputCase chooseOutput(Choice& choice) {
+  OutputCase output;
+  output.layout.positions = choice.of(positionFormats);
+  output.layout.normals = choice.of(normalFormats);
+  output.layout.tangents = choice.of(tangentFormats);
+  output.layout.arrangement = choice.of(arrangements);
+  output.layout.gap = choice.of(gaps);
+  output.layout.motion = choice.of(motions);
+  output.layout.bounds = choice.of(std::array{false, true});
+  output.tuning = choice.of(tunings);
+  return output;
+}
+
+/// Cuts a case down to what the device can store.
+OutputCase storable(OutputCase output, const DeviceLimits& limits) {
+  const std::uint32_t unit = !limits.storage16Bit ? 4 : !limits.storage8Bit ? 2 : 1;
+  OutputLayout& layout = output.layout;
+  for (VertexFormat* format : {&layout.positions, &layout.normals, &layout.tangents}) {
+    if (formatSize(*format) % unit != 0) *format = VertexFormat::float32x4;
+  }
+  layout.gap = (layout.gap + unit - 1) / unit * unit;
+  if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+    if (layout.arrangement == Arrangement::separate) layout.arrangement = Arrangement::planar;
+    if (layout.positions == VertexFormat::snorm16x4) layout.positions = VertexFormat::float16x4;
+    layout.bounds = false;
+  }
+  return output;
+}
+
+std::string_view typeName(ComponentType type) {
+  switch (type) {
+    case ComponentType::float32:
+      return "float32";
+    case ComponentType::float16:
+      return "float16";
+    case ComponentType::snorm8:
+      return "snorm8";
+    case ComponentType::snorm16:
+      return "snorm16";
+    case ComponentType::unorm8:
+      return "unorm8";
+    case ComponentType::unorm16:
+      return "unorm16";
+    case ComponentType::uint8:
+      return "uint8";
+    case ComponentType::uint16:
+      return "uint16";
+    case ComponentType::uint32:
+      return "uint32";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string OutputCase::name() const {
+  std::string text = "positions " + std::string(formatName(layout.positions));
+  if (layout.normals != VertexFormat::none)
+    text += ", normals " + std::string(formatName(layout.normals));
+  if (layout.tangents != VertexFormat::none)
+    text += ", tangents " + std::string(formatName(layout.tangents));
+  text += layout.arrangement == Arrangement::interleaved ? ", interleaved"
+          : layout.arrangement == Arrangement::planar    ? ", planar"
+                                                         : ", separate";
+  if (layout.gap != 0) text += ", gaps of " + std::to_string(layout.gap);
+  if (layout.motion == Motion::kept) text += ", previous kept";
+  if (layout.motion == Motion::reskinned) text += ", previous reskinned";
+  if (layout.bounds) text += ", bounds";
+  return text + ", " + std::to_string(tuning.workgroupSize) + " invocations, " +
+         std::to_string(tuning.instancesPerInvocation) + " instances each";
+}
+
+std::string RandomCase::inputName() const {
+  std::string text =
+      std::to_string(vertices) + " vertices, " + std::to_string(joints) + " joints as " +
+      std::string(typeName(input.joints)) + ", " + std::to_string(influences) + " weights as " +
+      std::string(typeName(input.weights)) + " in sets of " + std::to_string(input.setSize) +
+      ", positions as " + std::string(typeName(input.positions)) + ", directions as " +
+      std::string(typeName(input.directions));
+  if (morphs != 0) text += ", " + std::to_string(morphs) + " morph targets";
+  static constexpr std::array<const char*, 5> poses{"rigid", "scaled", "sheared", "mirrored",
+                                                    "mirrored along one axis"};
+  return text + ", " + poses[static_cast<std::size_t>(rigidity)];
+}
+
+std::vector<OutputCase> outputCases(const DeviceLimits& limits) {
+  std::vector<OutputCase> cases;
+  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(outputCounts())) {
+    Choice choice(combination);
+    cases.push_back(storable(chooseOutput(choice), limits));
+  }
+  return cases;
+}
+
+std::vector<RandomCase> randomCases(const DeviceLimits& limits) {
+  std::vector<std::uint32_t> counts =
+      countsOf(methods, rigidities, vertexCounts, jointCounts, influenceCounts, morphCounts,
+               positionTypes, directionTypes, jointTypes, weightTypes, setSizes, inputGaps);
+  const std::vector<std::uint32_t> outputs = outputCounts();
+  counts.insert(counts.end(), outputs.begin(), outputs.end());
+  std::vector<RandomCase> cases;
+  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(counts)) {
+    Choice choice(combination);
+    RandomCase random;
+    random.method = choice.of(methods);
+    random.rigidity = choice.of(rigidities);
+    random.vertices = choice.of(vertexCounts);
+    random.joints = choice.of(jointCounts);
+    random.influences = choice.of(influenceCounts);
+    random.morphs = choice.of(morphCounts);
+    random.input.positions = choice.of(positionTypes);
+    random.input.directions = choice.of(directionTypes);
+    random.input.joints = choice.of(jointTypes);
+    random.input.weights = choice.of(weightTypes);
+    random.input.setSize = choice.of(setSizes);
+    random.input.gap = choice.of(inputGaps);
+    if (random.input.joints == ComponentType::uint8)
+      random.joints = std::min(random.joints, std::uint32_t{256});
+    random.output = storable(chooseOutput(choice), limits);
+    cases.push_back(random);
+  }
+  return cases;
+}
+
+Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::Context& context,
+                                                       const RandomCase& random) {
+  OwnedMesh mesh = randomMesh(1, random.vertices, random.joints, random.influences);
+  addTangents(mesh, 2);
+  addMorphs(mesh, 3, random.morphs);
+  const StoredMesh stored(mesh, random.input);
+  const Result<PackedMesh> packed = pack(stored.view(), random.joints);
+  if (!packed) return packed.error();
+
+  // Most targets rest.
+  std::vector<MorphWeight> morphs, previousMorphs;
+  if (random.morphs > 0) {
+    morphs = {{random.morphs / 2, 0.7f}, {0, random.morphs > 2 ? -0.4f : 0.0f}};
+    if (random.morphs == 1) morphs.pop_back();
+    previousMorphs = {{random.morphs - 1, 0.5f}};
+  }
+  std::vector<std::vector<JointMatrix>> poses;
+  for (std::uint32_t pose = 0; pose < 6; ++pose)
+    poses.push_back(randomPose(10 + pose, random.joints, random.rigidity));
+  std::vector<InstanceToVerify> instances;
+  for (std::size_t instance = 0; instance < 3; ++instance) {
+    instances.push_back({&*packed, poses[instance], poses[instance + 3], morphs, previousMorphs,
+                         random.method, nullptr, nullptr});
+  }
+  // One that no morph target is at work on, beside two others.
+  instances[1].morphs = {};
+  std::array<reference::SkinnedMesh, 6> expected;
+  for (std::size_t instance = 0; instance < 3; ++instance) {
+    InstanceToVerify& verified = instances[instance];
+    const MeshView view = stored.view();
+    Result<reference::SkinnedMesh> now =
+        reference::skin(view, verified.palette, verified.method, verified.morphs);
+    if (!now) return now.error();
+    Result<reference::SkinnedMesh> before =
+        reference::skin(view, verified.previousPalette, verified.method, verified.previousMorphs);
+    if (!before) return before.error();
+    expected[instance] = std::move(*now);
+    expected[instance + 3] = std::move(*before);
+    verified.expected = &expected[instance];
+    verified.expectedBefore = &expected[instance + 3];
+  }
+  return verifyBatch(device, context, instances, random.output, true);
+}
+
+}  // namespace dermis::samples

@@ -1,0 +1,71 @@
+// Every way to skin, checked: the product of methods, inputs and outputs, by pairs.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "batch_runner.h"
+#include "dermis/accuracy.h"
+#include "random_rig.h"
+#include "stored_mesh.h"
+
+namespace dermis::samples {
+
+/// One way to store what is skinned, and to cut up the work.
+struct OutputCase {
+  OutputLayout layout;
+  Tuning tuning;
+  std::string name() const;  ///< "float16x4, normals octahedral8x2, interleaved, ..."
+};
+
+/// Ways in which every two values of two parameters meet, as far as a device with these limits can
+/// store them.
+std::vector<OutputCase> outputCases(const DeviceLimits& limits);
+
+/// One instance to verify. Spans and views refer to the caller's memory.
+struct InstanceToVerify {
+  const PackedMesh* packed = nullptr;
+  std::span<const JointMatrix> palette, previousPalette;
+  std::span<const MorphWeight> morphs, previousMorphs;
+  Method method = Method::dualQuaternion;
+  /// What must come out, in this pose and the previous one.
+  const reference::SkinnedMesh* expected = nullptr;
+  const reference::SkinnedMesh* expectedBefore = nullptr;
+};
+
+/// What came out for one instance.
+struct VerifiedInstance {
+  Comparison comparison;  ///< of the skinned vertices
+  PaletteStatus status;
+  std::string wrong;  ///< what is wrong besides; empty where nothing is
+
+  bool passed() const { return comparison.passed() && wrong.empty(); }
+};
+
+/// Skins a batch as the case says and holds all of it against the reference: attributes, previous
+/// positions (frames before and after too), bounds, clamped vertices; and that every byte of an
+/// attribute, and no other, was written. With `alone`, also that each instance comes out to the bit
+/// when it is skinned without the others. Fails where the batch cannot be skinned.
+Result<std::vector<VerifiedInstance>> verifyBatch(Device& device, vulkan::Context& context,
+                                                  std::span<const InstanceToVerify> instances,
+                                                  const OutputCase& output, bool alone = false);
+
+/// A random mesh in some input formats, with an awkward number of vertices, and an output.
+struct RandomCase {
+  InputFormats input;
+  std::uint32_t vertices = 1, joints = 1, influences = 4, morphs = 0;
+  Rigidity rigidity = Rigidity::rigid;
+  Method method = Method::linear;
+  OutputCase output;
+  std::string inputName() const;
+};
+
+std::vector<RandomCase> randomCases(const DeviceLimits& limits);
+
+/// Three instances of the case's mesh, each in a pose of its own.
+Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::Context& context,
+                                                       const RandomCase& randomCase);
+
+}  // namespace dermis::samples

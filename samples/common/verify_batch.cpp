@@ -1,0 +1,259 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "dermis/reference.h"
+#include "verification_product.h"
+
+namespace dermis::samples {
+namespace {
+
+bool isSnormPosition(VertexFormat format) {
+  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
+}
+
+/// The box of all that is finite.
+Box boxOf(const std::vector<reference::Double3>& positions) {
+  std::array<double, 3> low, high;
+  low.fill(std::numeric_limits<double>::infinity());
+  high.fill(-std::numeric_limits<double>::infinity());
+  for (const reference::Double3& position : positions) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!std::isfinite(position[axis])) continue;
+      low[axis] = std::min(low[axis], position[axis]);
+      high[axis] = std::max(high[axis], position[axis]);
+    }
+  }
+  Box box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.min[axis] = static_cast<float>(low[axis]);
+    box.max[axis] = static_cast<float>(high[axis]);
+  }
+  return box;
+}
+
+/// A box with sides: wider than the positions or, for every other instance, too small for them.
+Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
+  Box box = boxOf(positions);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!(box.max[axis] >= box.min[axis])) box.min[axis] = box.max[axis] = 0;
+    const float side = box.max[axis] - box.min[axis];
+    const float margin = clamps ? -0.2f * side : 0.05f * side;
+    box.min[axis] -= margin + 0.01f;
+    box.max[axis] += margin + 0.01f;
+  }
+  return box;
+}
+
+class BatchVerifier {
+ public:
+  BatchVerifier(Device& device, vulkan::Context& context,
+                std::span<const InstanceToVerify> instances, const OutputCase& output)
+      : device_(device), context_(context), instances_(instances), output_(output) {}
+
+  Result<std::vector<VerifiedInstance>> verify(bool alone) {
+    for (std::size_t index = 0; index < instances_.size(); ++index)
+      boxes_.push_back(storageBox(instances_[index].expected->positions, index % 2 == 1));
+    results_.resize(instances_.size());
+
+    std::vector<std::size_t> all;
+    for (std::size_t index = 0; index < instances_.size(); ++index) all.push_back(index);
+    Result<Frames> frames = run(std::byte{0xa5}, all);
+    if (!frames) return frames.error();
+    Result<Frames> again = run(std::byte{0x5a}, all);
+    if (!again) return again.error();
+    for (std::size_t index = 0; index < instances_.size(); ++index) {
+      if (Result<void> done = compareAttributes(frames->now.instances[index], index); !done)
+        return done.error();
+      if (output_.layout.motion != Motion::none) {
+        if (Result<void> done = compareMotion(*frames, index); !done) return done.error();
+      }
+      if (output_.layout.bounds) checkBounds(frames->now.instances[index], index);
+      checkClamped(frames->now.instances[index], index);
+      // A byte that was not written would be as it was before, which differed.
+      if (frames->now.instances[index].streams != again->now.instances[index].streams)
+        fail(index, "a byte of an attribute was not written, or not twice the same");
+      if (alone) {
+        const Result<Frames> own = run(std::byte{0xa5}, {&index, 1});
+        if (!own) return own.error();
+        if (own->now.instances[0].streams != frames->now.instances[index].streams)
+          fail(index, "alone, it is not skinned to the same bits");
+      }
+    }
+    if (frames->now.untouchedBytesChanged != 0) {
+      fail(0, std::to_string(frames->now.untouchedBytesChanged) +
+                  " bytes between attributes were changed");
+    }
+    return results_;
+  }
+
+ private:
+  /// The frame of interest and, where there is motion, one before and one after.
+  struct Frames {
+    BatchResult before, now, settled;
+  };
+
+  SkinRequest requestOf(std::size_t index) const {
+    const InstanceToVerify& instance = instances_[index];
+    SkinRequest request;
+    request.mesh = instance.packed;
+    request.palette = instance.palette;
+    request.method = instance.method;
+    request.morphs = instance.morphs;
+    request.previousPalette = instance.previousPalette;
+    request.previousMorphs = instance.previousMorphs;
+    request.box = boxes_[index];
+    return request;
+  }
+
+  Result<Frames> run(std::byte poison, std::span<const std::size_t> indices) const {
+    RunOptions options;
+    options.tuning = output_.tuning;
+    options.output = output_.layout;
+    options.poison = poison;
+    BatchRunner runner(device_, context_, options);
+    const bool moves = output_.layout.motion != Motion::none;
+    std::vector<SkinRequest> now, before, settled;
+    for (const std::size_t index : indices) {
+      now.push_back(requestOf(index));
+      before.push_back(now.back());
+      before.back().palette = now.back().previousPalette;
+      before.back().morphs = now.back().previousMorphs;
+      before.back().restartsMotion = moves;
+      settled.push_back(now.back());
+      settled.back().settles = moves;
+    }
+    Frames frames;
+    if (moves) {
+      Result<BatchResult> result = runner.run(before);
+      if (!result) return result.error();
+      frames.before = std::move(*result);
+    }
+    Result<BatchResult> result = runner.run(now);
+    if (!result) return result.error();
+    frames.now = std::move(*result);
+    if (moves) {
+      Result<BatchResult> last = runner.run(settled);
+      if (!last) return last.error();
+      frames.settled = std::move(*last);
+    }
+    return frames;
+  }
+
+  Result<void> compareAttributes(const SkinnedVertices& skinned, std::size_t index) {
+    const Result<Comparison> comparison =
+        compare(*instances_[index].expected, skinned.view(), instances_[index].method);
+    if (!comparison) return comparison.error();
+    results_[index].comparison = *comparison;
+    results_[index].status = skinned.status;
+    return {};
+  }
+
+  Result<void> compareMotion(const Frames& frames, std::size_t index) {
+    constexpr auto positions = static_cast<std::size_t>(Stream::positions);
+    constexpr auto previous = static_cast<std::size_t>(Stream::previousPositions);
+    const auto& before = frames.before.instances[index].streams;
+    const auto& now = frames.now.instances[index].streams;
+    const auto& settled = frames.settled.instances[index].streams;
+    if (before[previous] != before[positions])
+      fail(index, "on a first frame, previous positions are not the current ones");
+    if (output_.layout.motion == Motion::kept && now[previous] != before[positions])
+      fail(index, "previous positions are not those of the frame before");
+    if (settled[positions] != now[positions] || settled[previous] != now[positions])
+      fail(index, "after settling, previous positions are not the current ones");
+    SkinnedView view;
+    view.positions = frames.now.instances[index].attribute(Stream::previousPositions);
+    view.box = boxes_[index];
+    const Result<Comparison> comparison =
+        compare(*instances_[index].expectedBefore, view, instances_[index].method);
+    if (!comparison) return comparison.error();
+    if (comparison->failures != 0) {
+      fail(index, std::to_string(comparison->failures) +
+                      " previous positions are outside their bound, the first is vertex " +
+                      std::to_string(comparison->firstFailure));
+    }
+    return {};
+  }
+
+  void checkBounds(const SkinnedVertices& skinned, std::size_t index) {
+    const std::optional<Box> box = skinned.result.box();
+    if (!box) return fail(index, "there is no box of the positions");
+    if (skinned.positions.empty()) return checkBoundsNear(*box, index);
+    // Stored as float32, they are the very positions that were reduced.
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float low = std::numeric_limits<float>::infinity(), high = -low;
+      for (std::size_t i = axis; i < skinned.positions.size(); i += 3) {
+        low = std::min(low, skinned.positions[i]);
+        high = std::max(high, skinned.positions[i]);
+      }
+      if (box->min[axis] != low || box->max[axis] != high)
+        fail(index, "the box is not that of the positions");
+    }
+  }
+
+  /// As near as the positions themselves have to be.
+  void checkBoundsNear(const Box& box, std::size_t index) {
+    const reference::SkinnedMesh& expected = *instances_[index].expected;
+    const Box expectedBox = boxOf(expected.positions);
+    double allowed = 0;
+    for (const reference::Conditioning& conditioning : expected.conditioning) {
+      if (conditioning.signAmbiguous || conditioning.degenerate) return;
+      allowed = std::max(allowed, positionBound(instances_[index].method, conditioning));
+    }
+    const auto isNear = [allowed](float a, float b) {
+      const double expectedValue = static_cast<double>(b);
+      return std::abs(static_cast<double>(a) - expectedValue) <=
+             allowed + 1e-7 * std::abs(expectedValue);
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!isNear(box.min[axis], expectedBox.min[axis]) ||
+          !isNear(box.max[axis], expectedBox.max[axis]))
+        fail(index, "the box is not that of the positions");
+    }
+  }
+
+  void checkClamped(const SkinnedVertices& skinned, std::size_t index) {
+    if (!isSnormPosition(output_.layout.positions)) return;
+    const Box& box = boxes_[index];
+    std::uint32_t outside = 0, unsure = 0;
+    for (const reference::Double3& position : instances_[index].expected->positions) {
+      double farthest = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double low = static_cast<double>(box.min[axis]);
+        const double high = static_cast<double>(box.max[axis]);
+        farthest = std::max(farthest, std::abs(2 * position[axis] - low - high) / (high - low));
+      }
+      if (farthest > 1) ++outside;
+      if (!(std::abs(farthest - 1) > 1e-4)) ++unsure;
+    }
+    const std::uint32_t counted = skinned.result.clampedVertices;
+    if ((counted > outside ? counted - outside : outside - counted) > unsure) {
+      fail(index, std::to_string(counted) + " vertices were counted as clamped, " +
+                      std::to_string(outside) + " lie outside the box");
+    }
+  }
+
+  void fail(std::size_t index, const std::string& what) {
+    std::string& wrong = results_[index].wrong;
+    wrong += wrong.empty() ? what : "; " + what;
+  }
+
+  Device& device_;
+  vulkan::Context& context_;
+  std::span<const InstanceToVerify> instances_;
+  const OutputCase& output_;
+  std::vector<Box> boxes_;
+  std::vector<VerifiedInstance> results_;
+};
+
+}  // namespace
+
+Result<std::vector<VerifiedInstance>> verifyBatch(Device& device, vulkan::Context& context,
+                                                  std::span<const InstanceToVerify> instances,
+                                                  const OutputCase& output, bool alone) {
+  return BatchVerifier(device, context, instances, output).verify(alone);
+}
+
+}  // namespace dermis::samples

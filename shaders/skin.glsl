@@ -1,0 +1,177 @@
+// Skins vertices: a workgroup takes a run of vertices of one mesh, and each invocation skins its vertex for several instances of
+// that mesh, so that a vertex is read once. The .comp files that include it say how output is stored:
+//   STORE_HALVES, STORE_BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
+//   EXTRAS                      previous positions and results; kept out of other modules, since layers and drivers take what
+//                               a module names for used, whatever its constants say
+//   ONE_OUTPUT                  all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
+
+#include "abi.h"
+
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
+layout(constant_id = CONSTANT_INFLUENCES) const uint INFLUENCES = 0u;
+layout(constant_id = CONSTANT_INSTANCES) const uint INSTANCES = 1u;
+layout(constant_id = CONSTANT_POSITION_FORMAT) const uint POSITION_FORMAT = FORMAT_FLOAT32X3;
+layout(constant_id = CONSTANT_NORMAL_FORMAT) const uint NORMAL_FORMAT = FORMAT_NONE;
+layout(constant_id = CONSTANT_TANGENT_FORMAT) const uint TANGENT_FORMAT = FORMAT_NONE;
+layout(constant_id = CONSTANT_POSITION_UNIT) const uint POSITION_UNIT = 4u;
+layout(constant_id = CONSTANT_NORMAL_UNIT) const uint NORMAL_UNIT = 4u;
+layout(constant_id = CONSTANT_TANGENT_UNIT) const uint TANGENT_UNIT = 4u;
+layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
+layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
+#if defined(EXTRAS) || defined(ONE_OUTPUT)
+layout(constant_id = CONSTANT_MOTION) const uint MOTION = MOTION_NONE;
+#define HAS_MOTION
+#endif
+#ifdef EXTRAS
+layout(constant_id = CONSTANT_BOUNDS) const bool BOUNDS = false;
+#else
+const bool BOUNDS = false;
+#endif
+
+const bool NORMALS = NORMAL_FORMAT != FORMAT_NONE;
+const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
+
+#include "exact.glsl"
+#include "quaternion.glsl"
+#include "polar.glsl"
+#include "tables.glsl"
+#include "vertex.glsl"
+#include "mesh_access.glsl"
+#include "palette_access.glsl"
+#include "morph.glsl"
+#include "blend.glsl"
+#include "encode.glsl"
+#include "output_access.glsl"
+#include "results.glsl"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+// The group that a workgroup belongs to: the first whose end lies behind it.
+uint findGroup(uint number) {
+  uint low = 0u;
+  uint high = push[PUSH_RECORD_COUNT] - 1u;
+  while (low < high) {
+    uint middle = (low + high) / 2u;
+    if (tables[push[PUSH_FIRST_RECORD] + middle * GROUP_WORDS + GROUP_WORKGROUP_END] <= number) {
+      low = middle + 1u;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
+Vertex bindVertex(uint mesh, uint vertex) {
+  Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0));
+  bind.position = meshVector(meshSection(mesh, MESH_HEADER_POSITIONS) + vertex * 3u);
+  if (NORMALS) bind.normal = meshVector(meshSection(mesh, MESH_HEADER_NORMALS) + vertex * 3u);
+  if (TANGENTS) {
+    uint word = meshSection(mesh, MESH_HEADER_TANGENTS) + vertex * 4u;
+    bind.tangent = vec4(meshVector(word), uintBitsToFloat(meshes[word + 3u]));
+  }
+  return bind;
+}
+
+vec3 extensionVector(uint word) {
+  return vec3(uintBitsToFloat(tables[word]), uintBitsToFloat(tables[word + 1u]), uintBitsToFloat(tables[word + 2u]));
+}
+
+// A position as it is stored; snorm16 is relative to the box of the instance.
+uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
+  vec4 v = vec4(position, 1.0);
+  if (isSnormPosition(POSITION_FORMAT)) {
+    precise vec3 relative =
+        (position - extensionVector(extension + EXTENSION_CENTRE)) * extensionVector(extension + EXTENSION_INVERSE);
+    v.xyz = relative;
+    // A vertex of the engine's own box may stand a rounding outside.
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(tables[extension + EXTENSION_RESULT]);
+  }
+  return encodeComponents(POSITION_FORMAT, v);
+}
+
+// One instance's record, and this invocation's vertex in it.
+struct Instance {
+  uint record;
+  uint extension;
+  uint flags;
+  uint position;  // the byte at which the position goes
+};
+
+#ifdef HAS_MOTION
+uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences influences, uint mesh, uint vertex) {
+  if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
+  if (MOTION == MOTION_KEPT) return loadPositions(instance.position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  Vertex before = bind;
+  if (MORPHS) {
+    morphVertex(before, mesh, vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
+                tables[instance.extension + EXTENSION_PREVIOUS_MORPH_COUNT], false, false);
+  }
+  before = skinVertex(before, influences, tables[instance.extension + EXTENSION_PREVIOUS_PALETTE],
+                      tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], false, false);
+  return encodePosition(before.position, instance.extension, false);
+}
+#endif
+
+void main() {
+  uint number = workgroupNumber();
+  if (number >= push[PUSH_WORKGROUP_COUNT]) return;
+  uint index = findGroup(number);
+  uint group = push[PUSH_FIRST_RECORD] + index * GROUP_WORDS;
+  uint local = index == 0u ? number : number - tables[group - GROUP_WORDS + GROUP_WORKGROUP_END];
+
+  // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
+  uint vertexGroups = tables[group + GROUP_VERTEX_GROUPS];
+  uint firstVertex = tables[group + GROUP_FIRST_VERTEX];
+  uint run = (local % vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+  uint vertex = firstVertex + run;
+  if (vertex >= tables[group + GROUP_VERTEX_END]) return;
+  uint firstInstance = (local / vertexGroups) * INSTANCES;
+  uint instanceEnd = min(firstInstance + INSTANCES, tables[group + GROUP_INSTANCE_COUNT]);
+
+  uint mesh = tables[group + GROUP_MESH];
+  Vertex bind = bindVertex(mesh, vertex);
+  Influences influences = influencesOf(mesh, vertex);
+  if (INFLUENCES != 0u) influences.count = min(influences.count, INFLUENCES);
+
+  for (uint number = firstInstance; number < instanceEnd; ++number) {
+    Instance instance;
+    instance.record = push[PUSH_INSTANCE_RECORDS] + (tables[group + GROUP_FIRST_INSTANCE] + number) * INSTANCE_WORDS;
+    instance.extension = tables[instance.record + INSTANCE_EXTENSION];
+    instance.flags = tables[instance.record + INSTANCE_FLAGS];
+    instance.position = tables[instance.record + INSTANCE_POSITIONS] + run * tables[group + GROUP_POSITION_STRIDE];
+
+#ifdef HAS_MOTION
+    uint previous = tables[instance.record + INSTANCE_PREVIOUS] + run * tables[group + GROUP_PREVIOUS_STRIDE];
+    if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
+      uvec4 words = loadPositions(instance.position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+      storePrevious(previous, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+      continue;
+    }
+#endif
+
+    Vertex morphed = bind;
+    if (MORPHS) {
+      morphVertex(morphed, mesh, vertex, tables[instance.extension + EXTENSION_MORPHS],
+                  tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
+    }
+    Vertex skinned = skinVertex(morphed, influences, tables[instance.record + INSTANCE_PALETTE],
+                                tables[instance.record + INSTANCE_JOINTS], NORMALS, TANGENTS);
+    if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
+    uvec4 position = encodePosition(skinned.position, instance.extension, true);
+#ifdef HAS_MOTION
+    if (MOTION != MOTION_NONE) {
+      uvec4 words = previousPosition(instance, position, bind, influences, mesh, vertex);
+      storePrevious(previous, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+    }
+#endif
+    storePositions(instance.position, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+    if (NORMALS) {
+      uint place = tables[instance.record + INSTANCE_NORMALS] + run * tables[group + GROUP_NORMAL_STRIDE];
+      storeNormals(place, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+    }
+    if (TANGENTS) {
+      uint place = tables[instance.record + INSTANCE_TANGENTS] + run * tables[group + GROUP_TANGENT_STRIDE];
+      storeTangents(place, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+    }
+  }
+}

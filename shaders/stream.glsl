@@ -1,0 +1,68 @@
+// One output attribute: the buffer it goes to, as words and, where the kernel may store less, as halves and bytes. Included once
+// for each attribute, with STREAM_BINDING and the names to declare defined.
+
+layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_WORDS_BLOCK { uint STREAM_WORDS[]; };
+#ifdef STORE_HALVES
+layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_HALVES_BLOCK { uint16_t STREAM_HALVES[]; };
+#endif
+#ifdef STORE_BYTES
+layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_BYTES_BLOCK { uint8_t STREAM_BYTES[]; };
+#endif
+
+// Stores the first `size` bytes of `words`, `unit` bytes at a time; nothing else is touched. `place` counts bytes.
+void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
+#ifdef STORE_BYTES
+  if (unit == 1u) {
+    for (uint i = 0u; i < size; ++i) STREAM_BYTES[place + i] = uint8_t((words[i / 4u] >> (i % 4u * 8u)) & 0xffu);
+    return;
+  }
+#endif
+#ifdef STORE_HALVES
+  if (unit == 2u) {
+    uint first = place / 2u;
+    for (uint i = 0u; i < size / 2u; ++i) STREAM_HALVES[first + i] = uint16_t((words[i / 2u] >> (i % 2u * 16u)) & 0xffffu);
+    return;
+  }
+#endif
+  uint word = place / 4u;
+  STREAM_WORDS[word] = words.x;
+  if (size > 4u) STREAM_WORDS[word + 1u] = words.y;
+  if (size > 8u) STREAM_WORDS[word + 2u] = words.z;
+  if (size > 12u) STREAM_WORDS[word + 3u] = words.w;
+}
+
+#ifdef STREAM_LOAD
+// What stands there.
+uvec4 STREAM_LOAD(uint place, uint size, uint unit) {
+  uvec4 words = uvec4(0u);
+#ifdef STORE_BYTES
+  if (unit == 1u) {
+    for (uint i = 0u; i < size; ++i) words[i / 4u] |= uint(STREAM_BYTES[place + i]) << (i % 4u * 8u);
+    return words;
+  }
+#endif
+#ifdef STORE_HALVES
+  if (unit == 2u) {
+    uint first = place / 2u;
+    for (uint i = 0u; i < size / 2u; ++i) words[i / 2u] |= uint(STREAM_HALVES[first + i]) << (i % 2u * 16u);
+    return words;
+  }
+#endif
+  uint word = place / 4u;
+  words.x = STREAM_WORDS[word];
+  if (size > 4u) words.y = STREAM_WORDS[word + 1u];
+  if (size > 8u) words.z = STREAM_WORDS[word + 2u];
+  if (size > 12u) words.w = STREAM_WORDS[word + 3u];
+  return words;
+}
+#undef STREAM_LOAD
+#endif
+
+#undef STREAM_BINDING
+#undef STREAM_WORDS_BLOCK
+#undef STREAM_WORDS
+#undef STREAM_HALVES_BLOCK
+#undef STREAM_HALVES
+#undef STREAM_BYTES_BLOCK
+#undef STREAM_BYTES
+#undef STREAM_STORE

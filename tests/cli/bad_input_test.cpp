@@ -1,0 +1,651 @@
+// Bad input, row by row of DESIGN.md's table: what happens, through the command where it reaches
+// that far. Tests of the parts go into detail; here stands each sentence as a whole.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "batch_runner.h"
+#include "dermis/pack.h"
+#include "dermis/reference.h"
+#include "dermis/shader_compiler.h"
+#include "dermis/validate.h"
+#include "dermis/vulkan/context.h"
+#include "dermis_command.h"
+#include "glb.h"
+#include "gltf_builder.h"
+#include "intercepted_device.h"
+#include "mock_vulkan.h"
+#include "ply.h"
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+using Point = std::array<float, 3>;
+
+/// Rows that need the device ask for it; the others run without.
+class BadInput : public DeviceTest {
+ protected:
+  void SetUp() override {}
+};
+
+/// The importer's triangle as mesh 'Fox', its second joint 3 to the right and 4 up.
+FileBuilder fox() {
+  FileBuilder file = skinnedTriangle();
+  file.json["meshes"][0]["name"] = "Fox";
+  file.json["nodes"][2]["translation"] = {3, 4, 0};
+  return file;
+}
+
+std::string writeModel(const std::string& name, const FileBuilder& file) {
+  std::string path = outFile(name);
+  std::ofstream(path, std::ios::binary) << file.text();
+  return path;
+}
+
+/// The pose that the command writes; empty where it does not.
+Ply skinned(const std::string& model, const std::vector<std::string>& more = {}) {
+  const std::string out = outFile("pose.ply");
+  std::filesystem::remove(out);
+  std::vector<std::string> arguments{"skin", model, "-o", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const CommandResult result = dermis(arguments);
+  EXPECT_EQ(result.status, 0) << result.errors;
+  return readPly(out).value_or(Ply{});
+}
+
+Ply skinnedByCpu(const FileBuilder& file, const std::string& method = "dual_quaternion") {
+  return skinned(writeModel("model.gltf", file), {"--device", "cpu", "--method", method});
+}
+
+/// Two files that must be skinned alike.
+void expectSamePose(const FileBuilder& file, const FileBuilder& expected) {
+  for (const Method method : allMethods) {
+    const std::string name(methodName(method));
+    const Ply a = skinnedByCpu(file, name), b = skinnedByCpu(expected, name);
+    ASSERT_EQ(a.positions.size(), 3u);
+    ASSERT_EQ(b.positions.size(), 3u);
+    for (std::size_t vertex = 0; vertex < 3; ++vertex) {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(a.positions[vertex][axis], b.positions[vertex][axis], 1e-6f) << name;
+    }
+  }
+}
+
+/// Expects that `info` counts the problem and that `skin` says so and goes on, even where strict.
+void expectCounted(const FileBuilder& file, Problem problem, int count, int firstVertex) {
+  const std::string model = writeModel("counted.gltf", file);
+  const Json info = Json::parse(dermis({"info", model, "--json"}).output);
+  const Json& problems = info.at("meshes").at(0).at("problems");
+  const auto found = std::find_if(problems.begin(), problems.end(), [&](const Json& entry) {
+    return entry.at("kind") == problemName(problem);
+  });
+  ASSERT_NE(found, problems.end()) << problems;
+  EXPECT_EQ(found->at("vertices"), count);
+  EXPECT_EQ(found->at("firstVertex"), firstVertex);
+  const CommandResult result =
+      dermis({"skin", model, "-o", outFile("counted.ply"), "--device", "cpu", "--strict"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  const auto message = found->at("message").get<std::string>();
+  EXPECT_NE(result.errors.find("dermis: note: " + message), std::string::npos) << result.errors;
+}
+
+/// What `--device` may be here: the reference and, where there is one, the device.
+std::vector<std::string> devicesToTry() {
+  std::string reason;
+  if (testDevice(true, reason) != nullptr) return {"cpu", "auto"};
+  EXPECT_FALSE(isContinuousIntegration()) << reason;
+  return {"cpu"};
+}
+
+/// Both methods on every device, with what `check` expects of the file that is written.
+void skinEverywhere(const FileBuilder& file, const std::string& ending,
+                    const std::function<void(const std::string& out)>& check) {
+  const std::string model = writeModel("model.gltf", file), out = outFile("pose" + ending);
+  for (const std::string& device : devicesToTry()) {
+    for (const Method method : allMethods) {
+      const std::string name(methodName(method));
+      SCOPED_TRACE(device + ", " + name);
+      const CommandResult result =
+          dermis({"skin", model, "-o", out, "--device", device, "--method", name});
+      EXPECT_EQ(result.status, 0) << result.errors;
+      EXPECT_EQ(result.errors.find("not finite"), std::string::npos) << result.errors;
+      check(out);
+    }
+  }
+}
+
+// ---- joint index outside the palette, NaN or infinite position/weight, negative weight, counts
+// ---- that disagree, empty mesh, strides too small
+
+/// Ten vertices on a line; vertex v hangs on joint v % 3 by 0.75 and on the next by 0.25.
+struct LineMesh {
+  static constexpr std::uint32_t vertexCount = 10, jointCount = 3;
+  std::vector<float> positions, weights;
+  std::vector<std::uint32_t> joints;
+  InfluenceSet set;
+  MeshView view;
+
+  LineMesh() {
+    for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+      positions.insert(positions.end(), {static_cast<float>(vertex), 1, 2});
+      weights.insert(weights.end(), {0.75f, 0.25f});
+      joints.insert(joints.end(), {vertex % jointCount, (vertex + 1) % jointCount});
+    }
+    set = {{joints.data(), vertexCount, 8, ComponentType::uint32, 2},
+           floatAttribute(weights.data(), vertexCount, 2)};
+    view.name = "Fox";
+    view.vertexCount = vertexCount;
+    view.positions = floatAttribute(positions.data(), vertexCount, 3);
+    view.influenceSets = {&set, 1};
+  }
+  LineMesh(const LineMesh&) = delete;
+  LineMesh& operator=(const LineMesh&) = delete;
+};
+
+struct BrokenMesh {
+  Problem problem;
+  std::uint64_t count;
+  std::uint32_t firstVertex;
+  std::function<void(LineMesh&)> breakIt;
+  /// What `repair` leaves of the first vertex: its position, all weight on its first joint.
+  std::optional<Point> repaired;
+};
+
+const std::vector<BrokenMesh>& brokenMeshes() {
+  constexpr Point inPlace{7, 1, 2}, origin{0, 0, 0};
+  static const std::vector<BrokenMesh> meshes{
+      {Problem::jointOutOfRange, 1, 7, [](LineMesh& m) { m.joints[15] = 3; }, inPlace},
+      {Problem::nonFinitePosition, 2, 7,
+       [](LineMesh& m) { m.positions[22] = m.positions[27] = nan; }, origin},
+      {Problem::nonFinitePosition, 1, 7, [](LineMesh& m) { m.positions[21] = -infinity; }, origin},
+      {Problem::nonFiniteWeight, 1, 7, [](LineMesh& m) { m.weights[15] = nan; }, inPlace},
+      {Problem::nonFiniteWeight, 2, 7,
+       [](LineMesh& m) { m.weights[15] = m.weights[17] = infinity; }, inPlace},
+      {Problem::negativeWeight, 1, 7, [](LineMesh& m) { m.weights[15] = -0.25f; }, inPlace},
+      {Problem::countMismatch, 1, 0, [](LineMesh& m) { m.view.positions.count = 9; }, {}},
+      {Problem::emptyMesh, 1, 0, [](LineMesh& m) { m.view.vertexCount = 0; }, {}},
+      {Problem::strideTooSmall,
+       2,
+       0,
+       [](LineMesh& m) { m.view.positions.stride = m.set.weights.stride = 7; },
+       {}},
+  };
+  return meshes;
+}
+
+void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::string& sentence) {
+  const Result<RepairedMesh> repaired = repair(mesh.view, LineMesh::jointCount);
+  if (!broken.repaired) {
+    ASSERT_FALSE(repaired.ok());
+    EXPECT_EQ(repaired.error().code, ErrorCode::invalidMesh);
+    return;
+  }
+  ASSERT_TRUE(repaired.ok()) << repaired.error().message;
+  const Finding* changed = repaired->report().find(broken.problem);
+  ASSERT_NE(changed, nullptr);
+  EXPECT_EQ(changed->message, sentence) << "it says what it changed";
+  EXPECT_TRUE(validate(repaired->view(), LineMesh::jointCount).packable());
+  ASSERT_TRUE(pack(repaired->view(), LineMesh::jointCount).ok());
+
+  // Each joint lifts by its number: what is left of the weights is normalised.
+  std::vector<JointMatrix> pose(LineMesh::jointCount);
+  for (std::size_t joint = 0; joint < pose.size(); ++joint)
+    pose[joint].m[2][3] = 4 * static_cast<float>(joint);
+  const auto skinned = reference::skin(repaired->view(), pose, Method::linear);
+  ASSERT_TRUE(skinned.ok()) << skinned.error().message;
+  const bool lostWeight = broken.problem != Problem::nonFinitePosition;
+  const std::uint32_t vertex = broken.firstVertex, joint = vertex % LineMesh::jointCount;
+  EXPECT_EQ(skinned->positions[vertex],
+            (reference::Double3{(*broken.repaired)[0], (*broken.repaired)[1],
+                                (*broken.repaired)[2] + 4.0 * joint + (lostWeight ? 0.0 : 1.0)}));
+}
+
+/// The file is skinned with a warning, which may say more, and refused where strict.
+void expectWarning(const FileBuilder& file, const std::string& sentence,
+                   const std::string& more = {}) {
+  const std::string model = writeModel("broken.gltf", file), out = outFile("broken.ply");
+  const CommandResult lenient = dermis({"skin", model, "-o", out, "--device", "cpu"});
+  EXPECT_EQ(lenient.status, 0);
+  EXPECT_NE(lenient.errors.find("dermis: warning: " + sentence + more + "; repaired\n"),
+            std::string::npos)
+      << lenient.errors;
+  EXPECT_TRUE(readPly(out).has_value());
+  std::filesystem::remove(out);
+  const CommandResult strict = dermis({"skin", model, "-o", out, "--device", "cpu", "--strict"});
+  EXPECT_EQ(strict.status, 3);
+  expectOneErrorLine(strict);
+  EXPECT_NE(strict.errors.find(sentence), std::string::npos) << strict.errors;
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndRepaired) {
+  for (const BrokenMesh& broken : brokenMeshes()) {
+    LineMesh mesh;
+    broken.breakIt(mesh);
+    const MeshReport report = validate(mesh.view, LineMesh::jointCount);
+    ASSERT_EQ(report.findings.size(), 1u) << problemName(broken.problem);
+    const Finding& finding = report.findings[0];
+    SCOPED_TRACE(finding.message);
+    EXPECT_EQ(finding.problem, broken.problem);
+    EXPECT_EQ(finding.count, broken.count);
+    EXPECT_EQ(finding.firstVertex, broken.firstVertex);
+    const Result<PackedMesh> packed = pack(mesh.view, LineMesh::jointCount);
+    ASSERT_FALSE(packed.ok());
+    EXPECT_EQ(packed.error().code, ErrorCode::invalidMesh);
+    EXPECT_EQ(packed.error().message, finding.message);
+    expectRepaired(mesh, broken, finding.message);
+  }
+
+  FileBuilder joint = fox();
+  joint.attributes()["JOINTS_0"] =
+      joint.add<std::uint8_t>({0, 9, 0, 0, 1, 9, 0, 0, 0, 1, 0, 0}, "VEC4", unsignedByteType);
+  joint.attributes()["WEIGHTS_0"] =
+      joint.addFloats({1, 0, 0, 0, 0.5f, 0.5f, 0, 0, 0.25f, 0.75f, 0, 0}, "VEC4");
+  expectWarning(joint, "mesh 'Fox', vertex 1: joint 9 is outside the palette of 2");
+  FileBuilder position = fox();
+  position.attributes()["POSITION"] =
+      position.addFloats({0, 0, 0, 1, 0, 0, nan, 2, infinity}, "VEC3");
+  expectWarning(position, "mesh 'Fox', vertex 2: the position is not finite");
+  FileBuilder weight = fox();
+  weight.attributes()["WEIGHTS_0"] =
+      weight.addFloats({1, 0, 0, 0, 1, nan, 0, 0, 0.25f, infinity, 0, 0}, "VEC4");
+  expectWarning(weight, "mesh 'Fox', vertex 1: the weight of joint 0 is not finite",
+                " (and 1 more such vertices)");
+  FileBuilder negative = fox();
+  negative.attributes()["WEIGHTS_0"] =
+      negative.addFloats({1, 0, 0, 0, 1, 0, 0, 0, 1, -0.5f, 0, 0}, "VEC4");
+  expectWarning(negative, "mesh 'Fox', vertex 2: the weight of joint 1 is negative");
+
+  // Views that make no sense do not get past the importer.
+  FileBuilder counts = fox();
+  counts.attributes()["WEIGHTS_0"] = counts.addFloats({1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
+  const CommandResult refused = dermis(
+      {"skin", writeModel("counts.gltf", counts), "-o", outFile("counts.ply"), "--device", "cpu"});
+  EXPECT_EQ(refused.status, 3);
+  expectOneErrorLine(refused);
+}
+
+// ---- weights that do not sum to 1
+
+TEST_F(BadInput, WeightsThatDoNotSumToOneAreNormalisedOverAllSetsAndCounted) {
+  FileBuilder file = fox(), expected = fox();
+  const std::vector<std::uint8_t> swapped{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  file.attributes()["JOINTS_1"] = file.add(swapped, "VEC4", unsignedByteType);
+  // Set 0 has 1 for joints 0, 1 and both; set 1 adds 3 for joint 1.
+  file.attributes()["WEIGHTS_1"] = file.addFloats({3, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0}, "VEC4");
+  expected.attributes()["JOINTS_0"] =
+      expected.add<std::uint8_t>({0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, "VEC4", unsignedByteType);
+  expected.attributes()["WEIGHTS_0"] =
+      expected.addFloats({0.25f, 0.75f, 0, 0, 1, 0, 0, 0, 0.0625f, 0.9375f, 0, 0}, "VEC4");
+  expectSamePose(file, expected);
+  expectCounted(file, Problem::weightsNotNormalized, 2, 0);
+}
+
+// ---- the same joint twice in one vertex
+
+TEST_F(BadInput, TheSameJointTwiceInOneVertexHasItsWeightsAddedAndIsCounted) {
+  FileBuilder file = fox(), expected = fox();
+  file.attributes()["JOINTS_0"] =
+      file.add<std::uint8_t>({0, 1, 0, 0, 1, 0, 1, 1, 0, 0, 0, 0}, "VEC4", unsignedByteType);
+  file.attributes()["WEIGHTS_0"] =
+      file.addFloats({1, 0, 0, 0, 0.25f, 0.25f, 0.25f, 0.25f, 1, 0, 0, 0}, "VEC4");
+  expected.attributes()["JOINTS_0"] =
+      expected.add<std::uint8_t>({0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0}, "VEC4", unsignedByteType);
+  expected.attributes()["WEIGHTS_0"] =
+      expected.addFloats({1, 0, 0, 0, 0.75f, 0.25f, 0, 0, 1, 0, 0, 0}, "VEC4");
+  expectSamePose(file, expected);
+  expectCounted(file, Problem::duplicateJoint, 1, 1);
+}
+
+// ---- rotation keys that are not of unit length
+
+FileBuilder rotating(const std::vector<float>& times, const std::vector<float>& values,
+                     const char* interpolation) {
+  FileBuilder file = fox();
+  const std::size_t input = file.addFloats(times, "SCALAR");
+  const std::size_t output = file.addFloats(values, "VEC4");
+  file.json["animations"] = {
+      {{"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "rotation"}}}}}}}};
+  return file;
+}
+
+TEST_F(BadInput, RotationKeysThatAreNotOfUnitLengthAreNormalisedAndCounted) {
+  const FileBuilder file = rotating({0, 1}, {0, 0, 0, 7, 0, 0, 3, 3}, "LINEAR");
+  const float half = std::sqrt(0.5f);
+  const FileBuilder unit = rotating({0, 1}, {0, 0, 0, 1, 0, 0, half, half}, "LINEAR");
+  const CommandResult info = dermis({"info", writeModel("keys.gltf", file)});
+  EXPECT_NE(info.output.find("note   2 rotation keys"), std::string::npos) << info.output;
+  for (const char* time : {"0", "0.3", "1"}) {
+    const std::vector<std::string> at{"--device", "cpu", "--time", time};
+    const Ply a = skinned(writeModel("keys.gltf", file), at),
+              b = skinned(writeModel("unit.gltf", unit), at);
+    ASSERT_EQ(a.positions.size(), 3u);
+    for (std::size_t i = 0; i < 9; ++i)
+      EXPECT_NEAR(a.positions[i / 3][i % 3], b.positions.at(i / 3)[i % 3], 1e-6f) << time;
+  }
+  // Splines leave the unit sphere between their keys.
+  const gltf::Model spline = loaded(rotating({0, 1}, {0, 0, 0, 0, 0, 0, 0,    1,    5, 0, 0, 5,  //
+                                                      0, 9, 0, 0, 0, 0, half, half, 0, 0, 0, 0},
+                                             "CUBICSPLINE"));
+  const gltf::GlobalTransform turned = gltf::nodeGlobals(spline, 0, 0.5).at(1);
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t b = 0; b < 3; ++b) {
+      const double dot =
+          turned[0][a] * turned[0][b] + turned[1][a] * turned[1][b] + turned[2][a] * turned[2][b];
+      EXPECT_NEAR(dot, a == b ? 1 : 0, 1e-12);
+    }
+  }
+}
+
+// ---- a vertex with no weight left
+
+TEST_F(BadInput, AVertexWithNoWeightLeftStaysInBindPoseAndIsCounted) {
+  FileBuilder file = fox();
+  file.json["nodes"][1]["translation"] = {0, 0, 5};
+  file.attributes()["WEIGHTS_0"] = file.addFloats({1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, "VEC4");
+  expectCounted(file, Problem::vertexWithoutWeight, 2, 1);
+  skinEverywhere(file, ".ply", [](const std::string& out) {
+    const std::vector<Point> expected{{0, 0, 5}, {1, 0, 0}, {0, 2, 0}};
+    EXPECT_EQ(readPly(out).value_or(Ply{}).positions, expected);
+  });
+  // Nor has one whose only weight was dropped.
+  file.attributes()["WEIGHTS_0"] = file.addFloats({1, 0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
+  expectWarning(file, "mesh 'Fox', vertex 1: the weight of joint 1 is negative");
+  EXPECT_EQ(skinnedByCpu(file).positions.at(1), (Point{1, 0, 0}));
+}
+
+// ---- a singular joint matrix (scale 0)
+
+TEST_F(BadInput, ASingularJointMatrixGivesFiniteVertices) {
+  for (const Json& scale : {Json{0, 0, 0}, Json{0, 1, 1}, Json{0, 0, 1}, Json{1e-30, 1, 1e-30}}) {
+    FileBuilder file = fox();
+    file.attributes()["NORMAL"] = file.addFloats({1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3");
+    file.json["nodes"][2]["scale"] = scale;
+    SCOPED_TRACE(scale.dump());
+    skinEverywhere(file, ".ply", [](const std::string& out) {
+      const std::optional<Ply> ply = readPly(out);
+      ASSERT_TRUE(ply.has_value());
+      ASSERT_EQ(ply->positions.size(), 3u);
+      for (std::size_t i = 0; i < 9; ++i) {
+        EXPECT_TRUE(std::isfinite(ply->positions[i / 3][i % 3])) << i;
+        EXPECT_TRUE(std::isfinite(ply->normals[i / 3][i % 3])) << i;
+      }
+    });
+  }
+}
+
+// ---- mirrored joints (negative determinant)
+
+TEST_F(BadInput, MirroredJointsKeepTheSenseOfNormalsAndTangents) {
+  FileBuilder file = fox();
+  file.attributes()["NORMAL"] = file.addFloats({1, 0, 0, 0, 0, 1, 0.6f, 0.8f, 0}, "VEC3");
+  file.attributes()["TANGENT"] =
+      file.addFloats({0, 1, 0, 1, 1, 0, 0, -1, -0.8f, 0.6f, 0, 1}, "VEC4");
+  file.json["nodes"][1]["scale"] = {-1, 1, 1};
+  const std::vector<Point> normals{{-1, 0, 0}, {0, 0, 1}, {-0.6f, 0.8f, 0}};
+  const std::vector<std::array<float, 4>> tangents{
+      {0, 1, 0, -1}, {-1, 0, 0, 1}, {0.8f, 0.6f, 0, -1}};
+  skinEverywhere(file, ".glb", [&](const std::string& out) {
+    const Glb glb = readGlb(out);
+    const GlbPart& part = glb.parts.at(0);
+    ASSERT_EQ(part.tangents.size(), 3u);
+    for (std::size_t vertex = 0; vertex < 3; ++vertex) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_NEAR(part.normals[vertex][axis], normals[vertex][axis], 1e-6f) << vertex;
+        EXPECT_NEAR(part.tangents[vertex][axis], tangents[vertex][axis], 1e-6f) << vertex;
+      }
+      EXPECT_EQ(part.tangents[vertex][3], tangents[vertex][3]) << vertex;
+    }
+    EXPECT_NEAR(part.positions[1][0], -1 - 3, 1e-6f);
+  });
+}
+
+// ---- blended rotation near zero
+
+/// Half turns about the axes, and the turn by nothing: quaternions at right angles, whose blend is
+/// as short as it can be.
+std::vector<JointMatrix> halfTurns() {
+  std::vector<JointMatrix> pose(8);
+  for (int joint = 0; joint < 8; ++joint) {
+    for (int axis = 0; axis < 3; ++axis)
+      pose[static_cast<std::size_t>(joint)].m[axis][axis] =
+          joint % 4 == 0 || joint % 4 - 1 == axis ? 1.0f : -1.0f;
+  }
+  return pose;
+}
+
+TEST_F(BadInput, ABlendedRotationIsNeverNearZero) {
+  OwnedMesh mesh = randomMesh(21, 2000, 8, 8);
+  for (std::size_t slot = 0; slot < mesh.weights.size(); ++slot) {
+    mesh.joints[slot] = static_cast<std::uint32_t>(slot % 8);
+    mesh.weights[slot] = slot / 8 % 2 == 0 ? 0.125f : mesh.weights[slot];
+  }
+  const MeshView view = mesh.view();
+  const std::vector<JointMatrix> pose = halfTurns();
+  const reference::SkinnedMesh expected = *reference::skin(view, pose, Method::dualQuaternion);
+  const auto lengthOf = [](double x, double y, double z) { return std::hypot(x, y, z); };
+  // Joints that only turn leave every vertex as far from the origin as it was.
+  for (std::size_t i = 0; i < expected.positions.size(); ++i) {
+    const auto& [x, y, z] = expected.positions[i];
+    const float* bind = mesh.positions.data() + i * 3;
+    ASSERT_NEAR(lengthOf(x, y, z), lengthOf(bind[0], bind[1], bind[2]), 1e-12) << i;
+  }
+  useDevice(true);
+  if (IsSkipped() || HasFatalFailure()) return;
+  const PackedMesh packed = *pack(view, 8);
+  const samples::SkinRequest request{&packed, pose};
+  const auto result = samples::runBatch(device(), context(), {&request, 1});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  const std::vector<float>& positions = result->instances.at(0).positions;
+  ASSERT_EQ(positions.size(), mesh.positions.size());
+  for (std::size_t i = 0; i < positions.size(); i += 3) {
+    const float* bind = mesh.positions.data() + i;
+    ASSERT_NEAR(lengthOf(positions[i], positions[i + 1], positions[i + 2]),
+                lengthOf(bind[0], bind[1], bind[2]), 1e-5)
+        << i;
+  }
+}
+
+// ---- NaN in a pose
+
+TEST_F(BadInput, NanInAPoseAffectsThatInstanceAlone) {
+  useDevice(true);
+  if (IsSkipped() || HasFatalFailure()) return;
+  OwnedMesh mesh = randomMesh(22, 500, 10, 4);
+  const PackedMesh packed = *pack(mesh.view(), 10);
+  std::vector<std::vector<JointMatrix>> poses;
+  for (std::uint32_t instance = 0; instance < 6; ++instance)
+    poses.push_back(randomPose(instance, 10, Rigidity::rigid));
+  std::vector<samples::SkinRequest> requests;
+  for (std::size_t instance = 0; instance < 6; ++instance) {
+    requests.push_back(
+        {&packed, poses[instance], true, instance < 3 ? Method::linear : Method::dualQuaternion});
+  }
+  const auto before = samples::runBatch(device(), context(), requests);
+  for (JointMatrix& joint : poses[1]) joint.m[0][0] = nan;
+  for (JointMatrix& joint : poses[4]) joint.m[2][3] = nan;
+  const auto after = samples::runBatch(device(), context(), requests);
+  ASSERT_TRUE(before.ok() && after.ok());
+  for (std::size_t instance = 0; instance < 6; ++instance) {
+    EXPECT_EQ(before->instances[instance].streams == after->instances[instance].streams,
+              instance != 1 && instance != 4)
+        << instance;
+  }
+}
+
+// ---- truncated or hostile glTF
+
+/// Runs `info` with 1 GiB of address space, and expects it to refuse the file soon.
+void expectRefusedSoon(const std::string& model, const std::string& text) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  const std::string limit;  // their shadow memory is larger
+#else
+  const std::string limit = "ulimit -v 1048576; ";
+#endif
+  const auto start = std::chrono::steady_clock::now();
+  const CommandResult result =
+      runCommand({"/bin/sh", "-c", limit + "exec \"$0\" info \"$1\"", DERMIS_COMMAND, model});
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(result.status, 3) << result.errors;
+  expectOneErrorLine(result);
+  EXPECT_NE(result.errors.find(text), std::string::npos) << result.errors;
+  EXPECT_LT(seconds.count(), 20);
+}
+
+TEST_F(BadInput, TruncatedOrHostileGltfEndsWithAClearErrorAndNeverWithMore) {
+  const std::vector<std::byte> glb = fox().glb();
+  const std::string text = fox().text();
+  for (std::size_t length = 0; length < glb.size(); ++length) {
+    const Result<gltf::Model> cut = gltf::loadFromMemory({glb.data(), length}, {});
+    ASSERT_FALSE(cut.ok()) << length;
+    EXPECT_FALSE(cut.error().message.empty());
+  }
+  for (std::size_t length = 0; length < text.size(); ++length)
+    ASSERT_FALSE(gltf::loadFromMemory(std::as_bytes(std::span(text).first(length)), {})) << length;
+  const std::string truncated = outFile("truncated.glb");
+  std::ofstream(truncated, std::ios::binary)
+      .write(reinterpret_cast<const char*>(glb.data()),
+             static_cast<std::streamsize>(glb.size() - 5));
+  expectRefusedSoon(truncated, " bytes, the file has " + std::to_string(glb.size() - 5));
+
+  const auto expectHostile = [](const std::string& expected, auto change) {
+    FileBuilder file = fox();
+    change(file);
+    expectRefusedSoon(writeModel("hostile.gltf", file), expected);
+  };
+  expectHostile("accessor 0", [](FileBuilder& f) { f.accessor("POSITION")["count"] = 4294967295; });
+  expectHostile("accessor 0", [](FileBuilder& f) {
+    f.accessor("POSITION").erase("bufferView");
+    f.accessor("POSITION")["count"] = 2000000000;
+  });
+  expectHostile("accessor 1", [](FileBuilder& f) { f.accessor("JOINTS_0")["byteOffset"] = 1e15; });
+  expectHostile("bufferView 2", [](FileBuilder& f) { f.json["bufferViews"][2]["buffer"] = 7; });
+  expectHostile("node", [](FileBuilder& f) { f.json["nodes"][2]["children"] = {1}; });
+  expectHostile("skin 0", [](FileBuilder& f) { f.json["skins"][0]["joints"] = {1, 99}; });
+  const std::string deep = outFile("deep.gltf");
+  std::ofstream(deep) << std::string(200000, '[');
+  expectRefusedSoon(deep, "deep.gltf");
+}
+
+// ---- no Vulkan loader, no device, a missing feature
+
+TEST_F(BadInput, NoLoaderNoDeviceOrAMissingFeatureIsNamedAndTheReferenceStillWorks) {
+  const std::string model = writeModel("model.gltf", fox());
+  const std::string folder = outFile("libraries");
+  std::filesystem::create_directory(folder);
+  std::ofstream(folder + "/libvulkan.so.1") << "This is no library.";
+  const struct {
+    std::vector<std::string> environment;
+    const char* named;
+  } machines[] = {
+      {{"LD_LIBRARY_PATH=" + folder}, "there is no Vulkan loader (libvulkan.so.1)"},
+      {{"VK_DRIVER_FILES=/nonexistent.json", "VK_ICD_FILENAMES=/nonexistent.json"}, "Vulkan"}};
+  for (const auto& [environment, named] : machines) {
+    const std::string out = outFile("pose.ply");
+    const CommandResult none = dermis({"skin", model, "-o", out}, environment);
+    EXPECT_EQ(none.status, 4);
+    expectOneErrorLine(none);
+    EXPECT_NE(none.errors.find(named), std::string::npos) << none.errors;
+    EXPECT_EQ(dermis({"skin", model, "-o", out, "--device", "cpu"}, environment).status, 0);
+  }
+
+  MockVulkan few;
+  few.limits.maxPerStageDescriptorStorageBuffers = 3;
+  const Result<vulkan::Context> refused = vulkan::Context::create(few.description());
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::missingFeature);
+  EXPECT_NE(refused.error().message.find("storage buffers"), std::string::npos)
+      << refused.error().message;
+}
+
+// ---- device lost, out of memory
+
+/// What Dermis does with a device, up to the first error.
+Result<void> useContext(const vulkan::DeviceDescription& description) {
+  Result<vulkan::Context> context = vulkan::Context::create(description);
+  if (!context) return context.error();
+  const std::array variants{Variant{}, Variant{.kernel = Kernel::palette}};
+  if (Result<void> done = context->prepare(variants); !done) return done;
+  const vulkan::BufferRange range{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, 256};
+  const Result<vulkan::Bindings> bindings = context->createBindings(
+      {range, range, range, range, vulkan::OutputBuffers::oneBuffer(range), range});
+  if (!bindings) return bindings.error();
+  return {};
+}
+
+TEST_F(BadInput, ALostDeviceOrTooLittleMemoryIsAnErrorThatLeaksNothing) {
+  {
+    MockVulkan mock;
+    const Result<void> done = useContext(mock.description());
+    ASSERT_TRUE(done.ok()) << done.error().message;
+  }
+  for (const char* function :
+       {"vkCreateShaderModule", "vkCreateDescriptorSetLayout", "vkCreatePipelineLayout",
+        "vkCreateComputePipelines", "vkCreateDescriptorPool", "vkAllocateDescriptorSets"}) {
+    for (const VkResult failure :
+         {VK_ERROR_OUT_OF_HOST_MEMORY, VK_ERROR_OUT_OF_DEVICE_MEMORY, VK_ERROR_DEVICE_LOST}) {
+      SCOPED_TRACE(function);
+      MockVulkan mock;
+      mock.failing = function;
+      mock.failure = failure;
+      const Result<void> done = useContext(mock.description());
+      ASSERT_FALSE(done.ok());
+      EXPECT_EQ(done.error().code, ErrorCode::vulkanError);
+      EXPECT_EQ(done.error().vulkanResult, failure);
+      EXPECT_NE(done.error().message.find(function), std::string::npos) << done.error().message;
+      EXPECT_EQ(mock.aliveObjects(), 0);
+      EXPECT_TRUE(mock.commands.empty()) << "the engine's command buffers are untouched";
+    }
+  }
+}
+
+// ---- a damaged shader or pipeline cache
+
+// The pipeline cache is the engine's own; Dermis stores none.
+TEST_F(BadInput, ADamagedShaderCacheIsNoticedThrownAwayAndRebuilt) {
+  ShaderCompilerOptions options;
+  options.cacheFolder = outFile("cache");
+  std::filesystem::remove_all(options.cacheFolder);
+  ShaderCompiler compiler(options);
+  const ShaderSource source{"small.comp",
+                            "#version 450\nlayout(local_size_x = 8) in;\nvoid main() {}\n",
+                            ShaderStage::compute,
+                            {}};
+  const auto expected = compiler.compile(source);
+  ASSERT_TRUE(expected.ok()) << expected.error().message;
+  const std::filesystem::directory_iterator entries(options.cacheFolder);
+  ASSERT_NE(entries, std::filesystem::directory_iterator());
+  const std::filesystem::path entry = entries->path();
+  std::fstream file(entry, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(-3, std::ios::end);
+  file.put('\x55');
+  file.close();
+
+  const auto again = compiler.compile(source);
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(*again, *expected);
+  EXPECT_FALSE(compiler.lastFromCache());
+  EXPECT_NE(compiler.lastCacheProblem().find("thrown away"), std::string::npos);
+  ASSERT_TRUE(compiler.compile(source).ok());
+  EXPECT_TRUE(compiler.lastFromCache()) << "it has been made again";
+}
+
+}  // namespace
+}  // namespace dermis::test

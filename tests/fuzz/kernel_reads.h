@@ -1,0 +1,91 @@
+// What the skin kernel reads of a packed mesh, read as it does (shaders/mesh_access.glsl,
+// shaders/morph.glsl): the sanitizer sees where that leaves the blob.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/pack.h"
+
+namespace dermis::fuzz {
+
+inline void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+/// Its memory is as large as the blob and no larger, whatever a vector would keep in reserve.
+class KernelReads {
+ public:
+  explicit KernelReads(const PackedMesh& mesh)
+      : words_(new std::uint32_t[mesh.bytes().size() / 4]), info_(mesh.info()) {
+    const auto* bytes = reinterpret_cast<const std::uint32_t*>(mesh.bytes().data());
+    for (std::size_t i = 0; i < mesh.bytes().size() / 4; ++i) words_[i] = bytes[i];
+  }
+  ~KernelReads() { delete[] words_; }
+  KernelReads(const KernelReads&) = delete;
+  KernelReads& operator=(const KernelReads&) = delete;
+
+  void readAll() {
+    for (std::uint32_t vertex = 0; vertex < info_.vertexCount; ++vertex) {
+      read(words_[abi::MESH_HEADER_POSITIONS] + vertex * 3, 3);
+      if (info_.hasNormals) read(words_[abi::MESH_HEADER_NORMALS] + vertex * 3, 3);
+      if (info_.hasTangents) read(words_[abi::MESH_HEADER_TANGENTS] + vertex * 4, 4);
+      readInfluences(vertex);
+    }
+    for (std::uint32_t target = 0; target < info_.morphTargetCount; ++target) readMorph(target);
+  }
+
+  /// The word at which a target displaces a vertex, or 0. As the kernel finds it.
+  std::uint32_t findDisplacement(std::uint32_t target, std::uint32_t vertex) const {
+    const std::uint32_t* record =
+        words_ + words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS;
+    const std::uint32_t block = vertex / abi::MORPH_BLOCK_VERTICES - record[abi::MORPH_FIRST_BLOCK];
+    if (block >= record[abi::MORPH_BLOCK_COUNT]) return 0;
+    const std::uint32_t* entry =
+        words_ + record[abi::MORPH_BLOCKS] + block * abi::MORPH_BLOCK_WORDS;
+    const std::uint64_t mask = entry[0] | std::uint64_t{entry[1]} << 32;
+    const std::uint64_t bit = std::uint64_t{1} << vertex % abi::MORPH_BLOCK_VERTICES;
+    if ((mask & bit) == 0) return 0;
+    const auto before = static_cast<std::uint32_t>(std::popcount(mask & (bit - 1)));
+    return entry[abi::MORPH_BLOCK_DISPLACEMENTS] + before * displacementWords(target);
+  }
+  std::uint32_t attributes(std::uint32_t target) const {
+    return words_[words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS +
+                  abi::MORPH_ATTRIBUTES];
+  }
+  float floatAt(std::uint32_t word) const { return std::bit_cast<float>(words_[word]); }
+
+ private:
+  std::uint32_t displacementWords(std::uint32_t target) const {
+    return 3 * static_cast<std::uint32_t>(std::popcount(attributes(target)));
+  }
+  void read(std::uint32_t word, std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) sink_ = words_[word + i];
+  }
+  void readInfluences(std::uint32_t vertex) {
+    const std::uint32_t* firsts = words_ + words_[abi::MESH_HEADER_FIRSTS];
+    require(firsts[vertex + 1] - firsts[vertex] <= info_.maxInfluences);
+    for (std::uint32_t influence = firsts[vertex]; influence < firsts[vertex + 1]; ++influence) {
+      const std::uint32_t word =
+          words_[abi::MESH_HEADER_INFLUENCES] + influence * abi::INFLUENCE_WORDS;
+      read(word, abi::INFLUENCE_WORDS);
+      require(words_[word + abi::INFLUENCE_JOINT] < info_.requiredJoints);
+    }
+  }
+  void readMorph(std::uint32_t target) {
+    for (std::uint32_t vertex = 0; vertex < info_.vertexCount; ++vertex) {
+      const std::uint32_t word = findDisplacement(target, vertex);
+      if (word != 0) read(word, displacementWords(target));
+    }
+  }
+
+  std::uint32_t* words_;
+  MeshInfo info_;
+  volatile std::uint32_t sink_ = 0;
+};
+
+}  // namespace dermis::fuzz

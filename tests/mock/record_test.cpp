@@ -1,0 +1,557 @@
+// Bindings, and what a plan becomes in a command buffer, on a driver that is only pretended.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/vulkan/vulkan.h"
+#include "mock_batch.h"
+#include "mock_vulkan.h"
+
+namespace dermis::test {
+namespace {
+
+using vulkan::BatchBuffers;
+using vulkan::BufferRange;
+using vulkan::OutputBuffers;
+
+struct RecordTest : public ::testing::Test {
+  /// Makes the context of a device like this; `mock.limits` may be changed before.
+  void create(bool push = false, bool features = false) {
+    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+    halves.storageBuffer16BitAccess = VK_TRUE;
+    mock.extensions.clear();
+    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
+    vulkan::DeviceDescription description = mock.description();
+    if (features) description.enabledFeatures = &halves;
+    Result<vulkan::Context> made = vulkan::Context::create(description);
+    ASSERT_TRUE(made.ok());
+    context.emplace(std::move(*made));
+  }
+  /// Prepares and records.
+  Result<void> record(const MockBatch& batch, const BatchBuffers& buffers) {
+    mock.dispatches.clear();
+    mock.commands.clear();
+    mock.bufferBarriers.clear();
+    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
+    const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
+    if (!bindings) return bindings.error();
+    return context->record(commandBuffer, batch.plan, *bindings);
+  }
+  Result<void> record(const MockBatch& batch) { return record(batch, batch.buffers()); }
+  void expectRefused(const MockBatch& batch, const BatchBuffers& buffers, ErrorCode code,
+                     const std::string& text) {
+    const Result<void> recorded = record(batch, buffers);
+    ASSERT_FALSE(recorded.ok()) << text;
+    EXPECT_EQ(recorded.error().code, code) << recorded.error().message;
+    EXPECT_NE(recorded.error().message.find(text), std::string::npos) << recorded.error().message;
+    EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
+  }
+
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  MockVulkan mock;
+  std::optional<vulkan::Context> context;
+};
+
+/// Everything of a batch in buffers of its own: all formats, motion, bounds.
+MockBatch richBatch(const DeviceLimits& limits) {
+  MockBatch result;
+  Job job = result.batch.jobOf(0, 0, Method::dualQuaternion);
+  job.normals.format = VertexFormat::octahedral16x2;
+  job.tangents.format = VertexFormat::snorm8x4;
+  job.motion = Motion::kept;
+  job.bounds = true;
+  result.batch.place(job, Arrangement::separate);
+  job.method = Method::linear;
+  result.batch.place(job, Arrangement::separate);
+  result.makePlan(limits);
+  return result;
+}
+
+// ---- Bindings
+
+BufferRange& rangeOf(BatchBuffers& buffers, BufferRole role) {
+  switch (role) {
+    case BufferRole::meshes:
+      return buffers.meshes;
+    case BufferRole::matrices:
+      return buffers.matrices;
+    case BufferRole::tables:
+      return buffers.tables;
+    case BufferRole::palettes:
+      return buffers.palettes;
+    case BufferRole::results:
+      return buffers.results;
+    case BufferRole::positions:
+      return buffers.outputs.positions;
+    case BufferRole::normals:
+      return buffers.outputs.normals;
+    case BufferRole::tangents:
+      return buffers.outputs.tangents;
+    default:
+      return buffers.outputs.previousPositions;
+  }
+}
+
+const std::pair<BufferRole, const char*> roles[] = {
+    {BufferRole::meshes, "meshes"},
+    {BufferRole::matrices, "matrices"},
+    {BufferRole::tables, "tables"},
+    {BufferRole::palettes, "palettes"},
+    {BufferRole::results, "results"},
+    {BufferRole::positions, "outputs.positions"},
+    {BufferRole::normals, "outputs.normals"},
+    {BufferRole::tangents, "outputs.tangents"},
+    {BufferRole::previousPositions, "outputs.previousPositions"}};
+
+TEST_F(RecordTest, RangesThatCannotBeBoundAreRefused) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  ASSERT_TRUE(record(batch).ok());
+  for (const auto& [role, name] : roles) {
+    BatchBuffers buffers = batch.buffers();
+    ASSERT_NE(rangeOf(buffers, role).size, 0u) << name;
+    rangeOf(buffers, role).offset = 16;
+    expectRefused(batch, buffers, ErrorCode::invalidArgument,
+                  std::string(name) + ": the offset 16 is not a multiple of this device's 256");
+    buffers = batch.buffers();
+    for (const VkDeviceSize size :
+         {VkDeviceSize{0}, VkDeviceSize{VK_WHOLE_SIZE}, rangeOf(buffers, role).size + 2}) {
+      rangeOf(buffers, role).size = size;
+      expectRefused(batch, buffers, ErrorCode::invalidArgument,
+                    std::string(name) + ": its size must be");
+    }
+    rangeOf(buffers, role).offset = 512;
+    rangeOf(buffers, role).size = batch.range(role).size;
+    EXPECT_TRUE(record(batch, buffers).ok()) << name;
+  }
+}
+
+TEST_F(RecordTest, OnlyOutputsMayBeLargerThanARange) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  for (const auto& [role, name] : roles) {
+    BatchBuffers buffers = batch.buffers();
+    rangeOf(buffers, role).size = context->limits().maxStorageBufferRange;
+    EXPECT_TRUE(record(batch, buffers).ok()) << name;
+    rangeOf(buffers, role).size += 4;
+    if (role >= BufferRole::positions) {
+      EXPECT_TRUE(record(batch, buffers).ok()) << name;
+    } else {
+      expectRefused(batch, buffers, ErrorCode::limitExceeded,
+                    std::string(name) + ": 134217732 bytes");
+    }
+  }
+}
+
+TEST_F(RecordTest, WithFourStorageBuffersAllAttributesGoToOne) {
+  mock.limits.maxPerStageDescriptorStorageBuffers = 4;
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = MockBatch::withBothMethods(context->limits());
+  EXPECT_TRUE(record(batch).ok());
+  for (BufferRange OutputBuffers::*member :
+       {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
+    BatchBuffers buffers = batch.buffers();
+    const auto expectOtherRefused = [&] {
+      expectRefused(batch, buffers, ErrorCode::limitExceeded, "4 storage buffers a stage");
+      buffers = batch.buffers();
+    };
+    (buffers.outputs.*member).buffer = bufferOf(BufferRole::results);
+    expectOtherRefused();
+    (buffers.outputs.*member).offset = 256;
+    expectOtherRefused();
+    (buffers.outputs.*member).size += 4;
+    expectOtherRefused();
+    // Not wanted, not given.
+    if (member != &OutputBuffers::normals) {
+      buffers.outputs.*member = {};
+      EXPECT_TRUE(record(batch, buffers).ok());
+    }
+  }
+}
+
+TEST_F(RecordTest, BuffersThatThePlanUsesMustBeLargeEnough) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  for (const auto& [role, name] : roles) {
+    const std::string prefix = "outputs.";
+    std::string text = name;
+    if (text.find(prefix) == 0) text.erase(0, prefix.size());
+    if (text == "previousPositions") text = "previous positions";
+    const std::string needed = std::to_string(batch.plan.buffer(role).size);
+    BatchBuffers buffers = batch.buffers();
+    rangeOf(buffers, role).size -= 4;
+    expectRefused(batch, buffers, ErrorCode::invalidArgument, needed + " bytes of " + text);
+    rangeOf(buffers, role) = {};
+    expectRefused(batch, buffers, ErrorCode::invalidArgument, "the bindings have 0");
+  }
+}
+
+TEST_F(RecordTest, WhatThePlanDoesNotUseMayBeMissing) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  MockBatch batch;
+  batch.batch.addJob(0, 0, Method::linear, false, 12);
+  batch.makePlan(context->limits());
+  BatchBuffers buffers = batch.buffers();
+  EXPECT_EQ(buffers.palettes.buffer, VkBuffer{VK_NULL_HANDLE});
+  EXPECT_EQ(buffers.results.buffer, VkBuffer{VK_NULL_HANDLE});
+  for (BufferRange OutputBuffers::*member :
+       {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
+    buffers.outputs.*member = {bufferOf(BufferRole::normals), 0, 4};
+    EXPECT_TRUE(record(batch, buffers).ok()) << "too small for a plan that used it";
+    buffers.outputs.*member = {};
+  }
+  EXPECT_TRUE(record(batch, buffers).ok());
+}
+
+/// Every binding of the layout is bound, to a buffer of the batch.
+TEST_F(RecordTest, EveryBindingThatAModuleNamesIsBound) {
+  for (const bool push : {false, true}) {
+    for (const std::uint32_t storageBuffers : {4u, 8u}) {
+      mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
+      ASSERT_NO_FATAL_FAILURE(create(push));
+      for (const bool rich : {false, true}) {
+        if (rich && storageBuffers == 4) continue;
+        const MockBatch batch =
+            rich ? richBatch(context->limits()) : MockBatch::withBothMethods(context->limits());
+        ASSERT_TRUE(record(batch).ok());
+        ASSERT_EQ(mock.dispatches.size(), 3u);
+        for (const MockDispatch& dispatch : mock.dispatches) {
+          const bool isPalette = &dispatch == &mock.dispatches[0];
+          // The palette kernel names no attribute; results where it can clear them.
+          std::set<std::uint32_t> wanted{0, 1, 2};
+          if (!isPalette) wanted.insert(3);
+          if (!isPalette && storageBuffers == 8) wanted.insert({4, 5, 6});
+          if (storageBuffers == 8) wanted.insert(7);
+          for (const std::uint32_t binding : wanted) {
+            EXPECT_TRUE(dispatch.descriptors.contains(binding)) << binding;
+          }
+          for (const auto& [binding, descriptor] : dispatch.descriptors) {
+            EXPECT_LT(binding, storageBuffers);
+            EXPECT_NE(descriptor.buffer, VkBuffer{VK_NULL_HANDLE});
+            EXPECT_GT(descriptor.range, 0u);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(RecordTest, EachKernelSeesItsBuffers) {
+  for (const bool push : {false, true}) {
+    ASSERT_NO_FATAL_FAILURE(create(push));
+    const MockBatch batch = richBatch(context->limits());
+    ASSERT_TRUE(record(batch).ok());
+    const auto expectBound = [&](const MockDispatch& dispatch, std::uint32_t binding,
+                                 BufferRole role) {
+      ASSERT_TRUE(dispatch.descriptors.contains(binding));
+      const MockDescriptor expected{bufferOf(role), 0, batch.range(role).size};
+      EXPECT_TRUE(dispatch.descriptors.at(binding) == expected) << binding;
+    };
+    ASSERT_EQ(mock.dispatches.size(), 3u);
+    const MockDispatch& palette = mock.dispatches[0];
+    expectBound(palette, abi::BINDING_TABLES, BufferRole::tables);
+    expectBound(palette, abi::BINDING_MESHES, BufferRole::matrices);
+    expectBound(palette, abi::BINDING_PALETTES, BufferRole::palettes);
+    expectBound(palette, abi::BINDING_RESULTS, BufferRole::results);
+    for (std::size_t index = 1; index < 3; ++index) {
+      const MockDispatch& skin = mock.dispatches[index];
+      const bool linear = batch.plan.dispatches()[index].variant.method == Method::linear;
+      expectBound(skin, abi::BINDING_TABLES, BufferRole::tables);
+      expectBound(skin, abi::BINDING_MESHES, BufferRole::meshes);
+      expectBound(skin, abi::BINDING_PALETTES,
+                  linear ? BufferRole::matrices : BufferRole::palettes);
+      expectBound(skin, abi::BINDING_POSITIONS, BufferRole::positions);
+      expectBound(skin, abi::BINDING_NORMALS, BufferRole::normals);
+      expectBound(skin, abi::BINDING_TANGENTS, BufferRole::tangents);
+      expectBound(skin, abi::BINDING_PREVIOUS, BufferRole::previousPositions);
+      expectBound(skin, abi::BINDING_RESULTS, BufferRole::results);
+    }
+  }
+}
+
+// ---- Windows
+
+/// Instances all over outputs of 300000 bytes.
+MockBatch wideBatch(const DeviceLimits& limits, bool near) {
+  MockBatch result;
+  result.batch.outputSize = 300000;
+  for (std::uint64_t place = 0; place < 280000; place += 20000) {
+    Job job = result.batch.jobOf(0, 0, Method::linear);
+    job.positions = {place, 24, VertexFormat::float32x3};
+    job.normals = {near ? place + 12 : 290000 - place, 24, VertexFormat::float32x3};
+    result.batch.jobs.push_back(job);
+  }
+  result.makePlan(limits);
+  return result;
+}
+
+TEST_F(RecordTest, WindowsOfOutputsAreBoundWhereTheyBegin) {
+  mock.limits.maxStorageBufferRange = 65536;
+  for (const bool push : {false, true}) {
+    for (const std::uint32_t storageBuffers : {4u, 8u}) {
+      mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
+      ASSERT_NO_FATAL_FAILURE(create(push));
+      const MockBatch batch = wideBatch(context->limits(), true);
+      BatchBuffers buffers = batch.buffers();
+      buffers.outputs.positions.offset = 4096;
+      buffers.outputs = OutputBuffers::oneBuffer(buffers.outputs.positions);
+      ASSERT_TRUE(record(batch, buffers).ok());
+      ASSERT_EQ(mock.dispatches.size(), batch.plan.dispatches().size());
+      ASSERT_GT(mock.dispatches.size(), 4u);
+      for (std::size_t index = 0; index < mock.dispatches.size(); ++index) {
+        const Dispatch& dispatch = batch.plan.dispatches()[index];
+        for (std::uint32_t stream = 0; stream < 2; ++stream) {
+          if (stream == 1 && storageBuffers == 4) continue;
+          const MockDescriptor& bound =
+              mock.dispatches[index].descriptors.at(abi::BINDING_POSITIONS + stream);
+          EXPECT_EQ(bound.offset, 4096 + dispatch.windows[stream].offset);
+          EXPECT_EQ(bound.range,
+                    std::min<std::uint64_t>(65536, 300000 - dispatch.windows[stream].offset));
+        }
+      }
+    }
+  }
+}
+
+TEST_F(RecordTest, WindowsThatDifferNeedPushDescriptors) {
+  mock.limits.maxStorageBufferRange = 65536;
+  ASSERT_NO_FATAL_FAILURE(create(true));
+  const MockBatch batch = wideBatch(context->limits(), false);
+  ASSERT_TRUE(record(batch).ok());
+  for (std::size_t index = 0; index < mock.dispatches.size(); ++index) {
+    for (std::uint32_t stream = 0; stream < 2; ++stream) {
+      EXPECT_EQ(mock.dispatches[index].descriptors.at(abi::BINDING_POSITIONS + stream).offset,
+                batch.plan.dispatches()[index].windows[stream].offset);
+    }
+  }
+  ASSERT_NO_FATAL_FAILURE(create(false));
+  expectRefused(batch, batch.buffers(), ErrorCode::limitExceeded, "VK_KHR_push_descriptor");
+}
+
+// A window is the only one of a buffer within a range, whatever those of the others.
+TEST_F(RecordTest, BuffersWithinARangeHaveNoWindows) {
+  mock.limits.maxStorageBufferRange = 65536;
+  for (const bool push : {false, true}) {
+    ASSERT_NO_FATAL_FAILURE(create(push));
+    MockBatch batch;
+    batch.batch.hasSeparateOutputs = true;
+    batch.batch.separateSizes = {300000, 40000, 0, 0};
+    for (std::uint64_t instance = 0; instance < 5; ++instance) {
+      Job job = batch.batch.jobOf(0, 0, Method::linear);
+      job.positions = {instance * 60000, 24, VertexFormat::float32x3};
+      job.normals = {instance * 400, 4, VertexFormat::octahedral16x2};
+      batch.batch.jobs.push_back(job);
+    }
+    batch.makePlan(context->limits());
+    ASSERT_TRUE(record(batch).ok());
+    std::set<VkDeviceSize> positions;
+    for (const MockDispatch& dispatch : mock.dispatches) {
+      positions.insert(dispatch.descriptors.at(abi::BINDING_POSITIONS).offset);
+      EXPECT_EQ(dispatch.descriptors.at(abi::BINDING_NORMALS).offset, 0u);
+      EXPECT_EQ(dispatch.descriptors.at(abi::BINDING_NORMALS).range, 40000u);
+    }
+    EXPECT_GT(positions.size(), 3u);
+  }
+}
+
+TEST_F(RecordTest, ThePoolHasWhatTheWindowsNeedAndNoMore) {
+  mock.limits.maxStorageBufferRange = 65536;
+  for (const std::uint32_t storageBuffers : {4u, 8u}) {
+    mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
+    ASSERT_NO_FATAL_FAILURE(create());
+    const MockBatch batch = wideBatch(context->limits(), true);
+    mock.sets.clear();
+    ASSERT_TRUE(record(batch).ok());
+    const std::uint64_t step = outputWindowStep(context->limits());
+    const auto windows = static_cast<std::uint32_t>((300000 + step - 1) / step);
+    EXPECT_EQ(mock.setsInPool, 1 + windows * 2);
+    EXPECT_EQ(mock.descriptorsInPool, mock.setsInPool * storageBuffers);
+    EXPECT_EQ(mock.sets.size(), mock.setsInPool);
+  }
+}
+
+// ---- Recording
+
+TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
+  ASSERT_TRUE(bindings.ok());
+  const std::string skin =
+      " with positions as float32x3, normals as octahedral16x2, tangents as snorm8x4, previous "
+      "positions, bounds, for 4 influences has not been prepared";
+  const std::string sentences[] = {"the palette kernel has not been prepared",
+                                   "the variant of linear" + skin,
+                                   "the variant of dual_quaternion" + skin};
+  ASSERT_EQ(batch.plan.variants().size(), 3u);
+  for (std::size_t prepared = 0; prepared < 3; ++prepared) {
+    const Result<void> early = context->record(commandBuffer, batch.plan, *bindings);
+    ASSERT_FALSE(early.ok());
+    EXPECT_EQ(early.error().code, ErrorCode::notPrepared);
+    EXPECT_EQ(early.error().message, sentences[prepared]);
+    EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
+    ASSERT_TRUE(context->prepare(batch.plan.variants().subspan(prepared, 1)).ok());
+  }
+  EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
+}
+
+TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  MockBatch batch;
+  batch.batch.addMesh(meshOf(10, 5, 5, MeshParts{false, false, 1}));
+  batch.batch.addPalette(5, false);
+  batch.batch.addJob(1, 1, Method::linear, false).morphs = batch.batch.keep({{0, 1.0f}});
+  batch.makePlan(context->limits());
+  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
+  EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().message,
+            "the variant of linear with positions as float32x3, morph targets, for any number of "
+            "influences has not been prepared");
+}
+
+TEST_F(RecordTest, WhatEveryVariantListsIsEnough) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  ASSERT_TRUE(context->prepare(everyVariant(batch.batch.jobs[0], context->tuning())).ok());
+  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
+  EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
+}
+
+TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
+  ASSERT_NO_FATAL_FAILURE(create(true, true));
+  MockBatch batch = richBatch(context->limits());
+  Job halved = batch.batch.jobOf(0, 0, Method::linear);
+  halved.positions.format = VertexFormat::float16x3;
+  batch.batch.place(halved, Arrangement::separate);
+  batch.makePlan(context->limits());
+  ASSERT_TRUE(record(batch).ok());
+  ASSERT_EQ(mock.dispatches.size(), 4u);
+  for (std::size_t index = 0; index < 4; ++index) {
+    const Dispatch& expected = batch.plan.dispatches()[index];
+    const MockDispatch& actual = mock.dispatches[index];
+    EXPECT_EQ(actual.code, vulkan::kernelSpirv(expected.variant, context->limits()).data());
+    EXPECT_EQ(actual.groupCountX, expected.groupCountX);
+    EXPECT_EQ(actual.groupCountY, expected.groupCountY);
+    EXPECT_EQ(actual.constants,
+              (std::array<std::uint32_t, 4>{
+                  expected.constants.firstRecord, expected.constants.recordCount,
+                  expected.constants.workgroupCount, expected.constants.instanceRecords}));
+  }
+}
+
+TEST_F(RecordTest, RecordsTheBarrierBetweenItsPassesAndNoOther) {
+  for (const bool push : {false, true}) {
+    ASSERT_NO_FATAL_FAILURE(create(push));
+    const MockBatch batch = MockBatch::withBothMethods(context->limits());
+    ASSERT_TRUE(record(batch).ok());
+    const std::string descriptors = push ? "push descriptors" : "bind sets";
+    // The palettes, the linear instance, which needs none, and the dual-quaternion one.
+    const std::vector<std::string> expected{
+        "bind pipeline", descriptors,      "push constants", "dispatch", "bind pipeline",
+        descriptors,     "push constants", "dispatch",       "barrier",  "bind pipeline",
+        descriptors,     "push constants", "dispatch"};
+    EXPECT_EQ(mock.commands, expected);
+    ASSERT_EQ(mock.bufferBarriers.size(), 1u);
+    EXPECT_TRUE(mock.memoryBarriers.empty());
+    const VkBufferMemoryBarrier& barrier = mock.bufferBarriers[0];
+    EXPECT_EQ(barrier.srcAccessMask, static_cast<VkAccessFlags>(VK_ACCESS_SHADER_WRITE_BIT));
+    EXPECT_EQ(barrier.dstAccessMask, static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT));
+    EXPECT_EQ(barrier.buffer, bufferOf(BufferRole::palettes));
+    EXPECT_EQ(barrier.size, batch.plan.buffer(BufferRole::palettes).size);
+  }
+}
+
+// The skin kernel adds to what the palette kernel cleared.
+TEST_F(RecordTest, TheBarrierCoversPalettesAndResults) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const MockBatch batch = richBatch(context->limits());
+  BatchBuffers buffers = batch.buffers();
+  buffers.results.offset = 1024;
+  ASSERT_TRUE(record(batch, buffers).ok());
+  EXPECT_EQ(std::count(mock.commands.begin(), mock.commands.end(), "barrier"), 1);
+  EXPECT_EQ(mock.commands[4], "barrier") << "linear jobs with bounds wait too";
+  ASSERT_EQ(mock.bufferBarriers.size(), 2u);
+  const VkBufferMemoryBarrier& palettes = mock.bufferBarriers[0];
+  EXPECT_EQ(palettes.buffer, bufferOf(BufferRole::palettes));
+  EXPECT_EQ(palettes.dstAccessMask, static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT));
+  const VkBufferMemoryBarrier& results = mock.bufferBarriers[1];
+  EXPECT_EQ(results.buffer, bufferOf(BufferRole::results));
+  EXPECT_EQ(results.offset, 1024u);
+  EXPECT_EQ(results.size, 64u);
+  EXPECT_EQ(results.srcAccessMask, static_cast<VkAccessFlags>(VK_ACCESS_SHADER_WRITE_BIT));
+  EXPECT_EQ(results.dstAccessMask,
+            static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT));
+}
+
+TEST_F(RecordTest, LinearAloneNeedsNoPalettes) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  MockBatch batch;
+  batch.batch.addJob(0, 0, Method::linear, true);
+  batch.makePlan(context->limits());
+  EXPECT_EQ(batch.plan.buffer(BufferRole::palettes).size, 0u);
+  ASSERT_TRUE(record(batch).ok());
+  EXPECT_EQ(mock.commands,
+            (std::vector<std::string>{"bind pipeline", "bind sets", "push constants", "dispatch"}));
+}
+
+TEST_F(RecordTest, LinearJobsWithBoundsNeedNoPaletteBuffer) {
+  for (const bool push : {false, true}) {
+    ASSERT_NO_FATAL_FAILURE(create(push));
+    MockBatch batch;
+    batch.batch.addJob(0, 0, Method::linear, true).bounds = true;
+    batch.makePlan(context->limits());
+    ASSERT_EQ(batch.buffers().palettes.buffer, VkBuffer{VK_NULL_HANDLE});
+    ASSERT_TRUE(record(batch).ok());
+    ASSERT_EQ(mock.dispatches.size(), 2u);
+    ASSERT_EQ(mock.bufferBarriers.size(), 1u);
+    EXPECT_EQ(mock.bufferBarriers[0].buffer, bufferOf(BufferRole::results));
+    // The palette kernel names both: what it does not use is bound to what there is.
+    EXPECT_EQ(mock.dispatches[0].descriptors.at(abi::BINDING_PALETTES).buffer,
+              bufferOf(BufferRole::results));
+    EXPECT_EQ(mock.dispatches[0].descriptors.at(abi::BINDING_RESULTS).buffer,
+              bufferOf(BufferRole::results));
+  }
+}
+
+TEST_F(RecordTest, AnEmptyPlanRecordsNothing) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const Plan plan;
+  const Result<vulkan::Bindings> bindings = context->createBindings({});
+  ASSERT_TRUE(bindings.ok());
+  EXPECT_TRUE(context->record(commandBuffer, plan, *bindings).ok());
+  EXPECT_TRUE(mock.commands.empty());
+}
+
+TEST_F(RecordTest, APlanForOtherLimitsIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  DeviceLimits other[] = {context->limits(), context->limits(), context->limits()};
+  other[0].maxStorageBufferRange = 1 << 28;
+  other[1].maxStorageBuffersPerStage = 9;
+  other[2].storage16Bit = true;
+  for (const DeviceLimits& limits : other) {
+    const MockBatch batch = MockBatch::withBothMethods(limits);
+    expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "other limits");
+  }
+}
+
+TEST_F(RecordTest, BindingsOfAnotherContextAreRefused) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  const Result<vulkan::Context> other = vulkan::Context::create(mock.description());
+  const MockBatch batch = MockBatch::withBothMethods(context->limits());
+  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  const Result<vulkan::Bindings> bindings = other->createBindings(batch.buffers());
+  EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().code,
+            ErrorCode::invalidArgument);
+  EXPECT_EQ(context->record(commandBuffer, batch.plan, vulkan::Bindings()).error().code,
+            ErrorCode::invalidArgument);
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,338 @@
+// plan: the dispatches of a batch, and that they do its work once.
+
+#include "dermis/plan.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "core_plan_simulation.h"
+
+namespace dermis::test {
+namespace {
+
+// ---- The number of dispatches
+
+// The demand, counted.
+TEST(Plan, OneThousandInstancesOfThreeMeshesInAtMostSixDispatches) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(300, 1, 4, true));
+  batch.addMesh(meshOf(777, 4, 4, true));
+  batch.addMesh(meshOf(64, 6, 4, true));
+  for (std::uint32_t instance = 0; instance < 1000; ++instance) {
+    batch.addPalette(4, instance % 5 == 0);
+  }
+  for (std::uint32_t instance = 0; instance < 1000; ++instance) {
+    batch.addJob(instance % 3, instance,
+                 instance % 2 == 0 ? Method::linear : Method::dualQuaternion, instance % 7 != 0);
+  }
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  EXPECT_LE(out.dispatches().size(), 6u);
+  EXPECT_EQ(out.instanceCount(), 1000u);
+  // O(meshes) + O(instances) words: 4 a palette, 8 an instance, 12 a mesh, method and layout.
+  EXPECT_LE(out.buffer(BufferRole::tables).size / 4, 500 * 4 + 1000 * 8 + 12 * 12u);
+}
+
+TEST(Plan, OneMethodAndLayoutIsOneDispatchAfterThePalettes) {
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  for (std::uint32_t mesh = 0; mesh < 5; ++mesh) {
+    for (std::uint32_t palette = 0; palette < 4; ++palette) {
+      batch.addJob(mesh, palette, Method::dualQuaternion, false);
+    }
+  }
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  ASSERT_EQ(out.dispatches().size(), 2u);
+  EXPECT_EQ(out.dispatches()[0].variant.kernel, Kernel::palette);
+  EXPECT_EQ(out.dispatches()[1].variant.influences, 0);  // eight is any number
+}
+
+TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  batch.addJob(1, 2, Method::linear, false);
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  ASSERT_EQ(out.dispatches().size(), 1u);
+  EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
+  for (std::uint32_t palette = 0; palette < 4; ++palette) {
+    EXPECT_EQ(out.statusOffset(palette), Plan::noStatus);
+  }
+}
+
+TEST(Plan, PalettesThatNoDualQuaternionJobUsesAreLeftOut) {
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  batch.addJob(0, 3, Method::dualQuaternion, true);
+  batch.addJob(0, 2, Method::linear, true);
+  batch.addJob(0, 1, Method::dualQuaternion, true);
+  batch.addJob(0, 1, Method::dualQuaternion, true);
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
+  EXPECT_EQ(out.statusOffset(2), Plan::noStatus);
+  EXPECT_EQ(out.statusOffset(4), Plan::noStatus);  // there is none
+  EXPECT_NE(out.statusOffset(1), Plan::noStatus);
+  EXPECT_NE(out.statusOffset(3), out.statusOffset(1));
+  // 9 joints that may scale, 7 joints that may: 64 bytes each, and a status of 16.
+  EXPECT_EQ(out.buffer(BufferRole::palettes).size, 16 + 9 * 64 + 16 + 7 * 64u);
+}
+
+TEST(Plan, TheInfluenceClassFitsTheMostInfluencedMesh) {
+  const std::pair<std::uint32_t, int> classes[] = {{1, 1}, {2, 2}, {3, 4}, {4, 4}, {5, 0}, {8, 0}};
+  for (const auto& [influences, expected] : classes) {
+    OwnedBatch batch;
+    batch.addMesh(meshOf(10, 1, 8, false));
+    batch.addMesh(meshOf(10, influences, 8, false));
+    batch.addPalette(8, false);
+    batch.addJob(0, 0, Method::linear, false);
+    batch.addJob(1, 0, Method::linear, false);
+    batch.addJob(0, 0, Method::linear, false);
+    Plan out;
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+    ASSERT_EQ(out.dispatches().size(), 1u);
+    EXPECT_EQ(out.dispatches()[0].variant.influences, expected) << influences;
+  }
+}
+
+TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
+  Plan out;
+  EXPECT_TRUE(out.dispatches().empty());
+  EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  for (const Batch& empty : {Batch{}, batch.batch()}) {
+    ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
+    EXPECT_TRUE(out.dispatches().empty());
+    EXPECT_TRUE(out.variants().empty());
+    EXPECT_EQ(out.instanceCount(), 0u);
+    EXPECT_EQ(out.vertexCount(), 0u);
+    EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
+    EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
+    EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
+    EXPECT_TRUE(writeTables(out, {}).ok());
+  }
+}
+// ---- Formats, morph targets, motion
+
+/// One mesh with everything, one palette, and jobs that share a layout.
+struct PlanFeatures : public ::testing::Test {
+  PlanFeatures() {
+    batch.addMesh(meshOf(100, 2, 4, MeshParts{true, true, 4}));
+    batch.addPalette(4, false);
+    batch.addPalette(4, false);
+  }
+  Job& add(Job job) { return batch.place(job, Arrangement::separate); }
+  Job linear() const { return batch.jobOf(0, 0, Method::linear); }
+
+  OwnedBatch batch;
+  Plan out;
+};
+
+TEST_F(PlanFeatures, JobsOfDifferentFormatsGoToDifferentDispatches) {
+  for (const VertexFormat format : {VertexFormat::float32x3, VertexFormat::float16x4}) {
+    for (const VertexFormat normals : {VertexFormat::octahedral16x2, VertexFormat::snorm8x4}) {
+      for (int twice = 0; twice < 2; ++twice) {
+        Job job = linear();
+        job.positions.format = format;
+        job.normals.format = normals;
+        add(job);
+      }
+    }
+  }
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(out.dispatches().size(), 4u);
+}
+
+// Half a dispatch that stores halves would be a dispatch that stores halves.
+TEST_F(PlanFeatures, JobsOfDifferentStoreUnitsGoToDifferentDispatches) {
+  for (const std::uint32_t gap : {0u, 1u, 2u, 4u}) {
+    Job job = linear();
+    job.normals.format = VertexFormat::snorm8x4;
+    batch.place(job, Arrangement::separate, gap);
+  }
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  ASSERT_EQ(out.dispatches().size(), 3u);
+  std::multiset<int> units;
+  for (const Dispatch& dispatch : out.dispatches()) units.insert(dispatch.variant.units[1]);
+  EXPECT_EQ(units, (std::multiset<int>{1, 2, 4}));
+}
+
+TEST_F(PlanFeatures, JobsWithAndWithoutActiveMorphTargetsGoToDifferentDispatches) {
+  add(linear()).morphs = batch.keep({{2, 0.5f}});
+  add(linear()).morphs = batch.keep({{2, 0.0f}, {1, -0.0f}});
+  add(linear()).morphs = batch.keep({{0, -1.0f}, {1, 0.0f}});
+  add(linear());
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  ASSERT_EQ(out.dispatches().size(), 2u);
+  EXPECT_NE(out.dispatches()[0].variant.morphs, out.dispatches()[1].variant.morphs);
+}
+
+TEST_F(PlanFeatures, TheOrderOfMorphTargetsAndThoseOfWeightZeroChangeNothing) {
+  add(linear()).morphs = batch.keep({{0, 0.5f}, {1, 0.25f}, {3, 2.0f}});
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  const std::vector<std::uint32_t> tables = tablesOf(out);
+  batch.jobs[0].morphs = batch.keep({{3, 2.0f}, {2, 0.0f}, {0, 0.5f}, {1, 0.25f}});
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(tablesOf(out), tables);
+  batch.jobs[0].morphs = batch.keep({{3, 2.0f}, {0, 0.5f}, {1, 0.26f}});
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_NE(tablesOf(out), tables);
+}
+
+TEST_F(PlanFeatures, MorphWeightsAreCopied) {
+  std::vector<MorphWeight> weights{{1, 0.5f}};
+  add(linear()).morphs = weights;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  const std::vector<std::uint32_t> tables = tablesOf(out);
+  weights[0] = {99, 7.0f};
+  EXPECT_EQ(tablesOf(out), tables);
+}
+
+TEST_F(PlanFeatures, PreviousMorphWeightsMatterWhereTheInstanceIsSkinnedAgain) {
+  for (const Motion motion : {Motion::none, Motion::kept, Motion::reskinned}) {
+    batch.jobs.clear();
+    Job job = linear();
+    job.motion = motion;
+    job.previousMorphs = batch.keep({{3, 1.0f}});
+    add(job);
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+    ASSERT_EQ(out.dispatches().size(), 1u);
+    EXPECT_EQ(out.dispatches()[0].variant.morphs, motion == Motion::reskinned);
+  }
+}
+
+TEST_F(PlanFeatures, ThePreviousPaletteIsConvertedToo) {
+  Job job = batch.jobOf(0, 0, Method::dualQuaternion);
+  job.motion = Motion::reskinned;
+  job.previousPalette = 1;
+  add(job);
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_NE(out.statusOffset(1), Plan::noStatus);
+  batch.jobs[0].motion = Motion::kept;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(out.statusOffset(1), Plan::noStatus);
+}
+
+TEST_F(PlanFeatures, InstancesThatRestartOrSettleShareADispatchWithTheOthers) {
+  for (const Motion motion : {Motion::kept, Motion::reskinned}) {
+    batch.jobs.clear();
+    for (const bool restarts : {false, true}) {
+      for (const bool settles : {false, true}) {
+        Job job = linear();
+        job.motion = motion;
+        job.restartsMotion = restarts;
+        job.settles = settles;
+        add(job);
+      }
+    }
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+    EXPECT_EQ(out.dispatches().size(), 1u);
+  }
+}
+
+// ---- Results
+
+TEST_F(PlanFeatures, ResultsOfLinearJobsAloneAreClearedByThePaletteKernel) {
+  Job job = linear();
+  add(job);
+  job.bounds = true;
+  add(job);
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  ASSERT_EQ(out.dispatches().size(), 3u);
+  EXPECT_EQ(out.dispatches()[0].variant.kernel, Kernel::palette);
+  EXPECT_EQ(out.dispatches()[0].constants.recordCount, 0u);
+  EXPECT_EQ(out.dispatches()[0].constants.workgroupCount, 1u);
+  EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
+  for (const Dispatch& dispatch : out.dispatches().subspan(1))
+    EXPECT_EQ(dispatch.afterPalettes, dispatch.variant.bounds);
+}
+
+TEST_F(PlanFeatures, ResultsStandInTheOrderOfTheirJobsWithoutGaps) {
+  Job plain = linear(), bounded = linear(), snorm = linear();
+  bounded.bounds = true;
+  snorm.positions.format = VertexFormat::snorm16x4;
+  snorm.box = {{0, 0, 0}, {1, 1, 1}};
+  for (const Job& job : {plain, snorm, bounded, plain, bounded, snorm}) add(job);
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(out.resultOffset(0), Plan::noResult);
+  EXPECT_EQ(out.resultOffset(1), 0u);
+  EXPECT_EQ(out.resultOffset(2), 32u);
+  EXPECT_EQ(out.resultOffset(3), Plan::noResult);
+  EXPECT_EQ(out.resultOffset(4), 64u);
+  EXPECT_EQ(out.resultOffset(5), 96u);
+  EXPECT_EQ(out.buffer(BufferRole::results).size, 128u);
+}
+
+TEST_F(PlanFeatures, EnoughWorkgroupsClearTheResults) {
+  for (const std::uint32_t size : {8u, 64u, 128u}) {
+    for (const std::uint32_t count : {1u, 8u, 9u, 64u, 65u, 200u}) {
+      batch.jobs.clear();
+      Job job = batch.jobOf(0, 0, Method::dualQuaternion);
+      job.bounds = true;
+      for (std::uint32_t instance = 0; instance < count; ++instance) add(job);
+      ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {size, 4}, out));
+      EXPECT_EQ(out.dispatches()[0].constants.workgroupCount, 1 + (count + size - 1) / size);
+    }
+  }
+}
+
+// ---- Random batches
+
+class PlanTuning : public ::testing::TestWithParam<std::tuple<std::uint32_t, std::uint32_t>> {};
+
+TEST_P(PlanTuning, EveryVertexOfEveryInstanceIsSkinnedOnce) {
+  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam())};
+  Plan out;
+  for (const std::uint32_t jobs : {1u, 2u, 17u, 60u}) {
+    const OwnedBatch batch = randomBatch(jobs * 31 + tuning.workgroupSize, jobs);
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, tuning, out));
+    // Folded into y, so that hardly anything is left in x.
+    DeviceLimits narrow;
+    for (const std::uint32_t count : {1u, 3u, 7u, 64u}) {
+      narrow.maxWorkgroupCountX = count;
+      ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, narrow, tuning, out));
+    }
+  }
+}
+
+TEST_P(PlanTuning, SoItIsInEveryFormatWithMotionMorphTargetsAndBounds) {
+  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam())};
+  Plan out;
+  for (const std::uint32_t jobs : {1u, 30u, 200u}) {
+    for (const bool separate : {false, true}) {
+      const OwnedBatch batch = randomRichBatch(jobs * 31 + tuning.workgroupSize, jobs, separate);
+      ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), tuning, out));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Plan, PlanTuning,
+                         ::testing::Combine(::testing::Values(8u, 16u, 64u, 128u),
+                                            ::testing::Values(1u, 2u, 3u, 4u, 16u)));
+
+TEST(Plan, Truth20_TheOrderOfJobsChangesNothingForThem) {
+  OwnedBatch batch = randomBatch(5, 40);
+  Plan out;
+  std::mt19937 engine(1);
+  for (int trial = 0; trial < 5; ++trial) {
+    std::shuffle(batch.jobs.begin(), batch.jobs.end(), engine);
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  }
+  OwnedBatch rich = randomRichBatch(5, 40, true);
+  for (int trial = 0; trial < 5; ++trial) {
+    std::shuffle(rich.jobs.begin(), rich.jobs.end(), engine);
+    ASSERT_NO_FATAL_FAILURE(expectPlanned(rich, richLimits(), {}, out));
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

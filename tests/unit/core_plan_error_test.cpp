@@ -1,0 +1,560 @@
+// plan: what is refused.
+
+#include "dermis/plan.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "core_plan_simulation.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+/// A good batch of three jobs; a test breaks one rule of the second job or palette.
+struct PlanErrors : public ::testing::Test {
+  PlanErrors() {
+    batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 5}));
+    batch.addMesh(meshOf(10, 2, 7, false));
+    for (int palette = 0; palette < 3; ++palette) batch.addPalette(8, true);
+    for (std::uint32_t job = 0; job < 3; ++job) {
+      batch.addJob(0, job, Method::dualQuaternion, true);
+    }
+    limits = richLimits();
+  }
+  Job& job() { return batch.jobs[1]; }
+
+  void expectRefused(ErrorCode code, std::initializer_list<const char*> parts) {
+    Plan out;
+    const OwnedBatch other = randomRichBatch(1, 5, false);
+    ASSERT_TRUE(makePlan(other.batch(), richLimits(), {}, out).ok());
+    const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, code) << result.error().message;
+    for (const char* part : parts) {
+      EXPECT_NE(result.error().message.find(part), std::string::npos)
+          << "'" << result.error().message << "' lacks '" << part << "'";
+    }
+    EXPECT_TRUE(out.dispatches().empty());
+    EXPECT_TRUE(out.variants().empty());
+    EXPECT_EQ(out.instanceCount(), 0u);
+    EXPECT_EQ(out.vertexCount(), 0u);
+    EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
+    EXPECT_EQ(out.buffer(BufferRole::results).size, 0u);
+    EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
+    EXPECT_EQ(out.resultOffset(0), Plan::noResult);
+  }
+  void expectInvalid(std::initializer_list<const char*> parts) {
+    expectRefused(ErrorCode::invalidArgument, parts);
+  }
+  void expectGood() {
+    Plan out;
+    const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
+    EXPECT_TRUE(result.ok()) << result.error().message;
+  }
+
+  OwnedBatch batch;
+  DeviceLimits limits;
+  Tuning tuning;
+};
+
+TEST_F(PlanErrors, TheBatchIsGoodBeforeItIsBroken) {
+  expectGood();
+}
+
+TEST_F(PlanErrors, NoMesh) {
+  job().mesh = {};
+  expectInvalid({"job 1", "mesh"});
+}
+
+TEST_F(PlanErrors, MeshOffsets) {
+  job().meshOffset = 8;
+  expectInvalid({"job 1", "byte 8"});
+  job().meshOffset = batch.meshesSize - batch.meshes[0].bytes().size() + 16;
+  expectInvalid({"job 1"});
+  job().meshOffset = ~std::uint64_t{15};
+  expectInvalid({"job 1"});
+  job().meshOffset = 0;
+  batch.meshesSize = batch.meshes[0].bytes().size();
+  expectGood();
+  --batch.meshesSize;
+  expectInvalid({"job 0"});
+}
+
+TEST_F(PlanErrors, PaletteIndices) {
+  job().palette = 3;
+  expectInvalid({"job 1", "palette 3", "3"});
+  job().palette = 0xffffffffu;
+  expectInvalid({"job 1", "4294967295"});
+}
+
+TEST_F(PlanErrors, PalettesThatAreTooShortForTheMesh) {
+  batch.palettes[1].jointCount = 7;
+  expectGood();
+  batch.palettes[1].jointCount = 6;
+  expectInvalid({"job 1", "7 joints", "palette 1", "6"});
+}
+
+TEST_F(PlanErrors, PaletteCounts) {
+  batch.addPalette(0, false);
+  batch.matricesSize += 65537 * 48;  // room enough
+  expectInvalid({"palette 3", "0 joints", "65536"});
+  batch.palettes[3].jointCount = 65537;
+  expectInvalid({"palette 3", "65537"});
+  batch.palettes[3].jointCount = 65536;
+  expectGood();
+}
+
+TEST_F(PlanErrors, MatrixOffsets) {
+  batch.palettes[1].matrixOffset += 8;
+  expectInvalid({"palette 1", "8 matrices"});
+  batch.palettes[1].matrixOffset = batch.matricesSize - 8 * 48;
+  expectGood();
+  batch.palettes[1].matrixOffset += 16;
+  expectInvalid({"palette 1"});
+  batch.palettes[1].matrixOffset = ~std::uint64_t{15};
+  expectInvalid({"palette 1"});
+}
+
+TEST_F(PlanErrors, UnknownMethods) {
+  job().method = static_cast<Method>(2);
+  expectInvalid({"job 1", "method"});
+}
+
+TEST_F(PlanErrors, NormalsOfAMeshWithoutAny) {
+  job().mesh = batch.meshes[1].info();
+  job().meshOffset = batch.meshOffsets[1];
+  expectInvalid({"job 1", "normals"});
+  job().normals = {};
+  expectGood();
+}
+
+TEST_F(PlanErrors, TangentsOfAMeshWithoutAny) {
+  job().normals = {};
+  job().tangents = {0, 16, VertexFormat::float32x4};
+  expectGood();
+  job().mesh = batch.meshes[1].info();
+  job().meshOffset = batch.meshOffsets[1];
+  expectInvalid({"job 1", "tangents"});
+}
+
+TEST_F(PlanErrors, OutputAttributes) {
+  for (OutputAttribute Job::*member : {&Job::positions, &Job::normals}) {
+    const char* name = member == &Job::positions ? "positions" : "normals";
+    const OutputAttribute good = job().*member;
+    OutputAttribute& attribute = job().*member;
+    for (const std::uint32_t stride : {0u, 4u, 8u, 11u}) {
+      attribute.stride = stride;
+      expectInvalid({"job 1", name, "stride"});
+    }
+    attribute.stride = 0xffffffffu;
+    expectInvalid({"job 1", name, "output buffer"});
+    // The last vertex' last byte is the output's last.
+    attribute = good;
+    attribute.offset = batch.outputSize - 9 * 24 - 12;
+    expectGood();
+    ++attribute.offset;
+    expectInvalid({"job 1", name, "output buffer"});
+    attribute.offset = ~std::uint64_t{3};
+    expectInvalid({"job 1", name, "output buffer"});
+    attribute = good;
+    attribute.stride = 0xfffffffcu;
+    expectInvalid({"job 1", name, "output buffer"});
+    attribute = good;
+  }
+}
+
+// Where each attribute has a buffer, each must lie in its own.
+TEST_F(PlanErrors, OutputsOfDifferentSizes) {
+  batch.jobs.clear();
+  Job job = batch.jobOf(0, 0, Method::linear);
+  job.normals.format = VertexFormat::float32x3;
+  job.tangents.format = VertexFormat::float16x4;
+  job.motion = Motion::kept;
+  for (int instance = 0; instance < 2; ++instance) batch.place(job, Arrangement::separate);
+  const char* names[] = {"positions", "normals", "tangents", "previous positions"};
+  const std::uint64_t sizes[] = {240, 240, 160, 240};
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    ASSERT_EQ(batch.separateSizes[stream], sizes[stream]);
+    expectGood();
+    --batch.separateSizes[stream];
+    expectInvalid({"job 1", names[stream], std::to_string(sizes[stream] - 1).c_str()});
+    ++batch.separateSizes[stream];
+  }
+}
+
+TEST_F(PlanErrors, FormatsThatAnAttributeMayNotHave) {
+  struct Allowed {
+    VertexFormat format;
+    bool positions, normals, tangents;
+  };
+  const Allowed table[] = {
+      {VertexFormat::none, false, true, true},
+      {VertexFormat::float32x3, true, true, false},
+      {VertexFormat::float32x4, true, true, true},
+      {VertexFormat::float16x3, true, true, false},
+      {VertexFormat::float16x4, true, true, true},
+      {VertexFormat::snorm16x3, true, true, false},
+      {VertexFormat::snorm16x4, true, true, true},
+      {VertexFormat::snorm8x3, false, true, false},
+      {VertexFormat::snorm8x4, false, true, true},
+      {VertexFormat::octahedral16x2, false, true, true},
+      {VertexFormat::octahedral8x2, false, true, true},
+      {static_cast<VertexFormat>(11), false, false, false},
+      {static_cast<VertexFormat>(255), false, false, false},
+  };
+  const Job good = job();
+  for (const Allowed& allowed : table) {
+    SCOPED_TRACE(static_cast<int>(allowed.format));
+    for (const auto& [member, isAllowed, name] :
+         {std::tuple{&Job::positions, allowed.positions, "positions"},
+          {&Job::normals, allowed.normals, "normals"},
+          {&Job::tangents, allowed.tangents, "tangents"}}) {
+      job() = good;
+      job().box = {{0, 0, 0}, {1, 1, 1}};
+      job().*member = {0, 24, allowed.format};
+      if (isAllowed) {
+        expectGood();
+      } else {
+        expectInvalid({"job 1", name, std::string(formatName(allowed.format)).c_str()});
+      }
+    }
+  }
+}
+
+// The format of previous positions is that of the positions.
+TEST_F(PlanErrors, TheFormatOfPreviousPositionsIsNotLookedAt) {
+  job().motion = Motion::kept;
+  job().previousPositions = {0, 24, VertexFormat::octahedral8x2};
+  expectGood();
+  job().previousPositions = {0, 11, VertexFormat::octahedral8x2};
+  expectInvalid({"job 1", "previous positions", "size 12"});
+}
+
+// ---- Stores of less than a word
+
+TEST_F(PlanErrors, AttributesThatDoNotFillWholeWordsNeedFeatures) {
+  struct Case {
+    OutputAttribute attribute;
+    int unit;
+  };
+  const Case cases[] = {
+      {{0, 12, VertexFormat::float32x3}, 4},    {{2, 12, VertexFormat::float32x3}, 2},
+      {{1, 12, VertexFormat::float32x3}, 1},    {{0, 14, VertexFormat::float32x3}, 2},
+      {{0, 13, VertexFormat::float32x3}, 1},    {{0, 8, VertexFormat::float16x3}, 2},
+      {{0, 7, VertexFormat::float16x3}, 1},     {{4, 8, VertexFormat::float16x4}, 4},
+      {{0, 8, VertexFormat::snorm16x3}, 2},     {{0, 8, VertexFormat::snorm16x4}, 4},
+      {{0, 4, VertexFormat::snorm8x3}, 1},      {{0, 4, VertexFormat::snorm8x4}, 4},
+      {{6, 4, VertexFormat::snorm8x4}, 2},      {{0, 4, VertexFormat::octahedral16x2}, 4},
+      {{0, 4, VertexFormat::octahedral8x2}, 2}, {{0, 3, VertexFormat::octahedral8x2}, 1}};
+  for (const auto& [attribute, unit] : cases) {
+    job().normals = attribute;
+    const std::string offset = "offset " + std::to_string(attribute.offset);
+    const std::string stride = "stride " + std::to_string(attribute.stride);
+    SCOPED_TRACE(offset + ", " + stride + " " + std::string(formatName(attribute.format)));
+    for (const bool halves : {false, true}) {
+      for (const bool bytes : {false, true}) {
+        limits.storage16Bit = halves;
+        limits.storage8Bit = bytes;
+        if (unit == 4 || (halves && (unit == 2 || bytes))) {
+          expectGood();
+          continue;
+        }
+        const char* feature =
+            unit == 2 ? "storageBuffer16BitAccess" : "storageBuffer8BitAccess and storageBuffer16";
+        expectRefused(ErrorCode::missingFeature, {"job 1", "normals", offset.c_str(),
+                                                  stride.c_str(), "multiples of 4", feature});
+      }
+    }
+  }
+}
+
+TEST_F(PlanErrors, EveryAttributeThatDoesNotFillWholeWordsNeedsThem) {
+  limits.storage16Bit = limits.storage8Bit = false;
+  job().tangents = {0, 16, VertexFormat::float32x4};
+  job().motion = Motion::kept;
+  job().previousPositions = {0, 12};
+  expectGood();
+  for (const auto& [member, name] : {std::pair{&Job::positions, "positions"},
+                                     {&Job::normals, "normals"},
+                                     {&Job::tangents, "tangents"},
+                                     {&Job::previousPositions, "previous positions"}}) {
+    OutputAttribute& attribute = job().*member;
+    attribute.offset += 2;
+    expectRefused(ErrorCode::missingFeature, {"job 1", name});
+    attribute.offset -= 2;
+  }
+}
+
+// ---- Devices with four storage buffers a stage
+
+TEST_F(PlanErrors, FewStorageBuffersMeanNoResults) {
+  job().box = {{0, 0, 0}, {1, 1, 1}};
+  for (const std::uint32_t buffers : {4u, 7u, 8u}) {
+    limits.maxStorageBuffersPerStage = buffers;
+    const std::string count = std::to_string(buffers) + " storage buffers";
+    const Job good = job();
+    expectGood();
+    job().bounds = true;
+    if (buffers == 8) {
+      expectGood();
+    } else {
+      expectRefused(ErrorCode::limitExceeded, {"job 1", "bounds", count.c_str()});
+    }
+    job() = good;
+    job().positions = {0, 8, VertexFormat::snorm16x4};
+    if (buffers == 8) {
+      expectGood();
+    } else {
+      expectRefused(ErrorCode::limitExceeded, {"job 1", "snorm16", count.c_str()});
+    }
+    job() = good;
+  }
+}
+
+// The one kernel that such devices have stores words.
+TEST_F(PlanErrors, FewStorageBuffersMeanWholeWords) {
+  limits.maxStorageBuffersPerStage = 4;
+  for (const VertexFormat format :
+       {VertexFormat::octahedral16x2, VertexFormat::octahedral8x2, VertexFormat::snorm8x3}) {
+    job().normals = {0, 4, format};
+    if (format == VertexFormat::octahedral16x2) {
+      expectGood();
+    } else {
+      expectRefused(ErrorCode::missingFeature,
+                    {"job 1", "normals", "multiples of 4", "4 storage buffers"});
+    }
+  }
+}
+
+TEST_F(PlanErrors, FewStorageBuffersMeanOneWindow) {
+  limits.maxStorageBufferRange = 65536;
+  batch.outputSize = 10 * 65536;
+  job().tangents = {100, 16, VertexFormat::float32x4};
+  job().motion = Motion::kept;
+  job().previousPositions = {200, 12};
+  for (const std::uint32_t buffers : {4u, 8u}) {
+    limits.maxStorageBuffersPerStage = buffers;
+    expectGood();
+    for (const auto& [member, name] : {std::pair{&Job::positions, "positions"},
+                                       {&Job::normals, "normals"},
+                                       {&Job::tangents, "tangents"},
+                                       {&Job::previousPositions, "previous positions"}}) {
+      const Job good = job();
+      (job().*member).offset = 9 * 65536;
+      if (buffers == 8) {
+        expectGood();
+      } else {
+        expectRefused(ErrorCode::limitExceeded, {"job 1", "too far", "4 storage buffers"});
+        // What lies far from the positions is named; far positions are far from anything.
+        if (member != &Job::positions) expectRefused(ErrorCode::limitExceeded, {name});
+      }
+      job() = good;
+    }
+  }
+}
+
+// ---- Morph targets, motion, boxes
+
+TEST_F(PlanErrors, MorphTargetsThatTheMeshLacks) {
+  job().morphs = batch.keep({{4, 1.0f}, {0, 1.0f}});
+  expectGood();
+  job().morphs = batch.keep({{0, 1.0f}, {5, 1.0f}});
+  expectInvalid({"job 1", "morph target 5", "5"});
+  job().morphs = batch.keep({{0xffffffffu, 0.0f}});  // even with weight 0
+  expectInvalid({"job 1", "morph target 4294967295"});
+}
+
+TEST_F(PlanErrors, MorphTargetsThatStandTwice) {
+  job().morphs = batch.keep({{1, 1.0f}, {1, 1.0f}});
+  expectInvalid({"job 1", "morph target 1", "twice"});
+  job().morphs = batch.keep({{3, 1.0f}, {1, 1.0f}, {2, 1.0f}, {3, 0.5f}});
+  expectInvalid({"job 1", "morph target 3", "twice"});
+  job().morphs = batch.keep({{0, 1.0f}, {1, 1.0f}, {4, 1.0f}, {0, 0.5f}});
+  expectInvalid({"job 1", "morph target 0", "twice"});
+}
+
+TEST_F(PlanErrors, MorphWeightsThatAreNotFinite) {
+  for (const float bad : {nan, infinity, -infinity}) {
+    job().morphs = batch.keep({{0, 1.0f}, {3, bad}});
+    expectInvalid({"job 1", "morph target 3", "finite"});
+  }
+}
+
+TEST_F(PlanErrors, PreviousMorphTargetsAreLookedAtWhereTheyAreUsed) {
+  job().previousPositions = {0, 12};
+  for (const auto& [morphs, text] : {std::pair{batch.keep({{5, 1.0f}}), "morph target 5"},
+                                     {batch.keep({{2, 1.0f}, {2, 1.0f}}), "twice"},
+                                     {batch.keep({{2, nan}}), "finite"}}) {
+    job().previousMorphs = morphs;
+    for (const Motion motion : {Motion::none, Motion::kept}) {
+      job().motion = motion;
+      expectGood();
+    }
+    job().motion = Motion::reskinned;
+    expectInvalid({"job 1", text});
+  }
+}
+
+TEST_F(PlanErrors, UnknownMotions) {
+  job().motion = static_cast<Motion>(3);
+  expectInvalid({"job 1", "motion"});
+}
+
+TEST_F(PlanErrors, SettlingAndRestartingNeedPreviousPositions) {
+  for (bool Job::*flag : {&Job::settles, &Job::restartsMotion}) {
+    job().*flag = true;
+    job().motion = Motion::none;
+    expectInvalid({"job 1", "previous positions"});
+    job().previousPositions = {0, 12};
+    for (const Motion motion : {Motion::kept, Motion::reskinned}) {
+      job().motion = motion;
+      expectGood();
+    }
+    job().*flag = false;
+  }
+}
+
+TEST_F(PlanErrors, PreviousPalettesAreLookedAtWhereTheyAreUsed) {
+  job().previousPositions = {0, 12};
+  batch.addPalette(6, true);
+  for (const std::uint32_t palette : {3u, 4u, 0xffffffffu}) {
+    job().previousPalette = palette;
+    job().motion = Motion::kept;
+    expectGood();
+    job().motion = Motion::reskinned;
+    if (palette == 3) {
+      expectInvalid({"job 1", "7 joints", "palette 3", "6"});
+    } else {
+      expectInvalid({"job 1", std::to_string(palette).c_str()});
+    }
+  }
+}
+
+TEST_F(PlanErrors, BoxesOfSnormPositions) {
+  const Box good{{-1, 0, 5}, {-0.5f, 1e-6f, 1e6f}};
+  for (const VertexFormat format : {VertexFormat::snorm16x4, VertexFormat::snorm16x3}) {
+    job().positions = {0, 8, format};
+    job().box = good;
+    expectGood();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const float bad : {nan, infinity, -infinity}) {
+        job().box.min[axis] = bad;
+        expectInvalid({"job 1", "box"});
+        job().box = good;
+        job().box.max[axis] = bad;
+        expectInvalid({"job 1", "box"});
+        job().box = good;
+      }
+      job().box.max[axis] = job().box.min[axis];  // empty
+      expectInvalid({"job 1", "box"});
+      job().box.max[axis] = job().box.min[axis] - 1;  // upside down
+      expectInvalid({"job 1", "box"});
+      job().box = good;
+    }
+  }
+  job().positions.format = VertexFormat::float16x3;
+  job().box = {{nan, nan, nan}, {0, 0, 0}};
+  expectGood();
+}
+
+// ---- Sizes and limits
+
+TEST_F(PlanErrors, Tunings) {
+  for (const std::uint32_t size : {8u, 16u, 32u, 64u, 128u}) {
+    tuning.workgroupSize = size;
+    expectGood();
+  }
+  for (const std::uint32_t size : {0u, 1u, 4u, 9u, 65u, 96u, 256u, 0x80000000u}) {
+    tuning.workgroupSize = size;
+    expectInvalid({"tuning", "workgroup"});
+  }
+  tuning = {};
+  for (const std::uint32_t instances : {1u, 5u, 16u}) {
+    tuning.instancesPerInvocation = instances;
+    expectGood();
+  }
+  for (const std::uint32_t instances : {0u, 17u, 256u, 257u}) {
+    tuning.instancesPerInvocation = instances;
+    expectInvalid({"tuning", "instances"});
+  }
+}
+
+TEST_F(PlanErrors, TooManyWorkgroups) {
+  limits.maxWorkgroupCountX = 2;
+  limits.maxWorkgroupCountY = 1;
+  expectRefused(ErrorCode::limitExceeded, {"workgroups", "3"});
+  limits.maxWorkgroupCountY = 2;
+  expectGood();
+}
+
+TEST_F(PlanErrors, BuffersLargerThanARange) {
+  batch.addMesh(meshOf(30, 1, 1, true));
+  limits.maxStorageBufferRange = batch.meshesSize;
+  ASSERT_GT(batch.meshesSize, batch.matricesSize);
+  expectGood();
+  limits.maxStorageBufferRange = batch.meshesSize - 16;
+  expectRefused(ErrorCode::limitExceeded, {"range"});
+  limits.maxStorageBufferRange = batch.meshesSize;
+  batch.matricesSize = batch.meshesSize + 16;
+  expectRefused(ErrorCode::limitExceeded, {"range"});
+}
+
+TEST_F(PlanErrors, PalettesLargerThanARange) {
+  // 48 bytes a matrix become 64 where a joint may scale.
+  batch.addPalette(1000, true);
+  batch.jobs[2].palette = 3;
+  limits.maxStorageBufferRange = 63000;
+  expectRefused(ErrorCode::limitExceeded, {"range"});
+  batch.palettes[3].mayScale = false;
+  expectGood();
+}
+
+TEST_F(PlanErrors, TablesLargerThanARange) {
+  const Job good = job();
+  batch.jobs.clear();
+  batch.outputSize = 0;
+  for (int instance = 0; instance < 2000; ++instance) {
+    batch.jobs.push_back(good);
+    batch.jobs.back().positions.offset = batch.jobs.back().normals.offset = 0;
+    batch.jobs.back().method = Method::linear;
+  }
+  batch.outputSize = 240;
+  limits.maxStorageBufferRange = 62000;  // 32 bytes an instance
+  expectRefused(ErrorCode::limitExceeded, {"tables"});
+  batch.jobs.resize(1800);
+  expectGood();
+}
+
+// An engine that forgot to fill the limits gets an error, not a division by zero.
+TEST_F(PlanErrors, LimitsThatNoDeviceHas) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto planned = [&](const DeviceLimits& bad) {
+    Plan out;
+    const Result<void> result = makePlan(batch.batch(), bad, {}, out);
+    std::exit(result.ok() ? 1 : 0);
+  };
+  DeviceLimits bad;
+  bad.maxWorkgroupCountX = 0;
+  EXPECT_EXIT(planned(bad), ::testing::ExitedWithCode(0), "");
+  bad = {};
+  bad.maxStorageBufferRange = 0;
+  EXPECT_EXIT(planned(bad), ::testing::ExitedWithCode(0), "");
+  batch.outputSize = std::uint64_t{1} << 30;
+  for (const std::uint32_t alignment : {1u << 27, 1u << 28, 1u << 30}) {
+    bad = {};
+    bad.minStorageBufferOffsetAlignment = alignment;
+    EXPECT_EXIT(planned(bad), ::testing::ExitedWithCode(0), "") << alignment;
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

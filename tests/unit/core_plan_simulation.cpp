@@ -1,0 +1,584 @@
+#include "core_plan_simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <set>
+#include <utility>
+
+#include "abi.h"
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::size_t previousStream = static_cast<std::size_t>(Stream::previousPositions);
+
+std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
+  return (value + divisor - 1) / divisor;
+}
+
+/// The most bytes that a store may write, so that nothing else is touched.
+std::uint8_t unitOf(const OutputAttribute& attribute) {
+  for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{4, 2}) {
+    if (attribute.offset % unit == 0 && attribute.stride % unit == 0 &&
+        formatSize(attribute.format) % unit == 0)
+      return unit;
+  }
+  return 1;
+}
+
+bool isMorphed(const Job& job) {
+  return !activeMorphs(job.morphs).empty() ||
+         (job.motion == Motion::reskinned && !activeMorphs(job.previousMorphs).empty());
+}
+
+class Simulation {
+ public:
+  Simulation(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
+             const Plan& plan)
+      : batch_(batch), limits_(limits), tuning_(tuning), plan_(plan), tables_(tablesOf(plan)) {
+    const OutputSizes outputs = batch.batch().outputs;
+    sizes_ = {outputs.positions, outputs.normals, outputs.tangents, outputs.previousPositions};
+    for (std::uint32_t index = 0; index < batch.jobs.size(); ++index) {
+      begins_.push_back({batch.jobs[index].positions.offset, index});
+      written_.emplace_back(batch.jobs[index].mesh.vertexCount, std::uint8_t{0});
+      if (wantsResult(batch.jobs[index])) ++resultCount_;
+    }
+    std::sort(begins_.begin(), begins_.end());
+  }
+
+  void run() {
+    ASSERT_NO_FATAL_FAILURE(checkResults());
+    std::vector<Variant> used;
+    for (const Dispatch& dispatch : plan_.dispatches()) {
+      ASSERT_NO_FATAL_FAILURE(checkDispatch(dispatch));
+      if (std::find(used.begin(), used.end(), dispatch.variant) == used.end())
+        used.push_back(dispatch.variant);
+      if (dispatch.variant.kernel == Kernel::palette) {
+        ASSERT_FALSE(palettesDone_) << "one dispatch for all palettes";
+        palettesDone_ = true;
+        ASSERT_FALSE(dispatch.afterPalettes);
+        ASSERT_NO_FATAL_FAILURE(runPalettes(dispatch));
+      } else {
+        ASSERT_NO_FATAL_FAILURE(runSkin(dispatch));
+      }
+    }
+    ASSERT_NO_FATAL_FAILURE(checkAllWritten());
+    ASSERT_TRUE(std::ranges::equal(plan_.variants(), used));
+  }
+
+ private:
+  std::uint32_t word(std::uint64_t index) const { return tables_.at(index); }
+  float number(std::uint64_t index) const { return std::bit_cast<float>(word(index)); }
+
+  void checkResults() {
+    std::uint64_t next = 0;
+    for (std::uint32_t index = 0; index < batch_.jobs.size(); ++index) {
+      const bool wanted = wantsResult(batch_.jobs[index]);
+      ASSERT_EQ(plan_.resultOffset(index), wanted ? next : Plan::noResult) << index;
+      if (wanted) next += sizeof(InstanceResult);
+    }
+    ASSERT_EQ(plan_.buffer(BufferRole::results).size, next);
+    ASSERT_EQ(plan_.resultOffset(static_cast<std::uint32_t>(batch_.jobs.size())), Plan::noResult);
+  }
+
+  void checkAllWritten() {
+    std::uint64_t vertices = 0;
+    for (std::size_t index = 0; index < batch_.jobs.size(); ++index) {
+      const Job& job = batch_.jobs[index];
+      const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
+      std::uint8_t expected = 0;
+      for (std::size_t stream = 0; stream < streamCount; ++stream) {
+        if (attributes[stream].format == VertexFormat::none) continue;
+        if (!job.settles || stream == previousStream)
+          expected = static_cast<std::uint8_t>(expected | 1u << stream);
+      }
+      const auto isExpected = [&](std::uint8_t streams) { return streams == expected; };
+      ASSERT_TRUE(std::all_of(written_[index].begin(), written_[index].end(), isExpected))
+          << "job " << index << " lacks something";
+      vertices += job.mesh.vertexCount;
+    }
+    ASSERT_EQ(plan_.vertexCount(), vertices);
+    ASSERT_EQ(plan_.instanceCount(), batch_.jobs.size());
+  }
+
+  void checkDispatch(const Dispatch& dispatch) {
+    const std::uint64_t groups = std::uint64_t{dispatch.groupCountX} * dispatch.groupCountY;
+    ASSERT_GE(dispatch.groupCountX, 1u);
+    ASSERT_LE(dispatch.groupCountX, limits_.maxWorkgroupCountX);
+    ASSERT_LE(dispatch.groupCountY, limits_.maxWorkgroupCountY);
+    ASSERT_GE(groups, dispatch.constants.workgroupCount);
+    // Hardly any workgroup is started in vain.
+    ASSERT_LT(groups, std::uint64_t{dispatch.constants.workgroupCount} + dispatch.groupCountY);
+    ASSERT_EQ(dispatch.variant.workgroupSize, tuning_.workgroupSize);
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const OutputWindow& window = dispatch.windows[stream];
+      ASSERT_EQ(window.offset, window.index * outputWindowStep(limits_));
+      ASSERT_EQ(window.offset % limits_.minStorageBufferOffsetAlignment, 0u);
+      if (sizes_[stream] <= limits_.maxStorageBufferRange) {
+        ASSERT_EQ(window.index, 0u);
+      }
+    }
+  }
+
+  void runPalettes(const Dispatch& dispatch) {
+    const DispatchConstants& constants = dispatch.constants;
+    std::set<std::uint32_t> wanted;
+    for (const Job& job : batch_.jobs) {
+      if (job.method != Method::dualQuaternion) continue;
+      wanted.insert(job.palette);
+      if (job.motion == Motion::reskinned) wanted.insert(job.previousPalette);
+    }
+    ASSERT_EQ(constants.recordCount, wanted.size());
+    ASSERT_EQ(constants.instanceRecords, resultCount_);
+    ASSERT_EQ(constants.workgroupCount,
+              wanted.size() + divideUp(resultCount_, tuning_.workgroupSize));
+    std::uint64_t end = 0;
+    for (std::uint32_t number = 0; number < constants.recordCount; ++number) {
+      const std::uint64_t record = constants.firstRecord + number * abi::PALETTE_WORDS;
+      const std::uint64_t status = std::uint64_t{word(record + abi::PALETTE_OUTPUT)} * 16;
+      const auto found = std::find_if(wanted.begin(), wanted.end(), [&](std::uint32_t palette) {
+        return plan_.statusOffset(palette) == status;
+      });
+      ASSERT_NE(found, wanted.end());
+      const Palette& palette = batch_.palettes[*found];
+      wanted.erase(found);
+      ASSERT_EQ(std::uint64_t{word(record + abi::PALETTE_MATRICES)} * 16, palette.matrixOffset);
+      ASSERT_EQ(word(record + abi::PALETTE_JOINTS), palette.jointCount);
+      ASSERT_EQ(word(record + abi::PALETTE_MAY_SCALE), palette.mayScale ? 1u : 0u);
+      ASSERT_GE(status, end) << "palettes overlap";
+      end = status + 16 + std::uint64_t{palette.jointCount} * (palette.mayScale ? 64 : 32);
+      ASSERT_LE(end, plan_.buffer(BufferRole::palettes).size);
+    }
+    ASSERT_TRUE(wanted.empty());
+    ASSERT_EQ(end, plan_.buffer(BufferRole::palettes).size);
+  }
+
+  void runSkin(const Dispatch& dispatch) {
+    const DispatchConstants& constants = dispatch.constants;
+    ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
+    for (std::uint32_t number = 0; number < constants.workgroupCount; ++number) {
+      // The first group whose end lies behind the workgroup's number.
+      std::uint32_t index = 0, begin = 0, end = 0;
+      for (;; ++index) {
+        ASSERT_LT(index, constants.recordCount) << "workgroup " << number << " has no group";
+        begin = end;
+        end = word(std::uint64_t{constants.firstRecord} + index * abi::GROUP_WORDS +
+                   abi::GROUP_WORKGROUP_END);
+        ASSERT_GT(end, begin) << "an empty group";
+        if (number < end) break;
+      }
+      ASSERT_NO_FATAL_FAILURE(
+          runWorkgroup(dispatch, constants.firstRecord + index * abi::GROUP_WORDS, number - begin));
+    }
+  }
+
+  void runWorkgroup(const Dispatch& dispatch, std::uint32_t group, std::uint32_t local) {
+    const std::uint32_t vertexGroups = word(group + abi::GROUP_VERTEX_GROUPS);
+    const std::uint32_t firstVertex = word(group + abi::GROUP_FIRST_VERTEX);
+    const std::uint32_t vertexEnd = word(group + abi::GROUP_VERTEX_END);
+    const std::uint32_t instancesEach = dispatch.variant.instancesPerInvocation;
+    const std::uint32_t firstInstance = local / vertexGroups * instancesEach;
+    const std::uint32_t instanceCount = word(group + abi::GROUP_INSTANCE_COUNT);
+    ASSERT_LT(firstInstance, instanceCount) << "an idle workgroup";
+    const std::uint32_t firstRun = local % vertexGroups * dispatch.variant.workgroupSize;
+    ASSERT_LT(firstVertex + firstRun, vertexEnd) << "an idle workgroup";
+    const std::uint32_t runEnd =
+        std::min(firstRun + dispatch.variant.workgroupSize, vertexEnd - firstVertex);
+    for (std::uint32_t instance = firstInstance;
+         instance < std::min(firstInstance + instancesEach, instanceCount); ++instance) {
+      const std::uint64_t record =
+          std::uint64_t{dispatch.constants.instanceRecords} +
+          (word(group + abi::GROUP_FIRST_INSTANCE) + instance) * abi::INSTANCE_WORDS;
+      std::uint32_t job = 0;
+      ASSERT_NO_FATAL_FAILURE(findJob(dispatch, record, firstVertex, job));
+      ASSERT_NO_FATAL_FAILURE(checkVariant(dispatch, batch_.jobs[job]));
+      ASSERT_NO_FATAL_FAILURE(checkRecord(group, record, job));
+      ASSERT_NO_FATAL_FAILURE(checkExtension(record, job));
+      for (std::size_t stream = 0; stream < streamCount; ++stream) {
+        ASSERT_NO_FATAL_FAILURE(
+            writeStream(dispatch, group, record, job, stream, {firstVertex, firstRun, runEnd}));
+      }
+    }
+  }
+
+  /// The job whose positions the record points at.
+  void findJob(const Dispatch& dispatch, std::uint64_t record, std::uint32_t firstVertex,
+               std::uint32_t& index) {
+    const std::uint64_t place = dispatch.windows[0].offset + word(record + abi::INSTANCE_POSITIONS);
+    const auto behind =
+        std::upper_bound(begins_.begin(), begins_.end(), std::pair{place, ~std::uint32_t{0}});
+    ASSERT_NE(behind, begins_.begin()) << "a write that no job asked for";
+    index = std::prev(behind)->second;
+    const OutputAttribute& positions = batch_.jobs[index].positions;
+    ASSERT_EQ(place, positions.offset + std::uint64_t{firstVertex} * positions.stride);
+  }
+
+  void checkVariant(const Dispatch& dispatch, const Job& job) {
+    const Variant& variant = dispatch.variant;
+    ASSERT_EQ(variant.method, job.method);
+    ASSERT_EQ(variant.positions, job.positions.format);
+    ASSERT_EQ(variant.normals, job.normals.format);
+    ASSERT_EQ(variant.tangents, job.tangents.format);
+    ASSERT_EQ(variant.motion, job.motion);
+    ASSERT_EQ(variant.bounds, job.bounds);
+    ASSERT_EQ(variant.morphs, isMorphed(job));
+    ASSERT_TRUE(variant.influences == 0 || variant.influences >= job.mesh.maxInfluences);
+    const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const bool isWanted = attributes[stream].format != VertexFormat::none;
+      ASSERT_EQ(variant.units[stream], isWanted ? unitOf(attributes[stream]) : 4);
+      if (!isWanted) {
+        ASSERT_EQ(dispatch.windows[stream].index, 0u);
+      } else if (limits_.maxStorageBuffersPerStage < storageBuffersWanted) {
+        ASSERT_EQ(dispatch.windows[stream].index, dispatch.windows[0].index);
+      }
+    }
+    // It waits for what it reads or adds to, and for nothing else.
+    const bool reads = job.method == Method::dualQuaternion || wantsResult(job);
+    ASSERT_EQ(dispatch.afterPalettes, reads);
+    ASSERT_TRUE(palettesDone_ || !reads);
+  }
+
+  std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
+    return method == Method::linear ? batch_.palettes[palette].matrixOffset
+                                    : plan_.statusOffset(palette);
+  }
+
+  void checkRecord(std::uint32_t group, std::uint64_t record, std::uint32_t index) {
+    const Job& job = batch_.jobs[index];
+    ASSERT_EQ(std::uint64_t{word(group + abi::GROUP_MESH)} * 4, job.meshOffset);
+    ASSERT_EQ(word(record + abi::INSTANCE_JOINTS), batch_.palettes[job.palette].jointCount);
+    ASSERT_EQ(std::uint64_t{word(record + abi::INSTANCE_PALETTE)} * 16,
+              paletteBytes(job.method, job.palette));
+    ASSERT_EQ(word(record + abi::INSTANCE_FLAGS),
+              (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
+                  (job.settles ? abi::INSTANCE_SETTLES : 0u));
+  }
+
+  void checkMorphs(std::uint64_t first, std::uint32_t count, std::span<const MorphWeight> morphs) {
+    const std::vector<MorphWeight> expected = activeMorphs(morphs);
+    ASSERT_EQ(count, expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_EQ(word(first + i * abi::ACTIVE_WORDS + abi::ACTIVE_TARGET), expected[i].target);
+      ASSERT_EQ(number(first + i * abi::ACTIVE_WORDS + abi::ACTIVE_WEIGHT), expected[i].weight);
+    }
+  }
+
+  void checkExtension(std::uint64_t record, std::uint32_t index) {
+    const Job& job = batch_.jobs[index];
+    const std::uint64_t extension = word(record + abi::INSTANCE_EXTENSION);
+    if (!wantsResult(job) && job.motion != Motion::reskinned && !isMorphed(job)) {
+      ASSERT_EQ(extension, 0u) << "what the instance does not need costs words";
+      return;
+    }
+    ASSERT_GT(extension, record);
+    ASSERT_LE(extension + abi::EXTENSION_WORDS, tables_.size());
+    ASSERT_NO_FATAL_FAILURE(checkMorphs(word(extension + abi::EXTENSION_MORPHS),
+                                        word(extension + abi::EXTENSION_MORPH_COUNT), job.morphs));
+    if (job.motion == Motion::reskinned) {
+      ASSERT_EQ(std::uint64_t{word(extension + abi::EXTENSION_PREVIOUS_PALETTE)} * 16,
+                paletteBytes(job.method, job.previousPalette));
+      ASSERT_EQ(word(extension + abi::EXTENSION_PREVIOUS_JOINTS),
+                batch_.palettes[job.previousPalette].jointCount);
+      ASSERT_NO_FATAL_FAILURE(checkMorphs(word(extension + abi::EXTENSION_PREVIOUS_MORPHS),
+                                          word(extension + abi::EXTENSION_PREVIOUS_MORPH_COUNT),
+                                          job.previousMorphs));
+    }
+    if (wantsResult(job)) {
+      ASSERT_EQ(std::uint64_t{word(extension + abi::EXTENSION_RESULT)} * 4,
+                plan_.resultOffset(index));
+    }
+    if (job.positions.format != VertexFormat::snorm16x3 &&
+        job.positions.format != VertexFormat::snorm16x4)
+      return;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double low = static_cast<double>(job.box.min[axis]);
+      const double high = static_cast<double>(job.box.max[axis]);
+      ASSERT_EQ(number(extension + abi::EXTENSION_CENTRE + axis),
+                static_cast<float>((low + high) / 2));
+      ASSERT_EQ(number(extension + abi::EXTENSION_INVERSE + axis),
+                static_cast<float>(2 / (high - low)));
+    }
+  }
+
+  struct Run {
+    std::uint32_t firstVertex;  ///< of the group
+    std::uint32_t begin, end;   ///< the workgroup's vertices, from there
+  };
+
+  void writeStream(const Dispatch& dispatch, std::uint32_t group, std::uint64_t record,
+                   std::uint32_t index, std::size_t stream, const Run& run) {
+    const Job& job = batch_.jobs[index];
+    const OutputAttribute attribute = attributesOf(job)[stream];
+    if (attribute.format == VertexFormat::none) return;
+    const std::uint64_t window = dispatch.windows[stream].offset;
+    ASSERT_LE(window, sizes_[stream]);
+    const std::uint64_t range = std::min(limits_.maxStorageBufferRange, sizes_[stream] - window);
+    const std::uint32_t stride = word(group + abi::GROUP_POSITION_STRIDE + stream);
+    for (std::uint32_t i = run.begin; i < run.end; ++i) {
+      const std::uint64_t place =
+          word(record + abi::INSTANCE_POSITIONS + stream) + std::uint64_t{i} * stride;
+      const std::uint32_t vertex = run.firstVertex + i;
+      ASSERT_EQ(window + place, attribute.offset + std::uint64_t{vertex} * attribute.stride)
+          << "job " << index << ", stream " << stream << ", vertex " << vertex;
+      ASSERT_LE(place + formatSize(attribute.format), range) << "outside the output range";
+      ASSERT_EQ(place % dispatch.variant.units[stream], 0u);
+      if (job.settles && stream != previousStream) continue;  // positions are read
+      std::uint8_t& streams = written_[index].at(vertex);
+      ASSERT_EQ(streams & 1u << stream, 0u) << "a vertex is skinned twice";
+      streams = static_cast<std::uint8_t>(streams | 1u << stream);
+    }
+  }
+
+  const OwnedBatch& batch_;
+  const DeviceLimits& limits_;
+  const Tuning& tuning_;
+  const Plan& plan_;
+  std::vector<std::uint32_t> tables_;
+  std::array<std::uint64_t, streamCount> sizes_{};
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> begins_;  ///< of positions, and the job
+  std::vector<std::vector<std::uint8_t>> written_;  ///< by job and vertex: a bit a stream
+  std::uint64_t resultCount_ = 0;
+  bool palettesDone_ = false;
+};
+
+}  // namespace
+
+PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_t joints,
+                  MeshParts parts) {
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = influences;
+  mesh.positions.assign(std::size_t{vertices} * 3, 1.0f);
+  if (parts.normals) mesh.normals.assign(std::size_t{vertices} * 3, 1.0f);
+  for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+    for (std::uint32_t slot = 0; slot < influences; ++slot) {
+      mesh.joints.push_back(joints - 1 - slot % joints);
+      mesh.weights.push_back(1.0f / static_cast<float>(influences));
+    }
+  }
+  MeshView view = mesh.view();
+  const std::vector<float> tangents(std::size_t{vertices} * 4, 1.0f);
+  if (parts.tangents) view.tangents = floatAttribute(tangents.data(), vertices, 4);
+  const std::vector<MorphTargetView> targets(parts.morphTargets);
+  view.morphTargets = targets;
+  Result<PackedMesh> packed = pack(view, joints);
+  EXPECT_TRUE(packed.ok());
+  return std::move(*packed);
+}
+
+PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_t joints,
+                  bool normals) {
+  return meshOf(vertices, influences, joints, MeshParts{normals, false, 0});
+}
+
+void OwnedBatch::addMesh(PackedMesh mesh) {
+  meshOffsets.push_back(meshesSize);
+  meshesSize += mesh.bytes().size();
+  meshes.push_back(std::move(mesh));
+}
+
+void OwnedBatch::addPalette(std::uint32_t joints, bool mayScale) {
+  palettes.push_back({joints, matricesSize, mayScale});
+  matricesSize += std::uint64_t{joints} * 48;
+}
+
+Job OwnedBatch::jobOf(std::uint32_t mesh, std::uint32_t palette, Method method) const {
+  Job job;
+  job.mesh = meshes[mesh].info();
+  job.meshOffset = meshOffsets[mesh];
+  job.palette = palette;
+  job.method = method;
+  job.positions.format = VertexFormat::float32x3;
+  return job;
+}
+
+Job& OwnedBatch::addJob(std::uint32_t mesh, std::uint32_t palette, Method method, bool normals,
+                        std::uint32_t stride) {
+  Job job = jobOf(mesh, palette, method);
+  job.positions = {outputSize, stride, VertexFormat::float32x3};
+  if (normals) job.normals = {outputSize + 12, stride, VertexFormat::float32x3};
+  outputSize += std::uint64_t{job.mesh.vertexCount} * stride;
+  jobs.push_back(job);
+  return jobs.back();
+}
+
+Job& OwnedBatch::place(Job job, Arrangement arrangement, std::uint32_t gap) {
+  hasSeparateOutputs = hasSeparateOutputs || arrangement == Arrangement::separate;
+  const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
+  const std::array<OutputAttribute*, streamCount> places{&job.positions, &job.normals,
+                                                         &job.tangents, &job.previousPositions};
+  const std::uint64_t vertices = job.mesh.vertexCount;
+  std::uint32_t inVertex = 0;
+  std::uint32_t vertexSize = gap;
+  for (const OutputAttribute& attribute : attributes) vertexSize += formatSize(attribute.format);
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    const std::uint32_t size = formatSize(attributes[stream].format);
+    if (size == 0) continue;
+    if (arrangement == Arrangement::interleaved) {
+      places[stream]->offset = outputSize + inVertex;
+      places[stream]->stride = vertexSize;
+      inVertex += size;
+    } else {
+      std::uint64_t& end = endOf(stream);
+      places[stream]->offset = end;
+      places[stream]->stride = size + gap;
+      end += vertices * (size + gap);
+      end += (4 - end % 4) % 4;
+    }
+  }
+  if (arrangement == Arrangement::interleaved) outputSize += vertices * vertexSize;
+  jobs.push_back(job);
+  return jobs.back();
+}
+
+std::span<const MorphWeight> OwnedBatch::keep(std::vector<MorphWeight> morphs) {
+  return morphLists_.emplace_back(std::move(morphs));
+}
+
+Batch OwnedBatch::batch() const {
+  return {palettes, jobs, meshesSize, matricesSize,
+          hasSeparateOutputs
+              ? OutputSizes{separateSizes[0], separateSizes[1], separateSizes[2], separateSizes[3]}
+              : OutputSizes::oneBuffer(outputSize)};
+}
+
+void addMeshes(OwnedBatch& batch) {
+  batch.addMesh(meshOf(1, 1, 3, true));
+  batch.addMesh(meshOf(63, 2, 5, false));
+  batch.addMesh(meshOf(64, 4, 5, MeshParts{true, true, 3}));
+  batch.addMesh(meshOf(65, 8, 5, MeshParts{true, true, 9}));
+  batch.addMesh(meshOf(1234, 3, 5, MeshParts{true, false, 5}));
+}
+
+void addPalettes(OwnedBatch& batch) {
+  for (const std::uint32_t joints : {5u, 9u, 300u, 7u}) batch.addPalette(joints, joints % 2 == 1);
+}
+
+OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
+  std::mt19937 engine(seed);
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  // The same mesh may stand twice in the mesh buffer.
+  batch.meshesSize += 16;
+  batch.addMesh(meshOf(64, 4, 5, true));
+  for (std::uint32_t index = 0; index < jobs; ++index) {
+    batch.outputSize += engine() % 5 * 4;
+    const auto mesh = static_cast<std::uint32_t>(engine() % batch.meshes.size());
+    const bool normals = batch.meshes[mesh].info().hasNormals && engine() % 3 != 0;
+    const std::uint32_t stride = (normals ? 24 : 12) + static_cast<std::uint32_t>(engine() % 3) * 4;
+    Job& job =
+        batch.addJob(mesh, static_cast<std::uint32_t>(engine() % 4),
+                     engine() % 2 == 0 ? Method::linear : Method::dualQuaternion, normals, stride);
+    if (!normals || engine() % 2 == 0) continue;
+    // Planar: first all positions, then all normals with a stride of their own.
+    const std::uint32_t vertices = job.mesh.vertexCount;
+    job.positions.stride = 12 + static_cast<std::uint32_t>(engine() % 2) * 4;
+    job.normals.offset = job.positions.offset + std::uint64_t{vertices} * job.positions.stride;
+    job.normals.stride = 12 + static_cast<std::uint32_t>(engine() % 3) * 4;
+    batch.outputSize = job.normals.offset + std::uint64_t{vertices} * job.normals.stride;
+  }
+  return batch;
+}
+
+namespace {
+
+/// Some of the targets in random order, some of them with weight 0.
+std::vector<MorphWeight> randomMorphs(std::mt19937& engine, std::uint32_t targets) {
+  std::vector<MorphWeight> morphs;
+  for (std::uint32_t target = 0; target < targets; ++target) {
+    if (engine() % 2 == 0)
+      morphs.push_back({target, static_cast<float>(engine() % 4) / 2.0f - 0.5f});
+  }
+  std::shuffle(morphs.begin(), morphs.end(), engine);
+  return morphs;
+}
+
+VertexFormat anyFormat(std::mt19937& engine, bool (*isAllowed)(VertexFormat)) {
+  for (;;) {
+    const VertexFormat format = allVertexFormats[engine() % allVertexFormats.size()];
+    if (isAllowed(format)) return format;
+  }
+}
+
+}  // namespace
+
+OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate) {
+  std::mt19937 engine(seed);
+  const auto below = [&](std::uint32_t count) {
+    return static_cast<std::uint32_t>(engine()) % count;
+  };
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPalettes(batch);
+  for (std::uint32_t index = 0; index < jobs; ++index) {
+    Job job = batch.jobOf(below(5), below(4), allMethods[below(2)]);
+    job.positions.format = anyFormat(engine, isPositionFormat);
+    if (job.mesh.hasNormals && below(3) != 0)
+      job.normals.format = anyFormat(engine, isNormalFormat);
+    if (job.mesh.hasTangents && below(3) != 0)
+      job.tangents.format = anyFormat(engine, isTangentFormat);
+    job.box = {{-1, -2, -3}, {4, 5, static_cast<float>(6 + below(9))}};
+    job.bounds = below(3) == 0;
+    job.motion = static_cast<Motion>(below(3));
+    job.restartsMotion = job.motion != Motion::none && below(4) == 0;
+    job.settles = job.motion != Motion::none && below(4) == 0;
+    job.previousPalette = job.motion == Motion::reskinned ? below(4) : 1000;
+    if (below(2) == 0) {
+      job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
+      job.previousMorphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
+    }
+    batch.place(job,
+                separate        ? Arrangement::separate
+                : below(2) == 0 ? Arrangement::planar
+                                : Arrangement::interleaved,
+                below(4));
+  }
+  return batch;
+}
+
+DeviceLimits richLimits() {
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.storage16Bit = limits.storage8Bit = true;
+  return limits;
+}
+
+std::array<OutputAttribute, streamCount> attributesOf(const Job& job) {
+  OutputAttribute previous = job.previousPositions;
+  previous.format = job.motion == Motion::none ? VertexFormat::none : job.positions.format;
+  return {job.positions, job.normals, job.tangents, previous};
+}
+
+bool wantsResult(const Job& job) {
+  return job.bounds || job.positions.format == VertexFormat::snorm16x3 ||
+         job.positions.format == VertexFormat::snorm16x4;
+}
+
+std::vector<MorphWeight> activeMorphs(std::span<const MorphWeight> morphs) {
+  std::vector<MorphWeight> active;
+  for (const MorphWeight& morph : morphs) {
+    if (morph.weight != 0) active.push_back(morph);
+  }
+  std::sort(active.begin(), active.end(),
+            [](const MorphWeight& a, const MorphWeight& b) { return a.target < b.target; });
+  return active;
+}
+
+std::vector<std::uint32_t> tablesOf(const Plan& plan) {
+  std::vector<std::uint32_t> words(plan.buffer(BufferRole::tables).size / 4);
+  EXPECT_TRUE(writeTables(plan, std::as_writable_bytes(std::span(words))).ok());
+  return words;
+}
+
+void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                   Plan& out) {
+  const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  Simulation(batch, limits, tuning, out).run();
+}
+
+}  // namespace dermis::test
