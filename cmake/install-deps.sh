@@ -9,7 +9,7 @@ libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
 glslang-dev glslang-tools spirv-tools
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
-libgtest-dev
+libgtest-dev libbenchmark-dev
 "
 
 if ! command -v dpkg-query >/dev/null 2>&1; then

@@ -1,0 +1,40 @@
+// A batch that stays on a device, to be skinned again and again.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "batch_layout.h"
+#include "buffer.h"
+#include "dermis/vulkan/context.h"
+#include "open_device.h"
+
+namespace dermis::bench {
+
+/// The device of this process; nothing where there is none, which has then been said on standard
+/// error. DERMIS_DEVICE in the environment names another than the best.
+samples::OpenDevice* benchDevice();
+
+class BenchScene {
+ public:
+  /// Ends the process with a message where the batch cannot be skinned: there is nothing to measure
+  /// then.
+  BenchScene(samples::OpenDevice& open, std::span<const samples::SkinRequest> requests,
+             const samples::OutputLayout& output, const Tuning& tuning);
+
+  /// Submits the batch, waits, and returns the seconds that both took.
+  double skin();
+
+  std::uint64_t vertexCount() const { return plan_.vertexCount(); }
+
+ private:
+  samples::OpenDevice& open_;
+  samples::BatchLayout layout_;
+  Plan plan_;
+  samples::MappedBuffer meshes_, matrices_, tables_, palettes_, results_, output_;
+  std::optional<vulkan::Bindings> bindings_;
+  VkCommandBuffer commandBuffer_ = VK_NULL_HANDLE;
+};
+
+}  // namespace dermis::bench
