@@ -85,13 +85,14 @@ OutputCase chooseOutput(Choice& choice) {
 
 /// Cuts a case down to what the device can store.
 OutputCase storable(OutputCase output, const DeviceLimits& limits) {
-  const std::uint32_t unit = !limits.storage16Bit ? 4 : !limits.storage8Bit ? 2 : 1;
+  const bool fewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
+  const std::uint32_t unit = fewBuffers || !limits.storage16Bit ? 4 : !limits.storage8Bit ? 2 : 1;
   OutputLayout& layout = output.layout;
   for (VertexFormat* format : {&layout.positions, &layout.normals, &layout.tangents}) {
     if (formatSize(*format) % unit != 0) *format = VertexFormat::float32x4;
   }
   layout.gap = (layout.gap + unit - 1) / unit * unit;
-  if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+  if (fewBuffers) {
     if (layout.arrangement == Arrangement::separate) layout.arrangement = Arrangement::planar;
     if (layout.positions == VertexFormat::snorm16x4) layout.positions = VertexFormat::float16x4;
     layout.bounds = false;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "intercepted_device.h"
 #include "test_device.h"
 #include "verification_product.h"
 
@@ -11,10 +12,12 @@ namespace {
 
 class ProductTest : public DeviceTest {
  protected:
-  void verifyAll(vulkan::Context& context) {
+  /// One case in every `step`.
+  void verify(vulkan::Context& context, std::size_t step) {
     const std::vector<samples::RandomCase> cases = samples::randomCases(context.limits());
     EXPECT_GE(cases.size(), 77u) << "every two formats of positions, normals and tangents meet";
-    for (const samples::RandomCase& random : cases) {
+    for (std::size_t index = 0; index < cases.size(); index += step) {
+      const samples::RandomCase& random = cases[index];
       SCOPED_TRACE(random.inputName() + " -> " + random.output.name() + ", " +
                    std::string(methodName(random.method)));
       const Result<std::vector<samples::VerifiedInstance>> verified =
@@ -30,7 +33,31 @@ class ProductTest : public DeviceTest {
 };
 
 TEST_F(ProductTest, EveryCombinationIsInsideItsBounds) {
-  verifyAll(context());
+  verify(context(), 1);
+}
+
+TEST_F(ProductTest, WithoutPushDescriptors) {
+  useDevice(false);
+  verify(context(), 4);
+}
+
+TEST_F(ProductTest, WithoutStoresOfLessThanAWord) {
+  vulkan::DeviceDescription description = device().description();
+  description.enabledFeatures = nullptr;
+  Result<vulkan::Context> words = vulkan::Context::create(description);
+  ASSERT_TRUE(words.ok()) << words.error().message;
+  ASSERT_FALSE(words->limits().storage16Bit);
+  verify(*words, 4);
+}
+
+TEST_F(ProductTest, WithTheFourStorageBuffersThatEveryDeviceHas) {
+  InterceptedDevice few(device().description());
+  few.changeLimits(
+      [](VkPhysicalDeviceLimits& limits) { limits.maxPerStageDescriptorStorageBuffers = 4; });
+  Result<vulkan::Context> four = vulkan::Context::create(few.description());
+  ASSERT_TRUE(four.ok()) << four.error().message;
+  ASSERT_EQ(four->limits().maxStorageBuffersPerStage, 4u);
+  verify(*four, 4);
 }
 
 }  // namespace
