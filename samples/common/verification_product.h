@@ -45,12 +45,13 @@ struct VerifiedInstance {
 };
 
 /// Skins a batch as the case says and holds all of it against the reference: attributes, previous
-/// positions (frames before and after too), bounds, clamped vertices; and that every byte of an
-/// attribute, and no other, was written. With `alone`, also that each instance comes out to the bit
-/// when it is skinned without the others. Fails where the batch cannot be skinned.
+/// positions (frames before and after too), bounds, clamped vertices; and that no byte outside the
+/// attributes was touched. Where it is to be thorough, also that every byte of them was written,
+/// and that each instance comes out to the bit when it is skinned without the others. Fails where
+/// the batch cannot be skinned.
 Result<std::vector<VerifiedInstance>> verifyBatch(Device& device, vulkan::Context& context,
                                                   std::span<const InstanceToVerify> instances,
-                                                  const OutputCase& output, bool alone = false);
+                                                  const OutputCase& output, bool thorough = false);
 
 /// A random mesh in some input formats, with an awkward number of vertices, and an output.
 struct RandomCase {
