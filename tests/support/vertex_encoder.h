@@ -23,9 +23,10 @@ inline void appendBits(EncodedVertex& encoded, std::uint32_t bits, std::uint32_t
   }
 }
 
-/// The binary16 nearest to a number that is not NaN, ties to even.
+/// The binary16 nearest to a number, ties to even.
 inline std::uint32_t halfOf(double value) {
   const std::uint32_t sign = std::signbit(value) ? 0x8000 : 0;
+  if (std::isnan(value)) return sign | 0x7e00;
   const double magnitude = std::abs(value);
   if (magnitude >= 65520) return sign | 0x7c00;
   const int exponent = magnitude < std::ldexp(1.0, -14) ? -14 : std::ilogb(magnitude);
