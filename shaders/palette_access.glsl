@@ -5,7 +5,8 @@ layout(set = 0, binding = BINDING_PALETTES, std430) restrict readonly buffer Pal
 
 vec4 paletteUnit(uint unit) { return uintBitsToFloat(palettes[unit]); }
 
-bool paletteIsTwoPhase(uint palette) { return palettes[palette][STATUS_TWO_PHASE] != 0u; }
+// A branch that some drivers execute whatever its condition is left out where no palette may scale.
+bool paletteIsTwoPhase(uint palette) { return SCALES && palettes[palette][STATUS_TWO_PHASE] != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }

@@ -18,6 +18,7 @@ layout(constant_id = CONSTANT_NORMAL_UNIT) const uint NORMAL_UNIT = 4u;
 layout(constant_id = CONSTANT_TANGENT_UNIT) const uint TANGENT_UNIT = 4u;
 layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
 layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
+layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 #if defined(EXTRAS) || defined(ONE_OUTPUT)
 layout(constant_id = CONSTANT_MOTION) const uint MOTION = MOTION_NONE;
 #define HAS_MOTION

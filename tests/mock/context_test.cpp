@@ -399,6 +399,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.motion = Motion::reskinned;
   variant.morphs = true;
   variant.bounds = true;
+  variant.scales = true;
   variant.influences = 4;
   variant.instancesPerInvocation = 3;
   variant.workgroupSize = 32;
@@ -418,7 +419,8 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_PREVIOUS_UNIT, 2},
       {abi::CONSTANT_MOTION, abi::MOTION_RESKINNED},
       {abi::CONSTANT_MORPHS, 1},
-      {abi::CONSTANT_BOUNDS, 1}};
+      {abi::CONSTANT_BOUNDS, 1},
+      {abi::CONSTANT_SCALES, 1}};
   ASSERT_EQ(std::size(expected), abi::CONSTANT_COUNT);
   for (const auto& [id, value] : expected) EXPECT_EQ(constants.values[id], value) << id;
 }

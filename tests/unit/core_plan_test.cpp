@@ -145,7 +145,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
   for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
     for (const Method method : allMethods) {
       for (const Motion motion : {Motion::none, Motion::kept, Motion::reskinned}) {
-        for (const int flags : {0, 1, 2, 3}) {
+        for (const int flags : {0, 1, 2, 3, 4, 5, 6, 7}) {
           for (const std::uint8_t influences : Bytes{0, 1, 2, 4}) {
             for (const std::uint8_t instances : Bytes{1, 2, 3, 4, 16, 255}) {
               for (const std::uint16_t size : Shorts{8, 64, 128, 65535}) {
@@ -153,7 +153,8 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
                 variant.method = method;
                 variant.motion = motion;
                 variant.morphs = flags % 2 != 0;
-                variant.bounds = flags / 2 != 0;
+                variant.bounds = flags / 2 % 2 != 0;
+                variant.scales = flags / 4 != 0;
                 variant.influences = influences;
                 variant.instancesPerInvocation = instances;
                 variant.workgroupSize = size;
@@ -176,19 +177,23 @@ void planEverything(const Job& layout, const Tuning& tuning, const std::vector<V
     OwnedBatch batch;
     batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
     batch.addPalette(8, false);
+    batch.addPalette(8, true);
     for (const Method method : allMethods) {
       for (const float weight : {0.0f, 1.0f}) {
-        const Job job = batch.jobOf(0, 0, method);
-        batch.jobs = {layout};
-        batch.jobs[0].mesh = job.mesh;
-        batch.jobs[0].method = method;
-        batch.jobs[0].morphs = batch.keep({{1, weight}});
-        batch.outputSize = 10000;
-        Plan out;
-        ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), tuning, out));
-        for (const Variant& variant : out.variants()) {
-          EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
-          unused.erase(variant.key());
+        for (const std::uint32_t palette : {0u, 1u}) {
+          const Job job = batch.jobOf(0, palette, method);
+          batch.jobs = {layout};
+          batch.jobs[0].mesh = job.mesh;
+          batch.jobs[0].palette = palette;
+          batch.jobs[0].method = method;
+          batch.jobs[0].morphs = batch.keep({{1, weight}});
+          batch.outputSize = 10000;
+          Plan out;
+          ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), tuning, out));
+          for (const Variant& variant : out.variants()) {
+            EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
+            unused.erase(variant.key());
+          }
         }
       }
     }
@@ -216,13 +221,46 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
       std::set<std::uint64_t> unused;
       for (const Variant& variant : all) unused.insert(variant.key());
       EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
-      // Each method, with and without morph targets, for 1, 2, 4 and any number of influences; and
-      // palettes.
-      EXPECT_EQ(all.size(), 2 * 2 * 4 + 1u);
+      // Linear, and dual quaternions of joints that may scale or may not; with and without morph
+      // targets; for 1, 2, 4 and any number of influences; and palettes.
+      EXPECT_EQ(all.size(), 3 * 2 * 4 + 1u);
       ASSERT_NO_FATAL_FAILURE(planEverything(layout, tuning, all, unused));
       EXPECT_TRUE(unused.empty()) << "one that no plan needs";
     }
   }
+}
+
+// A dispatch leaves the two-phase path out where none of its palettes may scale.
+TEST(Plan, DispatchesScaleWhereOneOfTheirPalettesMay) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(10, 4, 8, MeshParts{true, false, 0}));
+  batch.addPalette(8, false);
+  batch.addPalette(8, true);
+  const auto scalesOf = [&](std::vector<std::pair<std::uint32_t, Method>> jobs) {
+    batch.jobs.clear();
+    batch.outputSize = 0;
+    for (const auto& [palette, method] : jobs) batch.addJob(0, palette, method, true);
+    Plan out;
+    EXPECT_TRUE(makePlan(batch.batch(), richLimits(), {}, out).ok());
+    EXPECT_EQ(out.dispatches().back().variant.kernel, Kernel::skin);
+    return out.dispatches().back().variant.scales;
+  };
+  const Method dual = Method::dualQuaternion;
+  EXPECT_FALSE(scalesOf({{0, dual}, {0, dual}}));
+  EXPECT_TRUE(scalesOf({{0, dual}, {1, dual}}));
+  EXPECT_TRUE(scalesOf({{1, dual}, {0, dual}}));
+  EXPECT_FALSE(scalesOf({{1, Method::linear}}));
+  // Skinned again from a palette that may.
+  batch.jobs.clear();
+  batch.outputSize = 0;
+  Job& job = batch.addJob(0, 0, dual, true);
+  job.motion = Motion::reskinned;
+  job.previousPalette = 1;
+  job.previousPositions = {240, 12, VertexFormat::none};
+  batch.outputSize = 1000;
+  Plan out;
+  ASSERT_TRUE(makePlan(batch.batch(), richLimits(), {}, out).ok());
+  EXPECT_TRUE(out.dispatches().back().variant.scales);
 }
 
 // ---- Plans as objects

@@ -55,8 +55,9 @@ struct Palette {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPaletteJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
   /// Whether joints may scale or shear: many exporters leave a scale in their joints. It costs 32
-  /// bytes a joint of scratch. Where it is denied, joints that do so all the same are skinned by
-  /// their rotation alone, and counted in `PaletteStatus`.
+  /// bytes a joint of scratch, and on some drivers time, whether or not a pose makes use of it.
+  /// Where it is denied, joints that do so all the same are skinned by their rotation alone, and
+  /// counted in `PaletteStatus`.
   bool mayScale = true;
 };
 
@@ -93,8 +94,8 @@ struct Job {
   OutputAttribute positions;  ///< `isPositionFormat`; always wanted
   OutputAttribute normals;    ///< of unit length; only for a mesh that has normals
   OutputAttribute tangents;   ///< of unit length; only for a mesh that has tangents
-  /// The box that positions in snorm16 are relative to; its sides must be longer than 1e-38. The
-  /// engine's, or `skinnedBounds` of the pose (bounds.h).
+  /// The box that positions in snorm16 are relative to; its sides must be finite, and longer than
+  /// 1e-38. The engine's, or `skinnedBounds` of the pose (bounds.h).
   Box box;
 
   /// Active morph targets in any order, none twice; those of weight 0 are skipped. `makePlan`
@@ -175,6 +176,8 @@ struct Variant {
   Motion motion = Motion::none;
   bool morphs = false;
   bool bounds = false;
+  /// Dual quaternions: whether joints may scale or shear (`Palette::mayScale`).
+  bool scales = false;
   /// 1, 2, 4, or 0 for any number of influences a vertex.
   std::uint8_t influences = 0;
   std::uint8_t instancesPerInvocation = 1;

@@ -65,6 +65,7 @@ SpecializationConstants specializationConstants(const Variant& variant) {
   set(abi::CONSTANT_MOTION, variant.motion);
   set(abi::CONSTANT_MORPHS, variant.morphs);
   set(abi::CONSTANT_BOUNDS, variant.bounds);
+  set(abi::CONSTANT_SCALES, variant.scales);
   return constants;
 }
 

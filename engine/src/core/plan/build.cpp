@@ -23,6 +23,12 @@ bool hasActiveMorphs(const Job& job) {
           std::any_of(job.previousMorphs.begin(), job.previousMorphs.end(), isActive));
 }
 
+bool mayScale(const Batch& batch, const Job& job) {
+  return job.method != Method::linear &&
+         (batch.palettes[job.palette].mayScale ||
+          (job.motion == Motion::reskinned && batch.palettes[job.previousPalette].mayScale));
+}
+
 }  // namespace
 
 void Plan::State::clear() {
@@ -42,15 +48,16 @@ void Plan::State::clear() {
 }
 
 void Plan::State::addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key,
-                           const Variant& variant) {
+                           const Variant& variant, bool scales) {
   // Neighbouring jobs mostly belong together: look there before asking the map.
   std::uint32_t group = pieces.empty() ? notUsed : pieces.back().group;
   if (group == notUsed || !(groups[group].key == key)) {
     const auto [entry, isNew] = groupOf.try_emplace(key, static_cast<std::uint32_t>(groups.size()));
     group = entry->second;
-    if (isNew) groups.push_back({key, variant, job.mesh.maxInfluences, 0, 0, 0});
+    if (isNew) groups.push_back({key, variant, job.mesh.maxInfluences, false, 0, 0, 0});
   }
   ++groups[group].instances;
+  groups[group].scales |= scales;
   pieces.push_back({group, jobIndex});
 }
 
@@ -78,7 +85,7 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
       key.firstVertex = run.firstVertex;
       key.vertexEnd = run.vertexEnd;
       if (Result<void> good = checkWindows(streams, run.windows, index, limits); !good) return good;
-      addPiece(job, static_cast<std::uint32_t>(index), key, variant);
+      addPiece(job, static_cast<std::uint32_t>(index), key, variant, mayScale(batch, job));
     }
     ++instanceCount;
     vertexCount += job.mesh.vertexCount;
@@ -168,11 +175,13 @@ Result<void> Plan::State::placeGroups(const Tuning& tuning) {
     std::size_t end = begin;
     std::uint64_t workgroups = 0;
     std::uint32_t maxInfluences = 0;
+    bool scales = false;
     for (; end < order.size() && dispatchOrder(order[end]) == dispatchOrder(order[begin]); ++end) {
       Group& group = groups[order[end]];
       group.firstInstance = firstInstance;
       firstInstance += group.instances;
       maxInfluences = std::max(maxInfluences, group.maxInfluences);
+      scales |= group.scales;
       const std::uint64_t vertexGroups =
           divideUp(group.key.vertexEnd - group.key.firstVertex, tuning.workgroupSize);
       workgroups += vertexGroups * divideUp(group.instances, tuning.instancesPerInvocation);
@@ -191,6 +200,7 @@ Result<void> Plan::State::placeGroups(const Tuning& tuning) {
     const Group& group = groups[order[begin]];
     Variant variant = group.variant;
     variant.influences = influenceClass(maxInfluences);
+    variant.scales = scales;
     const DispatchConstants constants{
         static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
         static_cast<std::uint32_t>(end - begin), 0, instanceRecords};

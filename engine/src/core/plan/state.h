@@ -42,8 +42,9 @@ struct GroupKeyHash {
 
 struct Group {
   GroupKey key;
-  Variant variant;  ///< of its dispatch, but for the influences
+  Variant variant;  ///< of its dispatch, but for the influences and scale
   std::uint32_t maxInfluences = 0;
+  bool scales = false;
   std::uint32_t instances = 0;
   std::uint32_t firstInstance = 0;
   std::uint32_t filled = 0;
@@ -85,8 +86,8 @@ struct Plan::State {
 
  private:
   Result<void> gatherPieces(const Batch& batch, const Tuning& tuning);
-  void addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key,
-                const Variant& variant);
+  void addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key, const Variant& variant,
+                bool scales);
   Result<void> placePalettes(const Batch& batch, const Tuning& tuning);
   Result<void> placeGroups(const Tuning& tuning);
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,

@@ -40,6 +40,7 @@ std::uint64_t Variant::key() const {
   add(motion, 2);
   add(morphs, 1);
   add(bounds, 1);
+  add(scales, 1);
   add(influences, 4);
   add(instancesPerInvocation, 8);
   add(workgroupSize, 16);
@@ -57,7 +58,11 @@ std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning) {
         variant.method = method;
         variant.morphs = morphs;
         variant.influences = influences;
-        variants.push_back(variant);
+        for (const bool scales : {false, true}) {
+          if (scales && method == Method::linear) continue;
+          variant.scales = scales;
+          variants.push_back(variant);
+        }
       }
     }
   }
