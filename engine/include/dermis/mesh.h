@@ -83,8 +83,8 @@ struct MorphWeight {
 };
 
 /// A mesh in bind pose. The influences of a vertex are those of all sets together, in any order and
-/// any number; they need not sum to 1 (they are normalised) and a joint may stand twice (its weights
-/// are added up).
+/// any number; they need not sum to 1 (they are normalised) and a joint may stand twice (its
+/// weights are added up).
 struct MeshView {
   std::string_view name;  ///< For messages only.
   std::uint32_t vertexCount = 0;
