@@ -168,7 +168,9 @@ TEST_F(FormatInputTest, AFourthComponentOfFloatsIsNotRead) {
 TEST_F(FormatInputTest, HandednessOfEveryType) {
   const auto handedness = [&](ComponentType type, std::initializer_list<int> fourth) {
     std::vector<int> bits;
-    for (const int w : fourth) bits.insert(bits.end(), {1, 0, 0, w});
+    for (const int w : fourth) {
+      for (const int component : {1, 0, 0, w}) bits.push_back(component);
+    }
     const Elements elements = elementsOf(bits, 4, type, 0);
     MeshView view = freeMesh(fourth.size());
     view.tangents = elements.view;
