@@ -48,8 +48,16 @@ DERMIS_CONSTANT CONSTANT_BOUNDS = 13u;  // 0 or 1
 DERMIS_CONSTANT CONSTANT_SCALES = 14u;  // 0 or 1: whether palettes may be two-phase
 DERMIS_CONSTANT CONSTANT_COUNT = 15u;
 
+// The numbers of Method.
 DERMIS_CONSTANT METHOD_LINEAR = 0u;
 DERMIS_CONSTANT METHOD_DUAL_QUATERNION = 1u;
+DERMIS_CONSTANT METHOD_DUAL_QUATERNION_ITERATIVE = 2u;
+DERMIS_CONSTANT METHOD_LOG_MATRIX = 3u;
+DERMIS_CONSTANT METHOD_SPHERICAL_BLEND = 4u;
+DERMIS_CONSTANT METHOD_QUATERNION_TRANSLATION = 5u;
+DERMIS_CONSTANT METHOD_BLENDED = 6u;
+DERMIS_CONSTANT METHOD_CENTER_OF_ROTATION = 7u;
+DERMIS_CONSTANT METHOD_BULGE_CONTROLLED = 8u;
 
 // The numbers of VertexFormat.
 DERMIS_CONSTANT FORMAT_NONE = 0u;
@@ -71,7 +79,7 @@ DERMIS_CONSTANT MOTION_RESKINNED = 2u;
 
 // Packed mesh: a header, then sections at word offsets from the blob's start.
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
-DERMIS_CONSTANT MESH_VERSION = 2u;
+DERMIS_CONSTANT MESH_VERSION = 3u;
 DERMIS_CONSTANT MESH_HEADER_MAGIC = 0u;
 DERMIS_CONSTANT MESH_HEADER_VERSION = 1u;
 DERMIS_CONSTANT MESH_HEADER_CHECKSUM =
@@ -87,7 +95,13 @@ DERMIS_CONSTANT MESH_HEADER_FIRSTS = 10u;      // vertices + 1 words: each verte
 DERMIS_CONSTANT MESH_HEADER_INFLUENCES = 11u;  // INFLUENCE_WORDS each; an even offset
 DERMIS_CONSTANT MESH_HEADER_MORPHS = 12u;      // MORPH_WORDS a morph target
 DERMIS_CONSTANT MESH_HEADER_MORPH_COUNT = 13u;
-DERMIS_CONSTANT MESH_HEADER_WORDS = 16u;
+DERMIS_CONSTANT MESH_HEADER_CENTERS =
+    14u;  // of rotation: 3 floats a vertex, 0 where there are none
+DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHTS = 15u;  // a float a vertex, 0 where all have …
+DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHT = 16u;   // … this one
+DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTHS = 17u;          // likewise
+DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTH = 18u;
+DERMIS_CONSTANT MESH_HEADER_WORDS = 20u;
 
 // Influences stand vertex by vertex, as many as each has. The first of a vertex is its pivot; a
 // vertex without influences stays in bind pose.
@@ -115,10 +129,14 @@ DERMIS_CONSTANT MORPH_BLOCK_WORDS = 3u;
 // Table record of a palette. Offsets into the matrices and palettes buffers count 16-byte units.
 DERMIS_CONSTANT PALETTE_MATRICES = 0u;  // the first joint matrix: 3 units each
 DERMIS_CONSTANT PALETTE_OUTPUT =
-    1u;  // the palette: a status unit, 2 units a joint, 2 more a joint where it may scale
+    1u;  // the palette: a status unit, the joints, 2 more units a joint where it may scale
 DERMIS_CONSTANT PALETTE_JOINTS = 2u;
-DERMIS_CONSTANT PALETTE_MAY_SCALE = 3u;
+DERMIS_CONSTANT PALETTE_FLAGS = 3u;
 DERMIS_CONSTANT PALETTE_WORDS = 4u;
+DERMIS_CONSTANT PALETTE_MAY_SCALE = 1u;
+DERMIS_CONSTANT PALETTE_LOGARITHMS = 2u;  // joints are logarithms instead of dual quaternions
+DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
+DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 
 // Words of the status unit at the start of a palette.
 DERMIS_CONSTANT STATUS_TWO_PHASE = 0u;

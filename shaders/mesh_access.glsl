@@ -31,3 +31,28 @@ float influenceWeight(Influences influences, uint slot) {
 uint influenceJoint(Influences influences, uint slot) {
   return meshes[influences.word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT];
 }
+
+// What some methods want to know of a vertex besides.
+struct MethodInputs {
+  vec3 center;
+  float share;  // of dual quaternions, or the strength of bulge control
+};
+
+float meshShare(uint mesh, uint vertex, uint values, uint value) {
+  uint section = meshes[mesh + values];
+  return uintBitsToFloat(section == 0u ? meshes[mesh + value] : meshes[mesh + section + vertex]);
+}
+
+MethodInputs methodInputsOf(uint mesh, uint vertex) {
+  MethodInputs inputs = MethodInputs(vec3(0.0), 0.0);
+  if (METHOD == METHOD_CENTER_OF_ROTATION || METHOD == METHOD_BULGE_CONTROLLED) {
+    inputs.center = meshVector(meshSection(mesh, MESH_HEADER_CENTERS) + vertex * 3u);
+  }
+  if (METHOD == METHOD_BULGE_CONTROLLED) {
+    inputs.share = meshShare(mesh, vertex, MESH_HEADER_BULGE_STRENGTHS, MESH_HEADER_BULGE_STRENGTH);
+  }
+  if (METHOD == METHOD_BLENDED) {
+    inputs.share = meshShare(mesh, vertex, MESH_HEADER_DUAL_QUATERNION_WEIGHTS, MESH_HEADER_DUAL_QUATERNION_WEIGHT);
+  }
+  return inputs;
+}

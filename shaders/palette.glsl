@@ -1,11 +1,12 @@
-// Joint matrices (3×4) to unit dual quaternions and, where a joint is not rigid, its scale/shear part: one workgroup a
-// palette, so that what is said of the whole palette needs no second pass. The workgroups behind those clear the results that
+// Joint matrices (3×4) to unit dual quaternions, or the logarithms of the rigid parts, and, where a joint is not rigid, its
+// scale/shear part: one workgroup a palette, so that what is said of the whole palette needs no second pass. The workgroups behind those clear the results that
 // the skin kernel adds to. With ONE_OUTPUT there are no results (4 storage buffers in all).
 
 #include "abi.h"
 #include "exact.glsl"
 #include "quaternion.glsl"
 #include "polar.glsl"
+#include "dual_exponential.glsl"
 #include "tables.glsl"
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
@@ -41,6 +42,16 @@ void writeScaleShear(uint unit, ScaleShear part) {
   palettes[unit + 1u] = floatBitsToUint(vec4(part.mixed.yz, 0.0, 0.0));
 }
 
+// The logarithm of a rigid transform, the short way round: rows of [ω]× | v, twice its screw.
+void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
+  Screw screw = rotation.w < 0.0 ? screwOf(-rotation, -dual) : screwOf(rotation, dual);
+  precise vec3 turn = 2.0 * screw.real;
+  precise vec3 shift = 2.0 * screw.dual;
+  palettes[unit] = floatBitsToUint(vec4(0.0, -turn.z, turn.y, shift.x));
+  palettes[unit + 1u] = floatBitsToUint(vec4(turn.z, 0.0, -turn.x, shift.y));
+  palettes[unit + 2u] = floatBitsToUint(vec4(-turn.y, turn.x, 0.0, shift.z));
+}
+
 void clearResult(uint number) {
 #ifndef ONE_OUTPUT
   if (number >= push[PUSH_INSTANCE_RECORDS]) return;
@@ -62,7 +73,9 @@ void main() {
   uint firstMatrix = tables[record + PALETTE_MATRICES];
   uint status = tables[record + PALETTE_OUTPUT];
   uint jointCount = tables[record + PALETTE_JOINTS];
-  bool mayScale = tables[record + PALETTE_MAY_SCALE] != 0u;
+  bool mayScale = (tables[record + PALETTE_FLAGS] & PALETTE_MAY_SCALE) != 0u;
+  bool logarithms = (tables[record + PALETTE_FLAGS] & PALETTE_LOGARITHMS) != 0u;
+  uint unitsOfJoint = logarithms ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
 
   if (gl_LocalInvocationID.x == 0u) {
     nonRigidJoints = 0u;
@@ -86,9 +99,14 @@ void main() {
       polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
-    palettes[status + 1u + joint * 2u] = floatBitsToUint(rotation);
-    palettes[status + 2u + joint * 2u] = floatBitsToUint(dual);
-    if (mayScale) writeScaleShear(status + 1u + jointCount * 2u + joint * 2u, scaleShear);
+    uint unit = status + 1u + joint * unitsOfJoint;
+    if (logarithms) {
+      writeLogarithm(unit, rotation, dual);
+    } else {
+      palettes[unit] = floatBitsToUint(rotation);
+      palettes[unit + 1u] = floatBitsToUint(dual);
+    }
+    if (mayScale) writeScaleShear(status + 1u + jointCount * unitsOfJoint + joint * 2u, scaleShear);
   }
   barrier();
 

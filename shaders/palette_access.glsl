@@ -1,5 +1,5 @@
-// How the palette is read. Dual quaternions: a status unit, then rotation and dual part of each joint, then the
-// scale/shear parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
+// How the palette is read. A status unit, then each joint's rotation and dual part, or its logarithm, then the scale/shear
+// parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
 
 layout(set = 0, binding = BINDING_PALETTES, std430) restrict readonly buffer Palettes { uvec4 palettes[]; };
 
@@ -12,10 +12,15 @@ vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }
 
 ScaleShear paletteScaleShear(uint palette, uint jointCount, uint joint) {
-  uint unit = palette + 1u + jointCount * 2u + joint * 2u;
+  const uint unitsOfJoint = METHOD == METHOD_LOG_MATRIX ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
+  uint unit = palette + 1u + jointCount * unitsOfJoint + joint * 2u;
   vec4 first = paletteUnit(unit);
   vec4 second = paletteUnit(unit + 1u);
   return ScaleShear(first.xyz, vec3(first.w, second.xy));
+}
+
+vec4 paletteLogarithmRow(uint palette, uint joint, uint row) {
+  return paletteUnit(palette + 1u + joint * UNITS_OF_LOGARITHM + row);
 }
 
 vec4 paletteRow(uint palette, uint joint, uint row) { return paletteUnit(palette + joint * 3u + row); }

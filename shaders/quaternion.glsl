@@ -33,3 +33,12 @@ vec4 dualPart(vec4 q, vec3 t) {
   precise float scalar = -0.5 * dot3(t, q.xyz);
   return vec4(vector, scalar);
 }
+
+// a b
+vec4 quaternionProduct(vec4 a, vec4 b) {
+  precise vec3 vector = a.w * b.xyz + b.w * a.xyz + cross3(a.xyz, b.xyz);
+  precise float scalar = a.w * b.w - dot3(a.xyz, b.xyz);
+  return vec4(vector, scalar);
+}
+
+vec4 conjugateOf(vec4 q) { return vec4(-q.xyz, q.w); }

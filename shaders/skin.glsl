@@ -99,7 +99,8 @@ struct Instance {
 };
 
 #ifdef HAS_MOTION
-uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences influences, uint mesh, uint vertex) {
+uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences influences, MethodInputs inputs, uint mesh,
+                       uint vertex) {
   if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
   Vertex before = bind;
@@ -107,7 +108,7 @@ uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences
     morphVertex(before, mesh, vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
                 tables[instance.extension + EXTENSION_PREVIOUS_MORPH_COUNT], false, false);
   }
-  before = skinVertex(before, influences, tables[instance.extension + EXTENSION_PREVIOUS_PALETTE],
+  before = skinVertex(before, influences, inputs, tables[instance.extension + EXTENSION_PREVIOUS_PALETTE],
                       tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], false, false);
   return encodePosition(before.position, instance.extension, false);
 }
@@ -131,6 +132,7 @@ void main() {
 
   uint mesh = tables[group + GROUP_MESH];
   Vertex bind = bindVertex(mesh, vertex);
+  MethodInputs inputs = methodInputsOf(mesh, vertex);
   Influences influences = influencesOf(mesh, vertex);
   if (INFLUENCES != 0u) influences.count = min(influences.count, INFLUENCES);
 
@@ -155,13 +157,13 @@ void main() {
       morphVertex(morphed, mesh, vertex, tables[instance.extension + EXTENSION_MORPHS],
                   tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
     }
-    Vertex skinned = skinVertex(morphed, influences, tables[instance.record + INSTANCE_PALETTE],
+    Vertex skinned = skinVertex(morphed, influences, inputs, tables[instance.record + INSTANCE_PALETTE],
                                 tables[instance.record + INSTANCE_JOINTS], NORMALS, TANGENTS);
     if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
     uvec4 position = encodePosition(skinned.position, instance.extension, true);
 #ifdef HAS_MOTION
     if (MOTION != MOTION_NONE) {
-      uvec4 words = previousPosition(instance, position, bind, influences, mesh, vertex);
+      uvec4 words = previousPosition(instance, position, bind, influences, inputs, mesh, vertex);
       storePrevious(previous, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     }
 #endif

@@ -90,7 +90,7 @@ void printText(const Json& json) {
 }
 
 ExitStatus info(const InfoOptions& options) {
-  const Result<Scene> scene = loadScene(options.model, false);
+  const Result<Scene> scene = loadScene(options.model, {});
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene);
   if (options.json) {

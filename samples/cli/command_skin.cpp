@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "dermis/reference.h"
 #include "mesh_output.h"
+#include "method_options.h"
 #include "open_device.h"
 #include "progress.h"
 #include "skinned_scene.h"
@@ -34,6 +35,7 @@ struct SkinOptions {
   std::optional<std::uint32_t> frames;
   double framesPerSecond = 30;
   std::string method = std::string(methodName(Method::dualQuaternion));
+  MethodShares shares;
   std::string device = "auto";
   bool strict = false;
 };
@@ -181,10 +183,11 @@ ExitStatus checkUsage(const SkinOptions& options) {
         fmt::format("OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
-    return reportError(ExitStatus::wrongUsage,
-                       fmt::format("there is no method '{}'; there are linear and dual_quaternion",
-                                   options.method));
+    return reportError(ExitStatus::wrongUsage, fmt::format("there is no method '{}'; there are {}",
+                                                           options.method, methodNames("and")));
   }
+  if (const ExitStatus shares = checkShares(options.shares); shares != ExitStatus::done)
+    return shares;
   if (!std::isfinite(options.time))
     return reportError(ExitStatus::wrongUsage, "--time must be a number of seconds");
   if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond)) {
@@ -238,7 +241,13 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
 
 ExitStatus skin(const SkinOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
-  const Result<Scene> scene = loadScene(options.model, options.strict);
+  const Method method = *methodFromName(options.method);
+  MeshPreparation preparation;
+  preparation.strict = options.strict;
+  preparation.centersOfRotation = needsCentersOfRotation(method);
+  preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
+  preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
+  const Result<Scene> scene = loadScene(options.model, preparation);
   if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
   for (const std::string& remark : scene->remarks) reportNote(remark);
@@ -249,7 +258,6 @@ ExitStatus skin(const SkinOptions& options) {
   }
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
-  const Method method = *methodFromName(options.method);
 
   if (options.device == "cpu")
     return writePoses(options, *scene, *clip, referenceSkinner(*scene, method));
@@ -278,7 +286,8 @@ Run addSkin(CLI::App& app) {
   CLI::Option* frames =
       command->add_option("--frames", options->frames, "Write this many poses, from --time on");
   command->add_option("--fps", options->framesPerSecond, "Poses a second [30]")->needs(frames);
-  command->add_option("--method", options->method, "linear or dual_quaternion [dual_quaternion]");
+  command->add_option("--method", options->method, methodNames("or") + " [dual_quaternion]");
+  addShares(*command, options->shares);
   command->add_option("--device", options->device,
                       "auto, cpu (the reference), a number of 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");

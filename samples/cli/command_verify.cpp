@@ -94,9 +94,12 @@ ExitStatus verify(const VerifyOptions& options) {
     models.push_back(std::move(*verified));
   }
   const std::vector<samples::OutputCase> outputs = samples::outputCases(open->context.limits());
+  MeshPreparation preparation;
+  preparation.strict = options.strict;
+  preparation.centersOfRotation = true;
   for (const std::string& model : options.models) {
     models.push_back({model, {}, {}});
-    Result<Scene> scene = loadScene(model, options.strict);
+    Result<Scene> scene = loadScene(model, preparation);
     if (!scene) models.back().error = scene.error().message;
     if (scene) {
       for (const std::string& warning : scene->warnings) reportWarning(warning);

@@ -4,13 +4,24 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/validate.h"
 
 namespace dermis::cli {
+
+/// What a mesh is made ready for.
+struct MeshPreparation {
+  bool strict = false;  ///< Refuse what could be repaired.
+  /// Find the centres of rotation, for methods that need them. It takes its time.
+  bool centersOfRotation = false;
+  float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< of every vertex
+  float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
+};
 
 /// Not movable: its views point into it.
 class PreparedMesh {
@@ -19,23 +30,28 @@ class PreparedMesh {
   /// object. Fails with `invalidMesh`, where `strict` also for what could be repaired.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::string name,
-                                                             std::uint32_t jointCount, bool strict);
+                                                             std::uint32_t jointCount,
+                                                             const MeshPreparation& preparation);
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;
 
   /// The mesh to skin: the repaired one where `pack` would have refused it.
-  MeshView view() const { return repaired_ ? repaired_->view() : original_; }
+  MeshView view() const;
   const PackedMesh& packed() const { return *packed_; }
   /// Of the mesh as the file has it.
   const MeshReport& report() const { return report_; }
 
  private:
   PreparedMesh() = default;
+  Result<void> addCentersOfRotation(std::uint32_t jointCount,
+                                    std::span<const std::uint32_t> triangles);
+
   std::string name_;
   std::optional<gltf::PrimitiveView> primitive_;
   MeshView original_;
   MeshReport report_;
   std::optional<RepairedMesh> repaired_;
+  std::vector<float> centersOfRotation_;  ///< 3 a vertex, or empty
   std::optional<PackedMesh> packed_;
 };
 

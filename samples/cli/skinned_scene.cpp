@@ -38,7 +38,7 @@ void addFindings(Scene& scene, const MeshReport& report) {
 
 }  // namespace
 
-Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
+Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
   Result<gltf::Model> loaded = gltf::load(path);
   if (!loaded) return loaded.error();
 
@@ -65,8 +65,8 @@ Result<Scene> loadScene(const std::filesystem::path& path, bool strict) {
       std::shared_ptr<const PreparedMesh>& mesh =
           prepared[{source.mesh, source.primitive, jointCount}];
       if (mesh == nullptr) {
-        Result<std::shared_ptr<const PreparedMesh>> made =
-            PreparedMesh::prepare(*part.primitive, meshName(model, source), jointCount, strict);
+        Result<std::shared_ptr<const PreparedMesh>> made = PreparedMesh::prepare(
+            *part.primitive, meshName(model, source), jointCount, preparation);
         if (!made)
           return Error{made.error().code,
                        fmt::format("'{}': {}", path.filename().string(), made.error().message)};

@@ -31,8 +31,8 @@ struct Scene {
 };
 
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or
-/// refused where `strict`.
-Result<Scene> loadScene(const std::filesystem::path& path, bool strict);
+/// refused where the preparation is strict.
+Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
 
 /// The clip that `--animation` means: a number, a name, "none" for the rest pose, nothing for clip
 /// 0 or the rest pose. Fails with `invalidArgument` where there is no such clip.

@@ -1,5 +1,6 @@
 #include "random_rig.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -55,6 +56,17 @@ void append(std::vector<float>& values, const glm::dvec3& vector, double scale =
   for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(scale * vector[i]));
 }
 
+void addMethodInputs(OwnedMesh& mesh, Random random) {
+  const auto share = [&random] {
+    return static_cast<float>(std::clamp(random.between(-0.2, 1.2), 0.0, 1.0));
+  };
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
+    mesh.dualQuaternionWeights.push_back(share());
+    mesh.bulgeStrengths.push_back(share());
+    append(mesh.centersOfRotation, random.direction(), random.between(0, 1));
+  }
+}
+
 AttributeView vectors(const std::vector<float>& values, std::uint32_t components) {
   if (values.empty()) return {};
   return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
@@ -74,6 +86,9 @@ MeshView OwnedMesh::view() {
                 influencesPerVertex};
   set.weights = floatAttribute(weights.data(), vertexCount(), influencesPerVertex);
   mesh.influenceSets = {&set, 1};
+  mesh.dualQuaternionWeights = vectors(dualQuaternionWeights, 1);
+  mesh.bulgeStrengths = vectors(bulgeStrengths, 1);
+  mesh.centersOfRotation = vectors(centersOfRotation, 3);
   morphViews.clear();
   for (const OwnedMorph& morph : morphs) {
     MorphTargetView& target = morphViews.emplace_back();
@@ -130,6 +145,7 @@ OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_
       mesh.weights.push_back(slot < used ? static_cast<float>(random.between(0.01, 1)) : 0.0f);
     }
   }
+  addMethodInputs(mesh, Random(seed + 1));
   return mesh;
 }
 

@@ -23,6 +23,7 @@ struct OwnedMesh {
   std::uint32_t influencesPerVertex = 4;
   std::vector<float> positions, normals, tangents, weights;
   std::vector<std::uint32_t> joints;
+  std::vector<float> dualQuaternionWeights, bulgeStrengths, centersOfRotation;
   std::vector<OwnedMorph> morphs;
   InfluenceSet set;
   std::vector<MorphTargetView> morphViews;
@@ -34,7 +35,8 @@ struct OwnedMesh {
 enum class Rigidity { rigid, uniformScale, shear, mirrored, mirroredAlongOneAxis };
 
 /// `influences` slots a vertex, of which a random number carry weight; one vertex in 50 carries
-/// none at all.
+/// none at all. What only some methods want is there too: dual-quaternion weights and bulge
+/// strengths, nothing and all among them, and random centres of rotation.
 OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                      std::uint32_t influences, bool normals = true);
 

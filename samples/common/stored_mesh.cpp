@@ -69,12 +69,24 @@ AttributeView StoredMesh::store(const std::vector<float>& values, std::uint32_t 
   return {bytes.data(), count, stride, type, components};
 }
 
+AttributeView StoredMesh::storeShares(const std::vector<float>& values) {
+  if (values.empty()) return {};
+  const std::uint32_t stride = componentSize(formats_.weights) + formats_.gap;
+  std::vector<std::byte>& bytes = arrays_.emplace_back(values.size() * stride);
+  for (std::size_t vertex = 0; vertex < values.size(); ++vertex)
+    putReal(bytes.data() + vertex * stride, formats_.weights, static_cast<double>(values[vertex]));
+  return {bytes.data(), vertexCount_, stride, formats_.weights, 1};
+}
+
 StoredMesh::StoredMesh(const OwnedMesh& mesh, const InputFormats& formats)
     : vertexCount_(mesh.vertexCount()), formats_(formats) {
   const double scale = isInteger(formats.positions) ? positionRange : 1;
   positions_ = store(mesh.positions, 3, formats.positions, scale);
   normals_ = store(mesh.normals, 3, formats.directions, 1);
   tangents_ = store(mesh.tangents, 4, formats.directions, 1);
+  dualQuaternionWeights_ = storeShares(mesh.dualQuaternionWeights);
+  bulgeStrengths_ = storeShares(mesh.bulgeStrengths);
+  centersOfRotation_ = store(mesh.centersOfRotation, 3, ComponentType::float32, 1);
 
   const std::uint32_t influences = mesh.influencesPerVertex;
   for (std::uint32_t first = 0; first < influences; first += formats.setSize) {
@@ -130,6 +142,9 @@ MeshView StoredMesh::view() const {
   mesh.tangents = tangents_;
   mesh.influenceSets = sets_;
   mesh.morphTargets = morphs_;
+  mesh.dualQuaternionWeights = dualQuaternionWeights_;
+  mesh.bulgeStrengths = bulgeStrengths_;
+  mesh.centersOfRotation = centersOfRotation_;
   return mesh;
 }
 

@@ -33,11 +33,14 @@ class StoredMesh {
   AttributeView store(const std::vector<float>& values, std::uint32_t components,
                       ComponentType type, double scale);
 
+  AttributeView storeShares(const std::vector<float>& values);
+
   std::uint32_t vertexCount_ = 0;
   InputFormats formats_;
   std::vector<std::vector<std::byte>> arrays_;
   std::vector<std::vector<std::uint32_t>> morphVertices_;
-  AttributeView positions_, normals_, tangents_;
+  AttributeView positions_, normals_, tangents_, dualQuaternionWeights_, bulgeStrengths_,
+      centersOfRotation_;
   std::vector<InfluenceSet> sets_;
   std::vector<MorphTargetView> morphs_;
 };

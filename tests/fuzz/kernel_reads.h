@@ -34,6 +34,11 @@ class KernelReads {
       read(words_[abi::MESH_HEADER_POSITIONS] + vertex * 3, 3);
       if (info_.hasNormals) read(words_[abi::MESH_HEADER_NORMALS] + vertex * 3, 3);
       if (info_.hasTangents) read(words_[abi::MESH_HEADER_TANGENTS] + vertex * 4, 4);
+      if (info_.hasCentersOfRotation) read(words_[abi::MESH_HEADER_CENTERS] + vertex * 3, 3);
+      for (const std::uint32_t shares :
+           {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, abi::MESH_HEADER_BULGE_STRENGTHS}) {
+        if (words_[shares] != 0) read(words_[shares] + vertex, 1);
+      }
       readInfluences(vertex);
     }
     for (std::uint32_t target = 0; target < info_.morphTargetCount; ++target) readMorph(target);

@@ -50,6 +50,11 @@ class MeshMaker {
     }
     if (data_.ConsumeBool()) mesh.normals = attribute(directionTypes, 3, 4);
     if (data_.ConsumeBool()) mesh.tangents = attribute(directionTypes, 4, 4);
+    if (data_.ConsumeBool()) mesh.centersOfRotation = attribute(centerTypes, 3, 3);
+    if (data_.ConsumeBool()) mesh.dualQuaternionWeights = shares();
+    if (data_.ConsumeBool()) mesh.bulgeStrengths = shares();
+    if (seldom()) mesh.dualQuaternionWeight = anyFloat();
+    if (seldom()) mesh.bulgeStrength = anyFloat();
     const std::size_t setCount = seldom() ? 0 : data_.ConsumeIntegralInRange<std::size_t>(1, 3);
     for (std::size_t i = 0; i < setCount; ++i) sets_.push_back(influenceSet());
     const auto targetCount = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
@@ -98,6 +103,7 @@ class MeshMaker {
                                              ComponentType::snorm8, ComponentType::snorm16};
   static constexpr std::array displacementTypes{ComponentType::float32, ComponentType::float16,
                                                 ComponentType::snorm16};
+  static constexpr std::array centerTypes{ComponentType::float32};
   static constexpr std::array jointTypes{ComponentType::uint8, ComponentType::uint16,
                                          ComponentType::uint32};
   static constexpr std::array weightTypes{ComponentType::float32, ComponentType::unorm8,
@@ -148,6 +154,17 @@ class MeshMaker {
     }
     for (std::size_t i = 0; i < bytes.size() && !pattern.empty(); ++i)
       bytes[i] = static_cast<std::byte>(pattern[i % pattern.size()]);
+  }
+
+  /// Mostly from 0 to 1: bytes, or floats that are whole.
+  AttributeView shares() {
+    AttributeView view = attribute(weightTypes, 1, 1);
+    if (view.type != ComponentType::float32 || view.components != 1 || view.stride < 4 || seldom())
+      return view;
+    const float share = data_.ConsumeBool() ? 1.0f : 0.0f;
+    for (std::size_t element = 0; element < view.count; ++element)
+      std::memcpy(memory_.back().get() + element * view.stride, &share, sizeof(share));
+    return view;
   }
 
   InfluenceSet influenceSet() {
@@ -248,7 +265,8 @@ void checkBounds(const MeshView& mesh, const JointBounds& bounds, std::span<cons
   for (const Method method : allMethods) {
     const Box box = skinnedBounds(bounds, pose, method);
     const Result<reference::SkinnedMesh> skinned = reference::skin(mesh, pose, method, morphs);
-    require(skinned.ok());
+    require(skinned.ok() == (!needsCentersOfRotation(method) || mesh.centersOfRotation));
+    if (!skinned) continue;
     for (const reference::Double3& position : skinned->positions) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         require(!std::isnan(box.min[axis]) && !std::isnan(box.max[axis]));

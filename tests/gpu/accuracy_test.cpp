@@ -68,7 +68,7 @@ std::string caseName(const ::testing::TestParamInfo<AccuracyTest::ParamType>& in
 
 INSTANTIATE_TEST_SUITE_P(
     RandomRigs, AccuracyTest,
-    ::testing::Combine(::testing::Values(Method::linear, Method::dualQuaternion),
+    ::testing::Combine(::testing::ValuesIn(allMethods),
                        ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                          Rigidity::mirrored, Rigidity::mirroredAlongOneAxis),
                        ::testing::Values(Case{1, 1, 1}, Case{63, 2, 2}, Case{64, 3, 4},

@@ -30,7 +30,7 @@ struct MockBatch {
     batch.addPalette(4, true);
   }
   /// Positions and normals of one instance for each method, in one buffer.
-  static MockBatch withBothMethods(const DeviceLimits& limits) {
+  static MockBatch withAllMethods(const DeviceLimits& limits) {
     MockBatch result;
     for (const Method method : allMethods) result.batch.addJob(0, 0, method, true);
     result.makePlan(limits);

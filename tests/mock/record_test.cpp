@@ -154,7 +154,7 @@ TEST_F(RecordTest, OnlyOutputsMayBeLargerThanARange) {
 TEST_F(RecordTest, WithFourStorageBuffersAllAttributesGoToOne) {
   mock.limits.maxPerStageDescriptorStorageBuffers = 4;
   ASSERT_NO_FATAL_FAILURE(create());
-  const MockBatch batch = MockBatch::withBothMethods(context->limits());
+  const MockBatch batch = MockBatch::withAllMethods(context->limits());
   EXPECT_TRUE(record(batch).ok());
   for (BufferRange OutputBuffers::*member :
        {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
@@ -220,9 +220,9 @@ TEST_F(RecordTest, EveryBindingThatAModuleNamesIsBound) {
       for (const bool rich : {false, true}) {
         if (rich && storageBuffers == 4) continue;
         const MockBatch batch =
-            rich ? richBatch(context->limits()) : MockBatch::withBothMethods(context->limits());
+            rich ? richBatch(context->limits()) : MockBatch::withAllMethods(context->limits());
         ASSERT_TRUE(record(batch).ok());
-        ASSERT_EQ(mock.dispatches.size(), 3u);
+        ASSERT_EQ(mock.dispatches.size(), rich ? 3u : 1 + allMethods.size());
         for (const MockDispatch& dispatch : mock.dispatches) {
           const bool isPalette = &dispatch == &mock.dispatches[0];
           // The palette kernel names no attribute; results where it can clear them.
@@ -419,7 +419,9 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
 TEST_F(RecordTest, WhatEveryVariantListsIsEnough) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
-  ASSERT_TRUE(context->prepare(everyVariant(batch.batch.jobs[0], context->tuning())).ok());
+  ASSERT_NE(batch.batch.jobs[0].method, batch.batch.jobs[1].method);
+  for (const Job& job : batch.batch.jobs)
+    ASSERT_TRUE(context->prepare(everyVariant(job, context->tuning())).ok());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
   EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
 }
@@ -449,14 +451,15 @@ TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
 TEST_F(RecordTest, RecordsTheBarrierBetweenItsPassesAndNoOther) {
   for (const bool push : {false, true}) {
     ASSERT_NO_FATAL_FAILURE(create(push));
-    const MockBatch batch = MockBatch::withBothMethods(context->limits());
+    const MockBatch batch = MockBatch::withAllMethods(context->limits());
     ASSERT_TRUE(record(batch).ok());
     const std::string descriptors = push ? "push descriptors" : "bind sets";
-    // The palettes, the linear instance, which needs none, and the dual-quaternion one.
-    const std::vector<std::string> expected{
-        "bind pipeline", descriptors,      "push constants", "dispatch", "bind pipeline",
-        descriptors,     "push constants", "dispatch",       "barrier",  "bind pipeline",
-        descriptors,     "push constants", "dispatch"};
+    // The palettes, the linear instance, which needs none, and those of the other methods.
+    std::vector<std::string> expected;
+    for (std::size_t dispatch = 0; dispatch < 1 + allMethods.size(); ++dispatch) {
+      if (dispatch == 2) expected.emplace_back("barrier");
+      expected.insert(expected.end(), {"bind pipeline", descriptors, "push constants", "dispatch"});
+    }
     EXPECT_EQ(mock.commands, expected);
     ASSERT_EQ(mock.bufferBarriers.size(), 1u);
     EXPECT_TRUE(mock.memoryBarriers.empty());
@@ -536,7 +539,7 @@ TEST_F(RecordTest, APlanForOtherLimitsIsRefused) {
   other[1].maxStorageBuffersPerStage = 9;
   other[2].storage16Bit = true;
   for (const DeviceLimits& limits : other) {
-    const MockBatch batch = MockBatch::withBothMethods(limits);
+    const MockBatch batch = MockBatch::withAllMethods(limits);
     expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "other limits");
   }
 }
@@ -544,7 +547,7 @@ TEST_F(RecordTest, APlanForOtherLimitsIsRefused) {
 TEST_F(RecordTest, BindingsOfAnotherContextAreRefused) {
   ASSERT_NO_FATAL_FAILURE(create());
   const Result<vulkan::Context> other = vulkan::Context::create(mock.description());
-  const MockBatch batch = MockBatch::withBothMethods(context->limits());
+  const MockBatch batch = MockBatch::withAllMethods(context->limits());
   ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
   const Result<vulkan::Bindings> bindings = other->createBindings(batch.buffers());
   EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().code,

@@ -110,9 +110,15 @@ struct RigInfluence {
   float weight;
 };
 
+inline void append(std::vector<float>& values, const glm::dvec3& vector) {
+  for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(vector[i]));
+}
+
+/// Its centre of rotation is a point by the way: half way to (0.2, −0.4, 0.6).
 inline void addVertex(OwnedMesh& mesh, const glm::dvec3& position,
                       std::initializer_list<RigInfluence> influences) {
-  for (int i = 0; i < 3; ++i) mesh.positions.push_back(static_cast<float>(position[i]));
+  append(mesh.positions, position);
+  append(mesh.centersOfRotation, 0.5 * position + glm::dvec3(0.1, -0.2, 0.3));
   std::uint32_t slot = 0;
   for (const RigInfluence& influence : influences) {
     mesh.joints.push_back(influence.joint);
@@ -125,12 +131,15 @@ inline void addVertex(OwnedMesh& mesh, const glm::dvec3& position,
   }
 }
 
-/// Vertices within the unit cube, every slot with a weight, no joint twice in a vertex.
+/// Vertices and centres of rotation within the unit cube, every slot with a weight, no joint twice
+/// in a vertex.
 inline OwnedMesh scatteredMesh(RigRandom& random, std::uint32_t vertices, std::uint32_t jointCount,
                                std::uint32_t influences) {
   OwnedMesh mesh;
   mesh.influencesPerVertex = influences;
+  RigRandom centers(vertices);  // their own: the rest does not depend on them
   for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+    append(mesh.centersOfRotation, centers.vector(1));
     const glm::dvec3 normal = random.direction();
     std::vector<std::uint32_t> joints(jointCount);
     for (std::uint32_t i = 0; i < jointCount; ++i) joints[i] = i;
@@ -180,7 +189,7 @@ inline bool isFiniteVector(const reference::Double3& v) {
 }
 
 /// A closed tube along z from −length/2 to length/2 between joints 0 and 1, whose weights change
-/// linearly along all of it.
+/// linearly along all of it. Its centres of rotation lie on the axis.
 struct Tube {
   OwnedMesh mesh;
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -192,6 +201,8 @@ inline Tube tubeOf(std::uint32_t rings, std::uint32_t sides, double length, doub
   const auto add = [&](const glm::dvec3& position, double along) {
     addVertex(tube.mesh, position,
               {{0, static_cast<float>(1 - along)}, {1, static_cast<float>(along)}});
+    tube.mesh.centersOfRotation.resize(tube.mesh.centersOfRotation.size() - 3);
+    append(tube.mesh.centersOfRotation, {0, 0, position.z});
   };
   for (std::uint32_t ring = 0; ring <= rings; ++ring) {
     const double along = static_cast<double>(ring) / rings;

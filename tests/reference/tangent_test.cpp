@@ -66,7 +66,8 @@ TEST(ReferenceTangents, LinearTakesTheBlendedMatrixItself) {
 }
 
 // Two points that lie a tangent apart move to points that lie the skinned tangent apart: the map is
-// affine where the weights are equal, in every method.
+// affine where the weights, and the centres of rotation, are equal. In `blended` too, but there the
+// directions are a mean of two unit vectors (below).
 TEST(ReferenceTangents, GoAsThePointsOfASurfaceGo) {
   RigRandom random(2);
   for (const bool scales : {false, true}) {
@@ -81,13 +82,34 @@ TEST(ReferenceTangents, GoAsThePointsOfASurfaceGo) {
       for (const glm::dvec3& p : {glm::dvec3(0.0), t}) {
         mesh.add(p, t, 1, {{0, 0.5f}, {1, 0.3f}, {2, 0.2f}});
       }
+      mesh.mesh.centersOfRotation = {0.25f, -0.5f, 0.75f, 0.25f, -0.5f, 0.75f};
       for (const Method method : allMethods) {
+        if (method == Method::blended) continue;
         const reference::SkinnedMesh result = mesh.skinned(pose, method);
         const glm::dvec3 apart = toVector(result.positions[1]) - toVector(result.positions[0]);
         if (glm::length(apart) < 1e-3) continue;
         expectNear(direction(result.tangents[0]), glm::normalize(apart), 1e-11);
       }
     }
+  }
+}
+
+TEST(ReferenceTangents, OfBlendedAreTheMeanOfBothMadeUnit) {
+  RigRandom random(22);
+  for (int trial = 0; trial < 300; ++trial) {
+    const std::vector<JointMatrix> pose{
+        jointOf(exactRotation(random) * randomMatrix(random), random.vector(1)),
+        jointOf(exactRotation(random) * randomMatrix(random), random.vector(1))};
+    TangentMesh mesh = vertexWithTangent(random.direction(), {{0, 0.375f}, {1, 0.625f}});
+    const auto share = static_cast<float>(random.between(0, 1));
+    mesh.mesh.dualQuaternionWeights = {share};
+    const glm::dvec3 linear = direction(mesh.skinned(pose, Method::linear).tangents[0]);
+    const glm::dvec3 dual = direction(mesh.skinned(pose, Method::dualQuaternion).tangents[0]);
+    const glm::dvec3 mean =
+        (1 - static_cast<double>(share)) * linear + static_cast<double>(share) * dual;
+    if (glm::length(mean) < 1e-3) continue;
+    expectNear(direction(mesh.skinned(pose, Method::blended).tangents[0]), glm::normalize(mean),
+               1e-12);
   }
 }
 

@@ -294,6 +294,7 @@ TEST(Compare, AZeroNormalMustStayZero) {
   mesh.influencesPerVertex = 1;
   mesh.positions = {1, 0, 0, 0, 1, 0};
   mesh.normals = {0, 0, 0, 0, 0, 1};
+  mesh.centersOfRotation = {1, 2, 3, 0, 0, 0};
   mesh.joints = {0, 0};
   mesh.weights = {1, 1};
   for (const float scale : {1.0f, 2.0f}) {

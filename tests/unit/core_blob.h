@@ -50,6 +50,19 @@ class Blob {
     return number(std::size_t{word(abi::MESH_HEADER_TANGENTS)} + vertex * 4 + component);
   }
 
+  float center(std::uint32_t vertex, std::uint32_t component) const {
+    return number(std::size_t{word(abi::MESH_HEADER_CENTERS)} + vertex * 3 + component);
+  }
+  /// The vertex' own, or the mesh's.
+  float dualQuaternionWeight(std::uint32_t vertex) const {
+    const std::size_t section = word(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS);
+    return number(section != 0 ? section + vertex : abi::MESH_HEADER_DUAL_QUATERNION_WEIGHT);
+  }
+  float bulgeStrength(std::uint32_t vertex) const {
+    const std::size_t section = word(abi::MESH_HEADER_BULGE_STRENGTHS);
+    return number(section != 0 ? section + vertex : abi::MESH_HEADER_BULGE_STRENGTH);
+  }
+
   /// The word at which a vertex' influences are counted from; that of the next ends them.
   std::size_t firstOf(std::uint32_t vertex) const {
     return std::size_t{word(abi::MESH_HEADER_FIRSTS)} + vertex;

@@ -64,6 +64,13 @@ TEST(Mesh, GlmMatricesAreTransposedOnTheWay) {
 TEST(Method, NamesGoBothWays) {
   EXPECT_EQ(methodName(Method::linear), "linear");
   EXPECT_EQ(methodName(Method::dualQuaternion), "dual_quaternion");
+  EXPECT_EQ(methodName(Method::dualQuaternionIterative), "dual_quaternion_iterative");
+  EXPECT_EQ(methodName(Method::logMatrix), "log_matrix");
+  EXPECT_EQ(methodName(Method::sphericalBlend), "spherical_blend");
+  EXPECT_EQ(methodName(Method::quaternionTranslation), "quaternion_translation");
+  EXPECT_EQ(methodName(Method::blended), "blended");
+  EXPECT_EQ(methodName(Method::centerOfRotation), "center_of_rotation");
+  EXPECT_EQ(methodName(Method::bulgeControlled), "bulge_controlled");
   for (const Method method : allMethods) EXPECT_EQ(methodFromName(methodName(method)), method);
   for (const char* name : {"", "Linear", "dualQuaternion", "unknown", "linear "}) {
     EXPECT_EQ(methodFromName(name), std::nullopt) << name;

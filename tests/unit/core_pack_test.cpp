@@ -339,6 +339,80 @@ TEST(Pack, AFourthComponentOfPositionsAndNormalsIsNotRead) {
 
 // ---- Influences
 
+TEST(Pack, WhatOnlySomeMethodsWantStandsVertexByVertex) {
+  for (const std::uint32_t vertices : {1u, 64u, 65u, 1234u}) {
+    OwnedMesh mesh = slottedMesh(vertices, vertices, 3, 20);
+    const std::size_t before = packed(mesh.view(), 20).bytes().size();
+    for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+      const auto number = static_cast<float>(vertex);
+      mesh.centersOfRotation.insert(mesh.centersOfRotation.end(), {number, -number, number / 2});
+      mesh.dualQuaternionWeights.push_back(number / static_cast<float>(vertices));
+      mesh.bulgeStrengths.push_back(1 - number / static_cast<float>(vertices));
+    }
+    const PackedMesh result = packed(mesh.view(), 20);
+    EXPECT_TRUE(result.info().hasCentersOfRotation);
+    const Blob blob(result.bytes());
+    for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+      ASSERT_NO_FATAL_FAILURE(expectVertex(blob, mesh, vertex));
+      for (std::uint32_t i = 0; i < 3; ++i)
+        ASSERT_EQ(blob.center(vertex, i), mesh.centersOfRotation[vertex * 3 + i]);
+      ASSERT_EQ(blob.dualQuaternionWeight(vertex), mesh.dualQuaternionWeights[vertex]);
+      ASSERT_EQ(blob.bulgeStrength(vertex), mesh.bulgeStrengths[vertex]);
+    }
+    // Three words and one and one, and what fills up to 16 bytes.
+    EXPECT_GE(result.bytes().size() + 16, before + 20 * std::size_t{vertices});
+    EXPECT_LE(result.bytes().size(), before + 20 * std::size_t{vertices} + 16);
+  }
+}
+
+TEST(Pack, SharesOfTheWholeMeshStandInTheHeader) {
+  OwnedMesh mesh = slottedMesh(1, 10, 3, 20);
+  const PackedMesh plain = packed(mesh.view(), 20);
+  EXPECT_FALSE(plain.info().hasCentersOfRotation);
+  const Blob blob(plain.bytes());
+  EXPECT_EQ(blob.word(abi::MESH_HEADER_CENTERS), 0u);
+  EXPECT_EQ(blob.word(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS), 0u);
+  EXPECT_EQ(blob.word(abi::MESH_HEADER_BULGE_STRENGTHS), 0u);
+  EXPECT_EQ(blob.dualQuaternionWeight(0), 0.5f) << "as mesh.h has it";
+  EXPECT_EQ(blob.bulgeStrength(0), 1.0f);
+  for (const float share : {0.0f, 0.125f, 1.0f}) {
+    MeshView view = mesh.view();
+    view.dualQuaternionWeight = share;
+    view.bulgeStrength = 1 - share;
+    const PackedMesh changed = packed(view, 20);
+    EXPECT_EQ(Blob(changed.bytes()).dualQuaternionWeight(9), share);
+    EXPECT_EQ(Blob(changed.bytes()).bulgeStrength(9), 1 - share);
+    EXPECT_EQ(changed.bytes().size(), plain.bytes().size()) << "they cost nothing";
+    const Result<PackedMesh> stored = PackedMesh::fromBytes(changed.bytes());
+    ASSERT_TRUE(stored.ok());
+    EXPECT_EQ(Blob(stored->bytes()).dualQuaternionWeight(3), share);
+  }
+}
+
+TEST(Pack, SharesOfEveryTypeAndStride) {
+  OwnedMesh mesh = slottedMesh(2, 5, 3, 20);
+  const std::vector<std::uint8_t> bytes{0, 9, 64, 9, 128, 9, 254, 9, 255};  // every other one
+  const std::vector<std::uint16_t> shorts{0, 1, 32768, 65534, 65535};
+  const std::vector<float> gapped{0, 9, 0.25f, 9, 0.5f, 9, 0.75f, 9, 1};
+  const std::pair<AttributeView, std::array<float, 5>> cases[] = {
+      {{bytes.data(), 5, 2, ComponentType::unorm8, 1},
+       {0, 64 / 255.0f, 128 / 255.0f, 254 / 255.0f, 1}},
+      {{shorts.data(), 5, 2, ComponentType::unorm16, 1},
+       {0, 1 / 65535.0f, 32768 / 65535.0f, 65534 / 65535.0f, 1}},
+      {{gapped.data(), 5, 8, ComponentType::float32, 1}, {0, 0.25f, 0.5f, 0.75f, 1}}};
+  for (const auto& [view, expected] : cases) {
+    MeshView shared = mesh.view();
+    shared.dualQuaternionWeights = shared.bulgeStrengths = view;
+    shared.dualQuaternionWeight = shared.bulgeStrength = nan;  // not looked at
+    const PackedMesh result = packed(shared, 20);
+    const Blob blob(result.bytes());
+    for (std::uint32_t vertex = 0; vertex < 5; ++vertex) {
+      EXPECT_EQ(blob.dualQuaternionWeight(vertex), expected[vertex]);
+      EXPECT_EQ(blob.bulgeStrength(vertex), expected[vertex]);
+    }
+  }
+}
+
 TEST(Pack, InfluencesOfAllSetsBelongTogether) {
   const std::uint32_t joints0[] = {4, 5}, joints1[] = {6, 4};
   const float weights0[] = {0.2f, 0.1f}, weights1[] = {0.25f, 0.45f}, position[] = {0, 0, 0};

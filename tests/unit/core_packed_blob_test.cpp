@@ -16,7 +16,7 @@
 namespace dermis::test {
 namespace {
 
-/// A mesh with tangents and morph targets, and its blob.
+/// A mesh with tangents, morph targets and what only some methods want, and its blob.
 struct MorphedMesh {
   OwnedMesh mesh;
   std::vector<float> tangents;
@@ -28,6 +28,9 @@ struct MorphedMesh {
     targets.push_back(randomTarget(seed + 1, mesh.vertexCount(), 10000, true, true));  // nothing
     targets.push_back(randomTarget(seed + 2, mesh.vertexCount(), 5, false, false));
     for (OwnedTarget* target : {&targets[0], &targets[2]}) target->positions.back() = 1;
+    mesh.centersOfRotation.assign(mesh.positions.size(), 0.5f);
+    mesh.dualQuaternionWeights.assign(mesh.vertexCount(), 0.25f);
+    mesh.bulgeStrengths.assign(mesh.vertexCount(), 0.75f);
   }
   PackedMesh pack(std::uint32_t jointCount) {
     MeshView view = mesh.view();
@@ -55,6 +58,7 @@ TEST(PackedBlob, ComesBackFromItsBytes) {
       EXPECT_EQ(info.morphTargetCount, morphs ? 3u : 0u);
       EXPECT_EQ(info.hasNormals, true);
       EXPECT_EQ(info.hasTangents, morphs);
+      EXPECT_EQ(info.hasCentersOfRotation, morphs);
     }
   }
 }
@@ -152,7 +156,8 @@ TEST_F(DamagedBlob, SwappedWordsAreRefused) {
 }
 
 TEST_F(DamagedBlob, AnotherVersionIsNamed) {
-  for (const std::uint32_t version : {0u, 1u, 3u, 0xffffffffu}) {
+  ASSERT_EQ(abi::MESH_VERSION, 3u);
+  for (const std::uint32_t version : {0u, 1u, 2u, 4u, 0xffffffffu}) {
     Blob changed = blob;
     changed.words()[abi::MESH_HEADER_VERSION] = version;
     changed.seal();
@@ -179,6 +184,9 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
       {abi::MESH_HEADER_POSITIONS, 66 * 3},
       {abi::MESH_HEADER_NORMALS, 66 * 3},
       {abi::MESH_HEADER_TANGENTS, 66 * 4},
+      {abi::MESH_HEADER_CENTERS, 66 * 3},
+      {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, 66},
+      {abi::MESH_HEADER_BULGE_STRENGTHS, 66},
       {abi::MESH_HEADER_FIRSTS, 67},
       {abi::MESH_HEADER_INFLUENCES, 2 * blob.word(blob.firstOf(66))},
       {abi::MESH_HEADER_MORPHS, 3 * abi::MORPH_WORDS}};
@@ -188,13 +196,28 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
                                        0x7ffffffeu, 0xfffffffeu, 0xffffffffu}) {
       expectRefusedWith(header, offset);
     }
+    ASSERT_NE(blob.word(header), 0u) << "this blob has everything";
     const bool mayBeAbsent =
-        header == abi::MESH_HEADER_NORMALS || header == abi::MESH_HEADER_TANGENTS;
+        header != abi::MESH_HEADER_POSITIONS && header != abi::MESH_HEADER_FIRSTS &&
+        header != abi::MESH_HEADER_INFLUENCES && header != abi::MESH_HEADER_MORPHS;
     if (!mayBeAbsent) expectRefusedWith(header, 0);
   }
   expectRefusedWith(abi::MESH_HEADER_INFLUENCES, blob.word(abi::MESH_HEADER_INFLUENCES) - 1);
   for (const std::uint32_t targets : {size(), size() / 4, 0x40000000u, 0x40000003u, 0xffffffffu})
     expectRefusedWith(abi::MESH_HEADER_MORPH_COUNT, targets);
+}
+
+TEST_F(DamagedBlob, WhatOnlySomeMethodsWantMayBeAbsent) {
+  Blob changed = blob;
+  for (const std::uint32_t header :
+       {abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS,
+        abi::MESH_HEADER_BULGE_STRENGTHS}) {
+    changed.words()[header] = 0;
+    changed.seal();
+    const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_FALSE(result->info().hasCentersOfRotation);
+  }
 }
 
 // Each vertex' influences follow those before it, as many as the header says at most.

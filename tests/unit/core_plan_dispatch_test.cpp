@@ -85,6 +85,74 @@ TEST(Plan, PalettesThatNoDualQuaternionJobUsesAreLeftOut) {
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 16 + 9 * 64 + 16 + 7 * 64u);
 }
 
+// Dual quaternions serve all methods but one, which wants logarithms.
+TEST(Plan, APaletteIsConvertedOnceForEachFormThatIsRead) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(10, 2, 5, true));
+  batch.addPalette(5, false);
+  batch.addPalette(7, true);
+  const auto sizeOf = [&](std::initializer_list<Method> methods, std::uint32_t palette) {
+    batch.jobs.clear();
+    batch.outputSize = 0;
+    for (const Method method : methods) batch.addJob(0, palette, method, true);
+    Plan out;
+    EXPECT_TRUE(makePlan(batch.batch(), {}, {}, out).ok());
+    expectPlanned(batch, {}, {}, out);
+    return out.buffer(BufferRole::palettes).size;
+  };
+  // A status of 16 bytes; a joint is 32, its logarithm 48, scale and shear 32.
+  const std::uint64_t dual = 16 + 5 * 32, logarithms = 16 + 5 * 48;
+  const std::uint64_t dualScaled = 16 + 7 * 64, logarithmsScaled = 16 + 7 * 80;
+  for (const Method method : allMethods) {
+    const bool isLog = method == Method::logMatrix, isLinear = method == Method::linear;
+    EXPECT_EQ(sizeOf({method}, 0), isLinear ? 0 : isLog ? logarithms : dual) << methodName(method);
+    EXPECT_EQ(sizeOf({method, method}, 1), isLinear ? 0 : isLog ? logarithmsScaled : dualScaled);
+    EXPECT_EQ(sizeOf({method, Method::dualQuaternion}, 0), isLog ? dual + logarithms : dual);
+    EXPECT_EQ(sizeOf({Method::logMatrix, method}, 1),
+              isLog || isLinear ? logarithmsScaled : dualScaled + logarithmsScaled);
+  }
+}
+
+TEST(Plan, APaletteInTwoFormsHasAStatusInEither) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(10, 2, 5, true));
+  for (int palette = 0; palette < 4; ++palette) batch.addPalette(5, palette % 2 == 0);
+  batch.addJob(0, 0, Method::logMatrix, true);
+  batch.addJob(0, 1, Method::logMatrix, true);
+  batch.addJob(0, 1, Method::blended, true);
+  batch.addJob(0, 2, Method::centerOfRotation, true);
+  batch.addJob(0, 3, Method::linear, true);
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  EXPECT_EQ(out.dispatches()[0].constants.recordCount, 4u);
+  std::set<std::uint64_t> offsets;
+  for (const std::uint32_t palette : {0u, 1u, 2u}) {
+    EXPECT_LT(out.statusOffset(palette), out.buffer(BufferRole::palettes).size);
+    EXPECT_EQ(out.statusOffset(palette) % 16, 0u);
+    offsets.insert(out.statusOffset(palette));
+  }
+  EXPECT_EQ(offsets.size(), 3u);
+  EXPECT_EQ(out.statusOffset(3), Plan::noStatus);
+}
+
+// The palette of the last frame, as logarithms, beside the same as dual quaternions.
+TEST(Plan, PreviousPalettesAreConvertedToTheFormOfTheirJob) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(10, 2, 5, true));
+  batch.addPalette(5, true);
+  batch.addPalette(5, false);
+  for (const Method method : {Method::logMatrix, Method::sphericalBlend}) {
+    Job job = batch.jobOf(0, 0, method);
+    job.motion = Motion::reskinned;
+    job.previousPalette = 1;
+    batch.place(job, Arrangement::planar);
+  }
+  Plan out;
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(out.buffer(BufferRole::palettes).size,
+            4 * 16 + 5 * (32 + 32) + 5 * 32 + 5 * (48 + 32) + 5 * 48u);
+}
+
 TEST(Plan, TheInfluenceClassFitsTheMostInfluencedMesh) {
   const std::pair<std::uint32_t, int> classes[] = {{1, 1}, {2, 2}, {3, 4}, {4, 4}, {5, 0}, {8, 0}};
   for (const auto& [influences, expected] : classes) {

@@ -125,8 +125,34 @@ TEST_F(PlanErrors, MatrixOffsets) {
 }
 
 TEST_F(PlanErrors, UnknownMethods) {
-  job().method = static_cast<Method>(2);
-  expectInvalid({"job 1", "method"});
+  for (const std::size_t number : {allMethods.size(), std::size_t{200}, std::size_t{255}}) {
+    job().method = static_cast<Method>(number);
+    expectInvalid({"job 1", "method"});
+  }
+}
+
+TEST_F(PlanErrors, MethodsWithACenterOfRotationForAMeshWithoutAny) {
+  batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 5, false}));
+  EXPECT_FALSE(batch.meshes[2].info().hasCentersOfRotation);
+  EXPECT_TRUE(batch.meshes[0].info().hasCentersOfRotation);
+  for (const Method method : allMethods) {
+    SCOPED_TRACE(methodName(method));
+    job().mesh = batch.meshes[0].info();
+    job().meshOffset = 0;
+    job().method = method;
+    expectGood();
+    job().mesh = batch.meshes[2].info();
+    job().meshOffset = batch.meshOffsets[2];
+    const bool needs = method == Method::centerOfRotation || method == Method::bulgeControlled;
+    EXPECT_EQ(needsCentersOfRotation(method), needs);
+    if (!needs) {
+      expectGood();
+      continue;
+    }
+    const std::string sentence = "job 1: " + std::string(methodName(method)) +
+                                 " needs centres of rotation, its mesh has none";
+    expectInvalid({sentence.c_str()});
+  }
 }
 
 TEST_F(PlanErrors, NormalsOfAMeshWithoutAny) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -32,6 +33,13 @@ std::uint8_t unitOf(const OutputAttribute& attribute) {
 bool isMorphed(const Job& job) {
   return !activeMorphs(job.morphs).empty() ||
          (job.motion == Motion::reskinned && !activeMorphs(job.previousMorphs).empty());
+}
+
+/// A palette, and whether as logarithms.
+using PaletteInForm = std::pair<std::uint32_t, bool>;
+
+bool wantsLogarithms(Method method) {
+  return method == Method::logMatrix;
 }
 
 class Simulation {
@@ -66,6 +74,7 @@ class Simulation {
       }
     }
     ASSERT_NO_FATAL_FAILURE(checkAllWritten());
+    ASSERT_NO_FATAL_FAILURE(checkStatuses());
     ASSERT_TRUE(std::ranges::equal(plan_.variants(), used));
   }
 
@@ -125,11 +134,12 @@ class Simulation {
 
   void runPalettes(const Dispatch& dispatch) {
     const DispatchConstants& constants = dispatch.constants;
-    std::set<std::uint32_t> wanted;
+    std::set<PaletteInForm> wanted;
     for (const Job& job : batch_.jobs) {
-      if (job.method != Method::dualQuaternion) continue;
-      wanted.insert(job.palette);
-      if (job.motion == Motion::reskinned) wanted.insert(job.previousPalette);
+      if (job.method == Method::linear) continue;
+      wanted.insert({job.palette, wantsLogarithms(job.method)});
+      if (job.motion == Motion::reskinned)
+        wanted.insert({job.previousPalette, wantsLogarithms(job.method)});
     }
     ASSERT_EQ(constants.recordCount, wanted.size());
     ASSERT_EQ(constants.instanceRecords, resultCount_);
@@ -139,21 +149,47 @@ class Simulation {
     for (std::uint32_t number = 0; number < constants.recordCount; ++number) {
       const std::uint64_t record = constants.firstRecord + number * abi::PALETTE_WORDS;
       const std::uint64_t status = std::uint64_t{word(record + abi::PALETTE_OUTPUT)} * 16;
-      const auto found = std::find_if(wanted.begin(), wanted.end(), [&](std::uint32_t palette) {
-        return plan_.statusOffset(palette) == status;
-      });
-      ASSERT_NE(found, wanted.end());
-      const Palette& palette = batch_.palettes[*found];
-      wanted.erase(found);
-      ASSERT_EQ(std::uint64_t{word(record + abi::PALETTE_MATRICES)} * 16, palette.matrixOffset);
+      // No two palettes of a batch begin at the same matrix.
+      const auto matrices = std::uint64_t{word(record + abi::PALETTE_MATRICES)} * 16;
+      const auto found =
+          std::find_if(batch_.palettes.begin(), batch_.palettes.end(),
+                       [&](const Palette& palette) { return palette.matrixOffset == matrices; });
+      ASSERT_NE(found, batch_.palettes.end());
+      const Palette& palette = *found;
+      const std::uint32_t flags = word(record + abi::PALETTE_FLAGS);
+      const bool logarithms = (flags & abi::PALETTE_LOGARITHMS) != 0;
+      const PaletteInForm form{static_cast<std::uint32_t>(found - batch_.palettes.begin()),
+                               logarithms};
+      ASSERT_EQ(wanted.erase(form), 1u) << "a palette that nobody reads, or twice in a form";
       ASSERT_EQ(word(record + abi::PALETTE_JOINTS), palette.jointCount);
-      ASSERT_EQ(word(record + abi::PALETTE_MAY_SCALE), palette.mayScale ? 1u : 0u);
+      ASSERT_EQ(flags, (palette.mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
+                           (logarithms ? abi::PALETTE_LOGARITHMS : 0u));
       ASSERT_GE(status, end) << "palettes overlap";
-      end = status + 16 + std::uint64_t{palette.jointCount} * (palette.mayScale ? 64 : 32);
+      // A joint: 8 floats of a dual quaternion, 12 of a logarithm, 8 of scale and shear.
+      end = status + 16 +
+            std::uint64_t{palette.jointCount} *
+                ((logarithms ? 48u : 32u) + (palette.mayScale ? 32u : 0u));
       ASSERT_LE(end, plan_.buffer(BufferRole::palettes).size);
+      statuses_[form] = status;
     }
     ASSERT_TRUE(wanted.empty());
     ASSERT_EQ(end, plan_.buffer(BufferRole::palettes).size);
+  }
+
+  /// What a plan says of a status is true of one that is written.
+  void checkStatuses() {
+    for (std::uint32_t palette = 0; palette < batch_.palettes.size(); ++palette) {
+      const std::uint64_t status = plan_.statusOffset(palette);
+      const auto dual = statuses_.find({palette, false}),
+                 logarithm = statuses_.find({palette, true});
+      if (status == Plan::noStatus) {
+        ASSERT_TRUE(dual == statuses_.end() && logarithm == statuses_.end()) << palette;
+      } else {
+        ASSERT_TRUE((dual != statuses_.end() && dual->second == status) ||
+                    (logarithm != statuses_.end() && logarithm->second == status))
+            << palette;
+      }
+    }
   }
 
   void runSkin(const Dispatch& dispatch) {
@@ -237,14 +273,14 @@ class Simulation {
       }
     }
     // It waits for what it reads or adds to, and for nothing else.
-    const bool reads = job.method == Method::dualQuaternion || wantsResult(job);
+    const bool reads = job.method != Method::linear || wantsResult(job);
     ASSERT_EQ(dispatch.afterPalettes, reads);
     ASSERT_TRUE(palettesDone_ || !reads);
   }
 
   std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
     return method == Method::linear ? batch_.palettes[palette].matrixOffset
-                                    : plan_.statusOffset(palette);
+                                    : statuses_.at({palette, wantsLogarithms(method)});
   }
 
   void checkRecord(std::uint32_t group, std::uint64_t record, std::uint32_t index) {
@@ -340,7 +376,8 @@ class Simulation {
   std::vector<std::uint32_t> tables_;
   std::array<std::uint64_t, streamCount> sizes_{};
   std::vector<std::pair<std::uint64_t, std::uint32_t>> begins_;  ///< of positions, and the job
-  std::vector<std::vector<std::uint8_t>> written_;  ///< by job and vertex: a bit a stream
+  std::vector<std::vector<std::uint8_t>> written_;   ///< by job and vertex: a bit a stream
+  std::map<PaletteInForm, std::uint64_t> statuses_;  ///< bytes into the palettes
   std::uint64_t resultCount_ = 0;
   bool palettesDone_ = false;
 };
@@ -352,6 +389,7 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
   OwnedMesh mesh;
   mesh.influencesPerVertex = influences;
   mesh.positions.assign(std::size_t{vertices} * 3, 1.0f);
+  if (parts.centers) mesh.centersOfRotation.assign(std::size_t{vertices} * 3, 0.5f);
   if (parts.normals) mesh.normals.assign(std::size_t{vertices} * 3, 1.0f);
   for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
     for (std::uint32_t slot = 0; slot < influences; ++slot) {
@@ -371,7 +409,7 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
 
 PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_t joints,
                   bool normals) {
-  return meshOf(vertices, influences, joints, MeshParts{normals, false, 0});
+  return meshOf(vertices, influences, joints, MeshParts{normals, false, 0, true});
 }
 
 void OwnedBatch::addMesh(PackedMesh mesh) {
@@ -470,9 +508,10 @@ OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
     const auto mesh = static_cast<std::uint32_t>(engine() % batch.meshes.size());
     const bool normals = batch.meshes[mesh].info().hasNormals && engine() % 3 != 0;
     const std::uint32_t stride = (normals ? 24 : 12) + static_cast<std::uint32_t>(engine() % 3) * 4;
-    Job& job =
-        batch.addJob(mesh, static_cast<std::uint32_t>(engine() % 4),
-                     engine() % 2 == 0 ? Method::linear : Method::dualQuaternion, normals, stride);
+    const auto palette = static_cast<std::uint32_t>(engine() % 4);
+    const Method method =
+        engine() % 2 == 0 ? Method::linear : allMethods[1 + engine() % (allMethods.size() - 1)];
+    Job& job = batch.addJob(mesh, palette, method, normals, stride);
     if (!normals || engine() % 2 == 0) continue;
     // Planar: first all positions, then all normals with a stride of their own.
     const std::uint32_t vertices = job.mesh.vertexCount;
@@ -515,7 +554,7 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
   addMeshes(batch);
   addPalettes(batch);
   for (std::uint32_t index = 0; index < jobs; ++index) {
-    Job job = batch.jobOf(below(5), below(4), allMethods[below(2)]);
+    Job job = batch.jobOf(below(5), below(4), allMethods[below(allMethods.size())]);
     job.positions.format = anyFormat(engine, isPositionFormat);
     if (job.mesh.hasNormals && below(3) != 0)
       job.normals.format = anyFormat(engine, isNormalFormat);

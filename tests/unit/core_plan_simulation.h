@@ -17,6 +17,7 @@ struct MeshParts {
   bool normals = false;
   bool tangents = false;
   std::uint32_t morphTargets = 0;
+  bool centers = true;  ///< of rotation
 };
 
 /// A packed mesh of which every vertex has so many influences and the last joint is used.

@@ -126,6 +126,76 @@ TEST(Repair, ElementsThatAreNotFiniteBecomeZeroAsAWhole) {
   EXPECT_TRUE(validate(mended, 10).findings.empty());
 }
 
+TEST(Repair, WhatOnlySomeMethodsWantIsKept) {
+  OwnedMesh mesh = goodMesh();
+  const std::vector<std::uint16_t> weights{0, 1, 32768, 40000, 65534, 65535};
+  for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
+    mesh.bulgeStrengths.push_back(static_cast<float>(vertex) / 5);
+    for (std::uint32_t i = 0; i < 3; ++i)
+      mesh.centersOfRotation.push_back(static_cast<float>(100 * vertex + i));
+  }
+  MeshView view = mesh.view();
+  view.dualQuaternionWeights = {weights.data(), 6, 2, ComponentType::unorm16, 1};
+  const RepairedMesh result = repaired(view, 10);
+  EXPECT_TRUE(result.report().findings.empty());
+  const MeshView mended = result.view();
+  EXPECT_EQ(mended.dualQuaternionWeights.type, ComponentType::float32);
+  for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
+    EXPECT_EQ(valueAt<float>(mended.dualQuaternionWeights, vertex, 0),
+              static_cast<float>(weights[vertex]) / 65535);
+    EXPECT_EQ(valueAt<float>(mended.bulgeStrengths, vertex, 0), mesh.bulgeStrengths[vertex]);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(valueAt<float>(mended.centersOfRotation, vertex, i),
+                mesh.centersOfRotation[vertex * 3 + i]);
+    }
+  }
+  // What the mesh lacks it goes on lacking, with the mesh's own shares.
+  view = goodMesh().view();
+  OwnedMesh bare = goodMesh();
+  view = bare.view();
+  view.dualQuaternionWeight = 0.375f;
+  view.bulgeStrength = 0.625f;
+  const RepairedMesh plain = repaired(view, 10);
+  EXPECT_FALSE(plain.view().centersOfRotation);
+  EXPECT_FALSE(plain.view().dualQuaternionWeights);
+  EXPECT_FALSE(plain.view().bulgeStrengths);
+  EXPECT_EQ(plain.view().dualQuaternionWeight, 0.375f);
+  EXPECT_EQ(plain.view().bulgeStrength, 0.625f);
+}
+
+TEST(Repair, SharesAreClampedCentersThatAreNotFiniteBecomeZero) {
+  OwnedMesh mesh = goodMesh();
+  mesh.dualQuaternionWeights = {-0.5f, 1.5f, nan, infinity, -infinity, 0.25f};
+  mesh.bulgeStrengths = {0.25f, -1e-30f, 1.0000001f, nan, 3e38f, -0.0f};
+  mesh.centersOfRotation.assign(18, 5.0f);
+  mesh.centersOfRotation[1 * 3 + 2] = nan;
+  mesh.centersOfRotation[4 * 3 + 0] = infinity;
+  const RepairedMesh result = repaired(mesh.view(), 10);
+  EXPECT_EQ(result.report().find(Problem::nonFiniteCenter)->count, 2u);
+  EXPECT_NE(result.report().find(Problem::shareOutOfRange), nullptr);
+  const MeshView mended = result.view();
+  const float weights[] = {0, 1, 0, 1, 0, 0.25f}, strengths[] = {0.25f, 0, 1, 0, 1, 0};
+  for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
+    EXPECT_EQ(valueAt<float>(mended.dualQuaternionWeights, vertex, 0), weights[vertex]);
+    EXPECT_EQ(valueAt<float>(mended.bulgeStrengths, vertex, 0), strengths[vertex]);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(valueAt<float>(mended.centersOfRotation, vertex, i),
+                vertex == 1 || vertex == 4 ? 0.0f : 5.0f);
+    }
+  }
+  EXPECT_TRUE(validate(mended, 10).findings.empty());
+  EXPECT_TRUE(pack(mended, 10)->info().hasCentersOfRotation);
+  for (const auto& [bad, good] : {std::pair{-1.0f, 0.0f}, {2.0f, 1.0f}, {nan, 0.0f}}) {
+    OwnedMesh whole = goodMesh();
+    MeshView view = whole.view();
+    view.dualQuaternionWeight = view.bulgeStrength = bad;
+    const RepairedMesh clamped = repaired(view, 10);
+    EXPECT_EQ(clamped.view().dualQuaternionWeight, good);
+    EXPECT_EQ(clamped.view().bulgeStrength, good);
+    EXPECT_TRUE(validate(clamped.view(), 10).packable());
+  }
+}
+
 TEST(Repair, PositionsLoseTheirScaleAndOffset) {
   OwnedMesh mesh = goodMesh();
   std::vector<std::int16_t> stored(6 * 4, 16384);

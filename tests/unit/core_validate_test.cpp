@@ -32,6 +32,9 @@ struct ValidateTest : public ::testing::Test {
       mesh.joints.insert(mesh.joints.end(), {vertex, vertex + 1, 0, 0});
       mesh.weights.insert(mesh.weights.end(), {0.75f, 0.25f, 0.0f, 0.0f});
       tangents.insert(tangents.end(), {1.0f, 0.0f, 0.0f, 1.0f});
+      mesh.centersOfRotation.insert(mesh.centersOfRotation.end(), {0.0f, 1.0f, 2.0f});
+      mesh.dualQuaternionWeights.push_back(static_cast<float>(vertex) / 9);
+      mesh.bulgeStrengths.push_back(1 - static_cast<float>(vertex) / 9);
     }
     view = mesh.view();
     view.tangents = floatAttribute(tangents.data(), vertexCount, 4);
@@ -70,6 +73,7 @@ TEST_F(ValidateTest, FindsNothingInAGoodMesh) {
   EXPECT_EQ(report.find(Problem::emptyMesh), nullptr);
   view.normals = {};
   view.tangents = {};
+  view.centersOfRotation = view.dualQuaternionWeights = view.bulgeStrengths = {};
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
 }
 
@@ -111,6 +115,9 @@ TEST_F(ValidateTest, CountsThatDisagree) {
   } cases[] = {{&view.positions, "positions"},
                {&view.normals, "normals"},
                {&view.tangents, "tangents"},
+               {&view.dualQuaternionWeights, "dual-quaternion weights"},
+               {&view.bulgeStrengths, "bulge strengths"},
+               {&view.centersOfRotation, "centres of rotation"},
                {&set.joints, "joints"},
                {&set.weights, "weights"}};
   for (const auto& [attribute, name] : cases) {
@@ -135,6 +142,9 @@ TEST_F(ValidateTest, StridesThatAreTooSmall) {
   } cases[] = {{&view.positions, "positions", 12},
                {&view.normals, "normals", 12},
                {&view.tangents, "tangents", 16},
+               {&view.dualQuaternionWeights, "dual-quaternion weights", 4},
+               {&view.bulgeStrengths, "bulge strengths", 4},
+               {&view.centersOfRotation, "centres of rotation", 12},
                {&set.joints, "joints", 16},
                {&set.weights, "weights", 16}};
   for (const auto& [attribute, name, size] : cases) {
@@ -169,6 +179,11 @@ TEST_F(ValidateTest, TypesThatAnAttributeMayHave) {
       {&view.positions, "positions", {Type::float32, Type::float16, Type::snorm16, Type::unorm16}},
       {&view.normals, "normals", {Type::float32, Type::float16, Type::snorm8, Type::snorm16}},
       {&view.tangents, "tangents", {Type::float32, Type::float16, Type::snorm8, Type::snorm16}},
+      {&view.dualQuaternionWeights,
+       "dual-quaternion weights",
+       {Type::float32, Type::unorm8, Type::unorm16}},
+      {&view.bulgeStrengths, "bulge strengths", {Type::float32, Type::unorm8, Type::unorm16}},
+      {&view.centersOfRotation, "centres of rotation", {Type::float32}},
       {&set.joints, "joints", {Type::uint8, Type::uint16, Type::uint32}},
       {&set.weights, "weights", {Type::float32, Type::unorm8, Type::unorm16}}};
   for (const auto& [attribute, name, allowed] : cases) {
@@ -205,6 +220,28 @@ TEST_F(ValidateTest, ComponentsThatAnAttributeMayHave) {
       attribute->components = components;
       if (allowed.contains(components)) {
         EXPECT_TRUE(validate(view, jointCount).repairable()) << components;
+      } else {
+        EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find(name), std::string::npos);
+      }
+    }
+    *attribute = good;
+  }
+}
+
+TEST_F(ValidateTest, SharesHaveOneComponentCentersThree) {
+  const struct {
+    AttributeView* attribute;
+    const char* name;
+    std::uint32_t allowed;
+  } cases[] = {{&view.dualQuaternionWeights, "dual-quaternion weights", 1},
+               {&view.bulgeStrengths, "bulge strengths", 1},
+               {&view.centersOfRotation, "centres of rotation", 3}};
+  for (const auto& [attribute, name, allowed] : cases) {
+    const AttributeView good = *attribute;
+    for (const std::uint32_t components : {0u, 1u, 2u, 3u, 4u, 0xffffffffu}) {
+      attribute->components = components;
+      if (components == allowed) {
+        EXPECT_TRUE(validate(view, jointCount).findings.empty());
       } else {
         EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find(name), std::string::npos);
       }
@@ -254,7 +291,8 @@ TEST_F(ValidateTest, NonFiniteAttributes) {
     const char* name;
   } cases[] = {{Problem::nonFinitePosition, &mesh.positions, 3, "position"},
                {Problem::nonFiniteNormal, &mesh.normals, 3, "normal"},
-               {Problem::nonFiniteTangent, &tangents, 4, "tangent"}};
+               {Problem::nonFiniteTangent, &tangents, 4, "tangent"},
+               {Problem::nonFiniteCenter, &mesh.centersOfRotation, 3, "centre of rotation"}};
   for (const auto& [problem, values, components, name] : cases) {
     const std::vector<float> good = *values;
     for (std::size_t component = 0; component < components; ++component) {
@@ -270,6 +308,47 @@ TEST_F(ValidateTest, NonFiniteAttributes) {
     onlyFinding(problem, 2, 7);
     std::copy(good.begin(), good.end(), values->begin());
   }
+}
+
+TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
+  const struct {
+    std::vector<float>* values;
+    AttributeView* attribute;
+    float* whole;
+    const char* name;
+  } cases[] = {{&mesh.dualQuaternionWeights, &view.dualQuaternionWeights,
+                &view.dualQuaternionWeight, "dual-quaternion weight"},
+               {&mesh.bulgeStrengths, &view.bulgeStrengths, &view.bulgeStrength, "bulge strength"}};
+  const float below = std::nextafter(0.0f, -1.0f), above = std::nextafter(1.0f, 2.0f);
+  for (const auto& [values, attribute, whole, name] : cases) {
+    const std::vector<float> good = *values;
+    const AttributeView goodView = *attribute;
+    const float goodWhole = *whole;
+    const std::string rest = std::string(name) + " is not from 0 to 1";
+    for (const float bad : {below, -1.0f, above, 7.0f, nan, infinity, -infinity}) {
+      (*values)[4] = bad;
+      EXPECT_EQ(onlyFinding(Problem::shareOutOfRange, 1, 4), "mesh 'Fox', vertex 4: the " + rest);
+      (*values)[8] = bad;
+      onlyFinding(Problem::shareOutOfRange, 2, 4);
+      std::copy(good.begin(), good.end(), values->begin());
+      // The mesh's own, which counts where the vertices have none.
+      *whole = bad;
+      EXPECT_TRUE(validate(view, jointCount).findings.empty());
+      *attribute = {};
+      EXPECT_NE(onlyFinding(Problem::shareOutOfRange, vertexCount, 0).find(rest),
+                std::string::npos);
+      *attribute = goodView;
+      *whole = goodWhole;
+    }
+    for (const float share : {0.0f, -0.0f, 1e-45f, 1.0f}) {
+      (*values)[4] = share;
+      EXPECT_TRUE(validate(view, jointCount).findings.empty()) << share;
+    }
+    std::copy(good.begin(), good.end(), values->begin());
+  }
+  // Vertices are counted.
+  mesh.dualQuaternionWeights[3] = mesh.bulgeStrengths[3] = 2;
+  onlyFinding(Problem::shareOutOfRange, 1, 3);
 }
 
 TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {

@@ -191,9 +191,9 @@ struct Variant {
 /// Whether the kernel writes `InstanceResult`: for bounds, and positions in snorm16.
 bool hasResults(const Variant& variant);
 
-/// Every variant that jobs with the outputs, motion and bounds of this one may need, whatever their
-/// mesh, method, palette and morph targets: for an engine that cannot foresee its batches but knows
-/// its vertex layouts, to hand to `Context::prepare` while loading.
+/// Every variant that jobs with the method, outputs, motion and bounds of this one may need,
+/// whatever their mesh, palette and morph targets: for an engine that cannot foresee its batches
+/// but knows its vertex layouts, to hand to `Context::prepare` while loading.
 std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning);
 
 /// The buffers of a batch.
@@ -275,7 +275,7 @@ class Plan {
   /// they are. Tables, palettes and results: as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
   /// Bytes into the palettes buffer at which the `PaletteStatus` of a palette stands; `noStatus`
-  /// where no dual-quaternion job uses that palette.
+  /// where only linear jobs use that palette.
   std::uint64_t statusOffset(std::uint32_t palette) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
   /// Bytes into the results buffer at which the `InstanceResult` of a job stands; `noResult` where

@@ -38,12 +38,24 @@ struct Conditioning {
   /// where joints cancel in a blend, what is left was rounded at the size of the joints.
   double normalAlignment = 1;
   double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|), likewise
+  /// A length that counts besides the scale: twice max σ_j times the centre of rotation's distance
+  /// from the origin (`centerOfRotation`, `bulgeControlled`), how far differences of rotations that
+  /// all but agree throw the centre (`sphericalBlend`: |r| + max |t_a − t_b| / σ, σ the least
+  /// singular value that is made use of), and what is left of the errors of earlier steps
+  /// (`dualQuaternionIterative`: scale · (`turning` − 1)).
+  double leverage = 0;
+  double turning = 1;  ///< `dualQuaternionIterative`: 1 / (1 − ρ), ρ the factor by which steps
+                       ///< shrink
+  double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalised
+  double tangentLength = 1;  ///< likewise
   bool normalRotatedOnly =
       true;  ///< dual quaternions with rigid joints: directions pass through no 3×3
   bool handednessAmbiguous =
       false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: its sign is a matter of rounding
-  bool signAmbiguous =
-      false;  ///< |dot| with the pivot below 1e-5: the sign of an influence is arbitrary
+  /// The answer jumps here, and rounding decides to which side: |dot| with the pivot below 1e-5,
+  /// `logMatrix`: a joint turned by 180° within 2e-5, `dualQuaternionIterative`: one nearly
+  /// opposite to the blend, `sphericalBlend`: a singular value within 1e-5 of the least.
+  bool signAmbiguous = false;
   bool degenerate =
       false;  ///< a joint of rank ≤ 1, or not finite: a result is only asked to be finite
 };

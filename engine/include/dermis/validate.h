@@ -25,6 +25,8 @@ enum class Problem : std::uint8_t {
   nonFiniteNormal,
   nonFiniteTangent,
   nonFiniteMorph,   ///< a displacement of a morph target
+  nonFiniteCenter,  ///< a centre of rotation
+  shareOutOfRange,  ///< a dual-quaternion weight or bulge strength not from 0 to 1
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
   jointOutOfRange,  ///< with a weight that is not 0
@@ -95,13 +97,15 @@ class RepairedMesh {
   };
   std::vector<Morph> morphs_;
   std::vector<MorphTargetView> morphViews_;
+  std::vector<float> dualQuaternionWeights_, bulgeStrengths_, centersOfRotation_;
+  float dualQuaternionWeight_ = 0, bulgeStrength_ = 0;
   MeshReport report_;
 };
 
 /// Mends what `validate` finds: influences with a weight that is negative or not finite, or a joint
-/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal, tangent
-/// or displacement that is not finite becomes 0. Fails with `invalidMesh` where the views make no
-/// sense.
+/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal,
+/// tangent, displacement or centre of rotation that is not finite becomes 0; dual-quaternion
+/// weights and bulge strengths are clamped. Fails with `invalidMesh` where the views make no sense.
 Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
 
 }  // namespace dermis

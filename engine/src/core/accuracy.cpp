@@ -6,19 +6,19 @@
 namespace dermis {
 namespace {
 
-/// A direction that passes through a 3×3, or is turned by a dual quaternion, or both.
-/// `bindRounding` in units of u.
+/// A direction that passes through a 3×3, or is turned by a blended rotation, or both.
+/// `bindRounding` in units of u; `length` is that of what is normalised in the end.
 double directionBound(Method method, const reference::Conditioning& conditioning, double alignment,
-                      double bindRounding) {
+                      double bindRounding, double length) {
   constexpr double leastAlignment = 1e-3;
   constexpr double mostOfAlignment = 0.05;
   const double bind = floatRounding * bindRounding;
-  const double turning = 1.5e-6 + conditioning.rigidShortcut;
+  const double turning =
+      method == Method::linear ? 0 : (1.5e-6 + conditioning.rigidShortcut) * conditioning.turning;
   const bool throughMatrix = method == Method::linear || !conditioning.normalRotatedOnly;
   if (!throughMatrix) return bind > mostOfAlignment ? -1 : turning + bind;
-  if (alignment < leastAlignment || bind > mostOfAlignment * alignment) return -1;
-  const double matrix = (6 * floatRounding + bind) / alignment;
-  return method == Method::linear ? matrix : matrix + turning;
+  if (alignment * length < leastAlignment || bind > mostOfAlignment * alignment * length) return -1;
+  return ((6 * floatRounding + bind) / alignment + turning) / length;
 }
 
 enum class Rounding { none, half, snorm, octahedral };
@@ -76,18 +76,20 @@ double componentwiseBound(const Precision& precision) {
 double positionBound(Method method, const reference::Conditioning& conditioning) {
   const double bind = floatRounding * conditioning.positionRounding * conditioning.stretch;
   if (method == Method::linear) return 6 * floatRounding * conditioning.scale + bind;
-  return 24 * floatRounding * conditioning.scale +
-         std::min(4e-6, conditioning.rigidShortcut) * conditioning.distance + bind;
+  return 24 * floatRounding * (conditioning.scale + conditioning.leverage) +
+         std::min(4e-6, conditioning.rigidShortcut) *
+             (conditioning.distance + conditioning.leverage) +
+         bind;
 }
 
 double normalBound(Method method, const reference::Conditioning& conditioning) {
   return directionBound(method, conditioning, conditioning.normalAlignment,
-                        conditioning.normalRounding);
+                        conditioning.normalRounding, conditioning.normalLength);
 }
 
 double tangentBound(Method method, const reference::Conditioning& conditioning) {
   return directionBound(method, conditioning, conditioning.tangentAlignment,
-                        conditioning.tangentRounding);
+                        conditioning.tangentRounding, conditioning.tangentLength);
 }
 
 double positionFormatBound(VertexFormat format, const reference::Double3& position,

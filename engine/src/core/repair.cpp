@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "attribute.h"
@@ -49,6 +50,17 @@ AttributeView viewOf(const std::vector<float>& values, std::uint32_t components)
                         components);
 }
 
+float clampedShare(float share) {
+  return share >= 0 ? std::min(share, 1.0f) : 0.0f;  // a NaN, too, becomes 0
+}
+
+std::vector<float> copyShares(const AttributeView& view) {
+  std::vector<float> copy;
+  for (std::uint32_t vertex = 0; view && vertex < view.count; ++vertex)
+    copy.push_back(clampedShare(loadFloat(view, vertex, 0)));
+  return copy;
+}
+
 bool isGoodInfluence(double weight, std::uint32_t joint, std::uint32_t jointCount) {
   return std::isfinite(weight) && weight > 0 && joint < jointCount && joint < maxPaletteJoints;
 }
@@ -64,6 +76,11 @@ MeshView RepairedMesh::view() const {
   mesh.tangents = viewOf(tangents_, 4);
   mesh.influenceSets = sets_;
   mesh.morphTargets = morphViews_;
+  mesh.dualQuaternionWeights = viewOf(dualQuaternionWeights_, 1);
+  mesh.dualQuaternionWeight = dualQuaternionWeight_;
+  mesh.bulgeStrengths = viewOf(bulgeStrengths_, 1);
+  mesh.bulgeStrength = bulgeStrength_;
+  mesh.centersOfRotation = viewOf(centersOfRotation_, 3);
   return mesh;
 }
 
@@ -77,6 +94,11 @@ Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
   repaired.positions_ = copyFinitePositions(mesh);
   repaired.normals_ = copyFinite(mesh.normals, 3);
   repaired.tangents_ = copyFinite(mesh.tangents, 4);
+  repaired.dualQuaternionWeights_ = copyShares(mesh.dualQuaternionWeights);
+  repaired.dualQuaternionWeight_ = clampedShare(mesh.dualQuaternionWeight);
+  repaired.bulgeStrengths_ = copyShares(mesh.bulgeStrengths);
+  repaired.bulgeStrength_ = clampedShare(mesh.bulgeStrength);
+  repaired.centersOfRotation_ = copyFinite(mesh.centersOfRotation, 3);
   for (const MorphTargetView& target : mesh.morphTargets) {
     repaired.morphs_.push_back({{target.vertices.begin(), target.vertices.end()},
                                 copyFiniteDisplacements(target),

@@ -67,6 +67,9 @@ struct AttributeRule {
 
 constexpr std::uint32_t anyNumber = 0xffffffffu;
 
+bool isFloat32(ComponentType type) {
+  return type == ComponentType::float32;
+}
 bool isFloat(ComponentType type) {
   return type == ComponentType::float32 || type == ComponentType::float16;
 }
@@ -182,6 +185,9 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
   bool good = check(mesh.positions, {"positions", 3, 4, isPositionType});
   good &= check(mesh.normals, {"normals", 3, 4, isDirectionType});
   good &= check(mesh.tangents, {"tangents", 4, 4, isDirectionType});
+  good &= check(mesh.dualQuaternionWeights, {"dual-quaternion weights", 1, 1, isWeightType});
+  good &= check(mesh.bulgeStrengths, {"bulge strengths", 1, 1, isWeightType});
+  good &= check(mesh.centersOfRotation, {"centres of rotation", 3, 3, isFloat32});
   for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {
     good &= checkMorphTarget(mesh.morphTargets[index], index, mesh.vertexCount, findings);
   }
@@ -207,6 +213,15 @@ void checkDirection(const AttributeView& view, std::uint32_t components, Problem
   if (!view || isFiniteElement(view, vertex, components)) return;
   findings.addVertex(problem, vertex,
                      [&] { return std::string("the ") + name + " is not finite"; });
+}
+
+/// `whole` is the mesh's own, where the vertices have none.
+void checkShare(const AttributeView& view, float whole, const char* name, std::uint32_t vertex,
+                Findings& findings) {
+  const float share = view ? loadFloat(view, vertex, 0) : whole;
+  if (share >= 0 && share <= 1) return;
+  findings.addVertex(Problem::shareOutOfRange, vertex,
+                     [&] { return std::string("the ") + name + " is not from 0 to 1"; });
 }
 
 bool isFiniteDisplacement(const MorphTargetView& target, std::uint32_t element) {
@@ -330,6 +345,10 @@ const char* problemName(Problem problem) {
       return "tangent not finite";
     case Problem::nonFiniteMorph:
       return "displacement not finite";
+    case Problem::nonFiniteCenter:
+      return "centre of rotation not finite";
+    case Problem::shareOutOfRange:
+      return "dual-quaternion weight or bulge strength out of range";
     case Problem::nonFiniteWeight:
       return "weight not finite";
     case Problem::negativeWeight:
@@ -377,6 +396,11 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
     }
     checkDirection(mesh.normals, 3, Problem::nonFiniteNormal, "normal", vertex, findings);
     checkDirection(mesh.tangents, 4, Problem::nonFiniteTangent, "tangent", vertex, findings);
+    checkDirection(mesh.centersOfRotation, 3, Problem::nonFiniteCenter, "centre of rotation",
+                   vertex, findings);
+    checkShare(mesh.dualQuaternionWeights, mesh.dualQuaternionWeight, "dual-quaternion weight",
+               vertex, findings);
+    checkShare(mesh.bulgeStrengths, mesh.bulgeStrength, "bulge strength", vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
   }
   for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {

@@ -10,6 +10,16 @@ namespace dermis::vulkan {
 static_assert(abi::CONSTANT_COUNT <= SpecializationConstants().values.size());
 static_assert(abi::METHOD_LINEAR == static_cast<std::uint32_t>(Method::linear));
 static_assert(abi::METHOD_DUAL_QUATERNION == static_cast<std::uint32_t>(Method::dualQuaternion));
+static_assert(abi::METHOD_DUAL_QUATERNION_ITERATIVE ==
+              static_cast<std::uint32_t>(Method::dualQuaternionIterative));
+static_assert(abi::METHOD_LOG_MATRIX == static_cast<std::uint32_t>(Method::logMatrix));
+static_assert(abi::METHOD_SPHERICAL_BLEND == static_cast<std::uint32_t>(Method::sphericalBlend));
+static_assert(abi::METHOD_QUATERNION_TRANSLATION ==
+              static_cast<std::uint32_t>(Method::quaternionTranslation));
+static_assert(abi::METHOD_BLENDED == static_cast<std::uint32_t>(Method::blended));
+static_assert(abi::METHOD_CENTER_OF_ROTATION ==
+              static_cast<std::uint32_t>(Method::centerOfRotation));
+static_assert(abi::METHOD_BULGE_CONTROLLED == static_cast<std::uint32_t>(Method::bulgeControlled));
 static_assert(abi::FORMAT_NONE == static_cast<std::uint32_t>(VertexFormat::none));
 static_assert(abi::FORMAT_FLOAT32X3 == static_cast<std::uint32_t>(VertexFormat::float32x3));
 static_assert(abi::FORMAT_FLOAT32X4 == static_cast<std::uint32_t>(VertexFormat::float32x4));

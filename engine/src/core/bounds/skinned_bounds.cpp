@@ -72,8 +72,14 @@ constexpr double ambiguousCosine = 2e-5;
 
 class PoseBounds {
  public:
-  PoseBounds(const JointBounds& bounds, Method method, std::pmr::memory_resource* memory)
-      : bounds_(bounds), method_(method), joints_(memory) {}
+  /// `takenApart`: linear blending of joints as the palette kernel takes them apart, which is
+  /// rounded as dual quaternions are.
+  PoseBounds(const JointBounds& bounds, Method method, bool takenApart,
+             std::pmr::memory_resource* memory)
+      : bounds_(bounds),
+        method_(method),
+        exactJoints_(method == Method::linear && !takenApart),
+        joints_(memory) {}
 
   Box of(std::span<const JointMatrix> palette) {
     if (!pose(palette)) return bounds::boxOf(bounds::everything());
@@ -256,18 +262,19 @@ class PoseBounds {
   }
 
   /// By how much a float32 position may be off, over its scale: `positionBound`.
-  double contract() const { return (method_ == Method::linear ? 6 : 24) * floatRounding; }
+  double contract() const { return (exactJoints_ ? 6 : 24) * floatRounding; }
 
   /// What float32 may add: the more where quaternions all but cancel. 1e-5 is for kernels and the
   /// reference that take joints for rigid which are not quite.
   double rounding() const {
     const double reach = bind_.empty() ? 0 : largest_ * bounds::reachOf(bind_);
     const double exactly = contract() * (furthest_ + reach);
-    return method_ == Method::linear ? exactly : amplification_ * (exactly + 1e-5 * reach);
+    return exactJoints_ ? exactly : amplification_ * (exactly + 1e-5 * reach);
   }
 
   const JointBounds& bounds_;
   Method method_;
+  bool exactJoints_;
   std::pmr::vector<Posed> joints_;
   Range box_, bind_;
   double furthest_ = 0;  ///< the largest |t|
@@ -276,13 +283,30 @@ class PoseBounds {
   bool anyAmbiguous_ = false;
 };
 
-}  // namespace
-
-Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method) {
+Box boundsBy(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method,
+             bool takenApart = false) {
   // Room for the joints of nearly all rigs; what does not fit comes from the heap.
   alignas(Posed) std::array<std::byte, 128 * sizeof(Posed)> room;
   std::pmr::monotonic_buffer_resource memory(room.data(), room.size());
-  return PoseBounds(bounds, method, &memory).of(palette);
+  return PoseBounds(bounds, method, takenApart, &memory).of(palette);
+}
+
+}  // namespace
+
+Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method) {
+  switch (method) {
+    case Method::linear:
+    case Method::dualQuaternion:
+      return boundsBy(bounds, palette, method);
+    case Method::blended: {
+      // Each position lies between one of linear blending and one of dual quaternions.
+      bounds::Range range = bounds::rangeOf(boundsBy(bounds, palette, Method::linear, true));
+      range.add(bounds::rangeOf(boundsBy(bounds, palette, Method::dualQuaternion)));
+      return bounds::boxOf(range);
+    }
+    default:
+      return bounds::boxOf(bounds::everything());
+  }
 }
 
 }  // namespace dermis

@@ -115,7 +115,9 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
   if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPaletteJoints ||
       words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 || words[abi::MESH_HEADER_POSITIONS] == 0 ||
       !isAttribute(abi::MESH_HEADER_POSITIONS, 3) || !isAttribute(abi::MESH_HEADER_NORMALS, 3) ||
-      !isAttribute(abi::MESH_HEADER_TANGENTS, 4) ||
+      !isAttribute(abi::MESH_HEADER_TANGENTS, 4) || !isAttribute(abi::MESH_HEADER_CENTERS, 3) ||
+      !isAttribute(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, 1) ||
+      !isAttribute(abi::MESH_HEADER_BULGE_STRENGTHS, 1) ||
       !isSection(words[abi::MESH_HEADER_MORPHS],
                  std::uint64_t{words[abi::MESH_HEADER_MORPH_COUNT]} * abi::MORPH_WORDS,
                  words.size())) {

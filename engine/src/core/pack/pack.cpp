@@ -34,8 +34,8 @@ std::uint32_t appendPositions(const MeshView& mesh, std::vector<std::uint32_t>& 
 }
 
 /// 0 where the mesh has none.
-std::uint32_t appendDirections(const AttributeView& view, std::uint32_t components,
-                               std::vector<std::uint32_t>& words) {
+std::uint32_t appendFloats(const AttributeView& view, std::uint32_t components,
+                           std::vector<std::uint32_t>& words) {
   if (!view) return 0;
   const std::uint32_t offset = offsetOf(words);
   for (std::uint32_t vertex = 0; vertex < view.count; ++vertex) {
@@ -74,6 +74,8 @@ void appendInfluences(const MeshView& mesh, std::vector<std::uint32_t>& words) {
 /// An upper limit of the words that a mesh takes, before any is written.
 std::uint64_t wordsNeeded(const MeshView& mesh) {
   std::uint64_t perVertex = 3 + (mesh.normals ? 3u : 0u) + (mesh.tangents ? 4u : 0u) + 1;
+  perVertex += (mesh.centersOfRotation ? 3u : 0u) + (mesh.dualQuaternionWeights ? 1u : 0u) +
+               (mesh.bulgeStrengths ? 1u : 0u);
   for (const InfluenceSet& set : mesh.influenceSets)
     perVertex += std::uint64_t{set.weights.components} * abi::INFLUENCE_WORDS;
   std::uint64_t words = abi::MESH_HEADER_WORDS + mesh.vertexCount * perVertex;
@@ -111,8 +113,15 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
   words[abi::MESH_HEADER_VERTEX_COUNT] = mesh.vertexCount;
   words[abi::MESH_HEADER_POSITIONS] = appendPositions(mesh, words);
-  words[abi::MESH_HEADER_NORMALS] = appendDirections(mesh.normals, 3, words);
-  words[abi::MESH_HEADER_TANGENTS] = appendDirections(mesh.tangents, 4, words);
+  words[abi::MESH_HEADER_NORMALS] = appendFloats(mesh.normals, 3, words);
+  words[abi::MESH_HEADER_TANGENTS] = appendFloats(mesh.tangents, 4, words);
+  words[abi::MESH_HEADER_CENTERS] = appendFloats(mesh.centersOfRotation, 3, words);
+  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS] =
+      appendFloats(mesh.dualQuaternionWeights, 1, words);
+  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHT] =
+      std::bit_cast<std::uint32_t>(mesh.dualQuaternionWeight);
+  words[abi::MESH_HEADER_BULGE_STRENGTHS] = appendFloats(mesh.bulgeStrengths, 1, words);
+  words[abi::MESH_HEADER_BULGE_STRENGTH] = std::bit_cast<std::uint32_t>(mesh.bulgeStrength);
   appendInfluences(mesh, words);
   words[abi::MESH_HEADER_MORPHS] = appendMorphs(mesh, words);
   words[abi::MESH_HEADER_MORPH_COUNT] = static_cast<std::uint32_t>(mesh.morphTargets.size());
@@ -144,6 +153,7 @@ MeshInfo PackedMesh::info() const {
   info.morphTargetCount = words_[abi::MESH_HEADER_MORPH_COUNT];
   info.hasNormals = words_[abi::MESH_HEADER_NORMALS] != 0;
   info.hasTangents = words_[abi::MESH_HEADER_TANGENTS] != 0;
+  info.hasCentersOfRotation = words_[abi::MESH_HEADER_CENTERS] != 0;
   return info;
 }
 

@@ -35,7 +35,7 @@ void Plan::State::clear() {
   dispatches.clear();
   variants.clear();
   tables.clear();
-  paletteUnits.clear();
+  for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
   results.clear();
   resultCount = 0;
   palettesSize = meshesSize = matricesSize = 0;
@@ -115,28 +115,44 @@ Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t work
   return {};
 }
 
+/// Appends the records of the palettes that are wanted in that form, and returns their number.
+std::uint32_t Plan::State::placePalettes(const Batch& batch, PaletteForm form,
+                                         std::uint64_t& units) {
+  const bool logarithms = form == PaletteForm::logarithms;
+  const std::uint32_t joint = logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
+  std::uint32_t records = 0;
+  std::vector<std::uint32_t>& places = paletteUnits[static_cast<std::size_t>(form)];
+  for (std::size_t index = 0; index < places.size(); ++index) {
+    if (places[index] == notUsed) continue;
+    const Palette& palette = batch.palettes[index];
+    places[index] = static_cast<std::uint32_t>(units);
+    tables.insert(tables.end(), {static_cast<std::uint32_t>(palette.matrixOffset / unitBytes),
+                                 static_cast<std::uint32_t>(units), palette.jointCount,
+                                 (palette.mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
+                                     (logarithms ? abi::PALETTE_LOGARITHMS : 0u)});
+    units += 1 + std::uint64_t{palette.jointCount} * (palette.mayScale ? joint + 2 : joint);
+    ++records;
+  }
+  return records;
+}
+
 Result<void> Plan::State::placePalettes(const Batch& batch, const Tuning& tuning) {
   for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
     if (Result<void> good = checkPalette(batch, batch.palettes[index], index); !good) return good;
   }
-  paletteUnits.assign(batch.palettes.size(), notUsed);
+  for (std::vector<std::uint32_t>& places : paletteUnits)
+    places.assign(batch.palettes.size(), notUsed);
   for (const Job& job : batch.jobs) {
-    if (job.method == Method::linear) continue;
-    paletteUnits[job.palette] = 0;
-    if (job.motion == Motion::reskinned) paletteUnits[job.previousPalette] = 0;
+    const std::optional<PaletteForm> form = paletteForm(job.method);
+    if (!form) continue;
+    std::vector<std::uint32_t>& places = paletteUnits[static_cast<std::size_t>(*form)];
+    places[job.palette] = 0;
+    if (job.motion == Motion::reskinned) places[job.previousPalette] = 0;
   }
   std::uint64_t units = 0;
   std::uint32_t records = 0;
-  for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
-    if (paletteUnits[index] == notUsed) continue;
-    const Palette& palette = batch.palettes[index];
-    paletteUnits[index] = static_cast<std::uint32_t>(units);
-    tables.insert(tables.end(), {static_cast<std::uint32_t>(palette.matrixOffset / unitBytes),
-                                 static_cast<std::uint32_t>(units), palette.jointCount,
-                                 palette.mayScale ? 1u : 0u});
-    units += 1 + std::uint64_t{palette.jointCount} * (palette.mayScale ? 4 : 2);
-    ++records;
-  }
+  for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms})
+    records += placePalettes(batch, form, units);
   palettesSize = units * unitBytes;
   if (palettesSize > limits.maxStorageBufferRange ||
       batch.matricesSize > limits.maxStorageBufferRange ||

@@ -161,6 +161,10 @@ Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index,
   if (Result<void> good = checkPaletteOf(batch, job, job.palette, index); !good) return good;
   if (methodName(job.method) == "unknown")
     return invalid(jobName(index) + ": its method is not one of Method");
+  if (needsCentersOfRotation(job.method) && !job.mesh.hasCentersOfRotation) {
+    return invalid(jobName(index) + ": " + std::string(methodName(job.method)) +
+                   " needs centres of rotation, its mesh has none");
+  }
   if (Result<void> good = checkFormats(job, index); !good) return good;
   if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
     return invalid(jobName(index) + " wants normals, its mesh has none");

@@ -35,9 +35,9 @@ void writeBox(std::uint32_t* extension, const Box& box) {
 
 std::uint32_t Plan::State::paletteOf(const Batch& batch, Method method,
                                      std::uint32_t palette) const {
-  return method == Method::linear
-             ? static_cast<std::uint32_t>(batch.palettes[palette].matrixOffset / unitBytes)
-             : paletteUnits[palette];
+  const std::optional<PaletteForm> form = paletteForm(method);
+  return form ? paletteUnits[static_cast<std::size_t>(*form)][palette]
+              : static_cast<std::uint32_t>(batch.palettes[palette].matrixOffset / unitBytes);
 }
 
 /// The place and number of the active targets, in rising order: the order of a sum decides on its

@@ -51,9 +51,11 @@ std::uint64_t Plan::vertexCount() const {
 }
 
 std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
-  if (palette >= state_->paletteUnits.size() || state_->paletteUnits[palette] == notUsed)
-    return noStatus;
-  return state_->paletteUnits[palette] * unitBytes;
+  // Each form has a status of its own, which says the same.
+  for (const std::vector<std::uint32_t>& units : state_->paletteUnits) {
+    if (palette < units.size() && units[palette] != notUsed) return units[palette] * unitBytes;
+  }
+  return noStatus;
 }
 
 std::uint64_t Plan::resultOffset(std::uint32_t job) const {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bit>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -13,6 +14,16 @@ namespace dermis {
 
 inline constexpr std::uint64_t unitBytes = 16;  ///< offsets into palettes and matrices count these
 inline constexpr std::uint32_t notUsed = 0xffffffffu;
+
+/// What stands in the palettes buffer for a joint.
+enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms };
+inline constexpr std::size_t paletteFormCount = 2;
+
+/// What a method reads; nothing where it reads the joint matrices themselves.
+inline std::optional<PaletteForm> paletteForm(Method method) {
+  if (method == Method::linear) return std::nullopt;
+  return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
+}
 
 /// One mesh with one output layout, in one dispatch; the instances follow in the instance table.
 struct GroupKey {
@@ -62,8 +73,8 @@ struct Plan::State {
   std::vector<Variant> variants;
   /// Palette records, group records, instance records, then extensions and active morph targets.
   std::vector<std::uint32_t> tables;
-  std::vector<std::uint32_t>
-      paletteUnits;  ///< where each palette stands in the palettes buffer, or notUsed
+  /// Where each palette stands in the palettes buffer in each form, or notUsed.
+  std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
   std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed
   std::uint32_t resultCount = 0;
   std::uint64_t palettesSize = 0;
@@ -89,6 +100,7 @@ struct Plan::State {
   void addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key, const Variant& variant,
                 bool scales);
   Result<void> placePalettes(const Batch& batch, const Tuning& tuning);
+  std::uint32_t placePalettes(const Batch& batch, PaletteForm form, std::uint64_t& units);
   Result<void> placeGroups(const Tuning& tuning);
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
                            const DispatchConstants& constants);

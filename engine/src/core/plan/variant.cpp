@@ -52,17 +52,14 @@ std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning) {
   Variant variant = outputVariant(job);
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
-  for (const Method method : allMethods) {
-    for (const bool morphs : {false, true}) {
-      for (const std::uint8_t influences : influenceClasses) {
-        variant.method = method;
+  for (const bool morphs : {false, true}) {
+    for (const std::uint8_t influences : influenceClasses) {
+      for (const bool scales : {false, true}) {
+        if (scales && job.method == Method::linear) continue;
         variant.morphs = morphs;
         variant.influences = influences;
-        for (const bool scales : {false, true}) {
-          if (scales && method == Method::linear) continue;
-          variant.scales = scales;
-          variants.push_back(variant);
-        }
+        variant.scales = scales;
+        variants.push_back(variant);
       }
     }
   }

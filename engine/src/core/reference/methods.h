@@ -1,0 +1,61 @@
+// The blending rules, in double precision. Each takes the joints of a palette, the influences of
+// one vertex in the order of their joints, at least one, and the vertex in bind pose; normals and
+// tangents come out of unit length or zero. What depends on the method is written into the
+// conditioning.
+#pragma once
+
+#include <span>
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "dermis/dual_quat.h"
+#include "dermis/method.h"
+#include "dermis/reference.h"
+#include "joint.h"
+#include "morph.h"
+#include "read.h"
+
+namespace dermis::reference {
+
+/// What some methods want to know of a vertex besides.
+struct MethodInputs {
+  glm::dvec3 center{0.0};
+  double dualQuaternionWeight = 0;
+  double bulgeStrength = 0;
+};
+
+struct VertexToSkin {
+  std::span<const Joint> joints;
+  std::span<const Influence> influences;
+  BindVertex bind;
+  MethodInputs inputs;
+};
+
+BindVertex skinVertex(const VertexToSkin& vertex, Method method, Conditioning& conditioning);
+
+/// The strongest influence, the lowest joint on a tie.
+const Influence& pivotOf(std::span<const Influence> influences);
+
+/// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1) with the pivot of
+/// greatest weight, the real part of unit length; and the scale/shear parts blended linearly.
+struct RigidBlend {
+  DualQuatd rigid;
+  glm::dmat3 scaleShear{0.0};
+};
+RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning);
+
+/// In two phases: scaled in bind space, then moved by a rotation about the origin and a
+/// translation.
+BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
+                       const glm::dquat& rotation, const glm::dvec3& translation,
+                       Conditioning& conditioning);
+
+/// Kavan et al. 2008, algorithm 3.
+DualQuatd iterate(const VertexToSkin& vertex, DualQuatd start, Conditioning& conditioning);
+/// exp(Σ w log C), C the rigid parts.
+DualQuatd blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
+/// Kavan and Žára 2005: the point that the rigid parts come nearest to agreeing on.
+glm::dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning);
+
+}  // namespace dermis::reference

@@ -1,0 +1,42 @@
+#include "method_options.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "dermis/method.h"
+
+namespace dermis::cli {
+
+void addShares(CLI::App& command, MethodShares& shares) {
+  command.add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
+                     fmt::format("blended: from 0, linear, to 1, dual quaternions [{}]",
+                                 shares.dualQuaternionWeight));
+  command.add_option("--bulge-strength", shares.bulgeStrength,
+                     fmt::format("bulge_controlled: from 0, as dual quaternions bulge, to 1 [{}]",
+                                 shares.bulgeStrength));
+}
+
+ExitStatus checkShares(const MethodShares& shares) {
+  const std::array<std::pair<const char*, double>, 2> options{
+      {{"--dual-quaternion-weight", shares.dualQuaternionWeight},
+       {"--bulge-strength", shares.bulgeStrength}}};
+  for (const auto& [name, value] : options) {
+    // Not a number is neither.
+    if (!(value >= 0 && value <= 1))
+      return reportError(ExitStatus::wrongUsage, fmt::format("{} must be from 0 to 1", name));
+  }
+  return ExitStatus::done;
+}
+
+std::string methodNames(const std::string& lastWord) {
+  std::string names;
+  for (const Method method : allMethods) {
+    if (!names.empty()) names += method == allMethods.back() ? " " + lastWord + " " : ", ";
+    names += methodName(method);
+  }
+  return names;
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,28 @@
+// What the subcommands that blend by a method of choice ask for.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <string>
+
+#include "dermis/mesh.h"
+#include "exit_status.h"
+
+namespace dermis::cli {
+
+/// Of every vertex; 0 to 1.
+struct MethodShares {
+  double dualQuaternionWeight = static_cast<double>(MeshView().dualQuaternionWeight);
+  double bulgeStrength = static_cast<double>(MeshView().bulgeStrength);
+};
+
+/// --dual-quaternion-weight and --bulge-strength.
+void addShares(CLI::App& command, MethodShares& shares);
+
+/// Reports wrong usage where one is not from 0 to 1.
+ExitStatus checkShares(const MethodShares& shares);
+
+/// "linear, dual_quaternion, … or bulge_controlled"; the last word to choice.
+std::string methodNames(const std::string& lastWord);
+
+}  // namespace dermis::cli

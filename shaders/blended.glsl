@@ -1,0 +1,59 @@
+// Between linear blending and dual quaternions. The linear part is made of the joints as they were taken apart, so that one
+// palette serves both. Needs linear and dual_quaternion.
+
+// The rows of R S, one joint's 3×3.
+void jointRows(vec4 q, ScaleShear part, bool twoPhase, out vec3 r0, out vec3 r1, out vec3 r2) {
+  precise vec3 doubled = q.xyz + q.xyz;
+  precise vec3 squares = doubled * q.xyz;
+  precise vec3 products = doubled.xyx * q.yzz;  // 2xy 2yz 2xz
+  precise vec3 byScalar = doubled * q.w;
+  precise vec3 row0 = vec3(1.0 - (squares.y + squares.z), products.x - byScalar.z, products.z + byScalar.y);
+  precise vec3 row1 = vec3(products.x + byScalar.z, 1.0 - (squares.x + squares.z), products.y - byScalar.x);
+  precise vec3 row2 = vec3(products.z - byScalar.y, products.y + byScalar.x, 1.0 - (squares.x + squares.y));
+  if (twoPhase) {  // S is symmetric: a row of R S is S times that row of R
+    row0 = scalePosition(part, row0);
+    row1 = scalePosition(part, row1);
+    row2 = scalePosition(part, row2);
+  }
+  r0 = row0;
+  r1 = row1;
+  r2 = row2;
+}
+
+Vertex skinBlended(Vertex vertex, Influences influences, uint palette, uint jointCount, float share, bool withNormal,
+                   bool withTangent) {
+  bool twoPhase = paletteIsTwoPhase(palette);
+  precise vec4 r0 = vec4(0.0);
+  precise vec4 r1 = vec4(0.0);
+  precise vec4 r2 = vec4(0.0);
+  for (uint slot = 0u; slot < influences.count; ++slot) {
+    float weight = influenceWeight(influences, slot);
+    uint joint = influenceJoint(influences, slot);
+    vec4 real = paletteRotation(palette, joint);
+    ScaleShear part = ScaleShear(vec3(1.0), vec3(0.0));
+    if (twoPhase) part = paletteScaleShear(palette, jointCount, joint);
+    vec3 row0;
+    vec3 row1;
+    vec3 row2;
+    jointRows(real, part, twoPhase, row0, row1, row2);
+    vec3 translation = translationOf(real, paletteDual(palette, joint), 1.0);
+    r0 += weight * vec4(row0, translation.x);
+    r1 += weight * vec4(row1, translation.y);
+    r2 += weight * vec4(row2, translation.z);
+  }
+  Vertex straight = throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
+  Vertex skinned = skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
+  precise float rest = 1.0 - share;
+  precise vec3 position = rest * straight.position + share * skinned.position;
+  skinned.position = position;
+  // A mirror shows in the scale parts; what linear blending makes of it where joints cancel does not count.
+  if (withNormal) {
+    precise vec3 normal = rest * straight.normal + share * skinned.normal;
+    skinned.normal = unitOr(normal, skinned.normal);
+  }
+  if (withTangent) {
+    precise vec3 tangent = rest * straight.tangent.xyz + share * skinned.tangent.xyz;
+    skinned.tangent.xyz = unitOr(tangent, skinned.tangent.xyz);
+  }
+  return skinned;
+}

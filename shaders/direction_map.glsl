@@ -1,0 +1,32 @@
+// What directions go through. Needs exact and vertex.
+
+// A blended 3×3 matrix by its rows, scaled so that no product of two of them leaves the range of a float, and the sign of its
+// determinant: what directions are transformed by.
+struct DirectionMap {
+  vec3 r0;
+  vec3 r1;
+  vec3 r2;
+  float side;
+};
+
+DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
+  float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
+  precise vec3 n0 = r0 / (largest == 0.0 ? 1.0 : largest);
+  precise vec3 n1 = r1 / (largest == 0.0 ? 1.0 : largest);
+  precise vec3 n2 = r2 / (largest == 0.0 ? 1.0 : largest);
+  return DirectionMap(n0, n1, n2, dot3(n0, cross3(n1, n2)) < 0.0 ? -1.0 : 1.0);
+}
+
+// Normals go by the cofactors of the matrix, which have the direction of its inverse transpose and stay finite where it is
+// singular; a mirror turns them over once. Of unit length.
+vec3 mapNormal(DirectionMap map, vec3 normal) {
+  precise vec3 turned = map.side * vec3(dot3(cross3(map.r1, map.r2), normal), dot3(cross3(map.r2, map.r0), normal),
+                                        dot3(cross3(map.r0, map.r1), normal));
+  return unitOr(turned, normal);
+}
+
+// Tangents go by the matrix itself.
+vec3 mapTangent(DirectionMap map, vec3 tangent) {
+  precise vec3 turned = vec3(dot3(map.r0, tangent), dot3(map.r1, tangent), dot3(map.r2, tangent));
+  return unitOr(turned, tangent);
+}

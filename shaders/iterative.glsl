@@ -1,0 +1,62 @@
+// Dual-quaternion iterative blending (Kavan et al. 2008, algorithm 3): the blend b is moved by the mean screw from it to the
+// joints', until that is nothing. Needs dual_quaternion and dual_exponential.
+
+// Reached where joints all but contradict each other; elsewhere a handful are enough.
+const uint MOST_STEPS = 20u;
+
+void makeUnit(inout vec4 real, inout vec4 dual) {
+  precise float inverse = inversesqrt(dot4(real, real));
+  precise vec4 unit = inverse * real;
+  precise vec4 scaled = inverse * dual;
+  precise vec4 orthogonal = scaled - dot4(unit, scaled) * unit;
+  real = unit;
+  dual = orthogonal;
+}
+
+// The mean screw from a transform to the joints', and the square of how far their dual parts reach.
+Screw meanScrew(vec4 real, vec4 dual, Influences influences, uint palette, vec4 pivot, out float reach) {
+  precise vec3 turn = vec3(0.0);
+  precise vec3 shift = vec3(0.0);
+  vec4 backReal = conjugateOf(real);
+  vec4 backDual = conjugateOf(dual);
+  reach = 0.0;
+  for (uint slot = 0u; slot < influences.count; ++slot) {
+    float weight = influenceWeight(influences, slot);
+    uint joint = influenceJoint(influences, slot);
+    vec4 jointReal = paletteRotation(palette, joint);
+    vec4 jointDual = paletteDual(palette, joint);
+    reach = max(reach, dot4(jointDual, jointDual));
+    if (dot4(pivot, jointReal) < 0.0) {
+      jointReal = -jointReal;
+      jointDual = -jointDual;
+    }
+    precise vec4 differenceDual = quaternionProduct(backReal, jointDual) + quaternionProduct(backDual, jointReal);
+    Screw screw = screwOf(quaternionProduct(backReal, jointReal), differenceDual);
+    turn += weight * screw.real;
+    shift += weight * screw.dual;
+  }
+  return Screw(turn, shift);
+}
+
+Vertex skinIterative(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal, bool withTangent) {
+  bool twoPhase = paletteIsTwoPhase(palette);
+  Blend blend = blendJoints(influences, palette, jointCount, twoPhase);
+  vec4 pivot = paletteRotation(palette, influenceJoint(influences, 0u));
+  makeUnit(blend.real, blend.dual);
+  for (uint step = 0u; step < MOST_STEPS; ++step) {
+    float reach;
+    Screw screw = meanScrew(blend.real, blend.dual, influences, palette, pivot, reach);
+    vec4 real;
+    vec4 dual;
+    exponentialOf(screw, real, dual);
+    precise vec4 movedDual = quaternionProduct(blend.real, dual) + quaternionProduct(blend.dual, real);
+    blend.real = quaternionProduct(blend.real, real);
+    blend.dual = movedDual;
+    makeUnit(blend.real, blend.dual);
+    // Five roundings.
+    precise float near = 9e-14 * reach;
+    if (dot3(screw.real, screw.real) <= 9e-14 && dot3(screw.dual, screw.dual) <= near) break;
+  }
+  return turnVertex(scaleVertex(vertex, blend.part, twoPhase, withNormal, withTangent), blend.real, 1.0,
+                    translationOf(blend.real, blend.dual, 1.0), withNormal, withTangent);
+}

@@ -1,0 +1,31 @@
+// Linear blend skinning. Needs exact, direction_map, mesh_access, palette_access and vertex.
+
+// A vertex through a blended 3×4 matrix, given by its rows.
+Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, bool withTangent) {
+  Vertex skinned = vertex;
+  vec3 p = vertex.position;
+  precise vec3 position = vec3(dot3(r0.xyz, p) + r0.w, dot3(r1.xyz, p) + r1.w, dot3(r2.xyz, p) + r2.w);
+  skinned.position = position;
+  if (withNormal || withTangent) {
+    DirectionMap map = directionMap(r0.xyz, r1.xyz, r2.xyz);
+    if (withNormal) skinned.normal = mapNormal(map, vertex.normal);
+    if (withTangent) skinned.tangent = tangentOf(mapTangent(map, vertex.tangent.xyz), vertex.tangent.w, map.side);
+  }
+  return skinned;
+}
+
+Vertex skinLinear(Vertex vertex, Influences influences, uint palette, bool withNormal, bool withTangent) {
+  float pivotWeight = influenceWeight(influences, 0u);
+  uint pivotJoint = influenceJoint(influences, 0u);
+  precise vec4 r0 = pivotWeight * paletteRow(palette, pivotJoint, 0u);
+  precise vec4 r1 = pivotWeight * paletteRow(palette, pivotJoint, 1u);
+  precise vec4 r2 = pivotWeight * paletteRow(palette, pivotJoint, 2u);
+  for (uint slot = 1u; slot < influences.count; ++slot) {
+    float weight = influenceWeight(influences, slot);
+    uint joint = influenceJoint(influences, slot);
+    r0 += weight * paletteRow(palette, joint, 0u);
+    r1 += weight * paletteRow(palette, joint, 1u);
+    r2 += weight * paletteRow(palette, joint, 2u);
+  }
+  return throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
+}
