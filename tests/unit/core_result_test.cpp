@@ -72,7 +72,8 @@ TEST(Result, EveryCodeHasItsName) {
       {ErrorCode::missingFeature, "missingFeature"},
       {ErrorCode::vulkanError, "vulkanError"},
       {ErrorCode::shaderError, "shaderError"},
-      {ErrorCode::ioError, "ioError"}};
+      {ErrorCode::ioError, "ioError"},
+      {ErrorCode::cancelled, "cancelled"}};
   for (const auto& [code, name] : names) EXPECT_EQ(errorCodeName(code), name);
   EXPECT_EQ(errorCodeName(static_cast<ErrorCode>(200)), "unknown");
 }

@@ -28,6 +28,8 @@ std::string_view errorCodeName(ErrorCode code) {
       return "shaderError";
     case ErrorCode::ioError:
       return "ioError";
+    case ErrorCode::cancelled:
+      return "cancelled";
   }
   return "unknown";
 }
