@@ -3,6 +3,7 @@
 
 #include "dermis/accuracy.h"
 #include "dermis/bounds.h"
+#include "dermis/centers_of_rotation.h"
 #include "dermis/dual_quat.h"
 #include "dermis/glm.h"
 #include "dermis/mesh.h"

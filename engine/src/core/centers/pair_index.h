@@ -1,0 +1,62 @@
+// Triangles by the pairs of joints that move them: a pair that a vertex and a triangle do not share
+// adds nothing to their similarity.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "dermis/types.h"
+
+namespace dermis::centers {
+
+struct Influence {
+  std::uint32_t joint = 0;
+  double weight = 0;
+};
+
+/// Σ weight · (centroid, 1): their quotient is a centre.
+struct Moment {
+  double x = 0, y = 0, z = 0, sum = 0;
+
+  void add(const Moment& other, double factor) {
+    x += factor * other.x;
+    y += factor * other.y;
+    z += factor * other.z;
+    sum += factor * other.sum;
+  }
+};
+
+/// Triangles of equal weights: they are similar to anything by the same measure, so that the sum of
+/// their moments stands for all of them. `influences` by rising joint.
+struct Group {
+  std::span<const Influence> influences;
+  Moment moment;  ///< weighted by area
+};
+
+class PairIndex {
+ public:
+  explicit PairIndex(std::span<const Group> groups);
+
+  /// Adds what two influences of a vertex contribute to its centre: all groups' moments, times
+  /// their similarity by this pair alone.
+  void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
+
+ private:
+  static_assert(maxPaletteJoints <= 65536, "the keys have 16 bits a joint");
+
+  struct Range {
+    std::size_t first = 0, last = 0;
+  };
+
+  std::unordered_map<std::uint32_t, Range> ranges_;
+  /// An entry a group and pair; those of one pair together, filled up to a multiple of `lanes` by
+  /// entries without weight.
+  std::vector<double> lowWeights_, highWeights_;
+  std::vector<std::uint32_t> groups_;
+  std::vector<Moment> moments_;  ///< by group
+};
+
+}  // namespace dermis::centers
