@@ -23,6 +23,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "centers/pair_index.h"
 #include "dermis/types.h"
 #include "random_rig.h"
 
@@ -177,6 +178,42 @@ TEST(CentersOfRotation, EqualTheDirectSumWhereWeightsRecur) {
       weight = static_cast<float>(std::uniform_int_distribution<int>(0, 2)(engine));
     }
     expectDirectSum(surface, "seed " + std::to_string(seed));
+  }
+}
+
+/// By one pair of joints, before anything is rounded to float32; groups that fill the lanes of the
+/// loop and that do not.
+TEST(CentersOfRotation, SumSimilaritiesInDoublePrecision) {
+  std::mt19937 engine(1);
+  std::uniform_real_distribution<double> between(0, 1);
+  for (std::size_t count = 1; count <= 40; ++count) {
+    std::vector<std::array<centers::Influence, 2>> influences;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double weight = between(engine);
+      influences.push_back({centers::Influence{3, weight}, {65535, 1 - weight}});
+    }
+    std::vector<centers::Group> groups;
+    for (const auto& pair : influences) {
+      groups.push_back({pair, {between(engine), between(engine), between(engine), 1}});
+    }
+    const centers::Influence low{3, count % 2 == 0 ? 1.0 : between(engine)};
+    const centers::Influence high{65535, count % 3 == 0 ? 1.0 : 1 - low.weight};
+    centers::Moment expected;
+    for (const centers::Group& group : groups) {
+      const double t = group.influences[0].weight, u = group.influences[1].weight;
+      const double difference = low.weight * u - high.weight * t;
+      expected.add(group.moment, low.weight * high.weight * t * u *
+                                     std::exp(-difference * difference / (0.1 * 0.1)));
+    }
+    const centers::PairIndex index(groups);
+    for (const bool swapped : {false, true}) {
+      centers::Moment sum;
+      index.addSimilar(swapped ? high : low, swapped ? low : high, sum);
+      EXPECT_NEAR(sum.x, expected.x, 1e-13 * expected.x) << count;
+      EXPECT_NEAR(sum.y, expected.y, 1e-13 * expected.y) << count;
+      EXPECT_NEAR(sum.z, expected.z, 1e-13 * expected.z) << count;
+      EXPECT_NEAR(sum.sum, expected.sum, 1e-13 * expected.sum) << count;
+    }
   }
 }
 

@@ -41,7 +41,7 @@ class PairIndex {
   explicit PairIndex(std::span<const Group> groups);
 
   /// Adds what two influences of a vertex contribute to its centre: all groups' moments, times
-  /// their similarity by this pair alone.
+  /// their similarity by this pair, j and k in one order only. The factor of 2 cancels.
   void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
 
  private:
