@@ -39,15 +39,15 @@ struct CentersOfRotationOptions {
 /// for each triangle: the whole surface, for what is left out draws no centre towards it. A mesh
 /// that was cut up, by material say, should be handed over as one.
 ///
-/// Weights are those that `pack` stores: normalised, a joint's added up, those below 2^-48 dropped.
+/// Weights are those that `pack` stores: normalised, a joint's added up, those below 2^-49 dropped.
 /// A vertex without weight adds nothing to the weights of its triangles, and a triangle without
 /// area adds nothing to a centre. Centres are finite and lie among the triangles' centroids, except
 /// where there is none to be had, which is the vertex' own bind position then: with fewer than two
 /// influences (the one joint moves the vertex as it will, wherever the centre is), or if no
 /// triangle has two of its joints.
 ///
-/// Sums are in double precision and in an order of their own: what differs from the exact centre is
-/// the rounding of weights and centres to float32.
+/// Sums are in double precision and in an order of their own: all that differs from the exact
+/// centre is the rounding of weights and centres to float32.
 ///
 /// Takes some 4 ns for each vertex, triangle and pair of joints that the two share (x86-64, one
 /// core). That is O(vertices × triangles) for each joint: 0.5 s for a body of 10,000 vertices,
