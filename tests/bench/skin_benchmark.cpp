@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -61,11 +62,15 @@ OwnedMesh morphMesh(std::uint32_t targets) {
 struct Scene {
   explicit Scene(OwnedMesh skinned, Method by = Method::dualQuaternion,
                  samples::Rigidity joints = samples::Rigidity::rigid)
-      : mesh(std::move(skinned)), method(by), rigidity(joints) {}
+      : mesh(std::move(skinned)),
+        method(by),
+        rigidity(joints),
+        mayScale(joints != samples::Rigidity::rigid) {}
 
   OwnedMesh mesh;
   Method method;
   samples::Rigidity rigidity;
+  bool mayScale;
   samples::OutputLayout output;
   std::vector<MorphWeight> morphs;
 };
@@ -81,7 +86,7 @@ void measure(benchmark::State& state, Scene scene) {
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = &packed;
     request.palette = pose;
-    request.mayScale = scene.rigidity != samples::Rigidity::rigid;
+    request.mayScale = scene.mayScale;
     request.method = scene.method;
     request.morphs = scene.morphs;
     request.previousPalette = pose;
@@ -118,7 +123,7 @@ samples::OutputLayout withBounds() {
   return layout;
 }
 
-void add(const std::string& name, Scene (*make)()) {
+void add(const std::string& name, const std::function<Scene()>& make) {
   benchmark::RegisterBenchmark(name.c_str(),
                                [make](benchmark::State& state) { measure(state, make()); })
       ->UseManualTime()
@@ -127,10 +132,17 @@ void add(const std::string& name, Scene (*make)()) {
 
 void registerAll() {
   using enum VertexFormat;
-  add("method/linear", [] { return Scene(evenMesh(4), Method::linear); });
-  add("method/dual_quaternion", [] { return Scene(evenMesh(4)); });
+  for (const Method method : allMethods) {
+    add("method/" + std::string(methodName(method)),
+        [method] { return Scene(evenMesh(4), method); });
+  }
   add("method/two_phase",
       [] { return Scene(evenMesh(4), Method::dualQuaternion, samples::Rigidity::shear); });
+  add("method/may_scale", [] {
+    Scene scene(evenMesh(4));
+    scene.mayScale = true;
+    return scene;
+  });
   add("influences/1", [] { return Scene(evenMesh(1)); });
   add("influences/2", [] { return Scene(evenMesh(2)); });
   add("influences/4", [] { return Scene(evenMesh(4)); });
@@ -162,7 +174,20 @@ void registerAll() {
 
 const std::vector<Ratio> ratios{
     {"method/dual_quaternion", "method/linear", "dual quaternions / linear"},
+    {"method/two_phase", "method/linear", "two-phase / linear"},
     {"method/two_phase", "method/dual_quaternion", "two-phase / dual quaternions"},
+    {"method/may_scale", "method/dual_quaternion",
+     "joints that may scale, but do not / joints that may not"},
+    {"method/dual_quaternion_iterative", "method/dual_quaternion",
+     "dual_quaternion_iterative / dual quaternions"},
+    {"method/log_matrix", "method/dual_quaternion", "log_matrix / dual quaternions"},
+    {"method/spherical_blend", "method/dual_quaternion", "spherical_blend / dual quaternions"},
+    {"method/quaternion_translation", "method/dual_quaternion",
+     "quaternion_translation / dual quaternions"},
+    {"method/blended", "method/dual_quaternion", "blended / dual quaternions"},
+    {"method/center_of_rotation", "method/dual_quaternion",
+     "center_of_rotation / dual quaternions"},
+    {"method/bulge_controlled", "method/dual_quaternion", "bulge_controlled / dual quaternions"},
     {"influences/1", "influences/4", "one influence a vertex / four"},
     {"influences/2", "influences/4", "two influences a vertex / four"},
     {"influences/8", "influences/4", "eight influences a vertex / four"},
