@@ -1,4 +1,4 @@
-// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix A.3): polynomials, since what a driver's own
+// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix): polynomials, since what a driver's own
 // sine and arc tangent are worth differs. Needs exact.
 
 // A pure dual quaternion: half the angle about, and half the way along, a screw axis.

@@ -1,4 +1,4 @@
-// Dual-quaternion iterative blending (Kavan et al. 2008, algorithm 3): the blend b is moved by the mean screw from it to the
+// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean screw from it to the
 // joints', until that is nothing. Needs dual_quaternion and dual_exponential.
 
 // Reached where joints all but contradict each other; elsewhere a handful are enough.

@@ -3,7 +3,7 @@
 // skinning with optimized centers of rotation", Le and Hodgins 2016.
 //
 // Two vectors of weights, i and t, are the more similar the more joints they share in the same
-// proportion (the paper's equation 4, σ = 0.1):
+// proportion (σ = 0.1):
 //
 //   s(i, t) = Σ_{j≠k} w_ij w_ik w_tj w_tk exp(−(w_ij w_tk − w_ik w_tj)² / σ²)
 //

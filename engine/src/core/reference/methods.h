@@ -51,7 +51,7 @@ BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
                        const glm::dquat& rotation, const glm::dvec3& translation,
                        Conditioning& conditioning);
 
-/// Kavan et al. 2008, algorithm 3.
+/// DIB, Kavan et al. 2008.
 DualQuatd iterate(const VertexToSkin& vertex, DualQuatd start, Conditioning& conditioning);
 /// exp(Σ w log C), C the rigid parts.
 DualQuatd blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
