@@ -40,7 +40,7 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
   return Blend(real, dual, ScaleShear(diagonal, mixed));
 }
 
-// The first phase: a vertex scaled and sheared in bind space.
+// The first phase: a vertex scaled and sheared in bind space, its directions of any length.
 struct Scaled {
   Vertex vertex;
   float side;  // -1 where it was mirrored

@@ -8,8 +8,11 @@ Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, 
   skinned.position = position;
   if (withNormal || withTangent) {
     DirectionMap map = directionMap(r0.xyz, r1.xyz, r2.xyz);
-    if (withNormal) skinned.normal = mapNormal(map, vertex.normal);
-    if (withTangent) skinned.tangent = tangentOf(mapTangent(map, vertex.tangent.xyz), vertex.tangent.w, map.side);
+    if (withNormal) skinned.normal = unitOr(mapNormal(map, vertex.normal), vec3(0.0));
+    if (withTangent) {
+      vec3 direction = unitOr(mapTangent(map, vertex.tangent.xyz), vec3(0.0));
+      skinned.tangent = tangentOf(direction, vertex.tangent.w, map.side);
+    }
   }
   return skinned;
 }

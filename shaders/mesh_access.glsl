@@ -9,11 +9,19 @@ vec3 meshVector(uint word) {
 // The word at which a section begins.
 uint meshSection(uint mesh, uint header) { return mesh + meshes[mesh + header]; }
 
-// Where the influences of one vertex stand.
+// The influences of one vertex. Up to four are read once, for all instances.
 struct Influences {
   uint word;
   uint count;
+  vec4 weights;
+  uvec4 joints;
 };
+
+float readWeight(uint word, uint slot) {
+  return uintBitsToFloat(meshes[word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT]);
+}
+
+uint readJoint(uint word, uint slot) { return meshes[word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT]; }
 
 Influences influencesOf(uint mesh, uint vertex) {
   uint firsts = meshSection(mesh, MESH_HEADER_FIRSTS) + vertex;
@@ -21,15 +29,25 @@ Influences influencesOf(uint mesh, uint vertex) {
   Influences influences;
   influences.word = meshSection(mesh, MESH_HEADER_INFLUENCES) + first * INFLUENCE_WORDS;
   influences.count = meshes[firsts + 1u] - first;
+  influences.weights = vec4(0.0);
+  influences.joints = uvec4(0u);
+  if (INFLUENCES != 0u) {
+    influences.count = min(influences.count, INFLUENCES);
+    for (uint slot = 0u; slot < INFLUENCES; ++slot) {
+      if (slot >= influences.count) break;
+      influences.weights[slot] = readWeight(influences.word, slot);
+      influences.joints[slot] = readJoint(influences.word, slot);
+    }
+  }
   return influences;
 }
 
 float influenceWeight(Influences influences, uint slot) {
-  return uintBitsToFloat(meshes[influences.word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT]);
+  return INFLUENCES != 0u ? influences.weights[slot] : readWeight(influences.word, slot);
 }
 
 uint influenceJoint(Influences influences, uint slot) {
-  return meshes[influences.word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT];
+  return INFLUENCES != 0u ? influences.joints[slot] : readJoint(influences.word, slot);
 }
 
 // What some methods want to know of a vertex besides.

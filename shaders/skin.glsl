@@ -134,7 +134,6 @@ void main() {
   Vertex bind = bindVertex(mesh, vertex);
   MethodInputs inputs = methodInputsOf(mesh, vertex);
   Influences influences = influencesOf(mesh, vertex);
-  if (INFLUENCES != 0u) influences.count = min(influences.count, INFLUENCES);
 
   for (uint number = firstInstance; number < instanceEnd; ++number) {
     Instance instance;
