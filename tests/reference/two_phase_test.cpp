@@ -1,73 +1,19 @@
 // Joints that scale, shear or mirror: C = R S, the S blended linearly in bind space, then the
 // blended rigid part. Held against a second implementation that shares no algorithm with the
-// reference: Newton's iteration for the polar decomposition, the outer product q qᵀ for the
-// quaternion, matrices for the movement.
-
-#include <glm/gtc/quaternion.hpp>
+// reference.
 
 #include <limits>
 
+#include "by_hand.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
 namespace {
 
-using Quaternion = std::array<double, 4>;  // w x y z
-
-/// Higham 1986: X ← ½ (X + X⁻ᵀ) converges to the orthogonal factor of a matrix of full rank.
-glm::dmat3 orthogonalFactor(glm::dmat3 x) {
-  for (int step = 0; step < 100; ++step) {
-    const double scale = std::pow(std::abs(glm::determinant(x)), -1.0 / 3);
-    const glm::dmat3 scaled = step < 8 ? x * scale : x;
-    x = (scaled + glm::transpose(glm::inverse(scaled))) * 0.5;
-  }
-  return x;
-}
-
-/// The column of q qᵀ with the largest diagonal element, which is linear in the rotation matrix.
-Quaternion quaternionOf(const glm::dmat3& r) {
-  const auto at = [&](int row, int column) { return r[column - 1][row - 1]; };
-  const double outer[4][4] = {{1 + at(1, 1) + at(2, 2) + at(3, 3), at(3, 2) - at(2, 3),
-                               at(1, 3) - at(3, 1), at(2, 1) - at(1, 2)},
-                              {at(3, 2) - at(2, 3), 1 + at(1, 1) - at(2, 2) - at(3, 3),
-                               at(1, 2) + at(2, 1), at(1, 3) + at(3, 1)},
-                              {at(1, 3) - at(3, 1), at(1, 2) + at(2, 1),
-                               1 - at(1, 1) + at(2, 2) - at(3, 3), at(2, 3) + at(3, 2)},
-                              {at(2, 1) - at(1, 2), at(1, 3) + at(3, 1), at(2, 3) + at(3, 2),
-                               1 - at(1, 1) - at(2, 2) + at(3, 3)}};
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < 4; ++i) {
-    if (outer[i][i] > outer[best][best]) best = i;
-  }
-  Quaternion q{};
-  double square = 0;
-  for (std::size_t i = 0; i < 4; ++i) square += outer[i][best] * outer[i][best];
-  for (std::size_t i = 0; i < 4; ++i) q[i] = outer[i][best] / std::sqrt(square);
-  return q;
-}
-
-Quaternion times(const Quaternion& a, const Quaternion& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-          a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-          a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
-
 struct Skinned {
   glm::dvec3 position, normal;
   bool ambiguous = false;
 };
-
-struct Parts {
-  glm::dmat3 rotation, scaleShear;
-  glm::dvec3 translation;
-};
-
-Parts partsOf(const JointMatrix& joint) {
-  const glm::dmat3 c = linearOf(joint);
-  const glm::dmat3 rotation = orthogonalFactor(glm::determinant(c) < 0 ? -c : c);
-  return {rotation, glm::transpose(rotation) * c, offsetOf(joint)};
-}
 
 /// Vertex `index` by the formulas of TRUTHS.md, with joints already taken apart.
 Skinned skinByHand(const OwnedMesh& mesh, std::size_t index, std::span<const Parts> joints) {
@@ -132,18 +78,6 @@ void expectAsByHand(OwnedMesh& mesh, std::span<const JointMatrix> pose, double p
     ++compared;
   }
   EXPECT_GT(compared, mesh.vertexCount() * 3 / 4);
-}
-
-glm::dmat3 randomSymmetric(RigRandom& random, double low, double high) {
-  const glm::dmat3 frame = rotationAbout(random.direction(), random.between(0, pi));
-  return frame *
-         diagonalMatrix(random.between(low, high), random.between(low, high),
-                        random.between(low, high)) *
-         glm::transpose(frame);
-}
-
-glm::dmat3 randomRotation(RigRandom& random) {
-  return rotationAbout(random.direction(), random.between(-pi, pi));
 }
 
 TEST(ReferenceTwoPhase, RigidJoints) {

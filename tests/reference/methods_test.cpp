@@ -1,0 +1,751 @@
+// Every method of the reference against its formula, written down a second time (by_hand.h), with
+// rigid joints and with joints that scale, shear or mirror: those go in two phases in all methods
+// but linear blending.
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "by_hand.h"
+#include "dermis/dual_quat.h"
+#include "reference_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::array twoPhaseMethods{
+    Method::dualQuaternion, Method::dualQuaternionIterative, Method::logMatrix,
+    Method::sphericalBlend, Method::quaternionTranslation,   Method::centerOfRotation,
+    Method::bulgeControlled};
+
+enum class Joints { rigid, scaled, mirrored, mixed };
+constexpr std::array allJoints{Joints::rigid, Joints::scaled, Joints::mirrored, Joints::mixed};
+
+/// Turned by less than `mostAngle`.
+JointMatrix randomJoint(RigRandom& random, Joints kind, double mostAngle = pi) {
+  const glm::dmat3 rotation =
+      rotationAbout(random.direction(), random.between(-mostAngle, mostAngle));
+  if (kind == Joints::mixed) kind = allJoints[random.below(3)];
+  const glm::dmat3 scale = kind == Joints::rigid    ? glm::dmat3(1.0)
+                           : kind == Joints::scaled ? randomSymmetric(random, 0.4, 2.5)
+                                                    : randomSymmetric(random, -2.5, -0.4);
+  return jointOf(rotation * scale, random.vector(1));
+}
+
+std::vector<JointMatrix> randomJoints(RigRandom& random, Joints kind, int count,
+                                      double mostAngle = pi) {
+  std::vector<JointMatrix> pose;
+  for (int joint = 0; joint < count; ++joint) pose.push_back(randomJoint(random, kind, mostAngle));
+  return pose;
+}
+
+/// Scattered, with shares of its own for every vertex.
+OwnedMesh meshWithShares(RigRandom& random, std::uint32_t vertices, std::uint32_t joints,
+                         std::uint32_t influences) {
+  OwnedMesh mesh = scatteredMesh(random, vertices, joints, influences);
+  for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+    mesh.dualQuaternionWeights.push_back(static_cast<float>(random.between(0, 1)));
+    mesh.bulgeStrengths.push_back(static_cast<float>(random.between(0, 1)));
+  }
+  return mesh;
+}
+
+/// A vertex with its joints taken apart by hand, normalised weights, and what two phases have in
+/// common.
+struct ByHand {
+  struct Influence {
+    double weight;
+    Parts parts;
+    JointMatrix matrix;
+  };
+
+  ByHand(const OwnedMesh& mesh, std::size_t vertex, std::span<const JointMatrix> pose)
+      : position(bindPosition(mesh, vertex)), normal(bindNormal(mesh, vertex)) {
+    for (int i = 0; i < 3; ++i)
+      center[i] =
+          static_cast<double>(mesh.centersOfRotation[3 * vertex + static_cast<std::size_t>(i)]);
+    double sum = 0;
+    for (std::uint32_t slot = 0; slot < mesh.influencesPerVertex; ++slot) {
+      const std::size_t entry = vertex * mesh.influencesPerVertex + slot;
+      const auto weight = static_cast<double>(mesh.weights[entry]);
+      const JointMatrix& matrix = pose[mesh.joints[entry]];
+      influences.push_back({weight, partsOf(matrix), matrix});
+      sum += weight;
+    }
+    std::size_t pivot = 0;
+    for (std::size_t i = 0; i < influences.size(); ++i) {
+      influences[i].weight /= sum;
+      m += influences[i].weight * influences[i].parts.scaleShear;
+      if (influences[i].weight > influences[pivot].weight) pivot = i;
+    }
+    const Quaternion towards = quaternionOf(influences[pivot].parts.rotation);
+    for (const Influence& influence : influences) {
+      const Quaternion q = quaternionOf(influence.parts.rotation);
+      const glm::dvec3& t = influence.parts.translation;
+      const Quaternion d = times({0, t.x / 2, t.y / 2, t.z / 2}, q);
+      double dot = 0;
+      for (std::size_t i = 0; i < 4; ++i) dot += q[i] * towards[i];
+      ambiguous |= std::abs(dot) < 1e-5;
+      for (std::size_t i = 0; i < 4; ++i) {
+        real[i] += (dot < 0 ? -1 : 1) * influence.weight * q[i];
+        dual[i] += (dot < 0 ? -1 : 1) * influence.weight * d[i];
+      }
+    }
+    rotation = rotationOf(real);
+  }
+
+  glm::dvec3 linear(const glm::dvec3& p) const {
+    glm::dvec3 sum(0.0);
+    for (const Influence& influence : influences)
+      sum += influence.weight * (linearOf(influence.matrix) * p + offsetOf(influence.matrix));
+    return sum;
+  }
+  glm::dvec3 rigidLinear(const glm::dvec3& p) const {
+    glm::dvec3 sum(0.0);
+    for (const Influence& influence : influences)
+      sum += influence.weight * (influence.parts.rotation * p + influence.parts.translation);
+    return sum;
+  }
+  /// Dual quaternions move M p by this besides the rotation.
+  glm::dvec3 dualTranslation() const {
+    double square = 0;
+    for (const double part : real) square += part * part;
+    const Quaternion t = times(dual, {real[0], -real[1], -real[2], -real[3]});
+    return 2.0 / square * glm::dvec3(t[1], t[2], t[3]);
+  }
+  glm::dvec3 dualQuaternions(const glm::dvec3& p) const {
+    return rotation * (m * p) + dualTranslation();
+  }
+  /// By the inverse transpose of M, then turned.
+  glm::dvec3 turnedNormal(const glm::dmat3& turn) const {
+    return glm::normalize(turn * (glm::transpose(glm::inverse(m)) * normal));
+  }
+
+  glm::dvec3 position, normal, center{0.0};
+  std::vector<Influence> influences;
+  glm::dmat3 m{0.0};    ///< Σ w S
+  glm::dmat3 rotation;  ///< of the blended quaternion
+  Quaternion real{}, dual{};
+  bool ambiguous = false;
+};
+
+struct Moved {
+  glm::dvec3 position, normal;
+};
+using Formula = std::function<Moved(const ByHand&)>;
+
+/// `compared` counts vertices, normals apart.
+void expectFormula(OwnedMesh& mesh, std::span<const JointMatrix> pose, Method method,
+                   double tolerance, const Formula& formula) {
+  const reference::SkinnedMesh result = skinned(mesh, pose, method);
+  std::size_t compared = 0;
+  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
+    const ByHand byHand(mesh, vertex, pose);
+    const reference::Conditioning& conditioning = result.conditioning[vertex];
+    if (byHand.ambiguous || conditioning.signAmbiguous) continue;
+    ++compared;
+    const Moved expected = formula(byHand);
+    expectNear(toVector(result.positions[vertex]), expected.position, tolerance);
+    if (conditioning.normalAlignment < 1e-2) continue;
+    expectNear(toVector(result.normals[vertex]), expected.normal, 100 * tolerance);
+  }
+  EXPECT_GE(compared, mesh.vertexCount() * 3 / 4);
+}
+
+// ---- What is true of all
+
+TEST(ReferenceMethods, OneInfluenceIsItsJointWhateverTheMethod) {
+  RigRandom random(1);
+  for (const Joints kind : allJoints) {
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 40);
+    OwnedMesh mesh = meshWithShares(random, 300, 40, 1);
+    for (const Method method : allMethods) {
+      const reference::SkinnedMesh result = skinned(mesh, pose, method);
+      for (std::size_t vertex = 0; vertex < 300; ++vertex) {
+        const JointMatrix& joint = pose[mesh.joints[vertex]];
+        expectNear(toVector(result.positions[vertex]),
+                   linearOf(joint) * bindPosition(mesh, vertex) + offsetOf(joint), 1e-13);
+        const glm::dmat3 c = linearOf(joint);
+        expectNear(toVector(result.normals[vertex]),
+                   glm::normalize(glm::transpose(glm::inverse(c)) * bindNormal(mesh, vertex)),
+                   1e-12);
+        EXPECT_FALSE(result.conditioning[vertex].signAmbiguous) << methodName(method);
+      }
+    }
+  }
+}
+
+TEST(ReferenceMethods, EqualJointsAreOneJointWhateverTheMethod) {
+  RigRandom random(2);
+  for (const Joints kind : allJoints) {
+    for (int trial = 0; trial < 30; ++trial) {
+      const std::vector<JointMatrix> pose(5, randomJoint(random, kind));
+      OwnedMesh mesh = meshWithShares(random, 10, 5, 4);
+      for (const Method method : allMethods) {
+        const reference::SkinnedMesh result = skinned(mesh, pose, method);
+        for (std::size_t vertex = 0; vertex < 10; ++vertex) {
+          const glm::dmat3 c = linearOf(pose[0]);
+          expectNear(toVector(result.positions[vertex]),
+                     c * bindPosition(mesh, vertex) + offsetOf(pose[0]), 1e-13);
+          expectNear(toVector(result.normals[vertex]),
+                     glm::normalize(glm::transpose(glm::inverse(c)) * bindNormal(mesh, vertex)),
+                     1e-12);
+        }
+      }
+    }
+  }
+}
+
+// Joints that only shift: every method is linear blending.
+TEST(ReferenceMethods, TranslationsBlendLinearlyWhateverTheMethod) {
+  RigRandom random(3);
+  std::vector<JointMatrix> pose;
+  for (int joint = 0; joint < 10; ++joint)
+    pose.push_back(jointOf(glm::dmat3(1.0), random.vector(2)));
+  OwnedMesh mesh = meshWithShares(random, 200, 10, 4);
+  for (const Method method : allMethods) {
+    const reference::SkinnedMesh result = skinned(mesh, pose, method);
+    for (std::size_t vertex = 0; vertex < 200; ++vertex) {
+      expectNear(toVector(result.positions[vertex]),
+                 ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
+    }
+  }
+}
+
+// S alone, common to all joints: it is applied in bind space, before whatever the method does.
+TEST(ReferenceMethods, AScaleInBindSpaceIsAScaledMeshWhateverTheMethod) {
+  RigRandom random(4);
+  for (int trial = 0; trial < 20; ++trial) {
+    std::vector<JointMatrix> rigid, scaled;
+    const float scale[] = {0.5f, 2.0f, 4.0f};
+    for (int joint = 0; joint < 6; ++joint) {
+      const glm::dmat3 rotation = exactRotation(random);
+      const glm::dvec3 translation = random.vector(2);
+      rigid.push_back(jointOf(rotation, translation));
+      scaled.push_back(jointOf(rotation * diagonalMatrix(0.5, 2, 4), translation));
+    }
+    OwnedMesh small = meshWithShares(random, 50, 6, 3), large = small;
+    for (std::size_t i = 0; i < small.positions.size(); ++i) {
+      large.positions[i] *= scale[i % 3];
+      large.centersOfRotation[i] *= scale[i % 3];
+    }
+    for (const Method method : allMethods) {
+      const reference::SkinnedMesh result = skinned(small, scaled, method);
+      const reference::SkinnedMesh expected = skinned(large, rigid, method);
+      for (std::size_t vertex = 0; vertex < 50; ++vertex) {
+        if (expected.conditioning[vertex].signAmbiguous) continue;
+        expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-12);
+      }
+    }
+  }
+}
+
+TEST(ReferenceMethods, Truth19_AScaleOf100IsKeptWhateverTheMethod) {
+  RigRandom random(5);
+  std::vector<JointMatrix> rigid, scaled;
+  for (int joint = 0; joint < 10; ++joint) {
+    const glm::dmat3 rotation = exactRotation(random);  // so that 100 R is stored exactly
+    const glm::dvec3 translation = random.vector(2);
+    rigid.push_back(jointOf(rotation, translation));
+    scaled.push_back(jointOf(rotation * 100.0, translation));
+  }
+  OwnedMesh small = meshWithShares(random, 300, 10, 4);
+  for (float& coordinate : small.positions) coordinate = std::round(coordinate * 1024) / 1024;
+  for (float& coordinate : small.centersOfRotation)
+    coordinate = std::round(coordinate * 1024) / 1024;
+  OwnedMesh large = small;
+  for (float& coordinate : large.positions) coordinate *= 100;
+  for (float& coordinate : large.centersOfRotation) coordinate *= 100;
+  for (const Method method : allMethods) {
+    const reference::SkinnedMesh expected = skinned(large, rigid, method);
+    const reference::SkinnedMesh result = skinned(small, scaled, method);
+    for (std::size_t vertex = 0; vertex < 300; ++vertex) {
+      if (expected.conditioning[vertex].signAmbiguous) continue;
+      expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-11);
+      expectNear(toVector(result.normals[vertex]), toVector(expected.normals[vertex]), 1e-12);
+    }
+  }
+}
+
+TEST(ReferenceMethods, ThoseWithACenterOfRotationRefuseAMeshWithout) {
+  RigRandom random(6);
+  OwnedMesh mesh = scatteredMesh(random, 10, 4, 2);
+  mesh.name = "Fox";
+  mesh.centersOfRotation.clear();
+  const std::vector<JointMatrix> pose(4);
+  for (const Method method : allMethods) {
+    const Result<reference::SkinnedMesh> result = reference::skin(mesh.view(), pose, method);
+    ASSERT_EQ(result.ok(), !needsCentersOfRotation(method)) << methodName(method);
+    if (result) continue;
+    EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
+    EXPECT_EQ(result.error().message, "mesh 'Fox': " + std::string(methodName(method)) +
+                                          " needs centres of rotation, it has none");
+  }
+}
+
+// ---- Quaternion and translation (Hejl 2004)
+
+TEST(ReferenceMethods, QuaternionTranslationIsHejlsFormula) {
+  RigRandom random(10);
+  for (const Joints kind : allJoints) {
+    for (const std::uint32_t influences : {2u, 3u, 4u, 7u}) {
+      const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+      OwnedMesh mesh = scatteredMesh(random, 300, 20, influences);
+      expectFormula(mesh, pose, Method::quaternionTranslation, 1e-12, [](const ByHand& vertex) {
+        glm::dvec3 translation(0.0);
+        for (const ByHand::Influence& influence : vertex.influences)
+          translation += influence.weight * offsetOf(influence.matrix);
+        return Moved{vertex.rotation * (vertex.m * vertex.position) + translation,
+                     vertex.turnedNormal(vertex.rotation)};
+      });
+    }
+  }
+}
+
+// ---- Matrix logarithms
+
+TEST(ReferenceMethods, TheSeriesInTheseTestsAreRight) {
+  RigRandom random(11);
+  for (int trial = 0; trial < 200; ++trial) {
+    const glm::dvec3 axis = random.direction();
+    const double angle = random.between(0.01, 3);
+    const glm::dmat4 c = matrixOf(rotationAbout(axis, angle), random.vector(1));
+    const glm::dmat4 logarithm = logarithmOf(c);
+    EXPECT_LE(largestEntry(exponentialOf(logarithm) - c), 1e-12);
+    // Of a rotation it is [angle · axis]×.
+    EXPECT_NEAR(logarithm[0][1], angle * axis.z, 1e-11);
+    EXPECT_NEAR(logarithm[1][2], angle * axis.x, 1e-11);
+    EXPECT_NEAR(logarithm[2][0], angle * axis.y, 1e-11);
+  }
+}
+
+TEST(ReferenceMethods, LogMatrixIsTheExponentialOfTheMeanLogarithm) {
+  RigRandom random(12);
+  for (const Joints kind : allJoints) {
+    for (const std::uint32_t influences : {2u, 3u, 4u}) {
+      const std::vector<JointMatrix> pose = randomJoints(random, kind, 20, 3.0);
+      OwnedMesh mesh = scatteredMesh(random, 100, 20, influences);
+      expectFormula(mesh, pose, Method::logMatrix, 1e-11, [](const ByHand& vertex) {
+        glm::dmat4 mean(0.0);
+        for (const ByHand::Influence& influence : vertex.influences) {
+          mean += influence.weight *
+                  logarithmOf(matrixOf(influence.parts.rotation, influence.parts.translation));
+        }
+        const glm::dmat4 blended = exponentialOf(mean);
+        return Moved{glm::dvec3(blended * glm::dvec4(vertex.m * vertex.position, 1)),
+                     vertex.turnedNormal(glm::dmat3(blended))};
+      });
+    }
+  }
+}
+
+// A rotation beyond half a turn from the pivot is taken the short way from rest, not from there.
+TEST(ReferenceMethods, LogMatrixMayGoTheLongWayRound) {
+  const auto turn = [](double degrees) {
+    return jointOf(rotationAbout({0, 0, 1}, degrees * pi / 180));
+  };
+  OwnedMesh mesh;
+  addVertex(mesh, {1, 0, 0}, {{0, 0.5f}, {1, 0.5f}});
+  const std::array pose{turn(170), turn(-170)};  // 20° apart, across 180°
+  expectNear(toVector(skinned(mesh, pose, Method::logMatrix).positions[0]), {1, 0, 0}, 1e-6);
+  for (const Method method : {Method::dualQuaternion, Method::dualQuaternionIterative})
+    expectNear(toVector(skinned(mesh, pose, method).positions[0]), {-1, 0, 0}, 1e-6);
+}
+
+// ---- Iterative dual quaternions: the blend in which the joints' screws cancel
+
+TEST(ReferenceMethods, IterativeBlendingIsWhereTheLogarithmsCancel) {
+  RigRandom random(13);
+  std::size_t compared = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    // Near to each other, for a matrix logarithm knows no hemispheres.
+    const glm::dmat3 base = rotationAbout(random.direction(), random.between(-pi, pi));
+    std::vector<JointMatrix> pose;
+    for (int joint = 0; joint < 4; ++joint) {
+      pose.push_back(jointOf(base * rotationAbout(random.direction(), random.between(-1.2, 1.2)),
+                             random.vector(1)));
+    }
+    OwnedMesh mesh;
+    std::vector<float> weights;
+    for (int i = 0; i < 4; ++i) weights.push_back(static_cast<float>(random.between(0.1, 1)));
+    for (const glm::dvec3& p :
+         {glm::dvec3(0.0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
+      addVertex(mesh, p, {{0, weights[0]}, {1, weights[1]}, {2, weights[2]}, {3, weights[3]}});
+    }
+    mesh.normals.assign(12, 0.0f);
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternionIterative);
+    glm::dmat4 b(1.0);
+    b[3] = glm::dvec4(toVector(result.positions[0]), 1);
+    for (int i = 0; i < 3; ++i) {
+      b[i] = glm::dvec4(toVector(result.positions[static_cast<std::size_t>(i) + 1]) -
+                            toVector(result.positions[0]),
+                        0);
+    }
+    glm::dmat4 residual(0.0);
+    for (const ByHand::Influence& influence : ByHand(mesh, 0, pose).influences) {
+      residual +=
+          influence.weight * logarithmOf(glm::inverse(b) * matrixOf(influence.parts.rotation,
+                                                                    influence.parts.translation));
+    }
+    // Joints in float32 scale a little, which the points show and the logarithm does not: 2e-7.
+    EXPECT_LE(largestEntry(residual), 5e-7);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 200u);
+}
+
+// ---- Spherical blending (Kavan and Žára 2005)
+
+glm::dvec3 unitAxis(const glm::dmat3& rotation) {
+  const Quaternion q = quaternionOf(rotation);
+  return glm::normalize(glm::dvec3(q[1], q[2], q[3]));
+}
+
+/// The least-squares solution over all pairs; of least length, where `free` is a direction that
+/// the equations do not say anything of.
+glm::dvec3 centerByHand(const ByHand& vertex, const glm::dvec3* free) {
+  glm::dmat3 square(0.0);
+  glm::dvec3 right(0.0);
+  for (const ByHand::Influence& a : vertex.influences) {
+    for (const ByHand::Influence& b : vertex.influences) {
+      const glm::dmat3 rows = a.parts.rotation - b.parts.rotation;
+      square += glm::transpose(rows) * rows;
+      right += glm::transpose(rows) * (b.parts.translation - a.parts.translation);
+    }
+  }
+  // What is perpendicular to `free` stays as it is.
+  if (free != nullptr) square += glm::outerProduct(*free, *free);
+  return glm::inverse(square) * right;
+}
+
+Moved sphericalByHand(const ByHand& vertex, const glm::dvec3& center) {
+  return {vertex.rotation * (vertex.m * vertex.position - center) + vertex.rigidLinear(center),
+          vertex.turnedNormal(vertex.rotation)};
+}
+
+TEST(ReferenceMethods, SphericalBlendTurnsAboutThePointOfLeastSquares) {
+  RigRandom random(14);
+  for (const Joints kind : allJoints) {
+    for (const std::uint32_t influences : {3u, 4u, 6u}) {
+      const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+      OwnedMesh mesh = scatteredMesh(random, 200, 20, influences);
+      // Hardly any three joints turn alike.
+      expectFormula(mesh, pose, Method::sphericalBlend, 1e-9, [](const ByHand& vertex) {
+        return sphericalByHand(vertex, centerByHand(vertex, nullptr));
+      });
+    }
+  }
+}
+
+// Two rotations agree along the axis of the one that leads from the first to the second.
+TEST(ReferenceMethods, SphericalBlendOfTwoJointsIsThePseudoInverse) {
+  RigRandom random(15);
+  for (const Joints kind : allJoints) {
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+    OwnedMesh mesh = scatteredMesh(random, 400, 20, 2);
+    expectFormula(mesh, pose, Method::sphericalBlend, 1e-9, [](const ByHand& vertex) {
+      const glm::dvec3 axis = unitAxis(glm::transpose(vertex.influences[0].parts.rotation) *
+                                       vertex.influences[1].parts.rotation);
+      const glm::dvec3 center = centerByHand(vertex, &axis);
+      EXPECT_NEAR(glm::dot(center, axis), 0, 1e-9);
+      return sphericalByHand(vertex, center);
+    });
+  }
+}
+
+// A joint's own: both lie where the first's children turn.
+TEST(ReferenceMethods, SphericalBlendFindsTheJointWhereTwoBonesMeet) {
+  RigRandom random(16);
+  for (int trial = 0; trial < 200; ++trial) {
+    const glm::dvec3 elbow = random.vector(1);
+    const glm::dmat3 bend = rotationAbout(random.direction(), random.between(0.1, 3));
+    const std::array pose{JointMatrix{}, jointOf(bend, elbow - bend * elbow)};
+    OwnedMesh mesh;
+    const auto p = glm::dvec3(glm::vec3(elbow));
+    addVertex(mesh, p, {{0, 0.375f}, {1, 0.625f}});
+    const glm::dvec3 beside(glm::vec3(elbow + random.direction()));
+    addVertex(mesh, beside, {{0, 0.375f}, {1, 0.625f}});
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    expectNear(toVector(result.positions[0]), p, 1e-5);
+    EXPECT_NEAR(glm::length(toVector(result.positions[1]) - p), glm::length(beside - p), 1e-5)
+        << "on a sphere about it";
+  }
+}
+
+TEST(ReferenceMethods, SphericalBlendOfACommonAxisIsFinite) {
+  RigRandom random(17);
+  for (int trial = 0; trial < 300; ++trial) {
+    const glm::dvec3 axis = random.direction();
+    const glm::dmat3 first = rotationAbout(random.direction(), random.between(-pi, pi));
+    std::vector<JointMatrix> pose;
+    for (int joint = 0; joint < 4; ++joint) {
+      pose.push_back(jointOf(first * rotationAbout(axis, random.between(-1, 1)), random.vector(1)));
+    }
+    OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    for (std::size_t vertex = 0; vertex < 5; ++vertex) {
+      ASSERT_TRUE(isFiniteVector(result.positions[vertex]));
+      // The least of two singular values says how far what is left of rounding is thrown.
+      const ByHand byHand(mesh, vertex, pose);
+      const Moved expected = sphericalByHand(byHand, centerByHand(byHand, &axis));
+      if (result.conditioning[vertex].signAmbiguous) continue;
+      expectNear(toVector(result.positions[vertex]), expected.position,
+                 1e-6 * (1 + result.conditioning[vertex].leverage));
+    }
+  }
+}
+
+// No centre is better than another: it stays where it is, at 0.
+TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
+  RigRandom random(18);
+  for (int trial = 0; trial < 100; ++trial) {
+    const glm::dmat3 rotation = rotationAbout(random.direction(), random.between(-pi, pi));
+    std::vector<JointMatrix> pose;
+    for (int joint = 0; joint < 4; ++joint) pose.push_back(jointOf(rotation, random.vector(1)));
+    OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
+    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    for (std::size_t vertex = 0; vertex < 5; ++vertex) {
+      expectNear(toVector(result.positions[vertex]),
+                 ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
+    }
+  }
+}
+
+// Rotations that differ by less than 1e-3: the centre must not fly off.
+TEST(ReferenceMethods, SphericalBlendOfNearlyEqualRotationsStaysNear) {
+  RigRandom random(19);
+  for (const double angle : {1e-7, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2}) {
+    for (int trial = 0; trial < 50; ++trial) {
+      std::vector<JointMatrix> pose;
+      for (int joint = 0; joint < 4; ++joint)
+        pose.push_back(jointOf(rotationAbout(random.direction(), angle), random.vector(1)));
+      OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
+      const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+      for (std::size_t vertex = 0; vertex < 5; ++vertex) {
+        ASSERT_TRUE(isFiniteVector(result.positions[vertex]));
+        // All joints move the point nearly alike but for their translations.
+        expectNear(toVector(result.positions[vertex]),
+                   ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)),
+                   0.02 + 3 * angle * (1 + result.conditioning[vertex].leverage));
+      }
+    }
+  }
+}
+
+// ---- Between linear blending and dual quaternions
+
+TEST(ReferenceMethods, BlendedIsTheMeanOfBothByItsWeight) {
+  RigRandom random(20);
+  for (const Joints kind : allJoints) {
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+    OwnedMesh mesh = meshWithShares(random, 400, 20, 4);
+    for (std::size_t vertex = 0; vertex < 100; ++vertex)
+      mesh.dualQuaternionWeights[vertex] = std::array{0.0f, 0.25f, 0.5f, 1.0f}[vertex % 4];
+    const reference::SkinnedMesh linear = skinned(mesh, pose, Method::linear),
+                                 dual = skinned(mesh, pose, Method::dualQuaternion),
+                                 result = skinned(mesh, pose, Method::blended);
+    for (std::size_t vertex = 0; vertex < 400; ++vertex) {
+      const auto share = static_cast<double>(mesh.dualQuaternionWeights[vertex]);
+      const auto mean = [&](const reference::Double3& a, const reference::Double3& b) {
+        return (1 - share) * toVector(a) + share * toVector(b);
+      };
+      expectNear(toVector(result.positions[vertex]),
+                 mean(linear.positions[vertex], dual.positions[vertex]), 1e-15);
+      const glm::dvec3 normal = mean(linear.normals[vertex], dual.normals[vertex]);
+      if (glm::length(normal) > 1e-3)
+        expectNear(toVector(result.normals[vertex]), glm::normalize(normal), 1e-12);
+      if (share == 0) {
+        EXPECT_EQ(result.positions[vertex], linear.positions[vertex]);
+      }
+      if (share == 1) {
+        EXPECT_EQ(result.positions[vertex], dual.positions[vertex]);
+      }
+    }
+  }
+}
+
+TEST(ReferenceMethods, BlendedTakesTheMeshsWeightWhereTheVerticesHaveNone) {
+  RigRandom random(21);
+  const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
+  OwnedMesh mesh = scatteredMesh(random, 50, 8, 3);
+  const reference::SkinnedMesh linear = skinned(mesh, pose, Method::linear),
+                               dual = skinned(mesh, pose, Method::dualQuaternion);
+  for (const float share : {0.0f, 0.125f, 0.5f, 1.0f}) {
+    MeshView view = mesh.view();
+    if (share != 0.5f) view.dualQuaternionWeight = share;  // a half unless it says otherwise
+    const Result<reference::SkinnedMesh> result = reference::skin(view, pose, Method::blended);
+    ASSERT_TRUE(result.ok());
+    for (std::size_t vertex = 0; vertex < 50; ++vertex) {
+      expectNear(toVector(result->positions[vertex]),
+                 (1 - static_cast<double>(share)) * toVector(linear.positions[vertex]) +
+                     static_cast<double>(share) * toVector(dual.positions[vertex]),
+                 1e-15);
+    }
+  }
+}
+
+// ---- Centres of rotation (Le and Hodgins 2016)
+
+TEST(ReferenceMethods, CenterOfRotationIsItsFormula) {
+  RigRandom random(22);
+  for (const Joints kind : allJoints) {
+    for (const std::uint32_t influences : {2u, 4u, 7u}) {
+      const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+      OwnedMesh mesh = scatteredMesh(random, 300, 20, influences);
+      expectFormula(mesh, pose, Method::centerOfRotation, 1e-12, [](const ByHand& vertex) {
+        return Moved{vertex.rotation * (vertex.m * (vertex.position - vertex.center)) +
+                         vertex.linear(vertex.center),
+                     vertex.turnedNormal(vertex.rotation)};
+      });
+    }
+  }
+}
+
+TEST(ReferenceMethods, AVertexAtItsCenterOfRotationGoesWhereLinearBlendingTakesIt) {
+  RigRandom random(23);
+  const std::vector<JointMatrix> pose = randomJoints(random, Joints::mixed, 20);
+  OwnedMesh mesh = scatteredMesh(random, 300, 20, 4);
+  mesh.centersOfRotation = mesh.positions;
+  const reference::SkinnedMesh result = skinned(mesh, pose, Method::centerOfRotation),
+                               linear = skinned(mesh, pose, Method::linear);
+  for (std::size_t vertex = 0; vertex < 300; ++vertex)
+    expectNear(toVector(result.positions[vertex]), toVector(linear.positions[vertex]), 1e-13);
+}
+
+TEST(ReferenceMethods, CenterOfRotationAtTheOriginIsQuaternionTranslation) {
+  RigRandom random(24);
+  const std::vector<JointMatrix> pose = randomJoints(random, Joints::mixed, 20);
+  OwnedMesh mesh = scatteredMesh(random, 300, 20, 4);
+  std::fill(mesh.centersOfRotation.begin(), mesh.centersOfRotation.end(), 0.0f);
+  const reference::SkinnedMesh result = skinned(mesh, pose, Method::centerOfRotation),
+                               expected = skinned(mesh, pose, Method::quaternionTranslation);
+  for (std::size_t vertex = 0; vertex < 300; ++vertex)
+    expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-14);
+}
+
+// ---- Bulge control
+
+TEST(ReferenceMethods, BulgeControlLeadsFromDualQuaternionsToCentersOfRotation) {
+  RigRandom random(25);
+  for (const Joints kind : allJoints) {
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+    OwnedMesh mesh = meshWithShares(random, 400, 20, 4);
+    for (std::size_t vertex = 0; vertex < 100; ++vertex)
+      mesh.bulgeStrengths[vertex] = std::array{0.0f, 0.25f, 0.5f, 1.0f}[vertex % 4];
+    const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
+                                 centred = skinned(mesh, pose, Method::centerOfRotation),
+                                 result = skinned(mesh, pose, Method::bulgeControlled);
+    for (std::size_t vertex = 0; vertex < 400; ++vertex) {
+      const auto strength = static_cast<double>(mesh.bulgeStrengths[vertex]);
+      expectNear(toVector(result.positions[vertex]),
+                 (1 - strength) * toVector(dual.positions[vertex]) +
+                     strength * toVector(centred.positions[vertex]),
+                 1e-13);
+      // All three turn alike.
+      EXPECT_EQ(result.normals[vertex], dual.normals[vertex]);
+      EXPECT_EQ(result.normals[vertex], centred.normals[vertex]);
+    }
+  }
+}
+
+TEST(ReferenceMethods, BulgeControlIsItsFormula) {
+  RigRandom random(26);
+  for (const Joints kind : allJoints) {
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+    OwnedMesh mesh = scatteredMesh(random, 300, 20, 4);
+    mesh.bulgeStrengths.assign(300, 0.375f);
+    expectFormula(mesh, pose, Method::bulgeControlled, 1e-12, [](const ByHand& vertex) {
+      return Moved{
+          vertex.dualQuaternions(vertex.position) -
+              0.375 * (vertex.dualQuaternions(vertex.center) - vertex.linear(vertex.center)),
+          vertex.turnedNormal(vertex.rotation)};
+    });
+  }
+}
+
+TEST(ReferenceMethods, BulgeControlTakesTheMeshsStrengthWhereTheVerticesHaveNone) {
+  RigRandom random(27);
+  const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
+  OwnedMesh mesh = scatteredMesh(random, 50, 8, 3);
+  const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
+                               centred = skinned(mesh, pose, Method::centerOfRotation);
+  for (const float strength : {0.0f, 0.125f, 1.0f}) {
+    MeshView view = mesh.view();
+    if (strength != 1) view.bulgeStrength = strength;  // all of it unless it says otherwise
+    const Result<reference::SkinnedMesh> result =
+        reference::skin(view, pose, Method::bulgeControlled);
+    ASSERT_TRUE(result.ok());
+    for (std::size_t vertex = 0; vertex < 50; ++vertex) {
+      expectNear(toVector(result->positions[vertex]),
+                 (1 - static_cast<double>(strength)) * toVector(dual.positions[vertex]) +
+                     static_cast<double>(strength) * toVector(centred.positions[vertex]),
+                 1e-14);
+    }
+  }
+}
+
+// A share of another type, from a view with gaps, is the same share.
+TEST(ReferenceMethods, SharesOfEveryType) {
+  RigRandom random(28);
+  const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
+  OwnedMesh mesh = scatteredMesh(random, 4, 8, 3);
+  const std::vector<std::uint8_t> bytes{0, 7, 51, 7, 204, 7, 255};  // every other one
+  const std::vector<std::uint16_t> shorts{0, 13107, 52428, 65535};
+  const std::vector<float> parts{0, 0.2f, 0.8f, 1};
+  OwnedMesh expected = mesh;
+  expected.dualQuaternionWeights = expected.bulgeStrengths = parts;
+  for (const Method method : {Method::blended, Method::bulgeControlled}) {
+    const reference::SkinnedMesh whole = skinned(expected, pose, method);
+    for (const AttributeView& shares :
+         {AttributeView{bytes.data(), 4, 2, ComponentType::unorm8, 1},
+          AttributeView{shorts.data(), 4, 2, ComponentType::unorm16, 1}}) {
+      MeshView view = mesh.view();
+      view.dualQuaternionWeights = view.bulgeStrengths = shares;
+      const Result<reference::SkinnedMesh> result = reference::skin(view, pose, method);
+      ASSERT_TRUE(result.ok());
+      for (std::size_t vertex = 0; vertex < 4; ++vertex)
+        expectNear(toVector(result->positions[vertex]), toVector(whole.positions[vertex]), 1e-7);
+    }
+  }
+}
+
+// ---- Two phases in all of them
+
+// The blended S is applied in bind space: rigid joints' answer to the scaled point.
+TEST(ReferenceMethods, WhatIsScaledIsThenMovedRigidly) {
+  RigRandom random(29);
+  for (const Joints kind : {Joints::scaled, Joints::mirrored, Joints::mixed}) {
+    for (int trial = 0; trial < 30; ++trial) {
+      // Rotations that float32 holds, so that the rigid part alone can be a joint too.
+      std::vector<JointMatrix> pose, rigid;
+      for (int joint = 0; joint < 3; ++joint) {
+        const bool mirrors = kind == Joints::mirrored || (kind == Joints::mixed && joint == 1);
+        const double sign = mirrors ? -1 : 1;
+        const glm::dmat3 rotation = exactRotation(random);
+        const glm::dvec3 t = random.vector(1);
+        pose.push_back(jointOf(rotation * diagonalMatrix(sign * 0.5, sign * 2, sign * 1.25), t));
+        rigid.push_back(jointOf(rotation, t));
+      }
+      OwnedMesh mesh = scatteredMesh(random, 1, 3, 3);
+      mesh.weights = {0.5f, 0.125f, 0.375f};
+      const ByHand byHand(mesh, 0, pose);
+      OwnedMesh scaled = mesh;
+      const auto scale = [&](std::vector<float>& values) {
+        const glm::dvec3 p = byHand.m * glm::dvec3(values[0], values[1], values[2]);
+        for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)] = static_cast<float>(p[i]);
+      };
+      scale(scaled.positions);
+      for (const Method method : twoPhaseMethods) {
+        // Those take the centre by the joints themselves, scale and all.
+        if (needsCentersOfRotation(method)) continue;
+        const reference::SkinnedMesh result = skinned(mesh, pose, method);
+        if (result.conditioning[0].signAmbiguous) continue;
+        expectNear(toVector(result.positions[0]),
+                   toVector(skinned(scaled, rigid, method).positions[0]), 1e-6);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
