@@ -79,6 +79,48 @@ TEST(Accuracy, TangentBoundsAreThoseOfNormalsWithTheirOwnAlignment) {
   EXPECT_LT(tangentBound(Method::dualQuaternion, conditioning), 0);
 }
 
+TEST(Accuracy, ALeverageCountsAsTheScaleDoesButForLinear) {
+  for (const Method method : allMethods) {
+    reference::Conditioning conditioning;
+    conditioning.scale = 2;
+    conditioning.distance = 3;
+    const double without = positionBound(method, conditioning);
+    EXPECT_DOUBLE_EQ(without, (method == Method::linear ? 12 : 48) * u) << methodName(method);
+    conditioning.leverage = 5;
+    const double with = positionBound(method, conditioning);
+    if (method == Method::linear) {
+      EXPECT_EQ(with, without);
+      continue;
+    }
+    EXPECT_DOUBLE_EQ(with, 24 * u * 7) << methodName(method);
+    conditioning.rigidShortcut = 1e-6;
+    EXPECT_DOUBLE_EQ(positionBound(method, conditioning), 24 * u * 7 + 8e-6);
+  }
+}
+
+TEST(Accuracy, StepsThatShrinkSlowlyMultiplyWhatTurnsADirection) {
+  reference::Conditioning conditioning;
+  conditioning.turning = 4;
+  conditioning.rigidShortcut = 0.5e-6;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternionIterative, conditioning), 8e-6);
+  EXPECT_DOUBLE_EQ(tangentBound(Method::dualQuaternionIterative, conditioning), 8e-6);
+  EXPECT_DOUBLE_EQ(normalBound(Method::linear, conditioning), 6 * u);
+  conditioning.normalRotatedOnly = false;
+  EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternionIterative, conditioning), 8e-6 + 6 * u);
+}
+
+TEST(Accuracy, DirectionsThatCancelInABlendAreTheLessCertain) {
+  reference::Conditioning conditioning;
+  conditioning.normalRotatedOnly = false;
+  conditioning.normalLength = 0.5;
+  conditioning.tangentLength = 0.25;
+  EXPECT_DOUBLE_EQ(normalBound(Method::blended, conditioning), 2 * (6 * u + 1.5e-6));
+  EXPECT_DOUBLE_EQ(tangentBound(Method::blended, conditioning), 4 * (6 * u + 1.5e-6));
+  conditioning.normalAlignment = conditioning.tangentAlignment = 0.003;
+  EXPECT_GT(normalBound(Method::blended, conditioning), 0);
+  EXPECT_LT(tangentBound(Method::blended, conditioning), 0) << "0.00075 is less than 1e-3";
+}
+
 TEST(Accuracy, WhatTheBindPoseIsOffByIsStretchedAndDividedByTheAlignment) {
   reference::Conditioning conditioning;
   conditioning.positionRounding = 10;
