@@ -153,7 +153,8 @@ struct Deviation {
 };
 
 TEST(ReferenceTruths, Truth04_WhoIsInvariantUnderWhat) {
-  for (const auto& [method, left, right, frame] : invariances) {
+  for (const Invariance& invariance : invariances) {
+    const Method method = invariance.method;
     RigRandom random(4);
     Deviation ofLeft, ofRight, ofFrame;
     const DualQuatd one;
@@ -191,9 +192,9 @@ TEST(ReferenceTruths, Truth04_WhoIsInvariantUnderWhat) {
     }
     constexpr double tolerance = 1e-14;
     const std::string name(methodName(method));
-    ofLeft.expect(left, tolerance, name + " from the left");
-    ofRight.expect(right, tolerance, name + " from the right");
-    ofFrame.expect(frame, tolerance, name + " of the frame");
+    ofLeft.expect(invariance.left, tolerance, name + " from the left");
+    ofRight.expect(invariance.right, tolerance, name + " from the right");
+    ofFrame.expect(invariance.frame, tolerance, name + " of the frame");
   }
 }
 
