@@ -17,13 +17,12 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
   float pivotWeight = influenceWeight(influences, 0u);
   precise vec4 real = pivotWeight * pivot;
   precise vec4 dual = pivotWeight * paletteDual(palette, pivotJoint);
-  precise vec3 diagonal = vec3(1.0);
-  precise vec3 mixed = vec3(0.0);
-  if (twoPhase) {
-    ScaleShear part = paletteScaleShear(palette, jointCount, pivotJoint);
-    diagonal = pivotWeight * part.diagonal;
-    mixed = pivotWeight * part.mixed;
-  }
+  // Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex
+  // comes out to the bit as if the palette had no such joint.
+  ScaleShear pivotPart = ScaleShear(vec3(1.0), vec3(0.0));
+  if (twoPhase) pivotPart = paletteScaleShear(palette, jointCount, pivotJoint);
+  precise vec3 diagonal = pivotPart.diagonal;
+  precise vec3 mixed = pivotPart.mixed;
   for (uint slot = 1u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
@@ -33,8 +32,8 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
     dual += towardsPivot * paletteDual(palette, joint);
     if (twoPhase) {
       ScaleShear part = paletteScaleShear(palette, jointCount, joint);
-      diagonal += weight * part.diagonal;
-      mixed += weight * part.mixed;
+      diagonal += weight * (part.diagonal - pivotPart.diagonal);
+      mixed += weight * (part.mixed - pivotPart.mixed);
     }
   }
   return Blend(real, dual, ScaleShear(diagonal, mixed));

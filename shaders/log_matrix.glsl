@@ -55,8 +55,10 @@ Vertex skinLogMatrix(Vertex vertex, Influences influences, uint palette, uint jo
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
-  precise vec3 diagonal = vec3(0.0);
-  precise vec3 mixed = vec3(0.0);
+  ScaleShear firstPart = ScaleShear(vec3(1.0), vec3(0.0));
+  if (twoPhase) firstPart = paletteScaleShear(palette, jointCount, influenceJoint(influences, 0u));
+  precise vec3 diagonal = firstPart.diagonal;
+  precise vec3 mixed = firstPart.mixed;
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
@@ -65,8 +67,8 @@ Vertex skinLogMatrix(Vertex vertex, Influences influences, uint palette, uint jo
     r2 += weight * paletteLogarithmRow(palette, joint, 2u);
     if (twoPhase) {
       ScaleShear part = paletteScaleShear(palette, jointCount, joint);
-      diagonal += weight * part.diagonal;
-      mixed += weight * part.mixed;
+      diagonal += weight * (part.diagonal - firstPart.diagonal);
+      mixed += weight * (part.mixed - firstPart.mixed);
     }
   }
   Affine blended = exponentialOf(Affine(r0, r1, r2));
