@@ -22,8 +22,7 @@ struct VerifyOptions {
 /// Fills `verification`; what it returns is a failure of the device. The ways to store are shared
 /// out among the poses, so that each comes once.
 Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
-                         std::span<const samples::OutputCase> outputs,
-                         ModelVerification& verification) {
+                         std::span<const OutputToVerify> outputs, ModelVerification& verification) {
   const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
   Progress progress(verification.model, poses.size());
   for (std::size_t index = 0; index < poses.size(); ++index) {
@@ -93,7 +92,7 @@ ExitStatus verify(const VerifyOptions& options) {
     if (verified->failures() != 0) status = ExitStatus::verificationFailed;
     models.push_back(std::move(*verified));
   }
-  const std::vector<samples::OutputCase> outputs = samples::outputCases(open->context.limits());
+  const std::vector<OutputToVerify> outputs = outputsToVerify(open->context.limits());
   MeshPreparation preparation;
   preparation.strict = options.strict;
   preparation.centersOfRotation = true;

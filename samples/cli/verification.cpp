@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+
+#include "method_rotation.h"
 
 namespace dermis::cli {
 namespace {
@@ -86,6 +89,7 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
     samples::RunOptions options;
     options.tuning = tuning;
     options.output.tangents = VertexFormat::float32x4;
+    options.countUntouched = false;
     Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
     if (!result) return result.error();
     for (std::size_t index = 0; index < requests.size(); ++index) {
@@ -135,24 +139,41 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
   return poses;
 }
 
+std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits) {
+  const std::vector<samples::OutputCase> cases = samples::outputCases(limits);
+  const std::vector<std::vector<Method>> methods = samples::shareOutMethods(cases);
+  std::vector<OutputToVerify> outputs;
+  for (std::size_t index = 0; index < cases.size(); ++index)
+    outputs.push_back({cases[index], methods[index]});
+  return outputs;
+}
+
 Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
                                              const Scene& scene, const PoseToVerify& pose,
                                              const PoseToVerify& before,
-                                             std::span<const samples::OutputCase> outputs) {
+                                             std::span<const OutputToVerify> outputs) {
   PoseBatch batch(scene, pose, before);
   if (Result<void> done = batch.skinReference(); !done) return done.error();
   std::vector<VerifiedCase> cases;
   if (Result<void> done = verifyTunings(device, context, batch, pose, cases); !done)
     return done.error();
-  for (const samples::OutputCase& output : outputs) {
+  for (const OutputToVerify& output : outputs) {
+    std::vector<samples::InstanceToVerify> instances;
+    std::vector<std::size_t> indices;
+    for (std::size_t index = 0; index < batch.instances.size(); ++index) {
+      if (std::ranges::count(output.methods, batch.instances[index].method) == 0) continue;
+      instances.push_back(batch.instances[index]);
+      indices.push_back(index);
+    }
     Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyBatch(device, context, batch.instances, output);
+        samples::verifyBatch(device, context, instances, output.output);
     if (!verified) return verified.error();
-    for (std::size_t index = 0; index < verified->size(); ++index) {
-      VerifiedCase& added = cases.emplace_back(batch.newCase(index, pose, output.name()));
-      added.comparison = (*verified)[index].comparison;
-      added.status = (*verified)[index].status;
-      added.wrong = std::move((*verified)[index].wrong);
+    for (std::size_t place = 0; place < verified->size(); ++place) {
+      VerifiedCase& added =
+          cases.emplace_back(batch.newCase(indices[place], pose, output.output.name()));
+      added.comparison = (*verified)[place].comparison;
+      added.status = (*verified)[place].status;
+      added.wrong = std::move((*verified)[place].wrong);
     }
   }
   return cases;

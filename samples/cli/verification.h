@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dermis/accuracy.h"
+#include "dermis/method.h"
 #include "skinned_scene.h"
 #include "verification_product.h"
 
@@ -37,12 +38,21 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, two times within, and its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// All parts with all methods in one batch, once for each way to cut up the work (which must not
-/// change a bit) and once for each of these ways to store the result. Motion goes from `before`.
+/// A way to store the result, and the methods to verify in it.
+struct OutputToVerify {
+  samples::OutputCase output;
+  std::vector<Method> methods;
+};
+
+/// The ways that a device with these limits has. Over all of them every method meets every format.
+std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits);
+
+/// All parts in one batch: with all methods, once for each way to cut up the work (which must not
+/// change a bit), and once for each of these ways to store the result. Motion goes from `before`.
 Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
                                              const Scene& scene, const PoseToVerify& pose,
                                              const PoseToVerify& before,
-                                             std::span<const samples::OutputCase> outputs);
+                                             std::span<const OutputToVerify> outputs);
 
 /// The product of methods, inputs and outputs over random meshes, by pairs. `done` is called after
 /// each combination.

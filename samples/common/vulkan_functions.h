@@ -8,6 +8,7 @@
   X(DestroyInstance)                        \
   X(EnumeratePhysicalDevices)               \
   X(GetPhysicalDeviceProperties)            \
+  X(GetPhysicalDeviceProperties2)           \
   X(GetPhysicalDeviceFeatures2)             \
   X(GetPhysicalDeviceMemoryProperties)      \
   X(GetPhysicalDeviceQueueFamilyProperties) \
@@ -33,6 +34,11 @@
   X(EndCommandBuffer)                     \
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
+  X(CreateQueryPool)                      \
+  X(DestroyQueryPool)                     \
+  X(CmdResetQueryPool)                    \
+  X(CmdWriteTimestamp)                    \
+  X(GetQueryPoolResults)                  \
   X(QueueSubmit)                          \
   X(CreateFence)                          \
   X(DestroyFence)                         \

@@ -1,0 +1,17 @@
+// How long a kernel is, for devices whose driver does not say.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "dermis/plan.h"
+
+namespace dermis::cli {
+
+/// The SPIR-V instructions of a kernel that calculate or touch memory, once its constants are
+/// specialised and what they leave dead is gone. One for a vector, and a loop's counted once.
+/// Nothing where SPIRV-Tools fail.
+std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
+                                                   const DeviceLimits& limits);
+
+}  // namespace dermis::cli

@@ -1,0 +1,200 @@
+#include "comparison_tube.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "dermis/reference.h"
+
+namespace dermis::cli {
+namespace {
+
+// The volume's error falls with the square of both.
+constexpr std::uint32_t zoneRings = 129;  // odd: one is in the middle
+constexpr std::uint32_t sides = 96;
+constexpr std::uint32_t firstOfZone = 1;  // a ring at either end of the tube
+constexpr std::uint32_t rings = zoneRings + 2;
+constexpr double length = 1;
+constexpr double radius = 0.1;
+constexpr double zoneBegin = 0.3;
+constexpr double zoneEnd = 0.7;
+const glm::dvec3 middle(length / 2, 0, 0);
+
+double ringPlace(std::uint32_t ring) {
+  if (ring == 0) return 0;
+  if (ring == rings - 1) return length;
+  return zoneBegin + (zoneEnd - zoneBegin) * (ring - firstOfZone) / (zoneRings - 1);
+}
+
+struct Tube {
+  std::vector<float> positions, centers, weights;
+  std::vector<std::uint32_t> joints;
+  InfluenceSet influences;
+
+  Tube() {
+    for (std::uint32_t ring = 0; ring < rings; ++ring) {
+      const double x = ringPlace(ring);
+      const double second = std::clamp((x - zoneBegin) / (zoneEnd - zoneBegin), 0.0, 1.0);
+      for (std::uint32_t side = 0; side < sides; ++side) {
+        const double angle = 2 * std::numbers::pi * side / sides;
+        for (const double value : {x, radius * std::cos(angle), radius * std::sin(angle)})
+          positions.push_back(static_cast<float>(value));
+        for (const double value : {x, 0.0, 0.0}) centers.push_back(static_cast<float>(value));
+        for (const double value : {1 - second, second})
+          weights.push_back(static_cast<float>(value));
+        joints.insert(joints.end(), {0, 1});
+      }
+    }
+    influences.joints = {joints.data(), rings * sides, 8, ComponentType::uint32, 2};
+    influences.weights = floatAttribute(weights.data(), rings * sides, 2);
+  }
+  Tube(const Tube&) = delete;
+  Tube& operator=(const Tube&) = delete;
+
+  MeshView view(const MethodShares& shares) const {
+    MeshView mesh;
+    mesh.name = "tube";
+    mesh.vertexCount = rings * sides;
+    mesh.positions = floatAttribute(positions.data(), mesh.vertexCount, 3);
+    mesh.influenceSets = {&influences, 1};
+    mesh.centersOfRotation = floatAttribute(centers.data(), mesh.vertexCount, 3);
+    mesh.dualQuaternionWeight = static_cast<float>(shares.dualQuaternionWeight);
+    mesh.bulgeStrength = static_cast<float>(shares.bulgeStrength);
+    return mesh;
+  }
+};
+
+/// A turn about a line through the tube's middle, where the second joint is.
+JointMatrix turnAboutMiddle(const glm::dmat3& turn) {
+  const glm::dvec3 translation = middle - turn * middle;
+  JointMatrix joint;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      joint.m[row][column] = static_cast<float>(turn[column][row]);
+    joint.m[row][3] = static_cast<float>(translation[row]);
+  }
+  return joint;
+}
+
+glm::dmat3 twistBy(double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {{1, 0, 0}, {0, c, s}, {0, -s, c}};
+}
+
+glm::dmat3 bendBy(double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {{c, s, 0}, {-s, c, 0}, {0, 0, 1}};
+}
+
+using Points = std::vector<glm::dvec3>;
+
+const glm::dvec3& pointOf(const Points& points, std::uint32_t ring, std::uint32_t side) {
+  return points[std::size_t{ring} * sides + side % sides];
+}
+
+glm::dvec3 ringMiddle(const Points& points, std::uint32_t ring) {
+  glm::dvec3 sum(0);
+  for (std::uint32_t side = 0; side < sides; ++side) sum += pointOf(points, ring, side);
+  return sum / double{sides};
+}
+
+/// Of the ring's projection onto the plane in which that is largest.
+double ringArea(const Points& points, std::uint32_t ring) {
+  const glm::dvec3 centre = ringMiddle(points, ring);
+  glm::dvec3 area(0);
+  for (std::uint32_t side = 0; side < sides; ++side) {
+    area +=
+        glm::cross(pointOf(points, ring, side) - centre, pointOf(points, ring, side + 1) - centre) /
+        2.0;
+  }
+  return glm::length(area);
+}
+
+/// Six times the signed volume of a tetrahedron with the tube's middle, which is near, so that
+/// little is lost.
+double sixVolumes(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  return glm::dot(a - middle, glm::cross(b - middle, c - middle));
+}
+
+double zoneVolume(const Points& points) {
+  double sum = 0;
+  const std::uint32_t last = firstOfZone + zoneRings - 1;
+  for (std::uint32_t side = 0; side < sides; ++side) {
+    for (std::uint32_t ring = firstOfZone; ring < last; ++ring) {
+      const glm::dvec3 &a = pointOf(points, ring, side), &b = pointOf(points, ring, side + 1),
+                       &c = pointOf(points, ring + 1, side + 1),
+                       &d = pointOf(points, ring + 1, side);
+      // Both ways to cut the quad in two, for neither prefers a sense of the twist.
+      sum +=
+          (sixVolumes(a, c, b) + sixVolumes(a, d, c) + sixVolumes(a, d, b) + sixVolumes(b, d, c)) /
+          2;
+    }
+    sum += sixVolumes(ringMiddle(points, firstOfZone), pointOf(points, firstOfZone, side),
+                      pointOf(points, firstOfZone, side + 1));
+    sum += sixVolumes(ringMiddle(points, last), pointOf(points, last, side + 1),
+                      pointOf(points, last, side));
+  }
+  return sum / 6;
+}
+
+double distanceToSegment(const glm::dvec3& point, const glm::dvec3& from, const glm::dvec3& to) {
+  const glm::dvec3 along = to - from;
+  const double share = std::clamp(glm::dot(point - from, along) / glm::dot(along, along), 0.0, 1.0);
+  return glm::distance(point, from + share * along);
+}
+
+Points pointsOf(const reference::SkinnedMesh& skinned) {
+  Points points;
+  for (const reference::Double3& p : skinned.positions) points.emplace_back(p[0], p[1], p[2]);
+  return points;
+}
+
+TubeShape shapeOf(const Points& points, const Points& rest, const glm::dmat3& turn) {
+  TubeShape shape;
+  shape.volume = zoneVolume(points) / zoneVolume(rest);
+  for (std::uint32_t ring = 0; ring < rings; ++ring)
+    shape.leastArea = std::min(shape.leastArea, ringArea(points, ring) / ringArea(rest, ring));
+  const glm::dvec3 end = middle + turn * glm::dvec3(length / 2, 0, 0);
+  shape.reach = 0;
+  for (const glm::dvec3& point : points) {
+    shape.leastRadius = std::min(shape.leastRadius, std::hypot(point.y, point.z) / radius);
+    const double distance = std::min(distanceToSegment(point, glm::dvec3(0), middle),
+                                     distanceToSegment(point, middle, end));
+    shape.reach = std::max(shape.reach, distance / radius);
+  }
+  return shape;
+}
+
+Result<TubeShape> turnTube(const Tube& tube, const glm::dmat3& turn, Method method,
+                           const MethodShares& shares) {
+  const MeshView mesh = tube.view(shares);
+  const std::array<JointMatrix, 2> still{}, turned{JointMatrix{}, turnAboutMiddle(turn)};
+  const Result<reference::SkinnedMesh> rest = reference::skin(mesh, still, method);
+  if (!rest) return rest.error();
+  const Result<reference::SkinnedMesh> skinned = reference::skin(mesh, turned, method);
+  if (!skinned) return skinned.error();
+  return shapeOf(pointsOf(*skinned), pointsOf(*rest), turn);
+}
+
+}  // namespace
+
+Result<TubeComparison> compareTube(Method method, const MethodShares& shares) {
+  const Tube tube;
+  constexpr double degree = std::numbers::pi / 180;
+  const Result<TubeShape> twisted =
+      turnTube(tube, twistBy(tubeTwistDegrees * degree), method, shares);
+  if (!twisted) return twisted.error();
+  const Result<TubeShape> bent = turnTube(tube, bendBy(tubeBendDegrees * degree), method, shares);
+  if (!bent) return bent.error();
+  return TubeComparison{*twisted, *bent};
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,37 @@
+// What a method does to a straight tube of two joints that is twisted, and bent: numbers that can
+// be told from theory.
+#pragma once
+
+#include "dermis/method.h"
+#include "dermis/result.h"
+#include "method_options.h"
+
+namespace dermis::cli {
+
+inline constexpr double tubeTwistDegrees = 120;
+inline constexpr double tubeBendDegrees = 90;
+
+/// Of a skinned tube against the same tube in bind pose.
+struct TubeShape {
+  /// Of the vertices in the zone where both joints have weight, the least distance from the tube's
+  /// axis in bind pose: what a twist leaves of the radius. No use where the tube is bent.
+  double leastRadius = 1;
+  /// The least area of a ring's cross-section.
+  double leastArea = 1;
+  /// The signed volume of the zone alone, closed at its end rings.
+  double volume = 1;
+  /// The largest distance of a vertex from the bones, in radii: 1 where nothing bulges.
+  double reach = 1;
+};
+
+struct TubeComparison {
+  TubeShape twisted;  ///< by `tubeTwistDegrees` about its axis
+  TubeShape bent;     ///< by `tubeBendDegrees` about a line through its axis
+};
+
+/// By the reference. The tube is the sample bar's, more finely divided: length 1, radius 0.1,
+/// weights that change linearly over the 0.4 about its middle, which is where the second joint is;
+/// bind space begins at its other end. Centres of rotation are the rings' middles.
+Result<TubeComparison> compareTube(Method method, const MethodShares& shares);
+
+}  // namespace dermis::cli

@@ -1,0 +1,22 @@
+// Which methods are verified in which way to store, where all in all would take too long.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/method.h"
+#include "verification_product.h"
+
+namespace dermis::samples {
+
+/// For each of these ways the methods to verify in it: two, seldom more. Over all of them every
+/// method meets every value of every parameter: the format of each attribute, arrangement, gap,
+/// motion, bounds and tuning. The same for the same ways.
+std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs);
+
+/// The values of an output case's parameters, each a number that no other value of that parameter
+/// has.
+std::vector<std::uint32_t> parameterValues(const OutputCase& output);
+
+}  // namespace dermis::samples

@@ -1,0 +1,41 @@
+// What a driver tells of the code that it makes of a kernel.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "dermis/plan.h"
+#include "device.h"
+
+namespace dermis::samples {
+
+/// A second device on the same hardware, since `Device` need not have what this takes:
+/// VK_KHR_pipeline_executable_properties.
+class PipelineStatistics {
+ public:
+  /// Null where the driver has no such extension, or makes no device with it.
+  static std::unique_ptr<PipelineStatistics> create(const Device& device);
+  ~PipelineStatistics();
+  PipelineStatistics(const PipelineStatistics&) = delete;
+  PipelineStatistics& operator=(const PipelineStatistics&) = delete;
+
+  /// The machine instructions of a kernel that stores whole words; nothing where the driver does
+  /// not count them.
+  std::optional<std::uint64_t> instructionCount(const Variant& variant,
+                                                const DeviceLimits& limits) const;
+
+ private:
+  struct Functions;
+  PipelineStatistics();
+  bool createLayouts();
+  VkPipeline createPipeline(VkShaderModule module, const Variant& variant) const;
+  std::optional<std::uint64_t> readCount(VkPipeline pipeline) const;
+
+  std::unique_ptr<Functions> functions_;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+  VkPipelineLayout pipelineLayout_ = VK_NULL_HANDLE;
+};
+
+}  // namespace dermis::samples

@@ -1,0 +1,61 @@
+// Batches that stay on a device, to be skinned again and again against each other.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "batch_layout.h"
+#include "buffer.h"
+#include "dermis/vulkan/context.h"
+#include "open_device.h"
+#include "timestamps.h"
+
+namespace dermis::samples {
+
+/// Batches that differ in their methods only: meshes, poses and outputs are the same memory.
+class TimedBatches {
+ public:
+  /// `open` must outlive this object. Fails with `vulkanError`.
+  static Result<TimedBatches> create(OpenDevice& open);
+  TimedBatches(TimedBatches&&) = default;
+  TimedBatches& operator=(TimedBatches&&) = default;
+  ~TimedBatches();
+
+  /// Adds a batch and skins it once, for the first time drivers compile, and memory is touched.
+  /// But for the methods, requests are those of the batches before. What is skinned goes to one
+  /// buffer. Fails where the batch cannot be skinned.
+  Result<void> add(std::span<const SkinRequest> requests, const OutputLayout& output,
+                   const Tuning& tuning);
+
+  /// Skins a batch and returns the seconds that it took: on the device where it has timestamps,
+  /// from submission to the end of waiting otherwise.
+  Result<double> skin(std::size_t batch);
+
+  bool hasTimestamps() const { return timestamps_.has(); }
+
+  const Plan& plan(std::size_t batch) const { return batches_[batch]->plan; }
+  /// What the palette kernel found out about the first request's pose; zeros for linear.
+  PaletteStatus status(std::size_t batch) const;
+
+ private:
+  struct TimedBatch {
+    Plan plan;
+    MappedBuffer tables, palettes, results;
+    std::optional<vulkan::Bindings> bindings;
+    VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
+  };
+  TimedBatches() = default;
+  Result<MappedBuffer> makeBuffer(const Plan& plan, BufferRole role);
+  Result<void> makeShared(const BatchLayout& layout, const Plan& plan);
+  Result<void> record(TimedBatch& batch);
+
+  OpenDevice* open_ = nullptr;
+  Timestamps timestamps_;
+  MappedBuffer meshes_, matrices_, output_;
+  std::vector<std::unique_ptr<TimedBatch>> batches_;
+};
+
+}  // namespace dermis::samples
