@@ -12,6 +12,7 @@ namespace dermis::cli {
 
 using Run = std::function<ExitStatus()>;
 
+Run addCompare(CLI::App& app);
 Run addDevices(CLI::App& app);
 Run addInfo(CLI::App& app);
 Run addSkin(CLI::App& app);

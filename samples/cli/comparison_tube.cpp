@@ -161,7 +161,8 @@ TubeShape shapeOf(const Points& points, const Points& rest, const glm::dmat3& tu
   TubeShape shape;
   shape.volume = zoneVolume(points) / zoneVolume(rest);
   for (std::uint32_t ring = 0; ring < rings; ++ring)
-    shape.leastArea = std::min(shape.leastArea, ringArea(points, ring) / ringArea(rest, ring));
+    shape.leastSection =
+        std::min(shape.leastSection, ringArea(points, ring) / ringArea(rest, ring));
   const glm::dvec3 end = middle + turn * glm::dvec3(length / 2, 0, 0);
   shape.reach = 0;
   for (const glm::dvec3& point : points) {

@@ -17,7 +17,7 @@ struct TubeShape {
   /// axis in bind pose: what a twist leaves of the radius. No use where the tube is bent.
   double leastRadius = 1;
   /// The least area of a ring's cross-section.
-  double leastArea = 1;
+  double leastSection = 1;
   /// The signed volume of the zone alone, closed at its end rings.
   double volume = 1;
   /// The largest distance of a vertex from the bones, in radii: 1 where nothing bulges.

@@ -27,11 +27,12 @@ ExitStatus run(int argc, char** argv) {
       "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable "
       "device,\n"
       "5 anything else that stopped it.");
-  const std::array<std::pair<const char*, dermis::cli::Run>, 4> commands{{
+  const std::array<std::pair<const char*, dermis::cli::Run>, 5> commands{{
       {"devices", dermis::cli::addDevices(app)},
       {"info", dermis::cli::addInfo(app)},
       {"skin", dermis::cli::addSkin(app)},
       {"verify", dermis::cli::addVerify(app)},
+      {"compare", dermis::cli::addCompare(app)},
   }};
   if (argc > 1 && argv[1][0] != '-' &&
       std::none_of(commands.begin(), commands.end(), [&](const auto& command) {

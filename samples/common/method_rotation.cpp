@@ -9,8 +9,6 @@
 namespace dermis::samples {
 namespace {
 
-constexpr std::size_t methodsAtATime = 2;
-
 /// Of a method, a parameter and its value: what a way to store covers.
 using Meeting = std::tuple<Method, std::size_t, std::uint32_t>;
 
@@ -21,13 +19,8 @@ class MethodRotation {
   }
 
   std::vector<std::vector<Method>> shareOut() {
-    for (std::size_t output = 0; output < values_.size(); ++output) {
-      for (std::size_t turn = 0; turn < methodsAtATime; ++turn) add(output, mostWanted(output));
-    }
-    for (std::size_t output = 0; output < values_.size(); ++output) {
-      for (const Method method : allMethods) {
-        if (newMeetings(output, method) != 0) add(output, method);
-      }
+    for (std::size_t output = 0; output < values_.size(); ++output) add(output, mostWanted(output));
+    while (addBest()) {
     }
     return methods_;
   }
@@ -44,11 +37,27 @@ class MethodRotation {
   /// The method with the most new meetings and, of several, the one that came up least.
   Method mostWanted(std::size_t output) const {
     const auto worth = [this, output](Method method) {
-      const bool isThere = std::ranges::count(methods_[output], method) != 0;
-      return std::tuple(!isThere, newMeetings(output, method),
+      return std::tuple(newMeetings(output, method),
                         -static_cast<std::ptrdiff_t>(uses_[static_cast<std::size_t>(method)]));
     };
     return *std::ranges::max_element(allMethods, {}, worth);
+  }
+
+  /// Whether there was a method left that does not meet all yet.
+  bool addBest() {
+    std::size_t most = 0, best = 0;
+    Method bestMethod = Method::linear;
+    for (std::size_t output = 0; output < values_.size(); ++output) {
+      for (const Method method : allMethods) {
+        if (const std::size_t count = newMeetings(output, method); count > most) {
+          most = count;
+          best = output;
+          bestMethod = method;
+        }
+      }
+    }
+    if (most != 0) add(best, bestMethod);
+    return most != 0;
   }
 
   void add(std::size_t output, Method method) {

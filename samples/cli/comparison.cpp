@@ -1,0 +1,309 @@
+#include "comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "comparison_instructions.h"
+#include "dermis/reference.h"
+#include "pipeline_statistics.h"
+#include "timed_batches.h"
+
+namespace dermis::cli {
+namespace {
+
+/// Enough that a run takes milliseconds, or all of a GPU.
+constexpr std::uint64_t verticesOnCpu = 1'500'000;
+constexpr std::uint64_t verticesOnGpu = 8'000'000;
+/// A small mesh with many joints: joint matrices and palettes of all methods.
+constexpr std::uint64_t mostPaletteBytes = std::uint64_t{1} << 26;
+constexpr std::uint64_t mostInstances = 20'000;
+/// Of all instances, whoever asks for them.
+constexpr std::uint64_t mostVertices = 100'000'000;
+
+/// Whether a kernel would take a joint for one that scales or shears (docs/accuracy.md).
+bool isRigid(const JointMatrix& joint) {
+  const auto at = [&joint](int row, int column) {
+    return static_cast<double>(joint.m[row][column]);
+  };
+  double farthest = 0;
+  for (int i = 0; i < 3; ++i) {
+    double rowSum = 0;
+    for (int j = 0; j < 3; ++j) {
+      double product = i == j ? -1 : 0;
+      for (int row = 0; row < 3; ++row) product += at(row, i) * at(row, j);
+      rowSum += std::abs(product);
+    }
+    farthest = std::max(farthest, rowSum);
+  }
+  const double determinant = at(0, 0) * (at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1)) -
+                             at(0, 1) * (at(1, 0) * at(2, 2) - at(1, 2) * at(2, 0)) +
+                             at(0, 2) * (at(1, 0) * at(2, 1) - at(1, 1) * at(2, 0));
+  return determinant > 0 && farthest <= 8e-6;
+}
+
+/// One instance: its parts.
+std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose& pose) {
+  std::vector<samples::SkinRequest> requests;
+  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+    const ScenePart& part = scene.parts[index];
+    if (part.mesh == nullptr) continue;
+    samples::SkinRequest& request = requests.emplace_back();
+    request.mesh = &part.mesh->packed();
+    request.palette = pose.palette(part);
+    request.mayScale = !std::ranges::all_of(request.palette, isRigid);
+    request.morphs = pose.morphs[index];
+  }
+  return requests;
+}
+
+Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
+                                      const ComparisonOptions& options,
+                                      const samples::OpenDevice& open) {
+  if (options.instances) {
+    if (comparison.vertices > mostVertices / *options.instances) {
+      return Error{ErrorCode::invalidArgument,
+                   fmt::format("{} instances of {} vertices are more than the {} vertices that "
+                               "this command takes",
+                               *options.instances, comparison.vertices, mostVertices)};
+    }
+    return *options.instances;
+  }
+  const std::uint64_t wanted =
+      (open.device->info().type == "CPU" ? verticesOnCpu : verticesOnGpu) / comparison.vertices;
+  // Joint matrices, and the largest palettes of all the methods.
+  const std::uint64_t bytes =
+      std::uint64_t{comparison.joints} * (48 + 80 * (allMethods.size() - 1));
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(std::min(wanted, mostPaletteBytes / bytes), 1, mostInstances));
+}
+
+double medianOf(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+/// The skin kernel that does most of a plan's work.
+Variant mainVariant(const Plan& plan) {
+  Variant variant;
+  std::uint32_t most = 0;
+  for (const Dispatch& dispatch : plan.dispatches()) {
+    if (dispatch.variant.kernel != Kernel::skin || dispatch.constants.workgroupCount < most)
+      continue;
+    most = dispatch.constants.workgroupCount;
+    variant = dispatch.variant;
+  }
+  return variant;
+}
+
+std::uint32_t bytesPerJoint(Method method, bool scales) {
+  if (method == Method::linear) return 48;
+  return (method == Method::logMatrix ? 48u : 32u) + (scales ? 32u : 0u);
+}
+
+struct Differences {
+  double largest = 0, squares = 0;
+  std::uint64_t count = 0;
+};
+
+bool isFinite(const reference::Double3& point) {
+  return std::isfinite(point[0]) && std::isfinite(point[1]) && std::isfinite(point[2]);
+}
+
+class MethodComparer {
+ public:
+  MethodComparer(const Scene& scene, const ScenePose& pose, const ComparisonOptions& options,
+                 const std::function<void()>& step)
+      : scene_(scene),
+        pose_(pose),
+        options_(options),
+        step_(step),
+        instance_(requestsOf(scene, pose)) {
+    for (const Method method : allMethods) comparison_.methods.emplace_back().method = method;
+    for (const samples::SkinRequest& request : instance_) {
+      comparison_.vertices += request.mesh->vertexCount();
+      comparison_.joints += static_cast<std::uint32_t>(request.palette.size());
+      comparison_.scales = comparison_.scales || request.mayScale;
+    }
+    for (ComparedMethod& compared : comparison_.methods)
+      compared.bytesPerJoint = bytesPerJoint(compared.method, comparison_.scales);
+  }
+
+  Result<MethodComparison> compare(samples::OpenDevice* open) {
+    if (Result<void> done = compareShapes(); !done) return done.error();
+    if (Result<void> done = compareOnModel(); !done) return done.error();
+    if (Result<void> done = open != nullptr ? time(*open) : planOnly(); !done) return done.error();
+    return std::move(comparison_);
+  }
+
+ private:
+  Result<void> compareShapes() {
+    for (ComparedMethod& compared : comparison_.methods) {
+      const Result<TubeComparison> tube = compareTube(compared.method, options_.shares);
+      if (!tube) return tube.error();
+      compared.tube = *tube;
+      step_();
+    }
+    return {};
+  }
+
+  /// The parts in a row.
+  Result<std::vector<reference::Double3>> skinModel(Method method) const {
+    std::vector<reference::Double3> positions;
+    for (std::size_t index = 0; index < scene_.parts.size(); ++index) {
+      const ScenePart& part = scene_.parts[index];
+      if (part.mesh == nullptr) continue;
+      const Result<reference::SkinnedMesh> skinned =
+          reference::skin(part.mesh->view(), pose_.palette(part), method, pose_.morphs[index]);
+      if (!skinned) return skinned.error();
+      positions.insert(positions.end(), skinned->positions.begin(), skinned->positions.end());
+    }
+    return positions;
+  }
+
+  static double sizeOf(const std::vector<reference::Double3>& positions) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    reference::Double3 low{infinity, infinity, infinity}, high{-infinity, -infinity, -infinity};
+    for (const reference::Double3& position : positions) {
+      if (!isFinite(position)) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], position[axis]);
+        high[axis] = std::max(high[axis], position[axis]);
+      }
+    }
+    return std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  }
+
+  Result<void> compareOnModel() {
+    const Result<std::vector<reference::Double3>> base = skinModel(Method::dualQuaternion);
+    if (!base) return base.error();
+    const double size = sizeOf(*base);
+    for (ComparedMethod& compared : comparison_.methods) {
+      const Result<std::vector<reference::Double3>> skinned = skinModel(compared.method);
+      if (!skinned) return skinned.error();
+      Differences differences;
+      for (std::size_t vertex = 0; vertex < base->size(); ++vertex) {
+        const reference::Double3 &a = (*base)[vertex], &b = (*skinned)[vertex];
+        if (!isFinite(a) || !isFinite(b)) continue;
+        const double distance = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+        differences.largest = std::max(differences.largest, distance);
+        differences.squares += distance * distance;
+        ++differences.count;
+      }
+      step_();
+      if (differences.count == 0 || !(size > 0)) continue;
+      compared.largestDifference = differences.largest / size;
+      compared.meanSquareDifference =
+          std::sqrt(differences.squares / static_cast<double>(differences.count)) / size;
+    }
+    return {};
+  }
+
+  std::vector<samples::SkinRequest> allRequests(Method method, std::uint32_t instances) const {
+    std::vector<samples::SkinRequest> requests;
+    for (std::uint32_t instance = 0; instance < instances; ++instance)
+      requests.insert(requests.end(), instance_.begin(), instance_.end());
+    for (samples::SkinRequest& request : requests) request.method = method;
+    return requests;
+  }
+
+  Result<void> time(samples::OpenDevice& open) {
+    const Result<std::uint32_t> instances = chooseInstances(comparison_, options_, open);
+    if (!instances) return instances.error();
+    comparison_.instances = *instances;
+    comparison_.repetitions = options_.repetitions;
+    Result<samples::TimedBatches> batches = samples::TimedBatches::create(open);
+    if (!batches) return batches.error();
+    comparison_.clock = batches->hasTimestamps() ? Clock::timestamps : Clock::submission;
+    std::vector<Variant> variants;
+    for (const ComparedMethod& compared : comparison_.methods) {
+      const Result<void> added =
+          batches->add(allRequests(compared.method, *instances), {}, open.context.tuning());
+      if (!added) return added.error();
+      variants.push_back(mainVariant(batches->plan(variants.size())));
+      step_();
+    }
+    // In turn, so that what else the machine does hits all alike.
+    std::vector<std::vector<double>> seconds(comparison_.methods.size());
+    for (std::uint32_t repetition = 0; repetition < options_.repetitions; ++repetition) {
+      for (std::size_t method = 0; method < seconds.size(); ++method) {
+        const Result<double> run = batches->skin(method);
+        if (!run) return run.error();
+        seconds[method].push_back(*run);
+      }
+      step_();
+    }
+    for (std::size_t method = 0; method < seconds.size(); ++method)
+      comparison_.methods[method].seconds = medianOf(seconds[method]);
+    const double linear = *comparison_.methods.front().seconds;
+    for (ComparedMethod& compared : comparison_.methods) {
+      if (linear > 0) compared.time = *compared.seconds / linear;
+    }
+    countInstructions(variants, open.context.limits(),
+                      samples::PipelineStatistics::create(*open.device).get());
+    return {};
+  }
+
+  /// The kernels of a device with all that Dermis makes use of.
+  Result<void> planOnly() {
+    DeviceLimits limits;
+    limits.maxStorageBuffersPerStage = storageBuffersWanted;
+    std::vector<Variant> variants;
+    for (const ComparedMethod& compared : comparison_.methods) {
+      const std::vector<samples::SkinRequest> requests = allRequests(compared.method, 1);
+      const samples::BatchLayout layout = samples::layOutBatch(requests, {});
+      Plan plan;
+      if (Result<void> planned = makePlan(layout.batch(), limits, {}, plan); !planned)
+        return planned;
+      variants.push_back(mainVariant(plan));
+    }
+    countInstructions(variants, limits, nullptr);
+    return {};
+  }
+
+  /// By the driver where it counts those of every kernel.
+  void countInstructions(const std::vector<Variant>& variants, const DeviceLimits& limits,
+                         const samples::PipelineStatistics* statistics) {
+    std::vector<std::optional<std::uint64_t>> counts;
+    if (statistics != nullptr) {
+      for (const Variant& variant : variants)
+        counts.push_back(statistics->instructionCount(variant, limits));
+    }
+    comparison_.instructionSource = InstructionSource::driver;
+    if (counts.empty() || std::ranges::any_of(counts, [](const auto& count) { return !count; })) {
+      comparison_.instructionSource = InstructionSource::spirv;
+      counts.clear();
+      for (const Variant& variant : variants)
+        counts.push_back(spirvInstructionCount(variant, limits));
+    }
+    for (std::size_t method = 0; method < counts.size(); ++method)
+      comparison_.methods[method].instructions = counts[method];
+  }
+
+  const Scene& scene_;
+  const ScenePose& pose_;
+  const ComparisonOptions& options_;
+  const std::function<void()>& step_;
+  const std::vector<samples::SkinRequest> instance_;
+  MethodComparison comparison_;
+};
+
+}  // namespace
+
+std::size_t comparisonSteps(const ComparisonOptions& options, bool withDevice) {
+  return allMethods.size() * (withDevice ? 3 : 2) + (withDevice ? options.repetitions : 0);
+}
+
+Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
+                                        samples::OpenDevice* open, const ComparisonOptions& options,
+                                        const std::function<void()>& step) {
+  return MethodComparer(scene, pose, options, step).compare(open);
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,62 @@
+// The methods beside each other: what they cost, and what they do.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "comparison_tube.h"
+#include "dermis/method.h"
+#include "method_options.h"
+#include "open_device.h"
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+
+struct ComparedMethod {
+  Method method = Method::linear;
+  std::optional<double> seconds;  ///< the median; nothing without a device
+  std::optional<double> time;     ///< of linear's
+  std::optional<std::uint64_t> instructions;
+  std::uint32_t bytesPerJoint = 0;  ///< of the palette, as the skin kernel reads it
+  TubeComparison tube;
+  // Distances from `dualQuaternion` in the model's pose, as a share of its size. Nothing where no
+  // vertex is finite.
+  std::optional<double> largestDifference;
+  std::optional<double> meanSquareDifference;  ///< its root
+};
+
+enum class Clock : std::uint8_t { none, timestamps, submission };
+enum class InstructionSource : std::uint8_t { driver, spirv };
+
+struct MethodComparison {
+  std::uint32_t instances = 0;
+  std::uint64_t vertices = 0;  ///< of one instance
+  std::uint32_t joints = 0;    ///< of all palettes of one instance
+  std::uint32_t repetitions = 0;
+  bool scales = false;  ///< whether joints scale or shear in the pose
+  Clock clock = Clock::none;
+  InstructionSource instructionSource = InstructionSource::spirv;
+  std::vector<ComparedMethod> methods;  ///< in the order of `allMethods`
+};
+
+struct ComparisonOptions {
+  std::optional<std::uint32_t> instances;  ///< nothing: enough to keep the device busy
+  std::uint32_t repetitions = 1;
+  MethodShares shares;
+};
+
+/// Steps that `compareMethods` tells of.
+std::size_t comparisonSteps(const ComparisonOptions& options, bool withDevice);
+
+/// Compares all methods on a scene that has a part with a mesh, each prepared with centres of
+/// rotation, in one pose. Without a device nothing is timed. `step` is called after each step.
+/// Fails where the device does, with `invalidArgument` where so many instances have too many
+/// vertices.
+Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
+                                        samples::OpenDevice* open, const ComparisonOptions& options,
+                                        const std::function<void()>& step);
+
+}  // namespace dermis::cli

@@ -1,0 +1,155 @@
+#include "comparison_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string_view>
+
+#include "output_file.h"
+#include "plain_text.h"
+
+namespace dermis::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A number, or a dash where there is none.
+template <typename Value>
+std::string cell(const std::optional<Value>& value, fmt::format_string<const Value&> format) {
+  return value ? fmt::format(format, *value) : "-";
+}
+
+std::string percent(const std::optional<double>& share) {
+  return share ? fmt::format("{:.3f} %", *share * 100) : "-";
+}
+
+std::string_view clockName(Clock clock) {
+  switch (clock) {
+    case Clock::timestamps:
+      return "the device's timestamps";
+    case Clock::submission:
+      return "from submission to the end of waiting: the device has no timestamps";
+    case Clock::none:
+      break;
+  }
+  return "";
+}
+
+std::string_view sourceName(InstructionSource source) {
+  return source == InstructionSource::driver ? "driver" : "SPIR-V";
+}
+
+void printTitle(const ComparisonTitle& title, const MethodComparison& comparison) {
+  fmt::print(
+      "device   {}\n",
+      plainLine(title.driver.empty() ? title.device : title.device + ", driver " + title.driver));
+  fmt::print("model    {}, {}\n", plainLine(title.model), plainLine(title.pose));
+  fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
+             comparison.scales ? ", some of which scale or shear" : "");
+  if (comparison.clock == Clock::none) {
+    fmt::print("timed    nothing: the reference is not made to be fast\n");
+    return;
+  }
+  fmt::print("timed    {} instances, {} vertices a run, positions and normals as float32\n",
+             comparison.instances, comparison.instances * comparison.vertices);
+  fmt::print("         medians of {} runs, the methods in turn; {}\n", comparison.repetitions,
+             clockName(comparison.clock));
+  fmt::print("         linear takes {:.3f} ms\n",
+             comparison.methods.front().seconds.value_or(0) * 1e3);
+}
+
+void printExplanation(const MethodComparison& comparison) {
+  const bool byDriver = comparison.instructionSource == InstructionSource::driver;
+  fmt::print(
+      "\n"
+      "time           of linear's: less is faster\n"
+      "instructions   of the skin kernel, each counted once, in a loop too: {}\n"
+      "joint bytes    that the skin kernel reads of each joint of a palette\n"
+      "twist          a tube of two joints, twisted by {}°: its least radius, and the volume of "
+      "the\n"
+      "               zone where both have weight, of those in bind pose. 1 is ideal\n"
+      "bend           the same tube, bent by {}°: its least cross-section, the volume, and how "
+      "far\n"
+      "               vertices get from the bones, in radii: above 1 it bulges\n"
+      "difference     from dual_quaternion on the model in this pose: the largest and the root of\n"
+      "               the mean square, of the diagonal of the model's box\n\n",
+      byDriver ? "the machine's, as the driver says"
+               : "those of SPIR-V that calculate or touch memory",
+      tubeTwistDegrees, tubeBendDegrees);
+}
+
+void printTable(const MethodComparison& comparison) {
+  fmt::print("{:25} {:>6} {:>12} {:>6} {:>15} {:>22} {:>21}\n", "", "", "instructions", "joint",
+             "twist", "bend", "difference");
+  fmt::print("{:25} {:>6} {:>12} {:>6} {:>7} {:>7} {:>8} {:>7} {:>5} {:>11} {:>9}\n", "method",
+             "time", fmt::format("({})", sourceName(comparison.instructionSource)), "bytes",
+             "radius", "volume", "section", "volume", "reach", "largest", "rms");
+  for (const ComparedMethod& compared : comparison.methods) {
+    const TubeShape &twisted = compared.tube.twisted, &bent = compared.tube.bent;
+    fmt::print(
+        "{:25} {:>6} {:>12} {:>6} {:>7.3f} {:>7.3f} {:>8.3f} {:>7.3f} {:>5.2f} {:>11} {:>9}\n",
+        methodName(compared.method), cell(compared.time, "{:.2f}"),
+        cell(compared.instructions, "{}"), compared.bytesPerJoint, twisted.leastRadius,
+        twisted.volume, bent.leastSection, bent.volume, bent.reach,
+        percent(compared.largestDifference), percent(compared.meanSquareDifference));
+  }
+}
+
+template <typename Value>
+Json optionalNumber(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json describe(const ComparedMethod& compared) {
+  const TubeShape &twisted = compared.tube.twisted, &bent = compared.tube.bent;
+  Json json;
+  json["method"] = methodName(compared.method);
+  json["time"] = optionalNumber(compared.time);
+  json["seconds"] = optionalNumber(compared.seconds);
+  json["instructions"] = optionalNumber(compared.instructions);
+  json["bytesPerJoint"] = compared.bytesPerJoint;
+  json["twist"] = {
+      {"degrees", tubeTwistDegrees}, {"radius", twisted.leastRadius}, {"volume", twisted.volume}};
+  json["bend"] = {{"degrees", tubeBendDegrees},
+                  {"section", bent.leastSection},
+                  {"volume", bent.volume},
+                  {"reach", bent.reach}};
+  json["difference"] = {{"largest", optionalNumber(compared.largestDifference)},
+                        {"rootMeanSquare", optionalNumber(compared.meanSquareDifference)}};
+  return json;
+}
+
+}  // namespace
+
+void printComparison(const ComparisonTitle& title, const MethodComparison& comparison) {
+  printTitle(title, comparison);
+  printExplanation(comparison);
+  printTable(comparison);
+}
+
+Result<void> writeJsonComparison(const std::filesystem::path& path, const ComparisonTitle& title,
+                                 const MethodComparison& comparison) {
+  Json json;
+  json["device"] = title.device;
+  json["driver"] = title.driver;
+  json["model"] = title.model;
+  json["pose"] = title.pose;
+  json["vertices"] = comparison.vertices;
+  json["joints"] = comparison.joints;
+  json["scales"] = comparison.scales;
+  json["instances"] = comparison.instances;
+  json["repetitions"] = comparison.repetitions;
+  json["clock"] = comparison.clock == Clock::timestamps   ? Json("timestamps")
+                  : comparison.clock == Clock::submission ? Json("submission")
+                                                          : Json();
+  json["instructionsOf"] = sourceName(comparison.instructionSource);
+  json["methods"] = Json::array();
+  for (const ComparedMethod& compared : comparison.methods)
+    json["methods"].push_back(describe(compared));
+  // Names come from a file: what is not UTF-8 in them is replaced.
+  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return writeFile(path, std::as_bytes(std::span(text)));
+}
+
+}  // namespace dermis::cli
