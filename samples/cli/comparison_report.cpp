@@ -63,19 +63,17 @@ void printExplanation(const MethodComparison& comparison) {
   const bool byDriver = comparison.instructionSource == InstructionSource::driver;
   fmt::print(
       "\n"
-      "time           of linear's: less is faster\n"
-      "instructions   of the skin kernel, each counted once, in a loop too: {}\n"
-      "joint bytes    that the skin kernel reads of each joint of a palette\n"
-      "twist          a tube of two joints, twisted by {}°: its least radius, and the volume of "
-      "the\n"
-      "               zone where both have weight, of those in bind pose. 1 is ideal\n"
-      "bend           the same tube, bent by {}°: its least cross-section, the volume, and how "
-      "far\n"
-      "               vertices get from the bones, in radii: above 1 it bulges\n"
-      "difference     from dual_quaternion on the model in this pose: the largest and the root of\n"
-      "               the mean square, of the diagonal of the model's box\n\n",
-      byDriver ? "the machine's, as the driver says"
-               : "those of SPIR-V that calculate or touch memory",
+      "time          of linear's: less is faster\n"
+      "instructions  of the skin kernel, those of a loop once: {}\n"
+      "joint bytes   that the skin kernel reads of each joint of a palette\n"
+      "twist         a tube of two joints, twisted by {}°: its least radius, and the volume of\n"
+      "              the zone where both have weight, each of that in bind pose\n"
+      "bend          the tube bent by {}°: the least area of a section, the volume, and how far\n"
+      "              vertices get from the bones, in radii: above 1 it bulges\n"
+      "difference    from dual_quaternion on the model in this pose: the largest and the root\n"
+      "              of the mean square, of the diagonal of the model's box\n\n",
+      byDriver ? "the machine's, as its driver counts them"
+               : "SPIR-V that calculates or touches memory",
       tubeTwistDegrees, tubeBendDegrees);
 }
 

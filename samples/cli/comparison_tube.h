@@ -13,10 +13,10 @@ inline constexpr double tubeBendDegrees = 90;
 
 /// Of a skinned tube against the same tube in bind pose.
 struct TubeShape {
-  /// Of the vertices in the zone where both joints have weight, the least distance from the tube's
-  /// axis in bind pose: what a twist leaves of the radius. No use where the tube is bent.
+  /// The least distance of a vertex from the tube's axis in bind pose, in radii: what a twist
+  /// leaves. No use where the tube is bent.
   double leastRadius = 1;
-  /// The least area of a ring's cross-section.
+  /// The least area of a ring of vertices, across the tube.
   double leastSection = 1;
   /// The signed volume of the zone alone, closed at its end rings.
   double volume = 1;

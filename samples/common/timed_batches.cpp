@@ -107,12 +107,4 @@ Result<double> TimedBatches::skin(std::size_t batch) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-PaletteStatus TimedBatches::status(std::size_t batch) const {
-  PaletteStatus status;
-  const std::uint64_t offset = batches_[batch]->plan.statusOffset(0);
-  if (offset != Plan::noStatus)
-    std::memcpy(&status, batches_[batch]->palettes.bytes().data() + offset, sizeof(status));
-  return status;
-}
-
 }  // namespace dermis::samples

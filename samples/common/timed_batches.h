@@ -21,7 +21,7 @@ class TimedBatches {
   /// `open` must outlive this object. Fails with `vulkanError`.
   static Result<TimedBatches> create(OpenDevice& open);
   TimedBatches(TimedBatches&&) = default;
-  TimedBatches& operator=(TimedBatches&&) = default;
+  TimedBatches& operator=(TimedBatches&&) = delete;
   ~TimedBatches();
 
   /// Adds a batch and skins it once, for the first time drivers compile, and memory is touched.
@@ -37,8 +37,6 @@ class TimedBatches {
   bool hasTimestamps() const { return timestamps_.has(); }
 
   const Plan& plan(std::size_t batch) const { return batches_[batch]->plan; }
-  /// What the palette kernel found out about the first request's pose; zeros for linear.
-  PaletteStatus status(std::size_t batch) const;
 
  private:
   struct TimedBatch {
