@@ -63,6 +63,7 @@ std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose
 }
 
 Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
+                                      std::span<const samples::SkinRequest> instance,
                                       const ComparisonOptions& options,
                                       const samples::OpenDevice& open) {
   if (options.instances) {
@@ -77,8 +78,9 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
   const std::uint64_t wanted =
       (open.device->info().type == "CPU" ? verticesOnCpu : verticesOnGpu) / comparison.vertices;
   // Joint matrices, and the largest palettes of all the methods.
-  const std::uint64_t bytes =
-      std::uint64_t{comparison.joints} * (48 + 80 * (allMethods.size() - 1));
+  std::uint64_t bytes = 0;
+  for (const samples::SkinRequest& part : instance)
+    bytes += part.palette.size() * (48 + 80 * (allMethods.size() - 1));
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(std::min(wanted, mostPaletteBytes / bytes), 1, mostInstances));
 }
@@ -128,9 +130,10 @@ class MethodComparer {
     for (const Method method : allMethods) comparison_.methods.emplace_back().method = method;
     for (const samples::SkinRequest& request : instance_) {
       comparison_.vertices += request.mesh->vertexCount();
-      comparison_.joints += static_cast<std::uint32_t>(request.palette.size());
       comparison_.scales = comparison_.scales || request.mayScale;
     }
+    for (const std::vector<JointMatrix>& palette : pose.palettes)
+      comparison_.joints += static_cast<std::uint32_t>(palette.size());
     for (ComparedMethod& compared : comparison_.methods)
       compared.bytesPerJoint = bytesPerJoint(compared.method, comparison_.scales);
   }
@@ -214,7 +217,7 @@ class MethodComparer {
   }
 
   Result<void> time(samples::OpenDevice& open) {
-    const Result<std::uint32_t> instances = chooseInstances(comparison_, options_, open);
+    const Result<std::uint32_t> instances = chooseInstances(comparison_, instance_, options_, open);
     if (!instances) return instances.error();
     comparison_.instances = *instances;
     comparison_.repetitions = options_.repetitions;

@@ -34,7 +34,7 @@ enum class InstructionSource : std::uint8_t { driver, spirv };
 struct MethodComparison {
   std::uint32_t instances = 0;
   std::uint64_t vertices = 0;  ///< of one instance
-  std::uint32_t joints = 0;    ///< of all palettes of one instance
+  std::uint32_t joints = 0;    ///< of all skins
   std::uint32_t repetitions = 0;
   bool scales = false;  ///< whether joints scale or shear in the pose
   Clock clock = Clock::none;
