@@ -1,7 +1,5 @@
 #include "prepared_mesh.h"
 
-#include <cstddef>
-#include <cstring>
 #include <utility>
 
 namespace dermis::cli {
@@ -13,25 +11,9 @@ MeshView PreparedMesh::view() const {
   return mesh;
 }
 
-// TODO: dermis/centers_of_rotation.h finds the centres. Until it is here each vertex is its own,
-// which makes centerOfRotation the same as linear blending.
-Result<void> PreparedMesh::addCentersOfRotation(std::uint32_t /*jointCount*/,
-                                                std::span<const std::uint32_t> /*triangles*/) {
-  const MeshView mesh = view();
-  std::vector<float> centers(std::size_t{mesh.vertexCount} * 3);
-  // Positions of glTF, and repaired ones, are float32.
-  for (std::size_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
-    std::memcpy(centers.data() + vertex * 3,
-                static_cast<const std::byte*>(mesh.positions.data) + vertex * mesh.positions.stride,
-                3 * sizeof(float));
-  }
-  centersOfRotation_ = std::move(centers);
-  return {};
-}
-
 Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     const gltf::Primitive& primitive, std::string name, std::uint32_t jointCount,
-    const MeshPreparation& preparation) {
+    const MeshPreparation& preparation, std::vector<float> centersOfRotation) {
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
   mesh->name_ = std::move(name);
   mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
@@ -46,10 +28,7 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     if (!repaired) return repaired.error();
     mesh->repaired_.emplace(std::move(*repaired));
   }
-  if (preparation.centersOfRotation) {
-    if (Result<void> added = mesh->addCentersOfRotation(jointCount, primitive.triangles); !added)
-      return added.error();
-  }
+  mesh->centersOfRotation_ = std::move(centersOfRotation);
   Result<PackedMesh> packed = pack(mesh->view(), jointCount);
   if (!packed) return packed.error();
   mesh->packed_.emplace(std::move(*packed));

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -27,11 +26,13 @@ struct MeshPreparation {
 class PreparedMesh {
  public:
   /// `name` is what `validate` puts behind "mesh". The primitive has influences, and outlives this
-  /// object. Fails with `invalidMesh`, where `strict` also for what could be repaired.
+  /// object. `centersOfRotation` are its own, 3 a vertex, or nothing. Fails with `invalidMesh`,
+  /// where `strict` also for what could be repaired.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::string name,
                                                              std::uint32_t jointCount,
-                                                             const MeshPreparation& preparation);
+                                                             const MeshPreparation& preparation,
+                                                             std::vector<float> centersOfRotation);
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;
 
@@ -43,8 +44,6 @@ class PreparedMesh {
 
  private:
   PreparedMesh() = default;
-  Result<void> addCentersOfRotation(std::uint32_t jointCount,
-                                    std::span<const std::uint32_t> triangles);
 
   std::string name_;
   std::optional<gltf::PrimitiveView> primitive_;

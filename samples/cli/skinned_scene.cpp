@@ -4,6 +4,10 @@
 
 #include <map>
 #include <tuple>
+#include <utility>
+#include <vector>
+
+#include "mesh_centers.h"
 
 namespace dermis::cli {
 namespace {
@@ -36,6 +40,25 @@ void addFindings(Scene& scene, const MeshReport& report) {
   }
 }
 
+/// Centres of rotation, found once for each mesh and number of joints.
+class FoundCenters {
+ public:
+  Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
+                                std::uint32_t jointCount) {
+    std::vector<std::vector<float>>& ofMesh = found_[{source.mesh, jointCount}];
+    if (ofMesh.empty()) {
+      Result<std::vector<std::vector<float>>> found =
+          centersOfMesh(model.meshes[source.mesh], jointCount);
+      if (!found) return found.error();
+      ofMesh = std::move(*found);
+    }
+    return ofMesh[source.primitive];
+  }
+
+ private:
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::vector<float>>> found_;
+};
+
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
@@ -49,6 +72,10 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
   std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>,
            std::shared_ptr<const PreparedMesh>>
       prepared;
+  FoundCenters centers;
+  const auto inFile = [&path](const Error& error) {
+    return Error{error.code, fmt::format("'{}': {}", path.filename().string(), error.message)};
+  };
   std::uint64_t vertices = 0;
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     ScenePart part;
@@ -65,11 +92,14 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
       std::shared_ptr<const PreparedMesh>& mesh =
           prepared[{source.mesh, source.primitive, jointCount}];
       if (mesh == nullptr) {
-        Result<std::shared_ptr<const PreparedMesh>> made = PreparedMesh::prepare(
-            *part.primitive, meshName(model, source), jointCount, preparation);
-        if (!made)
-          return Error{made.error().code,
-                       fmt::format("'{}': {}", path.filename().string(), made.error().message)};
+        Result<std::vector<float>> centersOfRotation = std::vector<float>();
+        if (preparation.centersOfRotation)
+          centersOfRotation = centers.of(model, source, jointCount);
+        if (!centersOfRotation) return inFile(centersOfRotation.error());
+        Result<std::shared_ptr<const PreparedMesh>> made =
+            PreparedMesh::prepare(*part.primitive, meshName(model, source), jointCount, preparation,
+                                  std::move(*centersOfRotation));
+        if (!made) return inFile(made.error());
         mesh = std::move(*made);
         addFindings(scene, mesh->report());
       }
