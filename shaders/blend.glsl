@@ -1,15 +1,18 @@
 // A vertex, its influences and a palette to a skinned vertex, by the method. Needs what the methods need.
 
 #include "direction_map.glsl"
-#include "linear.glsl"
 #include "dual_quaternion.glsl"
+#ifdef COMPARISON
 #include "dual_exponential.glsl"
 #include "iterative.glsl"
 #include "log_matrix.glsl"
-#include "quaternion_translation.glsl"
-#include "blended.glsl"
 #include "spherical_blend.glsl"
+#include "quaternion_translation.glsl"
+#else
+#include "linear.glsl"
+#include "blended.glsl"
 #include "center_of_rotation.glsl"
+#endif
 
 // A vertex without influences stays in bind pose.
 Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
@@ -21,16 +24,18 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uin
     return still;
   }
   switch (METHOD) {
-    case METHOD_LINEAR:
-      return skinLinear(vertex, influences, palette, withNormal, withTangent);
-    case METHOD_DUAL_QUATERNION_ITERATIVE:
-      return skinIterative(vertex, influences, palette, jointCount, withNormal, withTangent);
+#ifdef COMPARISON
     case METHOD_LOG_MATRIX:
       return skinLogMatrix(vertex, influences, palette, jointCount, withNormal, withTangent);
     case METHOD_SPHERICAL_BLEND:
       return skinSpherical(vertex, influences, palette, jointCount, withNormal, withTangent);
     case METHOD_QUATERNION_TRANSLATION:
       return skinQuaternionTranslation(vertex, influences, palette, jointCount, withNormal, withTangent);
+    default:
+      return skinIterative(vertex, influences, palette, jointCount, withNormal, withTangent);
+#else
+    case METHOD_LINEAR:
+      return skinLinear(vertex, influences, palette, withNormal, withTangent);
     case METHOD_BLENDED:
       return skinBlended(vertex, influences, palette, jointCount, inputs.share, withNormal, withTangent);
     case METHOD_CENTER_OF_ROTATION:
@@ -39,5 +44,6 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uin
       return skinBulgeControlled(vertex, influences, palette, jointCount, inputs.center, inputs.share, withNormal, withTangent);
     default:
       return skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
+#endif
   }
 }

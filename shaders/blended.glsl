@@ -3,21 +3,12 @@
 
 // The rows of R S, one joint's 3×3.
 void jointRows(vec4 q, ScaleShear part, bool twoPhase, out vec3 r0, out vec3 r1, out vec3 r2) {
-  precise vec3 doubled = q.xyz + q.xyz;
-  precise vec3 squares = doubled * q.xyz;
-  precise vec3 products = doubled.xyx * q.yzz;  // 2xy 2yz 2xz
-  precise vec3 byScalar = doubled * q.w;
-  precise vec3 row0 = vec3(1.0 - (squares.y + squares.z), products.x - byScalar.z, products.z + byScalar.y);
-  precise vec3 row1 = vec3(products.x + byScalar.z, 1.0 - (squares.x + squares.z), products.y - byScalar.x);
-  precise vec3 row2 = vec3(products.z - byScalar.y, products.y + byScalar.x, 1.0 - (squares.x + squares.y));
+  rowsOfQuaternion(q, r0, r1, r2);
   if (twoPhase) {  // S is symmetric: a row of R S is S times that row of R
-    row0 = scalePosition(part, row0);
-    row1 = scalePosition(part, row1);
-    row2 = scalePosition(part, row2);
+    r0 = scalePosition(part, r0);
+    r1 = scalePosition(part, r1);
+    r2 = scalePosition(part, r2);
   }
-  r0 = row0;
-  r1 = row1;
-  r2 = row2;
 }
 
 Vertex skinBlended(Vertex vertex, Influences influences, uint palette, uint jointCount, float share, bool withNormal,

@@ -42,3 +42,17 @@ vec4 quaternionProduct(vec4 a, vec4 b) {
 }
 
 vec4 conjugateOf(vec4 q) { return vec4(-q.xyz, q.w); }
+
+// The rows of the rotation of a unit quaternion.
+void rowsOfQuaternion(vec4 q, out vec3 r0, out vec3 r1, out vec3 r2) {
+  precise vec3 doubled = q.xyz + q.xyz;
+  precise vec3 squares = doubled * q.xyz;
+  precise vec3 products = doubled.xyx * q.yzz;  // 2xy 2yz 2xz
+  precise vec3 byScalar = doubled * q.w;
+  precise vec3 row0 = vec3(1.0 - (squares.y + squares.z), products.x - byScalar.z, products.z + byScalar.y);
+  precise vec3 row1 = vec3(products.x + byScalar.z, 1.0 - (squares.x + squares.z), products.y - byScalar.x);
+  precise vec3 row2 = vec3(products.z - byScalar.y, products.y + byScalar.x, 1.0 - (squares.x + squares.y));
+  r0 = row0;
+  r1 = row1;
+  r2 = row2;
+}

@@ -1,13 +1,19 @@
 // Skins vertices: a workgroup takes a run of vertices of one mesh, and each invocation skins its vertex for several instances of
-// that mesh, so that a vertex is read once. The .comp files that include it say how output is stored:
+// that mesh, so that a vertex is read once. The .comp files that include it say what of it is compiled; one module for all would
+// take drivers several times as long for each pipeline:
 //   STORE_HALVES, STORE_BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
 //   EXTRAS                      previous positions and results; kept out of other modules, since layers and drivers take what
 //                               a module names for used, whatever its constants say
+//   COMPARISON                  the methods that are there for comparison, instead of those for every day
 //   ONE_OUTPUT                  all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #include "abi.h"
 
+#ifdef COMPARISON
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION_ITERATIVE;
+#else
 layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
+#endif
 layout(constant_id = CONSTANT_INFLUENCES) const uint INFLUENCES = 0u;
 layout(constant_id = CONSTANT_INSTANCES) const uint INSTANCES = 1u;
 layout(constant_id = CONSTANT_POSITION_FORMAT) const uint POSITION_FORMAT = FORMAT_FLOAT32X3;

@@ -1,7 +1,7 @@
 // Spherical blend skinning (Kavan and Žára 2005): blended quaternions about the point that the joints come nearest to agreeing
 // on. That point r solves (R_a − R_b) r = t_b − t_a over all pairs of joints in the least-squares sense, which is
 // (R_j − mean R) r = mean t − t_j over all joints. The rows are brought to triangular form one after the other, for the square of
-// that matrix would have half its digits. Needs blended (jointRows) and dual_quaternion.
+// that matrix would have half its digits. Needs dual_quaternion.
 
 // Directions in which rotations differ by less are left alone: the pseudo-inverse.
 const float LEAST_SINGULAR_VALUE = 1e-3;
@@ -86,7 +86,7 @@ System jointSystem(uint palette, uint joint) {
   vec3 r0;
   vec3 r1;
   vec3 r2;
-  jointRows(real, ScaleShear(vec3(1.0), vec3(0.0)), false, r0, r1, r2);
+  rowsOfQuaternion(real, r0, r1, r2);
   vec3 t = translationOf(real, paletteDual(palette, joint), 1.0);
   return System(vec4(r0, t.x), vec4(r1, t.y), vec4(r2, t.z));
 }

@@ -1,6 +1,7 @@
 #include "dermis/vulkan/kernels.h"
 
 #include <algorithm>
+#include <array>
 
 #include "abi.h"
 #include "dermis_kernels.h"
@@ -41,20 +42,45 @@ static_assert(sizeof(PaletteStatus) == 16 && abi::STATUS_TWO_PHASE == 0 &&
               abi::STATUS_NON_RIGID == 1 && abi::STATUS_UNDECLARED_SCALE == 2 &&
               abi::STATUS_NON_FINITE == 3);
 
+namespace {
+
+using Spirv = std::span<const std::uint32_t>;
+
+/// The modules of a group of methods, by the bytes of the smallest store: 4, 2, 1.
+struct SkinModules {
+  std::array<Spirv, 3> plain, extras;
+  Spirv oneOutput;
+};
+
+bool isForComparison(Method method) {
+  return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
+         method == Method::sphericalBlend || method == Method::quaternionTranslation;
+}
+
+SkinModules skinModules(Method method) {
+  using namespace kernels;
+  if (isForComparison(method)) {
+    return {{skin_comparison_spirv, skin_comparison_halves_spirv, skin_comparison_bytes_spirv},
+            {skin_comparison_extras_spirv, skin_comparison_extras_halves_spirv,
+             skin_comparison_extras_bytes_spirv},
+            skin_comparison_one_output_spirv};
+  }
+  return {{skin_spirv, skin_halves_spirv, skin_bytes_spirv},
+          {skin_extras_spirv, skin_extras_halves_spirv, skin_extras_bytes_spirv},
+          skin_one_output_spirv};
+}
+
+}  // namespace
+
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (variant.kernel == Kernel::palette)
     return oneOutput ? kernels::palette_one_output_spirv : kernels::palette_spirv;
-  if (oneOutput) return kernels::skin_one_output_spirv;
+  const SkinModules modules = skinModules(variant.method);
+  if (oneOutput) return modules.oneOutput;
   const bool extras = variant.motion != Motion::none || hasResults(variant);
-  switch (*std::min_element(variant.units.begin(), variant.units.end())) {
-    case 1:
-      return extras ? kernels::skin_extras_bytes_spirv : kernels::skin_bytes_spirv;
-    case 2:
-      return extras ? kernels::skin_extras_halves_spirv : kernels::skin_halves_spirv;
-    default:
-      return extras ? kernels::skin_extras_spirv : kernels::skin_spirv;
-  }
+  const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
+  return (extras ? modules.extras : modules.plain)[smallest == 4 ? 0 : smallest == 2 ? 1 : 2];
 }
 
 SpecializationConstants specializationConstants(const Variant& variant) {

@@ -38,13 +38,16 @@ Result<void> Pipelines::create() {
   const std::uint8_t leastUnit = oneOutput || !limits_.storage16Bit ? 4
                                  : !limits_.storage8Bit             ? 2
                                                                     : 1;
-  for (const Motion motion : {Motion::none, Motion::kept}) {
-    for (std::uint8_t unit = 4; unit >= leastUnit; unit /= 2) {
-      Variant variant;
-      variant.motion = motion;
-      variant.units[0] = unit;
-      if (moduleOf(variant) != VK_NULL_HANDLE) continue;
-      if (Result<void> made = createModule(variant); !made) return made;
+  for (const Method method : allMethods) {
+    for (const Motion motion : {Motion::none, Motion::kept}) {
+      for (std::uint8_t unit = 4; unit >= leastUnit; unit /= 2) {
+        Variant variant;
+        variant.method = method;
+        variant.motion = motion;
+        variant.units[0] = unit;
+        if (moduleOf(variant) != VK_NULL_HANDLE) continue;  // shared with others
+        if (Result<void> made = createModule(variant); !made) return made;
+      }
     }
   }
   return {};
