@@ -34,6 +34,7 @@ Vertex skinBlended(Vertex vertex, Influences influences, uint palette, uint join
   }
   Vertex straight = throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
   Vertex skinned = skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
+  if (share >= 1.0) return skinned;
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;
   skinned.position = position;

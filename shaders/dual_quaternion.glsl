@@ -11,18 +11,36 @@ struct Blend {
 
 float signedWeight(vec4 pivot, vec4 rotation, float weight) { return dot4(pivot, rotation) < 0.0 ? -weight : weight; }
 
+// Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex comes
+// out to the bit as if the palette had no such joint. A loop of its own, over nothing where it is not wanted: some drivers execute
+// both sides of an `if`, but none goes through a loop that is over.
+ScaleShear blendScaleShear(Influences influences, uint palette, uint jointCount, bool twoPhase) {
+  precise vec3 diagonal = vec3(1.0);
+  precise vec3 mixed = vec3(0.0);
+  uint count = twoPhase ? influences.count : 0u;
+  vec3 pivotDiagonal = vec3(0.0);
+  vec3 pivotMixed = vec3(0.0);
+  for (uint slot = 0u; slot < count; ++slot) {
+    ScaleShear part = paletteScaleShear(palette, jointCount, influenceJoint(influences, slot));
+    if (slot == 0u) {
+      pivotDiagonal = part.diagonal;
+      pivotMixed = part.mixed;
+      diagonal = part.diagonal;
+      mixed = part.mixed;
+    }
+    float weight = influenceWeight(influences, slot);
+    diagonal += weight * (part.diagonal - pivotDiagonal);
+    mixed += weight * (part.mixed - pivotMixed);
+  }
+  return ScaleShear(diagonal, mixed);
+}
+
 Blend blendJoints(Influences influences, uint palette, uint jointCount, bool twoPhase) {
   uint pivotJoint = influenceJoint(influences, 0u);
   vec4 pivot = paletteRotation(palette, pivotJoint);
   float pivotWeight = influenceWeight(influences, 0u);
   precise vec4 real = pivotWeight * pivot;
   precise vec4 dual = pivotWeight * paletteDual(palette, pivotJoint);
-  // Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex
-  // comes out to the bit as if the palette had no such joint.
-  ScaleShear pivotPart = ScaleShear(vec3(1.0), vec3(0.0));
-  if (twoPhase) pivotPart = paletteScaleShear(palette, jointCount, pivotJoint);
-  precise vec3 diagonal = pivotPart.diagonal;
-  precise vec3 mixed = pivotPart.mixed;
   for (uint slot = 1u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
@@ -30,13 +48,8 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
     float towardsPivot = signedWeight(pivot, rotation, weight);
     real += towardsPivot * rotation;
     dual += towardsPivot * paletteDual(palette, joint);
-    if (twoPhase) {
-      ScaleShear part = paletteScaleShear(palette, jointCount, joint);
-      diagonal += weight * (part.diagonal - pivotPart.diagonal);
-      mixed += weight * (part.mixed - pivotPart.mixed);
-    }
   }
-  return Blend(real, dual, ScaleShear(diagonal, mixed));
+  return Blend(real, dual, blendScaleShear(influences, palette, jointCount, twoPhase));
 }
 
 // The first phase: a vertex scaled and sheared in bind space, its directions of any length.

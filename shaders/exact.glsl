@@ -19,8 +19,8 @@ vec3 cross3(vec3 a, vec3 b) {
 
 float largestComponent(vec3 v) { return max(abs(v.x), max(abs(v.y), abs(v.z))); }
 
-// The power of two that brings a number to between a half and 4, so that its square neither overflows nor vanishes: multiplying
-// by it rounds nothing, and takes less time than a division. 0 stays 0.
+// The power of two that brings a normal number to between a half and 4, and a subnormal one to at least 2^-23, so that its square
+// neither overflows nor vanishes: multiplying by it rounds nothing, and takes less time than a division.
 float powerScale(float largest) {
   uint exponent = floatBitsToUint(largest) >> 23u;
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -43,7 +44,8 @@ ExitStatus checkUsage(const CompareOptions& options) {
 
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
   if (clip == gltf::none) return "rest pose";
-  return fmt::format("clip {} '{}' at {:.3f} s", clip, model.clips[clip].name, time);
+  return fmt::format("clip {} '{}' at {:.3f} s", clip, model.clips[clip].name,
+                     std::clamp(time, 0.0, model.clips[clip].duration));
 }
 
 /// A scene with something to skin. What is wrong with it has been reported where there is none.

@@ -256,6 +256,11 @@ ExitStatus skin(const SkinOptions& options) {
     return reportError(ExitStatus::badInput,
                        fmt::format("{} has no skinned mesh in its scene", options.model));
   }
+  if (!allows(*scene, method)) {
+    return reportError(ExitStatus::badInput,
+                       fmt::format("{}: {} needs centres of rotation, which were too much work",
+                                   options.model, options.method));
+  }
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
 

@@ -127,7 +127,9 @@ class MethodComparer {
         options_(options),
         step_(step),
         instance_(requestsOf(scene, pose)) {
-    for (const Method method : allMethods) comparison_.methods.emplace_back().method = method;
+    for (const Method method : allMethods) {
+      if (allows(scene, method)) comparison_.methods.emplace_back().method = method;
+    }
     for (const samples::SkinRequest& request : instance_) {
       comparison_.vertices += request.mesh->vertexCount();
       comparison_.scales = comparison_.scales || request.mayScale;

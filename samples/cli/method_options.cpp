@@ -10,12 +10,17 @@
 namespace dermis::cli {
 
 void addShares(CLI::App& command, MethodShares& shares) {
-  command.add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
-                     fmt::format("blended: from 0, linear, to 1, dual quaternions [{}]",
-                                 shares.dualQuaternionWeight));
-  command.add_option("--bulge-strength", shares.bulgeStrength,
-                     fmt::format("bulge_controlled: from 0, as dual quaternions bulge, to 1 [{}]",
-                                 shares.bulgeStrength));
+  // An empty word would be taken for 0.
+  command
+      .add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
+                  fmt::format("blended: from 0, linear, to 1, dual quaternions [{}]",
+                              shares.dualQuaternionWeight))
+      ->check(CLI::Number);
+  command
+      .add_option("--bulge-strength", shares.bulgeStrength,
+                  fmt::format("bulge_controlled: from 0, as dual quaternions bulge, to 1 [{}]",
+                              shares.bulgeStrength))
+      ->check(CLI::Number);
 }
 
 ExitStatus checkShares(const MethodShares& shares) {

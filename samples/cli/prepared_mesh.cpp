@@ -13,7 +13,7 @@ MeshView PreparedMesh::view() const {
 
 Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     const gltf::Primitive& primitive, std::string name, std::uint32_t jointCount,
-    const MeshPreparation& preparation, std::vector<float> centersOfRotation) {
+    const MeshPreparation& preparation, const CentersOfPrimitive& centers) {
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
   mesh->name_ = std::move(name);
   mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
@@ -28,7 +28,9 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     if (!repaired) return repaired.error();
     mesh->repaired_.emplace(std::move(*repaired));
   }
-  mesh->centersOfRotation_ = std::move(centersOfRotation);
+  Result<std::vector<float>> centersOfRotation = centers();
+  if (!centersOfRotation) return centersOfRotation.error();
+  mesh->centersOfRotation_ = std::move(*centersOfRotation);
   Result<PackedMesh> packed = pack(mesh->view(), jointCount);
   if (!packed) return packed.error();
   mesh->packed_.emplace(std::move(*packed));

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "dermis/gltf.h"
+#include "dermis/method.h"
 #include "dermis/pack.h"
 #include "dermis/validate.h"
 
@@ -22,23 +24,30 @@ struct MeshPreparation {
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
 };
 
+/// Gives the primitive's centres of rotation, 3 floats a vertex, or none.
+using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
+
 /// Not movable: its views point into it.
 class PreparedMesh {
  public:
   /// `name` is what `validate` puts behind "mesh". The primitive has influences, and outlives this
-  /// object. `centersOfRotation` are its own, 3 a vertex, or nothing. Fails with `invalidMesh`,
-  /// where `strict` also for what could be repaired.
+  /// object. Fails with `invalidMesh`, where `strict` also for what could be repaired, and where
+  /// `centers`, which is asked last, does.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::string name,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
-                                                             std::vector<float> centersOfRotation);
+                                                             const CentersOfPrimitive& centers);
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;
 
   /// The mesh to skin: the repaired one where `pack` would have refused it.
   MeshView view() const;
   const PackedMesh& packed() const { return *packed_; }
+  /// Whether it has what the method needs.
+  bool allows(Method method) const {
+    return !needsCentersOfRotation(method) || packed_->info().hasCentersOfRotation;
+  }
   /// Of the mesh as the file has it.
   const MeshReport& report() const { return report_; }
 

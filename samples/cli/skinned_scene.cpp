@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "mesh_centers.h"
@@ -40,25 +40,6 @@ void addFindings(Scene& scene, const MeshReport& report) {
   }
 }
 
-/// Centres of rotation, found once for each mesh and number of joints.
-class FoundCenters {
- public:
-  Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
-                                std::uint32_t jointCount) {
-    std::vector<std::vector<float>>& ofMesh = found_[{source.mesh, jointCount}];
-    if (ofMesh.empty()) {
-      Result<std::vector<std::vector<float>>> found =
-          centersOfMesh(model.meshes[source.mesh], jointCount);
-      if (!found) return found.error();
-      ofMesh = std::move(*found);
-    }
-    return ofMesh[source.primitive];
-  }
-
- private:
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::vector<float>>> found_;
-};
-
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
@@ -69,21 +50,28 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
   scene.model = std::make_unique<gltf::Model>(std::move(*loaded));
   const gltf::Model& model = *scene.model;
   scene.notes = model.notes;
+  std::uint64_t vertices = 0;
+  for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives)
+    vertices += model.meshes[source.mesh].primitives[source.primitive].vertexCount;
+  if (vertices > mostVertices) {
+    return Error{ErrorCode::limitExceeded,
+                 fmt::format("'{}': its scene has {} skinned vertices, more than the {} that this "
+                             "command takes",
+                             path.filename().string(), vertices, mostVertices)};
+  }
   std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>,
            std::shared_ptr<const PreparedMesh>>
       prepared;
-  FoundCenters centers;
+  MeshCenters centers;
   const auto inFile = [&path](const Error& error) {
     return Error{error.code, fmt::format("'{}': {}", path.filename().string(), error.message)};
   };
-  std::uint64_t vertices = 0;
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     ScenePart part;
     part.source = source;
     part.primitive = &model.meshes[source.mesh].primitives[source.primitive];
     part.name = fmt::format("node {}{}, {}", source.node, quoted(model.nodes[source.node].name),
                             part.primitive->name);
-    vertices += part.primitive->vertexCount;
     if (part.primitive->influences.empty()) {
       scene.notes.push_back(fmt::format("{} has no JOINTS_0: its {} vertices stay in bind pose",
                                         part.name, part.primitive->vertexCount));
@@ -92,13 +80,15 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
       std::shared_ptr<const PreparedMesh>& mesh =
           prepared[{source.mesh, source.primitive, jointCount}];
       if (mesh == nullptr) {
-        Result<std::vector<float>> centersOfRotation = std::vector<float>();
-        if (preparation.centersOfRotation)
-          centersOfRotation = centers.of(model, source, jointCount);
-        if (!centersOfRotation) return inFile(centersOfRotation.error());
-        Result<std::shared_ptr<const PreparedMesh>> made =
-            PreparedMesh::prepare(*part.primitive, meshName(model, source), jointCount, preparation,
-                                  std::move(*centersOfRotation));
+        const CentersOfPrimitive findCenters = [&]() -> Result<std::vector<float>> {
+          if (!preparation.centersOfRotation) return std::vector<float>();
+          Result<std::vector<float>> found = centers.of(model, source, jointCount);
+          if (found || found.error().code != ErrorCode::limitExceeded) return found;
+          scene.warnings.push_back(found.error().message);
+          return std::vector<float>();
+        };
+        Result<std::shared_ptr<const PreparedMesh>> made = PreparedMesh::prepare(
+            *part.primitive, meshName(model, source), jointCount, preparation, findCenters);
         if (!made) return inFile(made.error());
         mesh = std::move(*made);
         addFindings(scene, mesh->report());
@@ -107,13 +97,13 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
     }
     scene.parts.push_back(std::move(part));
   }
-  if (vertices > mostVertices) {
-    return Error{ErrorCode::limitExceeded,
-                 fmt::format("'{}': its scene has {} skinned vertices, more than the {} that this "
-                             "command takes",
-                             path.filename().string(), vertices, mostVertices)};
-  }
   return scene;
+}
+
+bool allows(const Scene& scene, Method method) {
+  return std::ranges::all_of(scene.parts, [method](const ScenePart& part) {
+    return part.mesh == nullptr || part.mesh->allows(method);
+  });
 }
 
 Result<std::uint32_t> chooseClip(const gltf::Model& model,

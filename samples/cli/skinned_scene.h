@@ -30,6 +30,9 @@ struct Scene {
   std::vector<std::string> notes;     ///< what was mended on reading, left out, or is not skinned
 };
 
+/// Whether every part has what the method needs.
+bool allows(const Scene& scene, Method method);
+
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or
 /// refused where the preparation is strict.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);

@@ -32,6 +32,7 @@ struct PoseBatch {
       const ScenePart& part = scene.parts[index];
       if (part.mesh == nullptr) continue;
       for (const Method method : allMethods) {
+        if (!part.mesh->allows(method)) continue;
         instances.push_back({&part.mesh->packed(), now.palette(part), before.palette(part),
                              now.morphs[index], before.morphs[index], method, nullptr, nullptr});
         parts.push_back(&part);

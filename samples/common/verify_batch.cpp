@@ -39,6 +39,9 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
   Box box = boxOf(positions);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!(box.max[axis] >= box.min[axis])) box.min[axis] = box.max[axis] = 0;
+    // Numbers that snorm16 can be relative to at all.
+    box.min[axis] = std::clamp(box.min[axis], -1e37f, 1e37f);
+    box.max[axis] = std::clamp(box.max[axis], -1e37f, 1e37f);
     const float side = box.max[axis] - box.min[axis];
     const float margin = clamps ? -0.2f * side : 0.05f * side;
     box.min[axis] -= margin + 0.01f;

@@ -544,6 +544,72 @@ TEST_F(BadInput, TruncatedOrHostileGltfEndsWithAClearErrorAndNeverWithMore) {
   expectRefusedSoon(deep, "deep.gltf");
 }
 
+/// All vertices weighted to the same two joints, no two alike: centres of rotation cost the square.
+FileBuilder denseMesh(std::uint32_t vertexCount) {
+  FileBuilder file = skinnedTriangle();
+  std::vector<float> positions, weights;
+  std::vector<std::uint8_t> joints;
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+    const auto number = static_cast<float>(vertex);
+    positions.insert(positions.end(), {std::sin(number), std::cos(2 * number), number * 1e-4f});
+    const float share = (number + 1) / static_cast<float>(vertexCount + 2);
+    weights.insert(weights.end(), {share, 1 - share, 0, 0});
+    joints.insert(joints.end(), {0, 1, 0, 0});
+    if (vertex < 2) continue;
+    for (const std::uint32_t corner : {vertex - 2, vertex - 1, vertex}) triangles.push_back(corner);
+  }
+  file.attributes()["POSITION"] = file.addFloats(positions, "VEC3");
+  file.attributes()["JOINTS_0"] = file.add(joints, "VEC4", unsignedByteType);
+  file.attributes()["WEIGHTS_0"] = file.addFloats(weights, "VEC4");
+  file.primitive()["indices"] = file.add(triangles, "SCALAR", unsignedIntType);
+  return file;
+}
+
+TEST_F(BadInput, AMeshTooDenseForCentresOfRotationIsSkinnedWithoutThem) {
+  const std::string model = writeModel("dense.gltf", denseMesh(110'000));
+  const std::string out = outFile("dense.ply");
+  const auto skin = [&](const char* method) {
+    return dermis({"skin", model, "-o", out, "--device", "cpu", "--method", method});
+  };
+  const CommandResult refused = skin("center_of_rotation");
+  EXPECT_EQ(refused.status, 3) << refused.errors;
+  EXPECT_NE(refused.errors.find("centres of rotation"), std::string::npos) << refused.errors;
+  EXPECT_EQ(skin("dual_quaternion").status, 0);
+  const std::string report = outFile("dense.json");
+  const CommandResult compared = dermis({"compare", model, "--device", "cpu", "--json", report});
+  EXPECT_EQ(compared.status, 0) << compared.errors;
+  EXPECT_NE(compared.errors.find("centres of rotation"), std::string::npos) << compared.errors;
+  std::ifstream file(report);
+  const Json written = Json::parse(file);
+  std::vector<std::string> methods;
+  for (const Json& row : written.at("methods")) methods.push_back(row.at("method"));
+  EXPECT_EQ(methods.size(), allMethods.size() - 2) << "the two that need centres are left out";
+  EXPECT_EQ(std::count(methods.begin(), methods.end(), "bulge_controlled"), 0);
+}
+
+// Forty skins for one mesh differ in nothing that it can tell: its centres are found once, or this
+// would be too much work.
+TEST_F(BadInput, CentresOfRotationAreFoundOncePerMesh) {
+  FileBuilder file = denseMesh(20'000);
+  for (std::size_t skin = 1; skin < 40; ++skin) {
+    Json joints = Json::array();
+    for (std::size_t joint = 0; joint < 2 + skin; ++joint) {
+      joints.push_back(file.json["nodes"].size());
+      file.json["scenes"][0]["nodes"].push_back(file.json["nodes"].size());
+      file.json["nodes"].push_back(Json::object());
+    }
+    file.json["skins"].push_back({{"joints", joints}});
+    file.json["scenes"][0]["nodes"].push_back(file.json["nodes"].size());
+    file.json["nodes"].push_back({{"mesh", 0}, {"skin", skin}});
+  }
+  const std::string model = writeModel("skins.gltf", file);
+  const CommandResult result = dermis({"skin", model, "-o", outFile("skins.ply"), "--device", "cpu",
+                                       "--method", "center_of_rotation"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_EQ(result.errors.find("centres of rotation"), std::string::npos) << result.errors;
+}
+
 // ---- no Vulkan loader, no device, a missing feature
 
 TEST_F(BadInput, NoLoaderNoDeviceOrAMissingFeatureIsNamedAndTheReferenceStillWorks) {

@@ -15,6 +15,8 @@
 
 #include "batch_runner.h"
 #include "dermis/accuracy.h"
+#include "dermis/dual_quat.h"
+#include "dermis/glm.h"
 #include "random_rig.h"
 #include "test_device.h"
 
@@ -38,7 +40,7 @@ JointMatrix turnAboutZ(double degrees) {
   return jointOf(glm::mat3_cast(glm::angleAxis(degrees * pi / 180, glm::dvec3(0, 0, 1))));
 }
 
-class MethodTest : public DeviceTest, public ::testing::WithParamInterface<Method> {
+class SomeMethodsTest : public DeviceTest {
  protected:
   samples::BatchResult run(std::span<const samples::SkinRequest> requests,
                            samples::RunOptions options = {}) {
@@ -61,6 +63,8 @@ class MethodTest : public DeviceTest, public ::testing::WithParamInterface<Metho
     return *compare(*expected, skinned.view(), method);
   }
 };
+
+class MethodTest : public SomeMethodsTest, public ::testing::WithParamInterface<Method> {};
 
 /// Every attribute, by the byte.
 void expectSameBytes(const samples::SkinnedVertices& a, const samples::SkinnedVertices& b,
@@ -444,6 +448,49 @@ TEST_P(MethodTest, APoseInTwoFormsIsTheSamePose) {
 
 std::string nameOfCase(const ::testing::TestParamInfo<Method>& method) {
   return std::string(methodName(method.param));
+}
+
+// ---- what methods say of each other
+
+TEST_F(SomeMethodsTest, BlendedWithAllWeightOnDualQuaternionsIsTheirsToTheBit) {
+  for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear, Rigidity::mirrored}) {
+    OwnedMesh mesh = randomMesh(20, 500, 12, 5);
+    addTangents(mesh, 21);
+    std::fill(mesh.dualQuaternionWeights.begin(), mesh.dualQuaternionWeights.end(), 1.0f);
+    const std::vector<JointMatrix> pose = randomPose(22, 12, rigidity);
+    expectSameBytes(skin(mesh, pose, Method::blended), skin(mesh, pose, Method::dualQuaternion),
+                    "all weight on dual quaternions");
+  }
+}
+
+// DIB of two transforms is their screw motion.
+TEST_F(SomeMethodsTest, Truth07_IterativeBlendingOfTwoJointsIsTheScrewBetweenThem) {
+  constexpr std::uint32_t steps = 101;
+  OwnedMesh mesh = randomMesh(23, steps, 2, 2);
+  for (std::uint32_t step = 0; step < steps; ++step) {
+    const float share = static_cast<float>(step) / (steps - 1);
+    for (std::uint32_t slot = 0; slot < 2; ++slot) {
+      mesh.joints[2 * step + slot] = slot;
+      mesh.weights[2 * step + slot] = slot == 0 ? 1 - share : share;
+    }
+  }
+  for (std::uint32_t seed = 0; seed < 10; ++seed) {
+    const std::vector<JointMatrix> pose = randomPose(30 + seed, 2, Rigidity::rigid);
+    const samples::SkinnedVertices skinned = skin(mesh, pose, Method::dualQuaternionIterative);
+    const auto transform = [&pose](std::size_t joint) {
+      return normalize(fromRigidMatrix(glm::dmat4x3(toGlm(pose[joint]))));
+    };
+    for (std::uint32_t step = 0; step < steps; ++step) {
+      const DualQuatd between = screwInterpolate(transform(0), transform(1),
+                                                 static_cast<double>(mesh.weights[2 * step + 1]));
+      const glm::dvec3 bind(mesh.positions[3 * step], mesh.positions[3 * step + 1],
+                            mesh.positions[3 * step + 2]);
+      const glm::dvec3 expected = transformPoint(between, bind);
+      const glm::dvec3 actual(skinned.positions[3 * step], skinned.positions[3 * step + 1],
+                              skinned.positions[3 * step + 2]);
+      EXPECT_LE(glm::length(actual - expected), 2e-5) << "pose " << seed << ", vertex " << step;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, MethodTest, ::testing::ValuesIn(allMethods), nameOfCase);

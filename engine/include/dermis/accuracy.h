@@ -19,12 +19,12 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 /// The largest distance a float32 position may have from the reference's: 6 u · scale for `linear`,
 /// 24 u · (scale + `leverage`) for the others, u = `floatRounding`. A joint that is rigid but for
 /// rounding (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is not decomposed by the kernels: `rigidShortcut` (at most
-/// 4e-6) · (|p| + `leverage`) more, for methods with a centre of rotation of |p| + 2 |centre|.
-/// Inputs that are no float32, and morph targets: u · `positionRounding` · `stretch` more.
+/// 4e-6) · (`distance` + `leverage`) more. Inputs that are no float32, and morph targets: u ·
+/// `positionRounding` · `stretch` more.
 double positionBound(Method method, const reference::Conditioning& conditioning);
 
 /// The largest distance between a float32 unit normal and the reference's. Turned by a blended
-/// rotation: 1.5e-6 (and `rigidShortcut`, as above), times `turning`. Through a blended 3×3 M: 6 u
+/// rotation: (1.5e-6 + `rigidShortcut`) · `turning`. Through a blended 3×3 M: 6 u
 /// / a, a = `normalAlignment`. In two phases a normal goes through M and then is turned, so that
 /// both errors add up; those of `blended` are divided by `normalLength`. What the bind pose is off
 /// by, u · `normalRounding`, is divided by a as well. Negative where a normal is only asked to be

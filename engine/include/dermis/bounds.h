@@ -86,13 +86,13 @@ Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
 /// rounding included, in the palette's space. `palette` is what the mesh is skinned with: joint
 /// global transform × inverse bind matrix.
 ///
-/// For `linear`, `dualQuaternion` and `blended`; of the other methods nothing is proven, and the box
-/// is infinite. A few percent larger than it need be in ordinary poses; docs/bounds.md has the formulas, the
-/// proof and numbers. Joints that move no vertex have no effect, whatever their matrices. The box
-/// is infinite (from -inf to inf) where a joint that moves vertices is not finite or outside the
-/// palette, or the mesh reaches beyond 1e38, and its sides may be infinite where numbers leave the
-/// range of float32: ask `std::isfinite` before it becomes a format's box. It never has a NaN. A
-/// default-made `JointBounds` gives min > max.
+/// For `linear`, `dualQuaternion` and `blended`; of the other methods nothing is proven, and the
+/// box is infinite. A few percent larger than it need be in ordinary poses; docs/bounds.md has the
+/// formulas, the proof and numbers. Joints that move no vertex have no effect, whatever their
+/// matrices. The box is infinite (from -inf to inf) where a joint that moves vertices is not finite
+/// or outside the palette, or the mesh reaches beyond 1e38, and its sides may be infinite where
+/// numbers leave the range of float32: ask `std::isfinite` before it becomes a format's box. It
+/// never has a NaN. A default-made `JointBounds` gives min > max.
 ///
 /// O(joints + pairs + trios); allocates only above 128 joints that move vertices, and needs
 /// 32 KiB of stack. Any thread.

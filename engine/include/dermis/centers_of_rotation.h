@@ -43,16 +43,17 @@ struct CentersOfRotationOptions {
 /// A vertex without weight adds nothing to the weights of its triangles, and a triangle without
 /// area adds nothing to a centre. Centres are finite and lie among the triangles' centroids, except
 /// where there is none to be had, which is the vertex' own bind position then: with fewer than two
-/// influences (the one joint moves the vertex as it will, wherever the centre is), or if no
+/// influences (with one joint the centre makes no difference), or if no
 /// triangle has two of its joints.
 ///
 /// Sums are in double precision and in an order of their own: all that differs from the exact
 /// centre is the rounding of weights and centres to float32.
 ///
 /// Takes some 4 ns for each vertex, triangle and pair of joints that the two share (x86-64, one
-/// core). That is O(vertices × triangles) for each joint: 0.5 s for a body of 10,000 vertices,
-/// 20,000 triangles and 26 joints, and at worst, where all vertices have the same four joints, 5 s,
-/// and a hundred times that for ten times as many. Triangles of equal weights count as one.
+/// core). That is O(vertices × triangles) for each pair of joints: 0.5 s for a body of 10,000
+/// vertices, 20,000 triangles and 26 joints, and at worst, where all vertices have the same four
+/// joints, 5 s, and a hundred times that for ten times as many. Triangles of equal weights count as
+/// one.
 ///
 /// Fails with `invalidMesh` where `pack` would refuse the mesh, with that finding's sentence; with
 /// `invalidArgument` for a `jointCount` of 0 or above `maxPaletteJoints`, a number of indices that
@@ -78,6 +79,11 @@ class CenterOfRotationSolver {
   CenterOfRotationSolver& operator=(CenterOfRotationSolver&&) noexcept;
 
   std::uint32_t vertexCount() const;
+
+  /// How many terms the sums of all vertices have: one for each vertex, triangle (those of equal
+  /// weights count as one) and pair of joints that the two share. Some 4 ns each (x86-64, one
+  /// core): ask before a mesh of unknown origin. O(vertices × influences²).
+  std::uint64_t termCount() const;
 
   /// Writes the centres of the vertices from `firstVertex` on, as many as `centers` has room for at
   /// 3 floats each. Any number of threads may call it at a time. However the mesh is cut into

@@ -101,12 +101,12 @@ struct MeshView {
   std::span<const InfluenceSet> influenceSets;
   std::span<const MorphTargetView> morphTargets;
 
-  // What some methods want to know besides. Morph targets do not move it.
+  // Inputs of some methods. Morph targets do not change them.
   /// `Method::blended`, float32, unorm8 or unorm16 × 1: from 0, linear, to 1, dual quaternions.
   AttributeView dualQuaternionWeights;
   float dualQuaternionWeight = 0.5f;  ///< of every vertex, where those are absent
-  /// `Method::bulgeControlled`, the same types: from 0, as dual quaternions bulge, to 1, not at
-  /// all.
+  /// `Method::bulgeControlled`, the same types: from 0, as much as dual quaternions bulge, to 1, as
+  /// little as `Method::centerOfRotation`.
   AttributeView bulgeStrengths;
   float bulgeStrength = 1;  ///< of every vertex, where those are absent
   /// Points in bind space, float32 × 3, that `centersOfRotation` finds (centers_of_rotation.h).

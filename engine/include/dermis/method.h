@@ -31,7 +31,7 @@ enum class Method : std::uint8_t {
   /// Between `linear` and `dualQuaternion`, by `MeshView::dualQuaternionWeights`.
   blended,
   /// Blended quaternions about centres of rotation that are found once, at import (Le and Hodgins
-  /// 2016): neither collapses nor bulges. Needs `MeshView::centersOfRotation`.
+  /// 2016): does not collapse, and bulges less. Needs `MeshView::centersOfRotation`.
   centerOfRotation,
   /// `dualQuaternion` drawn towards `centerOfRotation` by `MeshView::bulgeStrengths`. Needs
   /// `MeshView::centersOfRotation`.

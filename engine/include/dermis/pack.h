@@ -25,7 +25,7 @@ struct MeshInfo {
   std::uint32_t morphTargetCount = 0;
   bool hasNormals = false;
   bool hasTangents = false;
-  bool hasCentersOfRotation = false;
+  bool hasCentersOfRotation = false;  ///< what `centerOfRotation` and `bulgeControlled` need
 };
 
 /// A packed mesh owns a blob of little-endian 32-bit words. It is relocatable (offsets count from

@@ -89,6 +89,7 @@ struct Job {
   MeshInfo mesh;  ///< `PackedMesh::info` of the mesh whose bytes stand in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
   std::uint32_t palette = 0;     ///< index into `Batch::palettes`
+  /// One that `needsCentersOfRotation`, only for a mesh that has them.
   Method method = Method::dualQuaternion;
 
   OutputAttribute positions;  ///< `isPositionFormat`; always wanted

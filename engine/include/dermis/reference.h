@@ -50,7 +50,7 @@ struct Conditioning {
   double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalised
   double tangentLength = 1;  ///< likewise
   bool normalRotatedOnly =
-      true;  ///< dual quaternions with rigid joints: directions pass through no 3×3
+      true;  ///< blended rotations of rigid joints: directions pass through no 3×3
   bool handednessAmbiguous =
       false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: its sign is a matter of rounding
   /// The answer jumps here, and rounding decides to which side: |dot| with the pivot below 1e-5,
@@ -71,12 +71,15 @@ struct SkinnedMesh {
 /// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix),
 /// after adding the active morph targets to the bind pose. Influences are normalised over all sets
 /// together; a vertex without weight stays in bind pose (morphed). Positions, normals and tangents
-/// are in the palette's space. Formulas: Kavan et al. 2007, section 4, for dual quaternions;
-/// two-phase scale and shear by polar decomposition, without a threshold; normals by the adjugate
-/// transpose of the blended 3×3, tangents by the blended 3×3 itself, not made orthogonal, their
-/// handedness times the sign of its determinant. Fails with `invalidMesh` where the mesh, with that
-/// many joints, would be refused by `pack`, and with `invalidArgument` for a morph target that the
-/// mesh does not have.
+/// are in the palette's space. docs/methods.md has the formula of each method and its source: Kavan
+/// et al. 2007, section 4, for dual quaternions, 2008 for iterative blending; Alexa 2002 and
+/// Cordier and Magnenat-Thalmann 2005 for logarithms; Kavan and Žára 2005 for spherical blending;
+/// Hejl 2004; Le and Hodgins 2016 for centres of rotation. Two-phase scale and shear by polar
+/// decomposition, without a threshold; normals by the adjugate transpose of the blended 3×3,
+/// tangents by the blended 3×3 itself, not made orthogonal, their handedness times the sign of its
+/// determinant. Fails with `invalidMesh` where the mesh, with that many joints, would be refused by
+/// `pack`, and with `invalidArgument` for a morph target that the mesh does not have, and for a
+/// method that needs centres of rotation which it lacks.
 Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
                          std::span<const MorphWeight> morphs = {});
 

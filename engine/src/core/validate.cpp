@@ -59,6 +59,12 @@ class Findings {
   std::array<std::uint32_t, problemCount> lastVertex_{};
 };
 
+std::string inWords(double number) {
+  char digits[32];
+  std::snprintf(digits, sizeof(digits), "%.9g", number);
+  return digits;
+}
+
 struct AttributeRule {
   const char* name;
   std::uint32_t fewest, most;  ///< components
@@ -215,13 +221,25 @@ void checkDirection(const AttributeView& view, std::uint32_t components, Problem
                      [&] { return std::string("the ") + name + " is not finite"; });
 }
 
-/// `whole` is the mesh's own, where the vertices have none.
-void checkShare(const AttributeView& view, float whole, const char* name, std::uint32_t vertex,
-                Findings& findings) {
-  const float share = view ? loadFloat(view, vertex, 0) : whole;
-  if (share >= 0 && share <= 1) return;
-  findings.addVertex(Problem::shareOutOfRange, vertex,
-                     [&] { return std::string("the ") + name + " is not from 0 to 1"; });
+bool isShare(float share) {
+  return share >= 0 && share <= 1;
+}
+
+/// `whole` is the mesh's own, which counts where the vertices have none.
+void checkShares(const AttributeView& view, float whole, const char* name, Findings& findings) {
+  if (!view && !isShare(whole)) {
+    findings.addView(Problem::shareOutOfRange, std::string("its ") + name + " is " +
+                                                   inWords(static_cast<double>(whole)) +
+                                                   ", not from 0 to 1");
+  }
+  for (std::uint32_t vertex = 0; view && vertex < view.count; ++vertex) {
+    const float share = loadFloat(view, vertex, 0);
+    if (isShare(share)) continue;
+    findings.addVertex(Problem::shareOutOfRange, vertex, [&] {
+      return std::string("the ") + name + " is " + inWords(static_cast<double>(share)) +
+             ", not from 0 to 1";
+    });
+  }
 }
 
 bool isFiniteDisplacement(const MorphTargetView& target, std::uint32_t element) {
@@ -303,11 +321,8 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
     return;
   }
   if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
-    findings.addVertex(Problem::weightsNotNormalized, vertex, [&] {
-      char digits[32];
-      std::snprintf(digits, sizeof(digits), "%.9g", sum);
-      return std::string("the weights sum to ") + digits + ", not to 1";
-    });
+    findings.addVertex(Problem::weightsNotNormalized, vertex,
+                       [&] { return "the weights sum to " + inWords(sum) + ", not to 1"; });
   }
   std::sort(used.begin(), used.end());
   const auto twice = std::adjacent_find(used.begin(), used.end());
@@ -398,11 +413,11 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
     checkDirection(mesh.tangents, 4, Problem::nonFiniteTangent, "tangent", vertex, findings);
     checkDirection(mesh.centersOfRotation, 3, Problem::nonFiniteCenter, "centre of rotation",
                    vertex, findings);
-    checkShare(mesh.dualQuaternionWeights, mesh.dualQuaternionWeight, "dual-quaternion weight",
-               vertex, findings);
-    checkShare(mesh.bulgeStrengths, mesh.bulgeStrength, "bulge strength", vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
   }
+  checkShares(mesh.dualQuaternionWeights, mesh.dualQuaternionWeight, "dual-quaternion weight",
+              findings);
+  checkShares(mesh.bulgeStrengths, mesh.bulgeStrength, "bulge strength", findings);
   for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {
     checkDisplacements(mesh.morphTargets[index], index, mesh.vertexCount, findings);
   }

@@ -77,15 +77,25 @@ PairIndex::PairIndex(std::span<const Group> groups) {
   }
 }
 
+const PairIndex::Range* PairIndex::rangeOf(const Influence& first, const Influence& second) const {
+  const auto found =
+      ranges_.find(first.joint < second.joint ? keyOf(first, second) : keyOf(second, first));
+  return found == ranges_.end() ? nullptr : &found->second;
+}
+
+std::size_t PairIndex::entryCount(const Influence& first, const Influence& second) const {
+  const Range* range = rangeOf(first, second);
+  return range == nullptr ? 0 : range->last - range->first;
+}
+
 void PairIndex::addSimilar(const Influence& first, const Influence& second, Moment& sum) const {
   const bool ordered = first.joint < second.joint;
   const Influence& low = ordered ? first : second;
   const Influence& high = ordered ? second : first;
-  const auto found = ranges_.find(keyOf(low, high));
-  if (found == ranges_.end()) return;
+  const Range* range = rangeOf(first, second);
+  if (range == nullptr) return;
 
-  const Range range = found->second;
-  for (std::size_t entry = range.first; entry < range.last; entry += lanes) {
+  for (std::size_t entry = range->first; entry < range->last; entry += lanes) {
     double similarity[lanes];
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const double lowWeight = lowWeights_[entry + lane], highWeight = highWeights_[entry + lane];

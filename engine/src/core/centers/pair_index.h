@@ -44,12 +44,18 @@ class PairIndex {
   /// their similarity by this pair, j and k in one order only. The factor of 2 cancels.
   void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
 
+  /// How many groups have both joints.
+  std::size_t entryCount(const Influence& first, const Influence& second) const;
+
  private:
   static_assert(maxPaletteJoints <= 65536, "the keys have 16 bits a joint");
 
   struct Range {
     std::size_t first = 0, last = 0;
   };
+
+  /// Null where no group has both joints.
+  const Range* rangeOf(const Influence& first, const Influence& second) const;
 
   std::unordered_map<std::uint32_t, Range> ranges_;
   /// An entry a group and pair; those of one pair together, filled up to a multiple of `lanes` by

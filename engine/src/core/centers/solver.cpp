@@ -98,6 +98,18 @@ std::uint32_t CenterOfRotationSolver::vertexCount() const {
   return static_cast<std::uint32_t>(state_->vertices.positions.size());
 }
 
+std::uint64_t CenterOfRotationSolver::termCount() const {
+  std::uint64_t terms = 0;
+  for (std::size_t vertex = 0; vertex < state_->vertices.influences.size(); ++vertex) {
+    const std::span<const Influence> influences = state_->vertices.influences[vertex];
+    for (std::size_t second = 1; second < influences.size(); ++second) {
+      for (std::size_t first = 0; first < second; ++first)
+        terms += state_->triangles.entryCount(influences[first], influences[second]);
+    }
+  }
+  return terms;
+}
+
 Result<void> CenterOfRotationSolver::solve(std::uint32_t firstVertex,
                                            std::span<float> centers) const {
   const std::size_t count = centers.size() / 3;
