@@ -26,7 +26,10 @@ echo "The Vulkan devices of this machine:"
 echo
 echo "Skinning the figure's walk, 8 poses with dual quaternions, on the best of them ..."
 "$dermis" skin "$models/figure.glb" --animation walk --frames 8 --fps 8 -o "$out/figure-%02d.ply"
-echo "Comparing every vertex, in every clip, with both methods, with the double-precision reference ..."
+echo "The methods side by side ..."
+"$dermis" compare "$models/figure.glb" --json "$out/compare.json"
+echo
+echo "Comparing every vertex, in every clip, by every method, with the double-precision reference ..."
 "$dermis" verify "$models/figure.glb" "$models/bar.glb" "$models/arm.glb" --json "$out/verify.json" --junit "$out/verify.xml"
 echo
 echo "The skinned figure (open it in any mesh viewer): $out/figure-00.ply ... figure-07.ply"

@@ -69,9 +69,9 @@ void printExplanation(const MethodComparison& comparison) {
       "twist         a tube of two joints, twisted by {}°: its least radius, and the volume of\n"
       "              the zone where both have weight, each of that in bind pose\n"
       "bend          the tube bent by {}°: the least area of a section, the volume, and how far\n"
-      "              vertices get from the bones, in radii: above 1 it bulges\n"
-      "difference    from dual_quaternion on the model in this pose: the largest and the root\n"
-      "              of the mean square, of the diagonal of the model's box\n\n",
+      "              vertices get from the bones, in radii of the tube: its bulge\n"
+      "difference    from dual_quaternion on the model in this pose: the largest distance and\n"
+      "              the root mean square, of the diagonal of the model's box\n\n",
       byDriver ? "the machine's, as its driver counts them"
                : "SPIR-V that calculates or touches memory",
       tubeTwistDegrees, tubeBendDegrees);

@@ -6,5 +6,5 @@ cd "$(dirname "$0")/../.."
 ./cmake/install-deps.sh
 cmake --preset release
 cmake --build build/release --target dermis_benchmarks
-exec ./build/release/tests/bench/dermis_benchmarks --benchmark_repetitions=9 --benchmark_min_time=0.1 \
+exec ./build/release/tests/bench/dermis_benchmarks --benchmark_repetitions=21 --benchmark_min_time=0.03 \
   --benchmark_enable_random_interleaving=true "$@"
