@@ -20,6 +20,14 @@ inline DualQuatd rigidOf(const glm::dquat& q, const glm::dvec3& t) {
   return {q, glm::dquat(-0.5 * glm::dot(t, v), d.x, d.y, d.z)};
 }
 
+/// As the reference has them.
+inline reference::Rigid toReference(const DualQuatd& q) {
+  return {{q.real.x, q.real.y, q.real.z, q.real.w}, {q.dual.x, q.dual.y, q.dual.z, q.dual.w}};
+}
+inline DualQuatd fromReference(const reference::Rigid& q) {
+  return {{q.real.w, q.real.x, q.real.y, q.real.z}, {q.dual.w, q.dual.x, q.dual.y, q.dual.z}};
+}
+
 inline glm::dquat turnAbout(const glm::dvec3& axis, double angle) {
   const glm::dvec3 v = std::sin(angle / 2) * axis;
   return {std::cos(angle / 2), v.x, v.y, v.z};
@@ -63,7 +71,7 @@ class ExactRig {
       const glm::dmat4x3 matrix = toMatrix(joints[i]);
       joint.linear = glm::dmat3(matrix[0], matrix[1], matrix[2]);
       joint.translation = translationOf(joints[i]);
-      joint.rigid = joints[i];
+      joint.rigid = toReference(joints[i]);
       joint.scaleShear = glm::dmat3(1.0);
       joint.rigidForKernels = true;
       influences_.push_back({i, weights[i], weights[i]});

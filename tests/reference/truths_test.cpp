@@ -256,7 +256,8 @@ TEST(ReferenceTruths, Truth05_DlbItselfDoesNotChangeLinearBlendingItselfDoes) {
     ExactRig whole(joints, weights), scaled(joints, part);
     const auto blended = [](const ExactRig& rig) {
       reference::Conditioning conditioning;
-      return reference::blendRigid({rig.joints(), rig.influences(), {}, {}}, conditioning).rigid;
+      return fromReference(
+          reference::blendRigid({rig.joints(), rig.influences(), {}, {}}, conditioning).rigid);
     };
     const DualQuatd b = blended(whole), same = blended(scaled);
     EXPECT_LE(std::sqrt(glm::dot(b.real - same.real, b.real - same.real)), 1e-15);
@@ -344,10 +345,10 @@ struct FourJoints {
 /// Σ w log(b* q): 0 where the iteration has ended.
 double residualOf(const ExactRig& rig, const DualQuatd& b) {
   const reference::Influence& strongest = reference::pivotOf(rig.influences());
-  const glm::dquat pivot = rig.joints()[strongest.joint].rigid.real;
+  const glm::dquat pivot = fromReference(rig.joints()[strongest.joint].rigid).real;
   DualQuatd mean{glm::dquat(0, 0, 0, 0), glm::dquat(0, 0, 0, 0)};
   for (const reference::Influence& influence : rig.influences()) {
-    DualQuatd joint = rig.joints()[influence.joint].rigid;
+    DualQuatd joint = fromReference(rig.joints()[influence.joint].rigid);
     if (glm::dot(joint.real, pivot) < 0) joint = -joint;
     mean = mean + log(normalize(conjugate(b) * joint)) * influence.weight;
   }
@@ -363,7 +364,9 @@ TEST(ReferenceTruths, Truth07_FourJointsWithin15RadiansEndWithin20Steps) {
     reference::Conditioning conditioning;
     const reference::RigidBlend blend = reference::blendRigid(vertex, conditioning);
     // The last of its steps, however many they were, left this much to do.
-    worst = std::max(worst, residualOf(rig, reference::iterate(vertex, blend.rigid, conditioning)));
+    worst = std::max(
+        worst,
+        residualOf(rig, fromReference(reference::iterate(vertex, blend.rigid, conditioning))));
   }
   EXPECT_LE(worst, 1e-12);
 }

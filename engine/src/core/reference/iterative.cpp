@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/geometric.hpp>
+
 #include "methods.h"
 
 namespace dermis::reference {
@@ -9,27 +11,27 @@ namespace {
 constexpr int mostSteps = 20;
 
 /// The square of a screw's size; the dual part is measured by how far the joints reach.
-double squareOf(const DualQuatd& screw, double reach) {
+double squareOf(const Rigid& screw, double reach) {
   const double dual = glm::dot(screw.dual, screw.dual);
   return glm::dot(screw.real, screw.real) + (reach > 0 ? dual / (reach * reach) : 0);
 }
 
 }  // namespace
 
-DualQuatd iterate(const VertexToSkin& vertex, DualQuatd start, Conditioning& conditioning) {
-  const glm::dquat pivot = vertex.joints[pivotOf(vertex.influences).joint].rigid.real;
-  DualQuatd b = normalize(start);
+Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditioning) {
+  const glm::dvec4 pivot = vertex.joints[pivotOf(vertex.influences).joint].rigid.real;
+  Rigid b = normalize(start);
   double reach = 0, before = 0, slowest = 0;
   for (const Influence& influence : vertex.influences) {
-    const glm::dquat& dual = vertex.joints[influence.joint].rigid.dual;
+    const glm::dvec4& dual = vertex.joints[influence.joint].rigid.dual;
     reach = std::max(reach, std::sqrt(glm::dot(dual, dual)));
   }
   for (int step = 0; step < mostSteps; ++step) {
-    DualQuatd mean{glm::dquat(0, 0, 0, 0), glm::dquat(0, 0, 0, 0)};
+    Rigid mean{glm::dvec4(0.0), glm::dvec4(0.0)};
     for (const Influence& influence : vertex.influences) {
-      DualQuatd joint = vertex.joints[influence.joint].rigid;
+      Rigid joint = vertex.joints[influence.joint].rigid;
       if (glm::dot(joint.real, pivot) < 0) joint = -joint;
-      const DualQuatd difference = normalize(conjugate(b) * joint);
+      const Rigid difference = normalize(conjugate(b) * joint);
       // Near a full turn the axis, and with it the step, is a matter of rounding.
       conditioning.signAmbiguous |= difference.real.w < -0.9;
       mean = mean + log(difference) * influence.weight;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "decompose.h"
@@ -11,27 +12,27 @@ namespace dermis::reference {
 namespace {
 
 using glm::dmat3;
-using glm::dquat;
+using glm::dvec4;
 
 /// The unit quaternion of a rotation matrix, by the largest of its four squared components
 /// (Shepperd 1978).
-dquat quaternionOf(const dmat3& r) {
+dvec4 quaternionOf(const dmat3& r) {
   // r[column][row]
   const double x = 1 + r[0][0] - r[1][1] - r[2][2];
   const double y = 1 - r[0][0] + r[1][1] - r[2][2];
   const double z = 1 - r[0][0] - r[1][1] + r[2][2];
   const double w = 1 + r[0][0] + r[1][1] + r[2][2];
-  dquat q;  // w x y z
+  dvec4 q;
   if (w >= x && w >= y && w >= z) {
-    q = dquat(w, r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]);
+    q = dvec4(r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0], w);
   } else if (x >= y && x >= z) {
-    q = dquat(r[1][2] - r[2][1], x, r[0][1] + r[1][0], r[2][0] + r[0][2]);
+    q = dvec4(x, r[0][1] + r[1][0], r[2][0] + r[0][2], r[1][2] - r[2][1]);
   } else if (y >= z) {
-    q = dquat(r[2][0] - r[0][2], r[0][1] + r[1][0], y, r[1][2] + r[2][1]);
+    q = dvec4(r[0][1] + r[1][0], y, r[1][2] + r[2][1], r[2][0] - r[0][2]);
   } else {
-    q = dquat(r[0][1] - r[1][0], r[2][0] + r[0][2], r[1][2] + r[2][1], z);
+    q = dvec4(r[2][0] + r[0][2], r[1][2] + r[2][1], z, r[0][1] - r[1][0]);
   }
-  return q * (1 / std::sqrt(glm::dot(q, q)));
+  return glm::normalize(q);
 }
 
 }  // namespace
@@ -52,7 +53,7 @@ Joint takeApart(const JointMatrix& matrix) {
   }
   if (!finite) {
     const double nan = std::nan("");
-    joint.rigid = {dquat(nan, nan, nan, nan), dquat(nan, nan, nan, nan)};
+    joint.rigid = {dvec4(nan), dvec4(nan)};
     joint.scaleShear = dmat3(nan);
     joint.largest = 0;
     joint.degenerate = true;
@@ -62,7 +63,7 @@ Joint takeApart(const JointMatrix& matrix) {
   joint.scaleShear = parts.scaleShear;
   joint.largest = parts.largest;
   joint.degenerate = parts.degenerate;
-  joint.rigid = fromRotationTranslation(quaternionOf(parts.rotation), joint.translation);
+  joint.rigid = rigidOf(quaternionOf(parts.rotation), joint.translation);
 
   const dmat3 gram = glm::transpose(joint.linear) * joint.linear - dmat3(1.0);
   double deviation = 0;  // the largest sum of a row's absolute values

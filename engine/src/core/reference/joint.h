@@ -4,15 +4,15 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/dual_quat.h"
 #include "dermis/types.h"
+#include "rigid.h"
 
 namespace dermis::reference {
 
 struct Joint {
   glm::dmat3 linear;
   glm::dvec3 translation;
-  DualQuatd rigid;  ///< the rotation of the polar decomposition, and the translation
+  Rigid rigid;  ///< the rotation of the polar decomposition, and the translation
   glm::dmat3 scaleShear;
   double largest = 1;  ///< singular value
   bool degenerate = false;

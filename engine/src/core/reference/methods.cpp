@@ -13,12 +13,8 @@ namespace dermis::reference {
 namespace {
 
 using glm::dmat3;
-using glm::dquat;
 using glm::dvec3;
-
-dvec3 rotate(const dquat& q, const dvec3& v) {
-  return transformVector(DualQuatd{q, dquat(0, 0, 0, 0)}, v);
-}
+using glm::dvec4;
 
 BindVertex skinLinear(const VertexToSkin& vertex, Conditioning& conditioning) {
   dmat3 linear(0.0);
@@ -42,7 +38,7 @@ BindVertex skinDualQuaternion(const VertexToSkin& vertex, Conditioning& conditio
 
 BindVertex skinIterative(const VertexToSkin& vertex, Conditioning& conditioning) {
   const RigidBlend blend = blendRigid(vertex, conditioning);
-  const DualQuatd rigid = iterate(vertex, blend.rigid, conditioning);
+  const Rigid rigid = iterate(vertex, blend.rigid, conditioning);
   return moveRigidly(vertex, blend.scaleShear, rigid.real, translationOf(rigid), conditioning);
 }
 
@@ -50,7 +46,7 @@ BindVertex skinLogMatrix(const VertexToSkin& vertex, Conditioning& conditioning)
   const bool signs = conditioning.signAmbiguous;  // no pivot here
   const RigidBlend blend = blendRigid(vertex, conditioning);
   conditioning.signAmbiguous = signs;
-  const DualQuatd rigid = blendLogarithms(vertex, conditioning);
+  const Rigid rigid = blendLogarithms(vertex, conditioning);
   return moveRigidly(vertex, blend.scaleShear, rigid.real, translationOf(rigid), conditioning);
 }
 
@@ -143,9 +139,9 @@ const Influence& pivotOf(std::span<const Influence> influences) {
 
 RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning) {
   const Influence& strongest = pivotOf(vertex.influences);
-  const dquat pivot = vertex.joints[strongest.joint].rigid.real;
+  const dvec4 pivot = vertex.joints[strongest.joint].rigid.real;
   RigidBlend blend;
-  blend.rigid = {dquat(0, 0, 0, 0), dquat(0, 0, 0, 0)};
+  blend.rigid = {dvec4(0.0), dvec4(0.0)};
   bool kernelsScale = false;
   for (const Influence& influence : vertex.influences) {
     const Joint& joint = vertex.joints[influence.joint];
@@ -163,7 +159,7 @@ RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning) {
   return blend;
 }
 
-BindVertex moveRigidly(const VertexToSkin& vertex, const dmat3& scaleShear, const dquat& rotation,
+BindVertex moveRigidly(const VertexToSkin& vertex, const dmat3& scaleShear, const dvec4& rotation,
                        const dvec3& translation, Conditioning& conditioning) {
   const BindVertex scaled = transformDirections(BlendedMatrix(scaleShear, conditioning.stretch),
                                                 vertex.bind, conditioning);

@@ -9,12 +9,12 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/dual_quat.h"
 #include "dermis/method.h"
 #include "dermis/reference.h"
 #include "joint.h"
 #include "morph.h"
 #include "read.h"
+#include "rigid.h"
 
 namespace dermis::reference {
 
@@ -40,7 +40,7 @@ const Influence& pivotOf(std::span<const Influence> influences);
 /// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1) with the pivot of
 /// greatest weight, the real part of unit length; and the scale/shear parts blended linearly.
 struct RigidBlend {
-  DualQuatd rigid;
+  Rigid rigid;
   glm::dmat3 scaleShear{0.0};
 };
 RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning);
@@ -48,13 +48,13 @@ RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning);
 /// In two phases: scaled in bind space, then moved by a rotation about the origin and a
 /// translation.
 BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
-                       const glm::dquat& rotation, const glm::dvec3& translation,
+                       const glm::dvec4& rotation, const glm::dvec3& translation,
                        Conditioning& conditioning);
 
 /// DIB, Kavan et al. 2008.
-DualQuatd iterate(const VertexToSkin& vertex, DualQuatd start, Conditioning& conditioning);
+Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditioning);
 /// exp(Σ w log C), C the rigid parts.
-DualQuatd blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
+Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
 /// Kavan and Žára 2005: the point that the rigid parts come nearest to agreeing on.
 glm::dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning);
 

@@ -22,15 +22,15 @@ constexpr double leastWeight = 0x1p-49;
 }  // namespace
 
 dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
-  struct Rigid {
+  struct Turned {
     dmat3 rotation;
     dvec3 translation;
   };
-  std::vector<Rigid> joints;
+  std::vector<Turned> joints;
   for (const Influence& influence : vertex.influences) {
     if (influence.weight < leastWeight) continue;
-    const glm::dmat4x3 matrix = toMatrix(vertex.joints[influence.joint].rigid);
-    joints.push_back({dmat3(matrix[0], matrix[1], matrix[2]), dvec3(matrix[3])});
+    const Joint& joint = vertex.joints[influence.joint];
+    joints.push_back({matrixOf(joint.rigid.real), joint.translation});
   }
   // The normal equations of (R_a − R_b) r = t_b − t_a over all pairs.
   dmat3 square(0.0);
