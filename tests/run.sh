@@ -14,4 +14,4 @@ preset=${1:-ci}
 cmake --preset "$preset"
 cmake --build "build/$preset"
 # LLVM, inside lavapipe, keeps memory until the process ends.
-ASAN_OPTIONS=${ASAN_OPTIONS:-detect_leaks=0} ctest --test-dir "build/$preset" --output-on-failure --timeout 900
+ASAN_OPTIONS=${ASAN_OPTIONS:-detect_leaks=0} ctest --test-dir "build/$preset" --output-on-failure --timeout 900 -j "$(nproc)"

@@ -52,7 +52,10 @@ Golden readGolden(const std::filesystem::path& path) {
 double skinAndCompare(const std::filesystem::path& model, const std::string& animation,
                       const std::string& time, bool dualQuaternion, const std::string& device,
                       const Golden& golden) {
-  const std::string out = ::testing::TempDir() + "golden_" + device + ".ply";
+  // Of the running test alone: others may run at the same time.
+  std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  std::replace(test.begin(), test.end(), '/', '_');
+  const std::string out = ::testing::TempDir() + "golden_" + test + ".ply";
   const CommandResult result = runCommand(
       {DERMIS_COMMAND, "skin", model.string(), "-o", out, "--animation", animation, "--time", time,
        "--method", dualQuaternion ? "dual_quaternion" : "linear", "--device", device});
