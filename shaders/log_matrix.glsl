@@ -55,24 +55,16 @@ Vertex skinLogMatrix(Vertex vertex, Influences influences, uint palette, uint jo
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
-  ScaleShear firstPart = ScaleShear(vec3(1.0), vec3(0.0));
-  if (twoPhase) firstPart = paletteScaleShear(palette, jointCount, influenceJoint(influences, 0u));
-  precise vec3 diagonal = firstPart.diagonal;
-  precise vec3 mixed = firstPart.mixed;
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
     r0 += weight * paletteLogarithmRow(palette, joint, 0u);
     r1 += weight * paletteLogarithmRow(palette, joint, 1u);
     r2 += weight * paletteLogarithmRow(palette, joint, 2u);
-    if (twoPhase) {
-      ScaleShear part = paletteScaleShear(palette, jointCount, joint);
-      diagonal += weight * (part.diagonal - firstPart.diagonal);
-      mixed += weight * (part.mixed - firstPart.mixed);
-    }
   }
   Affine blended = exponentialOf(Affine(r0, r1, r2));
-  Scaled scaled = scaleVertex(vertex, ScaleShear(diagonal, mixed), twoPhase, withNormal, withTangent);
+  ScaleShear part = blendScaleShear(influences, palette, jointCount, twoPhase);
+  Scaled scaled = scaleVertex(vertex, part, twoPhase, withNormal, withTangent);
   Vertex skinned = scaled.vertex;
   precise vec3 position = direct(blended, scaled.vertex.position) + vec3(blended.r0.w, blended.r1.w, blended.r2.w);
   skinned.position = position;
