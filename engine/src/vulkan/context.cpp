@@ -122,6 +122,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxWorkgroupCountX = properties.limits.maxComputeWorkGroupCount[0];
   state.limits.maxWorkgroupCountY = properties.limits.maxComputeWorkGroupCount[1];
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
+  state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
   if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
     return Error{ErrorCode::missingFeature,
