@@ -4,6 +4,7 @@
 #include <string>
 
 #include "abi.h"
+#include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
 
@@ -95,6 +96,8 @@ Result<void> Context::State::createLayouts() {
     pipelineLayout = VK_NULL_HANDLE;
     return vulkanError("vkCreatePipelineLayout", result);
   }
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT, setLayout, "dermis");
+  nameObject(table, device, VK_OBJECT_TYPE_PIPELINE_LAYOUT, pipelineLayout, "dermis");
   return {};
 }
 

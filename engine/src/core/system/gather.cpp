@@ -183,10 +183,10 @@ bool Scene::commitShift(SceneInstance& instance, InstanceHandle handle) {
   if (!instance.target) return true;  // waiting; listed again when it is placed
   const bool isMove = instance.shown && instance.shown->mesh == instance.target->mesh;
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
-  if (instance.shown && instance.shown != instance.target) {
-    retire(Retired::Store::output, instance.shown->bytes);
-    if (!instance.isInternal) moved_.push_back(handle);
-  }
+  const bool moves = instance.shown && instance.shown != instance.target;
+  if (moves) retire(Retired::Store::output, instance.shown->bytes);
+  if ((moves && !instance.isInternal) || instance.showsBindPose) moved_.push_back(handle);
+  instance.showsBindPose = false;
   instance.shown = instance.target;
   return true;
 }

@@ -101,6 +101,7 @@ Result<void> Scene::setMesh(InstanceHandle handle, MeshHandle mesh) {
     shifting_.push_back(handle);
   } else {
     waiting_.push_back(handle);
+    instance.showsBindPose = static_cast<bool>(instance.bindPose);
     if (description_.overflow == OverflowPolicy::bindPose && instance.shown) {
       retire(Retired::Store::output, instance.shown->bytes);
       instance.shown.reset();

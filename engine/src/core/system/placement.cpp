@@ -270,6 +270,7 @@ Result<InstanceHandle> Scene::insert(const InstanceDescription& description, boo
     added.culledIndex = static_cast<std::uint32_t>(culled_.size());
     culled_.push_back(handle.index);
   }
+  added.showsBindPose = !added.target && added.bindPose;
   (added.target ? shifting_ : waiting_).push_back(handle);
   makeStale(handle.index);
   return handle;

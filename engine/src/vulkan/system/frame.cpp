@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <string>
 
 #include "abi.h"
 #include "dermis/vulkan/scope.h"
@@ -115,6 +116,12 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
     return Error{ErrorCode::invalidArgument,
                  "FrameDescription::visibility is null, and there are instances that are culled on "
                  "the GPU"};
+  }
+  if (scene.frame().culled().groupCount > context->limits.maxWorkgroupCountX) {
+    return Error{ErrorCode::limitExceeded,
+                 "instances that are culled on the GPU have " +
+                     std::to_string(scene.frame().culled().groupCount) +
+                     " meshes and layouts, more than the device can count workgroups"};
   }
   if (culls) {
     if (Result<void> ready = prepareCulling(); !ready) return ready;
