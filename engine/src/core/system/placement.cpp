@@ -5,6 +5,7 @@
 
 #include "plan/check.h"
 #include "plan/outputs.h"
+#include "system/errors.h"
 #include "system/scene.h"
 
 namespace dermis {
@@ -32,22 +33,14 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVer
   return job;
 }
 
-template <typename ThingHandle>
-Error unknown(const char* kind, ThingHandle handle) {
-  return {ErrorCode::invalidArgument, "the instance's " + std::string(kind) + " handle, " +
-                                          std::to_string(handle.index) + " of generation " +
-                                          std::to_string(handle.generation) +
-                                          ", is null, of something removed, or another system's"};
-}
-
 }  // namespace
 
 /// Whether it could be skinned, were there room.
 Result<void> Scene::check(const SceneInstance& instance) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
-  if (mesh == nullptr) return unknown("mesh", instance.mesh);
+  if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
   const ScenePalette* palette = palettes_.find(instance.paletteHandle);
-  if (palette == nullptr) return unknown("palette", instance.paletteHandle);
+  if (palette == nullptr) return unknownHandle("palette", instance.paletteHandle);
   if (instance.updateInterval == 0) {
     return invalid("the instance's update interval is 1 or more frames, not 0");
   }
