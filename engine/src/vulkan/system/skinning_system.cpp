@@ -205,7 +205,7 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
         !built)
       return built;
   }
-  return {};
+  return description.culledOnGpu ? state_->prepareVisibility() : Result<void>();
 }
 
 // -- What changes.
