@@ -34,6 +34,7 @@
   X(EndCommandBuffer)                     \
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
+  X(CmdCopyBuffer)                        \
   X(CreateQueryPool)                      \
   X(DestroyQueryPool)                     \
   X(CmdResetQueryPool)                    \
@@ -42,6 +43,7 @@
   X(QueueSubmit)                          \
   X(CreateFence)                          \
   X(DestroyFence)                         \
+  X(ResetFences)                          \
   X(WaitForFences)                        \
   X(DeviceWaitIdle)
 
