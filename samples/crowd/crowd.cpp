@@ -163,9 +163,9 @@ Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
 
 Result<void> Crowd::move(const CrowdFigure& figure) {
   const FigureFrame& now = figure.now;
-  // Who is out of view need not be animated, if only the CPU knows that he is.
-  for (std::uint32_t skin = 0; skin < figure.palettes.size(); ++skin) {
-    if (!now.isInView && !options_.culledOnGpu) break;
+  // Where it is the CPU that knows who is out of view, he need not be animated.
+  const bool isAnimated = now.isInView || options_.culledOnGpu;
+  for (std::uint32_t skin = 0; isAnimated && skin < figure.palettes.size(); ++skin) {
     const Result<std::span<JointMatrix>> pose = system_.writePose(figure.palettes[skin]);
     if (!pose) return pose.error();
     std::ranges::copy(character_->pose(now.pose, skin), pose->begin());

@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <new>
 #include <optional>
@@ -26,9 +27,6 @@ namespace {
 
 using namespace dermis;
 using namespace crowd;
-
-/// Frames from one that is checked to the next; the last is checked in any case.
-constexpr std::uint64_t checkedFrames = 20;
 
 ExitStatus reportDeviceError(const Error& error) {
   const bool noDevice =
@@ -54,7 +52,7 @@ Result<void> playFrame(Show& show, const Options& options) {
     return done;
   show.shown.follow(show.crowd, frame);
   show.report.add(show.crowd, show.shown.counts());
-  if (options.verifies && (frame % checkedFrames == 0 || frame == options.frames)) {
+  if (options.verifies && (frame % options.checkInterval == 0 || frame == options.frames)) {
     if (Result<void> done = show.check.capture(show.crowd, show.shown, frame, *commandBuffer);
         !done)
       return done;
@@ -86,7 +84,7 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
   ReportTitle title;
   title.device = open.device->info().name;
   title.driver = samples::driverVersion(*open.device);
-  title.model = options.model;
+  title.model = std::filesystem::path(options.model).filename().string();
   title.meshes = character.parts().size();
   title.verticesOfFigure = character.vertexCount();
   title.framesInFlight = options.crowd.framesInFlight;

@@ -60,6 +60,9 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
                  "MiB of skinned vertices [enough for all figures]")
       ->check(CLI::Range(1u, mostMebibytes));
   app.add_option("--json", options.json, "Write the same numbers to a file");
+  app.add_option("--check-every", options.checkInterval,
+                 "Compare every vertex in each frame of so many, and in the last [10]")
+      ->check(CLI::Range(1u, mostFrames));
   app.add_flag("--no-verify", skipsVerification, "Do not read back: for times that count");
   app.add_flag("--gpu-culling", options.crowd.culledOnGpu,
                "Let the GPU choose which instances are visible");

@@ -30,7 +30,8 @@ struct Options {
   std::string json;
   CrowdOptions crowd;
   bool verifies = true;
-  bool validates = false;  ///< with the validation layer
+  std::uint32_t checkInterval = 10;  ///< frames from one that is compared to the next
+  bool validates = false;            ///< with the validation layer
 };
 
 /// Nothing where the program is to go on.
