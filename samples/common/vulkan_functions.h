@@ -34,6 +34,9 @@
   X(EndCommandBuffer)                     \
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
+  X(CmdCopyBuffer)                        \
+  X(CmdBeginQuery)                        \
+  X(CmdEndQuery)                          \
   X(CreateQueryPool)                      \
   X(DestroyQueryPool)                     \
   X(CmdResetQueryPool)                    \
