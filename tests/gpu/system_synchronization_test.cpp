@@ -99,10 +99,7 @@ class BusyScene {
     device_.functions().CmdCopyBuffer(commandBuffer, engine_->outputBuffer(),
                                       drawn_[engine_.frame() % framesInFlight].handle(), 1, &all);
   }
-  template <typename Count>
-  std::uint32_t below(Count count) {
-    return static_cast<std::uint32_t>(random_() % count);
-  }
+  std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   void add() {
     const std::uint32_t seed = below(100);
     if (palettes_.size() < 12) palettes_.push_back(engine_.addPalette(systemPose(seed)));
