@@ -108,6 +108,8 @@ class Scene {
     description.context = &open.context;
     description.tuning = open.context.tuning();
     description.jointBudget = instanceCount * jointCount;
+    description.instanceBudget = instanceCount;
+    description.boundsBudget = 0;
     description.outputBudget = std::uint64_t{instanceCount} * (meanVertexCount + 1000) * 24;
     description.measuresGpuTime = true;
     return description;

@@ -204,6 +204,25 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
   full.submit();
 }
 
+TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
+  SkinningSystemDescription small = description();
+  small.instanceBudget = 3;
+  small.boundsBudget = 1;
+  SingleInstance first(device(), small, plainLayout());
+  EXPECT_EQ(first.engine->instanceCapacity(), 3u);
+  InstanceDescription bounded = first.description;
+  bounded.bounds = true;
+  const InstanceHandle second = first.engine.addInstance(bounded);
+  expectRefused(first.engine->addInstance(bounded), ErrorCode::limitExceeded, "bounds");
+  first.engine.addInstance(first.description);
+  expectRefused(first.engine->addInstance(first.description), ErrorCode::limitExceeded,
+                "instances");
+  must(first.engine->removeInstance(second));
+  first.engine.addInstance(bounded);
+  first.engine.submit();
+  EXPECT_EQ(first.engine.lastFrame().instances, 3u);
+}
+
 TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
   SkinningSystem system = must(SkinningSystem::create(description()));
   expectInvalid(system.record(VK_NULL_HANDLE), "record before any frame");
@@ -218,7 +237,7 @@ TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
   must(system.beginFrame(3, 1));
   expectInvalid(system.beginFrame(4, 0), "what was complete is so no longer");
   expectInvalid(system.beginFrame(2, 1), "backwards");
-  must(system.beginFrame(10, 3));
+  must(system.beginFrame(4, 3));
 }
 
 TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
@@ -238,6 +257,7 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
       {"meshBudget", [](SkinningSystemDescription& d) { d.meshBudget = 0; }},
       {"jointBudget", [](SkinningSystemDescription& d) { d.jointBudget = 0; }},
       {"outputBudget", [](SkinningSystemDescription& d) { d.outputBudget = 0; }},
+      {"instanceBudget", [](SkinningSystemDescription& d) { d.instanceBudget = 0; }},
       {"memory", [&](SkinningSystemDescription& d) { d.memory.allocate = allocate; }},
       {"tuning", [](SkinningSystemDescription& d) { d.tuning.workgroupSize = 33; }},
   };

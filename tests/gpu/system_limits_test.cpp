@@ -135,22 +135,22 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuReachesEveryRange) {
   system.context = &narrow;
   system.meshBudget = 192 << 10;
   system.jointBudget = 1024;
-  system.outputBudget = 1 << 20;
+  system.outputBudget = 600 * 70 * 24 + (1 << 16);
   SystemEngine engine(device(), system);
   engine.begin();
   InstanceDescription instance;
   instance.layout = plainLayout();
   instance.culledOnGpu = true;
-  instance.mesh = engine.addMesh(meshes_[0]);
+  instance.mesh = engine.addMesh(meshes_[1]);
   instance.palette = engine.addPalette(systemPose(1));
   std::vector<InstanceHandle> instances;
-  for (int i = 0; i < 30; ++i) instances.push_back(engine.addInstance(instance));
+  for (int i = 0; i < 600; ++i) instances.push_back(engine.addInstance(instance));
   const samples::MappedBuffer words = must(samples::MappedBuffer::create(
       device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::ranges::fill(words.bytes(), std::byte{1});
   engine.submit({words.handle(), 0});
   const std::vector<std::byte> bytes = engine.readOutput();
-  const Streams expected = alone(meshes_[0], systemPose(1), instance);
+  const Streams expected = alone(meshes_[1], systemPose(1), instance);
   for (const InstanceHandle handle : instances) expectSkinned(engine.read(bytes, handle), expected);
 }
 

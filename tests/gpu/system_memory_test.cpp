@@ -76,8 +76,8 @@ class SystemMemoryTest : public SystemTest {
  protected:
   /// Everything for which a system may want memory: culling, bounds, copies of many frames.
   void use(SystemEngine& engine) {
-    const samples::MappedBuffer visibility =
-        must(samples::MappedBuffer::create(device(), 4096 * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    const samples::MappedBuffer visibility = must(samples::MappedBuffer::create(
+        device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
     const PackedMesh packed = systemMesh(1, 100);
     engine.begin();
     InstanceDescription instance;

@@ -47,7 +47,8 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
     small.overflow = GetParam();
     small.framesInFlight = framesInFlight;
     small.meshBudget = 512 << 10;
-    small.jointBudget = 8 * 60;
+    small.jointBudget = 8 * 80;
+    small.instanceBudget = 200;
     small.outputBudget = 120 << 10;  // so small that it is full at times
     engine_.emplace(device(), small);
     model_.emplace(*engine_);
@@ -187,6 +188,7 @@ void SystemModelTest::setMesh(ModelInstance& instance) {
   instance.mesh = mesh->first;
   instance.description.mesh = mesh->second.handle;
   instance.vertexCount = vertexCount;
+  instance.morphs = 0;
   instance.isChanged = instance.changesMesh = true;
 }
 

@@ -199,6 +199,20 @@ TEST_F(SystemOverflowTest, AChangedMeshWaitsWithTheLastResult) {
   expectPose(first, dense, 12, 12);
 }
 
+TEST_F(SystemOverflowTest, TheLastResultComesToRest) {
+  open(OverflowPolicy::keepLast, 2);
+  const InstanceHandle first = add(0);
+  add(1);
+  engine_->submit();
+  moveAll(10);
+  engine_->begin();
+  must(system().setMesh(first, engine_->addMesh(systemMesh(2, 90))));
+  engine_->submit();
+  const Streams streams = engine_->read(first);
+  EXPECT_TRUE(streams[positionStream] == alone(packed_, systemPose(10), instance_)[positionStream]);
+  EXPECT_TRUE(streams[previousStream] == streams[positionStream]) << "it moves no longer";
+}
+
 // The old mesh is needed no longer, but nothing of it either: its last result stands in the output.
 TEST_F(SystemOverflowTest, ChangingBackEndsTheWait) {
   open(OverflowPolicy::keepLast, 2);

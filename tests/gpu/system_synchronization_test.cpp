@@ -51,6 +51,7 @@ class SystemSynchronizationTest : public SystemTest {
     strict.context = &open_->context;
     strict.framesInFlight = framesInFlight;
     strict.outputBudget = 256 << 10;
+    strict.instanceBudget = 1000;
     return strict;
   }
 
@@ -66,7 +67,8 @@ class BusyScene {
       : device_(device), engine_(device, system) {
     const VkBufferUsageFlags usage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-    visibility_ = must(samples::MappedBuffer::create(device, 4096 * 4, usage));
+    visibility_ =
+        must(samples::MappedBuffer::create(device, engine_->instanceCapacity() * 4, usage));
     for (samples::MappedBuffer& drawn : drawn_)
       drawn = must(samples::MappedBuffer::create(device, system.outputBudget, usage, true));
     size_ = system.outputBudget;

@@ -37,6 +37,8 @@ vulkan::SkinningSystemDescription SystemTest::description() {
   description.context = &context();
   description.meshBudget = 4 << 20;
   description.jointBudget = 4096;
+  description.instanceBudget = 4096;
+  description.boundsBudget = 256;
   description.outputBudget = 4 << 20;
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                             VK_BUFFER_USAGE_TRANSFER_DST_BIT;
