@@ -64,15 +64,7 @@ void SystemModel::checkPlacesAreApart() const {
   }
 }
 
-void SystemModel::checkInterval(const ModelInstance& instance) {
-  // Instances of one palette take the same frames.
-  const std::uint32_t interval = instance.description.updateInterval;
-  std::map<std::uint32_t, std::uint64_t>& phases = palettes.at(instance.palette).phases;
-  const std::uint64_t phase = engine_.frame() % interval;
-  EXPECT_EQ(phases.emplace(interval, phase).first->second, phase) << "it takes other frames";
-}
-
-bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, const Lists& lists) {
+bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
   const bool comesBack = !instance.wasDisplayed;
   const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
   const bool isForced = isPlaced || instance.teleports || isOwed;
@@ -82,13 +74,15 @@ bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, con
     EXPECT_TRUE(isSkinned) << "it changed";
   } else if (!instance.isChanged && !comesBack) {
     EXPECT_FALSE(isSkinned) << "it did not change";
-  } else if (isSkinned && !comesBack) {
-    checkInterval(instance);
+  } else if (!comesBack) {
+    const std::pair beat{instance.palette, instance.description.updateInterval};
+    EXPECT_EQ(lists.beats.emplace(beat, isSkinned).first->second, isSkinned)
+        << "instances of one palette take the same frames";
   }
   return isSkinned;
 }
 
-void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, const Lists& lists) {
+void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
   const bool comesBack = !instance.wasDisplayed;
   const bool hasPrevious = instance.description.layout.previousPositions;
   const bool isSettled = lists.settled.contains(instance.handle.index);
@@ -128,7 +122,7 @@ void SystemModel::updateHidden(ModelInstance& instance, bool isPlaced, const Lis
   instance.wasDisplayed = false;
 }
 
-void SystemModel::update(ModelInstance& instance, const Lists& lists) {
+void SystemModel::update(ModelInstance& instance, Lists& lists) {
   const InstanceOutput output = must(engine_->output(instance.handle));
   checkPlace(instance, output, lists.moved.contains(instance.handle.index));
   const bool isOwn = output.state == OutputState::own;
@@ -170,8 +164,10 @@ void SystemModel::checkStatistics(const Lists& lists) const {
 }
 
 void SystemModel::afterRecord() {
-  const Lists lists{indicesOf(engine_->skinnedInstances()), indicesOf(engine_->settledInstances()),
-                    indicesOf(engine_->movedInstances())};
+  Lists lists{indicesOf(engine_->skinnedInstances()),
+              indicesOf(engine_->settledInstances()),
+              indicesOf(engine_->movedInstances()),
+              {}};
   for (ModelInstance& instance : instances) {
     SCOPED_TRACE("frame " + std::to_string(engine_.frame()) + ", instance " +
                  std::to_string(instance.handle.index));

@@ -24,7 +24,6 @@ struct ShownPose {
 struct ModelPalette {
   PaletteHandle handle;
   std::uint32_t pose = 0;
-  std::map<std::uint32_t, std::uint64_t> phases;  ///< frame modulo interval, where it is known
 };
 
 struct ModelInstance {
@@ -78,6 +77,8 @@ class SystemModel {
   };
   struct Lists {
     std::set<std::uint32_t> skinned, settled, moved;
+    /// By palette and interval, whether its instances took this frame.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, bool> beats;
   };
   ShownPose wantedPose(const ModelInstance& instance) const {
     return {instance.mesh, palettes.at(instance.palette).pose, instance.morphs};
@@ -85,11 +86,10 @@ class SystemModel {
   void lock(const InstanceOutput& output);
   void checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed);
   void checkPlacesAreApart() const;
-  void update(ModelInstance& instance, const Lists& lists);
+  void update(ModelInstance& instance, Lists& lists);
   void updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists);
-  void updateDisplayed(ModelInstance& instance, bool isPlaced, const Lists& lists);
-  bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, const Lists& lists);
-  void checkInterval(const ModelInstance& instance);
+  void updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists);
+  bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists);
   void checkStatistics(const Lists& lists) const;
 
   SystemEngine& engine_;

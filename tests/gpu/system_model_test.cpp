@@ -121,7 +121,7 @@ void SystemModelTest::addPalette() {
   const std::uint32_t pose = below(poseCount);
   const Result<PaletteHandle> added = system().addPalette(8);
   if (!added) return;  // places of palettes that went are not free yet
-  model_->palettes[nextNumber_++] = {*added, pose, {}};
+  model_->palettes[nextNumber_++] = {*added, pose};
   engine_->writePose(*added, systemPose(pose));
 }
 
