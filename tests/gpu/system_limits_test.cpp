@@ -191,7 +191,7 @@ TEST_F(SystemLimitsTest, FourStorageBuffersAreEnough) {
     bounded.bounds = true;
     const Result<InstanceHandle> refused = engine->addInstance(bounded);
     ASSERT_FALSE(refused.ok());
-    EXPECT_EQ(refused.error().code, ErrorCode::missingFeature) << refused.error().message;
+    EXPECT_EQ(refused.error().code, ErrorCode::limitExceeded) << refused.error().message;
     engine.runFrame();
   }
 }

@@ -78,6 +78,10 @@ class BusyScene {
     engine_.afterRecord = [this](VkCommandBuffer buffer) { draw(buffer); };
   }
 
+  ~BusyScene() { engine_.finish(); }
+  BusyScene(const BusyScene&) = delete;
+  BusyScene& operator=(const BusyScene&) = delete;
+
   void runFrame(std::uint32_t underWay = framesInFlight - 1) {
     engine_.begin(underWay);
     change();
