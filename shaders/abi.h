@@ -174,6 +174,10 @@ DERMIS_CONSTANT INSTANCE_WORDS = 8u;
 
 DERMIS_CONSTANT INSTANCE_RESTARTS = 1u;  // previous positions are the current ones
 DERMIS_CONSTANT INSTANCE_SETTLES = 2u;   // not skinned; previous positions become the current ones
+// Of instances that the GPU chooses:
+DERMIS_CONSTANT INSTANCE_HAS_MOTION = 4u;  // it has previous positions
+DERMIS_CONSTANT INSTANCE_HAS_RESULT =
+    8u;  // its extension names one, to be cleared when it is skinned
 
 // What only some instances have.
 DERMIS_CONSTANT EXTENSION_PREVIOUS_PALETTE = 0u;  // as INSTANCE_PALETTE
@@ -198,11 +202,57 @@ DERMIS_CONSTANT RESULT_CLAMPED = 3u;
 DERMIS_CONSTANT RESULT_MAX = 4u;  // likewise
 DERMIS_CONSTANT RESULT_WORDS = 8u;
 
+// Instances that the GPU chooses. Behind the records of a frame's tables stand, for each such
+// instance, in the order of the instance records, what the visibility kernel has to know of it …
+DERMIS_CONSTANT CANDIDATE_SLOT = 0u;  // its place in the visibility and history buffers
+DERMIS_CONSTANT CANDIDATE_VERSION =
+    1u;  // of what it should show; different for all instances and poses
+DERMIS_CONSTANT CANDIDATE_OWNER = 2u;  // who has the slot
+DERMIS_CONSTANT CANDIDATE_WORDS = 4u;
+// … for each of their dispatches its groups …
+DERMIS_CONSTANT CULLED_DISPATCH_GROUPS = 0u;  // word offset of the first group record
+DERMIS_CONSTANT CULLED_DISPATCH_GROUP_COUNT = 1u;
+DERMIS_CONSTANT CULLED_DISPATCH_INSTANCES = 2u;  // instances per invocation
+DERMIS_CONSTANT CULLED_DISPATCH_WORDS = 4u;
+// … and the arguments of the indirect dispatches, as VkDispatchIndirectCommand, which the kernel
+// writes.
+DERMIS_CONSTANT INDIRECT_WORDS = 4u;
+
+// What the GPU remembers of a slot.
+DERMIS_CONSTANT HISTORY_OWNER = 0u;
+DERMIS_CONSTANT HISTORY_VERSION = 1u;       // that was last skinned
+DERMIS_CONSTANT HISTORY_LAST_VISIBLE = 2u;  // frame
+DERMIS_CONSTANT HISTORY_LAST_MOVED = 3u;  // frame in which it was skinned, its motion not restarted
+DERMIS_CONSTANT HISTORY_WORDS = 4u;
+
+// What the visibility kernel counts, for the engine's statistics.
+DERMIS_CONSTANT COUNTER_VISIBLE = 0u;
+DERMIS_CONSTANT COUNTER_SKINNED = 1u;
+DERMIS_CONSTANT COUNTER_SETTLED = 2u;
+DERMIS_CONSTANT COUNTER_WORKGROUPS = 3u;
+DERMIS_CONSTANT COUNTER_WORDS = 4u;
+
+// Bindings of the visibility kernel; the tables are written too.
+DERMIS_CONSTANT BINDING_VISIBILITY = 1u;
+DERMIS_CONSTANT BINDING_HISTORY = 2u;
+DERMIS_CONSTANT BINDING_COUNTERS = 3u;
+
+// Push constants of the visibility kernel, by word.
+DERMIS_CONSTANT PUSH_CULLED_GROUPS = 0u;      // word offset of the first group, or culled dispatch
+DERMIS_CONSTANT PUSH_CULLED_CANDIDATES = 1u;  // word offset, or that of the indirect arguments
+DERMIS_CONSTANT PUSH_CULLED_FRAME = 2u;       // number of the frame, or the most workgroups in x
+DERMIS_CONSTANT PUSH_CULLED_INSTANCES = 3u;   // word offset of the instance records
+DERMIS_CONSTANT PUSH_CULLED_FIRST_INSTANCE = 4u;  // the number of the first culled one
+DERMIS_CONSTANT PUSH_CULLED_COUNT = 5u;           // of groups or dispatches: one workgroup each
+DERMIS_CONSTANT PUSH_CULLED_PASS = 6u;            // 0: instances, 1: dispatches
+DERMIS_CONSTANT PUSH_CULLED_WORDS = 8u;
+
 // Push constants, by word.
 DERMIS_CONSTANT PUSH_FIRST_RECORD = 0u;
 DERMIS_CONSTANT PUSH_RECORD_COUNT = 1u;
 DERMIS_CONSTANT PUSH_WORKGROUP_COUNT = 2u;
-DERMIS_CONSTANT PUSH_INSTANCE_RECORDS = 3u;  // palette kernel: the number of results to clear
+DERMIS_CONSTANT PUSH_INSTANCE_RECORDS =
+    3u;  // palette kernel: how many results to clear; their numbers follow the palette records
 DERMIS_CONSTANT PUSH_WORDS = 4u;
 
 #ifdef __cplusplus

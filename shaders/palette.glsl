@@ -55,10 +55,9 @@ void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
 void clearResult(uint number) {
 #ifndef ONE_OUTPUT
   if (number >= push[PUSH_INSTANCE_RECORDS]) return;
-  for (uint word = 0u; word < RESULT_WORDS; ++word) results[number * RESULT_WORDS + word] = 0u;
-  for (uint axis = 0u; axis < 3u; ++axis) {
-    results[number * RESULT_WORDS + RESULT_MIN + axis] = 0xffffffffu;
-  }
+  uint result = tables[push[PUSH_FIRST_RECORD] + push[PUSH_RECORD_COUNT] * PALETTE_WORDS + number] * RESULT_WORDS;
+  for (uint word = 0u; word < RESULT_WORDS; ++word) results[result + word] = 0u;
+  for (uint axis = 0u; axis < 3u; ++axis) results[result + RESULT_MIN + axis] = 0xffffffffu;
 #endif
 }
 

@@ -6,6 +6,8 @@
 #include "dermis/centers_of_rotation.h"
 #include "dermis/dual_quat.h"
 #include "dermis/glm.h"
+#include "dermis/handle.h"
+#include "dermis/instance.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/pack.h"

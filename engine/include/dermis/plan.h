@@ -293,6 +293,7 @@ class Plan {
  private:
   friend Result<void> makePlan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
   friend Result<void> writeTables(const Plan&, std::span<std::byte>);
+  friend class FrameBuilder;  // of SkinningSystem
   struct State;
   std::unique_ptr<State> state_;
 };

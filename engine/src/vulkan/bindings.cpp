@@ -7,6 +7,7 @@
 
 #include "abi.h"
 #include "vulkan/descriptor_writes.h"
+#include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
 
@@ -199,6 +200,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
     state.pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorPool", result);
   }
+  nameObject(context.table, context.device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, state.pool, "dermis");
   const std::vector<VkDescriptorSetLayout> layouts(setCount, context.setLayout);
   state.sets.resize(setCount);
   VkDescriptorSetAllocateInfo allocateInfo{};

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "abi.h"
+#include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
 
@@ -95,6 +96,8 @@ Result<void> Context::State::createLayouts() {
     pipelineLayout = VK_NULL_HANDLE;
     return vulkanError("vkCreatePipelineLayout", result);
   }
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT, setLayout, "dermis");
+  nameObject(table, device, VK_OBJECT_TYPE_PIPELINE_LAYOUT, pipelineLayout, "dermis");
   return {};
 }
 
@@ -122,6 +125,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxWorkgroupCountX = properties.limits.maxComputeWorkGroupCount[0];
   state.limits.maxWorkgroupCountY = properties.limits.maxComputeWorkGroupCount[1];
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
+  state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
   if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
     return Error{ErrorCode::missingFeature,

@@ -32,6 +32,8 @@ class Loader {
                        [&](const char* name) { return name != nullptr && extension == name; });
   }
 
+  PFN_vkGetDeviceProcAddr deviceProcAddr() const { return getDeviceProcAddr_; }
+
   const std::string& firstMissing() const { return firstMissing_; }
 
  private:
@@ -50,6 +52,7 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
   DispatchTable table;
   Loader loader(description);
   loader.instanceFunction("vkGetPhysicalDeviceProperties", table.getPhysicalDeviceProperties);
+  table.getDeviceProcAddr = loader.deviceProcAddr();
 
   loader.deviceFunction("vkCreateShaderModule", table.createShaderModule);
   loader.deviceFunction("vkDestroyShaderModule", table.destroyShaderModule);

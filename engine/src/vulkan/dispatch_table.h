@@ -10,6 +10,7 @@
 namespace dermis::vulkan {
 
 struct DispatchTable {
+  PFN_vkGetDeviceProcAddr getDeviceProcAddr = nullptr;
   PFN_vkGetPhysicalDeviceProperties getPhysicalDeviceProperties = nullptr;
 
   PFN_vkCreateShaderModule createShaderModule = nullptr;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "dermis/vulkan/kernels.h"
+#include "vulkan/object_name.h"
 #include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
@@ -26,6 +27,8 @@ Result<void> Pipelines::createModule(const Variant& variant) {
       result != VK_SUCCESS) {
     return vulkanError("vkCreateShaderModule", result);
   }
+  nameObject(table_, device_, VK_OBJECT_TYPE_SHADER_MODULE, module.module,
+             variant.kernel == Kernel::palette ? "dermis palette" : "dermis skin");
   modules_.push_back(module);
   return {};
 }
@@ -95,17 +98,10 @@ Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
       result != VK_SUCCESS) {
     return vulkanError("vkCreateComputePipelines", result);
   }
-  if (table_.setDebugUtilsObjectName != nullptr) {
-    const std::string name = variant.kernel == Kernel::palette
-                                 ? std::string("dermis palette")
-                                 : "dermis skin " + std::string(methodName(variant.method));
-    VkDebugUtilsObjectNameInfoEXT nameInfo{};
-    nameInfo.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
-    nameInfo.objectType = VK_OBJECT_TYPE_PIPELINE;
-    nameInfo.objectHandle = reinterpret_cast<std::uint64_t>(pipeline);
-    nameInfo.pObjectName = name.c_str();
-    table_.setDebugUtilsObjectName(device_, &nameInfo);
-  }
+  const std::string name = variant.kernel == Kernel::palette
+                               ? std::string("dermis palette")
+                               : "dermis skin " + std::string(methodName(variant.method));
+  nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
 
   const std::unique_lock lock(mutex_);
   if (!pipelines_.try_emplace(variant.key(), pipeline).second) {

@@ -36,6 +36,8 @@ class Pipelines {
   /// VK_NULL_HANDLE where the variant has not been built.
   VkPipeline find(const Variant& variant) const;
 
+  VkPipelineCache cache() const { return cache_; }
+
  private:
   Result<void> createModule(const Variant& variant);
   VkShaderModule moduleOf(const Variant& variant) const;

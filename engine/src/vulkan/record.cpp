@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "vulkan/descriptor_writes.h"
+#include "vulkan/label.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {
@@ -18,30 +19,6 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
   return Error{ErrorCode::invalidArgument, std::string("the plan needs ") + std::to_string(needed) +
                                                " bytes of " + name + ", the bindings have " +
                                                std::to_string(given)};
-}
-
-/// What the palette kernel wrote becomes visible to the skin kernel, which adds to the results.
-void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
-                          const BatchBuffers& buffers) {
-  std::array<VkBufferMemoryBarrier, 2> barriers{};
-  std::uint32_t count = 0;
-  for (const auto& [range, accesses] :
-       {std::pair{&buffers.palettes, VkAccessFlags{VK_ACCESS_SHADER_READ_BIT}},
-        {&buffers.results, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}}) {
-    if (range->buffer == VK_NULL_HANDLE) continue;
-    VkBufferMemoryBarrier& barrier = barriers[count++];
-    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
-    barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
-    barrier.dstAccessMask = accesses;
-    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.buffer = range->buffer;
-    barrier.offset = range->offset;
-    barrier.size = range->size;
-  }
-  table.cmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-                           VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 0, nullptr, count,
-                           barriers.data(), 0, nullptr);
 }
 
 std::string describe(const Variant& variant) {
@@ -60,27 +37,6 @@ std::string describe(const Variant& variant) {
                                   : std::to_string(variant.influences)) +
          " influences";
 }
-
-class Label {
- public:
-  Label(const DispatchTable& table, VkCommandBuffer commandBuffer, const char* name)
-      : table_(table), commandBuffer_(commandBuffer) {
-    if (table_.cmdBeginDebugUtilsLabel == nullptr) return;
-    VkDebugUtilsLabelEXT label{};
-    label.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_LABEL_EXT;
-    label.pLabelName = name;
-    table_.cmdBeginDebugUtilsLabel(commandBuffer_, &label);
-  }
-  ~Label() {
-    if (table_.cmdEndDebugUtilsLabel != nullptr) table_.cmdEndDebugUtilsLabel(commandBuffer_);
-  }
-  Label(const Label&) = delete;
-  Label& operator=(const Label&) = delete;
-
- private:
-  const DispatchTable& table_;
-  VkCommandBuffer commandBuffer_;
-};
 
 }  // namespace
 
@@ -137,6 +93,60 @@ Result<void> Bindings::State::check(const Plan& plan) const {
   return {};
 }
 
+void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
+                          const BatchBuffers& buffers) {
+  std::array<VkBufferMemoryBarrier, 2> barriers{};
+  std::uint32_t count = 0;
+  for (const auto& [range, accesses] :
+       {std::pair{&buffers.palettes, VkAccessFlags{VK_ACCESS_SHADER_READ_BIT}},
+        {&buffers.results, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}}) {
+    if (range->buffer == VK_NULL_HANDLE) continue;
+    VkBufferMemoryBarrier& barrier = barriers[count++];
+    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
+    barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+    barrier.dstAccessMask = accesses;
+    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.buffer = range->buffer;
+    barrier.offset = range->offset;
+    barrier.size = range->size;
+  }
+  table.cmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                           VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 0, nullptr, count,
+                           barriers.data(), 0, nullptr);
+}
+
+void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
+                    const Bindings::State& bound, const IndirectArguments* arguments) {
+  const Context::State& context = *bound.context;
+  const DispatchTable& table = context.table;
+  const bool isPalette = dispatch.variant.kernel == Kernel::palette;
+  table.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
+                        context.pipelines->find(dispatch.variant));
+  if (context.pushesDescriptors()) {
+    Windows windows;
+    for (std::size_t stream = 0; stream < streamCount; ++stream)
+      windows[stream] = dispatch.windows[stream].index;
+    const BoundBuffers kernelBuffers =
+        isPalette ? bound.paletteKernel() : bound.skinKernel(dispatch.variant.method, windows);
+    const DescriptorWrites writes(kernelBuffers);
+    table.cmdPushDescriptorSet(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
+                               context.pipelineLayout, 0, writes.count(), writes.data());
+  } else {
+    const VkDescriptorSet set =
+        bound.sets[Bindings::State::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
+    table.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
+                                context.pipelineLayout, 0, 1, &set, 0, nullptr);
+  }
+  table.cmdPushConstants(commandBuffer, context.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                         sizeof(dispatch.constants), &dispatch.constants);
+  if (arguments == nullptr) {
+    table.cmdDispatch(commandBuffer, dispatch.groupCountX, dispatch.groupCountY, 1);
+  } else {
+    arguments->cmdDispatchIndirect(commandBuffer, arguments->buffer, arguments->offset);
+  }
+}
+
 Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
                              const Bindings& bindings) const {
   const State& context = *state_;
@@ -154,27 +164,7 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
       recordPaletteBarrier(table, commandBuffer, bound.buffers);
       palettesVisible = true;
     }
-    const bool isPalette = dispatch.variant.kernel == Kernel::palette;
-    table.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                          context.pipelines->find(dispatch.variant));
-    if (context.pushesDescriptors()) {
-      Windows windows;
-      for (std::size_t stream = 0; stream < streamCount; ++stream)
-        windows[stream] = dispatch.windows[stream].index;
-      const BoundBuffers kernelBuffers =
-          isPalette ? bound.paletteKernel() : bound.skinKernel(dispatch.variant.method, windows);
-      const DescriptorWrites writes(kernelBuffers);
-      table.cmdPushDescriptorSet(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                                 context.pipelineLayout, 0, writes.count(), writes.data());
-    } else {
-      const VkDescriptorSet set =
-          bound.sets[Bindings::State::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
-      table.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                                  context.pipelineLayout, 0, 1, &set, 0, nullptr);
-    }
-    table.cmdPushConstants(commandBuffer, context.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                           sizeof(dispatch.constants), &dispatch.constants);
-    table.cmdDispatch(commandBuffer, dispatch.groupCountX, dispatch.groupCountY, 1);
+    recordDispatch(commandBuffer, dispatch, bound, nullptr);
   }
   return {};
 }

@@ -16,7 +16,11 @@ namespace dermis::vulkan {
 
 struct Context::State {
   explicit State(const DeviceDescription& description)
-      : device(description.device), allocator(description.allocator) {}
+      : instance(description.instance),
+        getInstanceProcAddr(description.getInstanceProcAddr),
+        physicalDevice(description.physicalDevice),
+        device(description.device),
+        allocator(description.allocator) {}
   ~State();
 
   std::uint32_t bindingCount() const {
@@ -26,8 +30,12 @@ struct Context::State {
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
 
+  VkInstance instance;
+  PFN_vkGetInstanceProcAddr getInstanceProcAddr;
+  VkPhysicalDevice physicalDevice;
   VkDevice device;
   const VkAllocationCallbacks* allocator;
+  float timestampPeriod = 1;  ///< nanoseconds
   DispatchTable table;
   DeviceLimits limits;
   VkDescriptorSetLayout setLayout = VK_NULL_HANDLE;
@@ -77,6 +85,20 @@ struct Bindings::State {
   Result<void> checkBuffers(const Plan& plan) const;
   Result<void> checkVariants(const Plan& plan) const;
 };
+
+/// Where a dispatch has its workgroup counts from, where not from the plan.
+struct IndirectArguments {
+  PFN_vkCmdDispatchIndirect cmdDispatchIndirect = nullptr;
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0;
+};
+
+/// Records one dispatch of a plan that `Bindings::State::check` has passed.
+void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
+                    const Bindings::State& bound, const IndirectArguments* arguments);
+/// What the palette kernel wrote becomes visible to the skin kernel, which adds to the results.
+void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
+                          const BatchBuffers& buffers);
 
 /// Whether a kernel writes an attribute.
 bool writesStream(const Variant& variant, std::size_t stream);

@@ -51,9 +51,11 @@ class Bindings {
   Bindings(Bindings&&) noexcept;
   Bindings& operator=(Bindings&&) noexcept;
 
+  struct State;  // internal
+
  private:
   friend class Context;
-  struct State;
+  friend class SkinningSystem;
   std::unique_ptr<State> state_;
 };
 

@@ -89,10 +89,12 @@ class Context {
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 
+  struct State;  // internal
+
  private:
   Context();
   friend class Bindings;
-  struct State;
+  friend class SkinningSystem;
   std::unique_ptr<State> state_;
 };
 

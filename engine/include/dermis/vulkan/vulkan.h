@@ -5,4 +5,6 @@
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/memory.h"
 #include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/skinning_system.h"

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -66,7 +67,7 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
   results.reserve(batch.jobs.size());
   for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
     const Job& job = batch.jobs[index];
-    if (Result<void> good = checkJob(batch, job, index, limits); !good) return good;
+    if (Result<void> good = checkJob(batch, job, {"job", index}, limits); !good) return good;
     results.push_back(hasResult(job) ? resultCount++ : notUsed);
 
     Variant variant = outputVariant(job);
@@ -84,7 +85,8 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
       key.windows = run.windows;
       key.firstVertex = run.firstVertex;
       key.vertexEnd = run.vertexEnd;
-      if (Result<void> good = checkWindows(streams, run.windows, index, limits); !good) return good;
+      if (Result<void> good = checkWindows(streams, run.windows, {"job", index}, limits); !good)
+        return good;
       addPiece(job, static_cast<std::uint32_t>(index), key, variant, mayScale(batch, job));
     }
     ++instanceCount;
@@ -118,8 +120,6 @@ Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t work
 /// Appends the records of the palettes that are wanted in that form, and returns their number.
 std::uint32_t Plan::State::placePalettes(const Batch& batch, PaletteForm form,
                                          std::uint64_t& units) {
-  const bool logarithms = form == PaletteForm::logarithms;
-  const std::uint32_t joint = logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
   std::uint32_t records = 0;
   std::vector<std::uint32_t>& places = paletteUnits[static_cast<std::size_t>(form)];
   for (std::size_t index = 0; index < places.size(); ++index) {
@@ -128,9 +128,8 @@ std::uint32_t Plan::State::placePalettes(const Batch& batch, PaletteForm form,
     places[index] = static_cast<std::uint32_t>(units);
     tables.insert(tables.end(), {static_cast<std::uint32_t>(palette.matrixOffset / unitBytes),
                                  static_cast<std::uint32_t>(units), palette.jointCount,
-                                 (palette.mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
-                                     (logarithms ? abi::PALETTE_LOGARITHMS : 0u)});
-    units += 1 + std::uint64_t{palette.jointCount} * (palette.mayScale ? joint + 2 : joint);
+                                 paletteFlags(form, palette.mayScale)});
+    units += paletteSize(form, palette.jointCount, palette.mayScale);
     ++records;
   }
   return records;
@@ -165,15 +164,26 @@ Result<void> Plan::State::placePalettes(const Batch& batch, const Tuning& tuning
             std::to_string(limits.maxStorageBufferRange) +
             " bytes; a batch of fewer of them would fit"};
   }
-  if (records == 0 && resultCount == 0) return {};
+  std::vector<std::uint32_t>& cleared = order;  // scratch
+  cleared.resize(resultCount);
+  std::iota(cleared.begin(), cleared.end(), 0u);
+  return addPaletteDispatch(tuning, records, cleared);
+}
+
+Result<void> Plan::State::addPaletteDispatch(const Tuning& tuning, std::uint32_t palettes,
+                                             std::span<const std::uint32_t> clearedResults) {
+  if (palettes == 0 && clearedResults.empty()) return {};
+  tables.insert(tables.end(), clearedResults.begin(), clearedResults.end());
   // Behind the workgroups of the palettes come those that clear the results.
-  return addDispatch(paletteVariant(tuning), records + divideUp(resultCount, tuning.workgroupSize),
-                     {0, records, 0, resultCount});
+  return addDispatch(paletteVariant(tuning),
+                     palettes + divideUp(clearedResults.size(), tuning.workgroupSize),
+                     {0, palettes, 0, static_cast<std::uint32_t>(clearedResults.size())});
 }
 
 Result<void> Plan::State::placeGroups(const Tuning& tuning) {
   const auto dispatchOrder = [&](std::uint32_t index) {
-    return std::tie(groups[index].key.windows, groups[index].key.variant);
+    const GroupKey& key = groups[index].key;
+    return std::tie(key.isCulled, key.windows, key.variant);
   };
   order.resize(groups.size());
   for (std::uint32_t index = 0; index < order.size(); ++index) order[index] = index;

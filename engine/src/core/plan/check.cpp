@@ -9,30 +9,32 @@ namespace {
 
 constexpr std::uint64_t matrixAlignment = 16;
 
-Result<void> checkFormat(bool isAllowed, VertexFormat format, const char* name, std::size_t index) {
+Result<void> checkFormat(bool isAllowed, VertexFormat format, const char* name,
+                         const Subject& subject) {
   if (isAllowed) return {};
-  return invalid(jobName(index) + ": its " + name + " cannot be stored as " +
+  return invalid(subject.name() + ": its " + name + " cannot be stored as " +
                  std::string(formatName(format)));
 }
 
-Result<void> checkFormats(const Job& job, std::size_t index) {
+Result<void> checkFormats(const Job& job, const Subject& subject) {
   if (Result<void> good = checkFormat(isPositionFormat(job.positions.format), job.positions.format,
-                                      "positions", index);
+                                      "positions", subject);
       !good)
     return good;
   if (Result<void> good = checkFormat(
           job.normals.format == VertexFormat::none || isNormalFormat(job.normals.format),
-          job.normals.format, "normals", index);
+          job.normals.format, "normals", subject);
       !good)
     return good;
   return checkFormat(
       job.tangents.format == VertexFormat::none || isTangentFormat(job.tangents.format),
-      job.tangents.format, "tangents", index);
+      job.tangents.format, "tangents", subject);
 }
 
 Result<void> checkStream(const OutputStream& stream, const char* name, std::uint32_t vertexCount,
-                         std::uint64_t bufferSize, std::size_t index, const DeviceLimits& limits) {
-  const std::string place = jobName(index) + ": the offset " + std::to_string(stream.offset) +
+                         std::uint64_t bufferSize, const Subject& subject,
+                         const DeviceLimits& limits) {
+  const std::string place = subject.name() + ": the offset " + std::to_string(stream.offset) +
                             ", stride " + std::to_string(stream.stride) + " and size " +
                             std::to_string(stream.size) + " of its " + name;
   if (stream.stride < stream.size) {
@@ -56,37 +58,39 @@ Result<void> checkStream(const OutputStream& stream, const char* name, std::uint
   }
   const std::uint64_t length = std::uint64_t{vertexCount - 1} * stream.stride + stream.size;
   if (stream.offset > bufferSize || length > bufferSize - stream.offset) {
-    return invalid(jobName(index) + ": its " + name + " end outside their output buffer of " +
+    return invalid(subject.name() + ": its " + name + " end outside their output buffer of " +
                    std::to_string(bufferSize) + " bytes");
   }
   return {};
 }
 
-Result<void> checkStreams(const Batch& batch, const Job& job, std::size_t index,
+Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& subject,
                           const DeviceLimits& limits) {
   const OutputStreams streams = outputStreams(job);
   const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (streams[stream].size == 0) continue;
     if (Result<void> good = checkStream(streams[stream], streamName(stream), job.mesh.vertexCount,
-                                        sizes[stream], index, limits);
+                                        sizes[stream], subject, limits);
         !good)
       return good;
   }
   return {};
 }
 
+}  // namespace
+
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
-                         std::size_t index) {
+                         const Subject& subject) {
   std::uint32_t highest = 0;
   for (std::size_t i = 0; i < morphs.size(); ++i) {
     const std::uint32_t target = morphs[i].target;
     if (target >= targetCount) {
-      return invalid(jobName(index) + ": there is no morph target " + std::to_string(target) +
+      return invalid(subject.name() + ": there is no morph target " + std::to_string(target) +
                      " among the " + std::to_string(targetCount) + " of its mesh");
     }
     if (!std::isfinite(morphs[i].weight)) {
-      return invalid(jobName(index) + ": the weight of morph target " + std::to_string(target) +
+      return invalid(subject.name() + ": the weight of morph target " + std::to_string(target) +
                      " is not finite");
     }
     // Mostly they stand in order; then nothing needs to be searched.
@@ -96,11 +100,13 @@ Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targ
     }
     for (std::size_t other = 0; other < i; ++other) {
       if (morphs[other].target == target)
-        return invalid(jobName(index) + " has morph target " + std::to_string(target) + " twice");
+        return invalid(subject.name() + " has morph target " + std::to_string(target) + " twice");
     }
   }
   return {};
 }
+
+namespace {
 
 bool isBox(const Box& box) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -112,13 +118,13 @@ bool isBox(const Box& box) {
 }
 
 Result<void> checkPaletteOf(const Batch& batch, const Job& job, std::uint32_t palette,
-                            std::size_t index) {
+                            const Subject& subject) {
   if (palette >= batch.palettes.size()) {
-    return invalid(jobName(index) + ": there is no palette " + std::to_string(palette) + " among " +
+    return invalid(subject.name() + ": there is no palette " + std::to_string(palette) + " among " +
                    std::to_string(batch.palettes.size()));
   }
   if (batch.palettes[palette].jointCount < job.mesh.requiredJoints) {
-    return invalid(jobName(index) + ": its mesh needs a palette of " +
+    return invalid(subject.name() + ": its mesh needs a palette of " +
                    std::to_string(job.mesh.requiredJoints) + " joints, palette " +
                    std::to_string(palette) + " has " +
                    std::to_string(batch.palettes[palette].jointCount));
@@ -126,17 +132,17 @@ Result<void> checkPaletteOf(const Batch& batch, const Job& job, std::uint32_t pa
   return {};
 }
 
-Result<void> checkMotion(const Batch& batch, const Job& job, std::size_t index) {
+Result<void> checkMotion(const Batch& batch, const Job& job, const Subject& subject) {
   if (job.motion > Motion::reskinned)
-    return invalid(jobName(index) + ": its motion is not one of Motion");
+    return invalid(subject.name() + ": its motion is not one of Motion");
   if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
-    return invalid(jobName(index) +
+    return invalid(subject.name() +
                    " settles or restarts its motion, but has no previous positions");
   }
   if (job.motion != Motion::reskinned) return {};
-  if (Result<void> good = checkPaletteOf(batch, job, job.previousPalette, index); !good)
+  if (Result<void> good = checkPaletteOf(batch, job, job.previousPalette, subject); !good)
     return good;
-  return checkMorphs(job.previousMorphs, job.mesh.morphTargetCount, index);
+  return checkMorphs(job.previousMorphs, job.mesh.morphTargetCount, subject);
 }
 
 }  // namespace
@@ -145,55 +151,57 @@ Error invalid(std::string message) {
   return {ErrorCode::invalidArgument, std::move(message)};
 }
 
-std::string jobName(std::size_t index) {
-  return "job " + std::to_string(index);
+std::string Subject::name() const {
+  std::string text = kind;
+  if (index != noIndex) text.append(1, ' ').append(std::to_string(index));
+  return text;
 }
 
-Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index,
+Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                       const DeviceLimits& limits) {
-  if (job.mesh.vertexCount == 0) return invalid(jobName(index) + " has no mesh");
+  if (job.mesh.vertexCount == 0) return invalid(subject.name() + " has no mesh");
   if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
       job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
-    return invalid(jobName(index) + ": a packed mesh of " + std::to_string(job.mesh.byteSize) +
+    return invalid(subject.name() + ": a packed mesh of " + std::to_string(job.mesh.byteSize) +
                    " bytes cannot stand at byte " + std::to_string(job.meshOffset) +
                    " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
-  if (Result<void> good = checkPaletteOf(batch, job, job.palette, index); !good) return good;
+  if (Result<void> good = checkPaletteOf(batch, job, job.palette, subject); !good) return good;
   if (methodName(job.method) == "unknown")
-    return invalid(jobName(index) + ": its method is not one of Method");
+    return invalid(subject.name() + ": its method is not one of Method");
   if (needsCentersOfRotation(job.method) && !job.mesh.hasCentersOfRotation) {
-    return invalid(jobName(index) + ": " + std::string(methodName(job.method)) +
+    return invalid(subject.name() + ": " + std::string(methodName(job.method)) +
                    " needs centres of rotation, its mesh has none");
   }
-  if (Result<void> good = checkFormats(job, index); !good) return good;
+  if (Result<void> good = checkFormats(job, subject); !good) return good;
   if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
-    return invalid(jobName(index) + " wants normals, its mesh has none");
+    return invalid(subject.name() + " wants normals, its mesh has none");
   if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
-    return invalid(jobName(index) + " wants tangents, its mesh has none");
-  if (Result<void> good = checkMotion(batch, job, index); !good) return good;
-  if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, index); !good)
+    return invalid(subject.name() + " wants tangents, its mesh has none");
+  if (Result<void> good = checkMotion(batch, job, subject); !good) return good;
+  if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
     return good;
   if (isSnormPosition(job.positions.format) && !isBox(job.box)) {
-    return invalid(jobName(index) +
+    return invalid(subject.name() +
                    ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
   if (hasResult(job) && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
     return Error{ErrorCode::limitExceeded,
-                 jobName(index) + " wants bounds, or positions in snorm16: on a device with " +
+                 subject.name() + " wants bounds, or positions in snorm16: on a device with " +
                      std::to_string(limits.maxStorageBuffersPerStage) +
                      " storage buffers a stage there are none"};
   }
-  return checkStreams(batch, job, index, limits);
+  return checkStreams(batch, job, subject, limits);
 }
 
 Result<void> checkWindows(const OutputStreams& streams,
-                          const std::array<std::uint32_t, streamCount>& windows, std::size_t index,
-                          const DeviceLimits& limits) {
+                          const std::array<std::uint32_t, streamCount>& windows,
+                          const Subject& subject, const DeviceLimits& limits) {
   if (limits.maxStorageBuffersPerStage >= storageBuffersWanted) return {};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (streams[stream].size != 0 && windows[stream] != windows[0]) {
       return Error{ErrorCode::limitExceeded,
-                   jobName(index) + ": its " + streamName(stream) +
+                   subject.name() + ": its " + streamName(stream) +
                        " lie too far from its positions for a device with " +
                        std::to_string(limits.maxStorageBuffersPerStage) +
                        " storage buffers a stage"};

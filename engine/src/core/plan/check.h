@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "dermis/plan.h"
@@ -11,16 +12,27 @@
 namespace dermis {
 
 Error invalid(std::string message);
-std::string jobName(std::size_t index);
+
+/// Who is at fault, as sentences begin: "job 17", "the instance".
+struct Subject {
+  static constexpr std::size_t noIndex = ~std::size_t{0};
+
+  const char* kind = "job";
+  std::size_t index = noIndex;
+
+  std::string name() const;
+};
 
 Result<void> checkLimits(const DeviceLimits& limits);
 Result<void> checkTuning(const Tuning& tuning);
 Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index);
-Result<void> checkJob(const Batch& batch, const Job& job, std::size_t index,
+Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                       const DeviceLimits& limits);
+Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
+                         const Subject& subject);
 /// Whether a kernel can see all windows that a run is written to.
 Result<void> checkWindows(const OutputStreams& streams,
-                          const std::array<std::uint32_t, streamCount>& windows, std::size_t index,
-                          const DeviceLimits& limits);
+                          const std::array<std::uint32_t, streamCount>& windows,
+                          const Subject& subject, const DeviceLimits& limits);
 
 }  // namespace dermis

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "plan/instances.h"
+
 #include "abi.h"
 #include "plan/state.h"
 
@@ -22,6 +24,8 @@ void writeFloat(std::uint32_t& word, double value) {
   word = std::bit_cast<std::uint32_t>(static_cast<float>(value));
 }
 
+}  // namespace
+
 void writeBox(std::uint32_t* extension, const Box& box) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double low = static_cast<double>(box.min[axis]);
@@ -30,8 +34,6 @@ void writeBox(std::uint32_t* extension, const Box& box) {
     writeFloat(extension[abi::EXTENSION_INVERSE + axis], 2 / (high - low));
   }
 }
-
-}  // namespace
 
 std::uint32_t Plan::State::paletteOf(const Batch& batch, Method method,
                                      std::uint32_t palette) const {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "abi.h"
 #include "dermis/plan.h"
 #include "plan/windows.h"
 
@@ -25,6 +26,21 @@ inline std::optional<PaletteForm> paletteForm(Method method) {
   return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
 }
 
+inline std::uint32_t unitsOfJoint(PaletteForm form) {
+  return form == PaletteForm::logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
+}
+
+/// Units of a palette: its status, its joints, and their scale/shear parts.
+inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
+  return 1 + std::uint64_t{jointCount} * (unitsOfJoint(form) + (mayScale ? 2 : 0));
+}
+
+/// The flags of its record.
+inline std::uint32_t paletteFlags(PaletteForm form, bool mayScale) {
+  return (mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
+         (form == PaletteForm::logarithms ? abi::PALETTE_LOGARITHMS : 0u);
+}
+
 /// One mesh with one output layout, in one dispatch; the instances follow in the instance table.
 struct GroupKey {
   std::uint64_t mesh = 0;     ///< bytes into the mesh buffer
@@ -33,6 +49,7 @@ struct GroupKey {
   std::array<std::uint32_t, streamCount> strides{};
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;
+  bool isCulled = false;  ///< its instances are chosen on the GPU
 
   friend bool operator==(const GroupKey&, const GroupKey&) = default;
 };
@@ -47,6 +64,7 @@ struct GroupKeyHash {
     for (std::size_t stream = 0; stream < streamCount; ++stream)
       add(std::uint64_t{key.windows[stream]} << 32 | key.strides[stream]);
     add(std::uint64_t{key.firstVertex} << 32 | key.vertexEnd);
+    add(key.isCulled ? 1 : 0);
     return static_cast<std::size_t>(hash ^ (hash >> 32));
   }
 };
@@ -95,15 +113,21 @@ struct Plan::State {
   void clear();
   Result<void> build(const Batch& batch, const DeviceLimits& deviceLimits, const Tuning& tuning);
 
+  /// Appends the palette kernel's records: `palettes` of them stand at the beginning of the tables,
+  /// and behind them the numbers of the results that it clears.
+  Result<void> addPaletteDispatch(const Tuning& tuning, std::uint32_t palettes,
+                                  std::span<const std::uint32_t> clearedResults);
+  /// Appends a record for each of `groups`, whose instances follow, and the dispatches.
+  Result<void> placeGroups(const Tuning& tuning);
+
  private:
+  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
+                           const DispatchConstants& constants);
   Result<void> gatherPieces(const Batch& batch, const Tuning& tuning);
   void addPiece(const Job& job, std::uint32_t jobIndex, const GroupKey& key, const Variant& variant,
                 bool scales);
   Result<void> placePalettes(const Batch& batch, const Tuning& tuning);
   std::uint32_t placePalettes(const Batch& batch, PaletteForm form, std::uint64_t& units);
-  Result<void> placeGroups(const Tuning& tuning);
-  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
-                           const DispatchConstants& constants);
   void writeInstances(const Batch& batch, std::uint32_t firstRecord);
   std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
   std::uint32_t appendExtension(const Batch& batch, std::uint32_t jobIndex);

@@ -1,0 +1,286 @@
+// Where instances stand in the output, and which groups they belong to.
+
+#include <algorithm>
+#include <string>
+
+#include "plan/check.h"
+#include "plan/outputs.h"
+#include "system/errors.h"
+#include "system/scene.h"
+
+namespace dermis {
+namespace {
+
+constexpr Subject theInstance{"the instance"};
+
+/// The job that skins an instance, but for what changes from frame to frame; its attributes
+/// `offset` bytes into the output.
+Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVertices& laidOut,
+          std::uint64_t offset) {
+  Job job;
+  job.mesh = mesh.info;
+  job.meshOffset = mesh.bytes.offset;
+  job.method = instance.method;
+  std::array<OutputAttribute, streamCount> attributes = laidOut.attributes;
+  for (OutputAttribute& attribute : attributes) attribute.offset += offset;
+  job.positions = attributes[0];
+  job.normals = attributes[1];
+  job.tangents = attributes[2];
+  job.previousPositions = attributes[3];
+  job.motion = instance.hasMotion ? Motion::kept : Motion::none;
+  job.box = instance.box;
+  job.bounds = instance.bounds;
+  return job;
+}
+
+}  // namespace
+
+/// Whether it could be skinned, were there room.
+Result<void> Scene::check(const SceneInstance& instance) const {
+  const SceneMesh* mesh = meshes_.find(instance.mesh);
+  if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
+  const ScenePalette* palette = palettes_.find(instance.paletteHandle);
+  if (palette == nullptr) return unknownHandle("palette", instance.paletteHandle);
+  if (instance.updateInterval == 0) {
+    return invalid("the instance's update interval is 1 or more frames, not 0");
+  }
+  if (instance.layout.arrangement > Arrangement::planar)
+    return invalid("the instance's arrangement is not one of Arrangement");
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh->info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  if (laidOut->size > description_.outputBudget) {
+    return Error{ErrorCode::limitExceeded, "the instance takes " + std::to_string(laidOut->size) +
+                                               " bytes of output, the whole budget is " +
+                                               std::to_string(description_.outputBudget)};
+  }
+  const Palette own{palette->jointCount, 0, palette->mayScale};
+  Batch batch;
+  batch.palettes = {&own, 1};
+  batch.meshesSize = description_.meshBudget;
+  batch.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  return checkJob(batch, jobOf(instance, *mesh, *laidOut, 0), theInstance, description_.limits);
+}
+
+Result<void> Scene::takeResult(SceneInstance& instance) {
+  if (!instance.bounds && !isSnormPosition(instance.layout.positions)) return {};
+  if (!freeResults_.empty()) {
+    instance.extras.result = freeResults_.back();
+    freeResults_.pop_back();
+    return {};
+  }
+  if (nextResult_ == description_.boundsBudget) {
+    return Error{ErrorCode::limitExceeded,
+                 "the instance wants bounds, or positions in snorm16: as many as the budget has, " +
+                     std::to_string(description_.boundsBudget) + ", have them already"};
+  }
+  instance.extras.result = nextResult_++;
+  return {};
+}
+
+/// The palette's place in the form that the method reads; it stays until the palette is removed.
+Result<void> Scene::reserveUnits(const SceneInstance& instance) {
+  const std::optional<PaletteForm> form = paletteForm(instance.method);
+  if (!form) return {};
+  ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
+  std::optional<Range>& units = palette.forms[static_cast<std::size_t>(*form)].units;
+  if (units) return {};
+  const std::uint64_t size = paletteSize(*form, palette.jointCount, palette.mayScale);
+  units = unitStore_.allocate(size, 1);
+  if (units) return {};
+  return Error{ErrorCode::limitExceeded,
+               "palette " + std::to_string(instance.paletteHandle.index) + " takes " +
+                   std::to_string(size * unitBytes) + " bytes in the form that " +
+                   std::string(methodName(instance.method)) + " reads; of the " +
+                   std::to_string(unitStore_.capacity() * unitBytes) +
+                   " that go with the joint budget, " +
+                   std::to_string(unitStore_.largestFree() * unitBytes) + " are free in one piece"};
+}
+
+Result<bool> Scene::findRoom(SceneInstance& instance) {
+  const SceneMesh& mesh = meshes_.at(instance.mesh.index);
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  const std::optional<Range> bytes = outputStore_.allocate(laidOut->size, laidOut->alignment);
+  if (!bytes) return false;
+  instance.target = Place{*bytes, instance.mesh, mesh.info.vertexCount};
+  instance.vertexCount = mesh.info.vertexCount;
+  if (Result<void> good = makeRuns(instance); !good) {
+    outputStore_.free(*bytes);
+    instance.target.reset();
+    return good.error();
+  }
+  return true;
+}
+
+Result<void> Scene::makeRuns(SceneInstance& instance) {
+  const SceneMesh& mesh = meshes_.at(instance.mesh.index);
+  const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  const Job job = jobOf(instance, mesh, *laidOut, instance.target->bytes.offset);
+  const OutputStreams streams = outputStreams(job);
+  Variant variant = outputVariant(job);
+  variant.morphs = !instance.extras.morphs.empty();
+  variant.instancesPerInvocation =
+      static_cast<std::uint8_t>(description_.tuning.instancesPerInvocation);
+  variant.workgroupSize = static_cast<std::uint16_t>(description_.tuning.workgroupSize);
+  GroupKey key;
+  key.mesh = job.meshOffset;
+  key.variant = variant.key();
+  key.isCulled = instance.isCulled;
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
+
+  const std::array<std::uint64_t, streamCount> sizes =
+      outputSizes(OutputSizes::oneBuffer(description_.outputBudget));
+  cutIntoRuns(streams, mesh.info.vertexCount, sizes, description_.limits, runsScratch_);
+  for (const VertexRun& run : runsScratch_) {
+    if (Result<void> good = checkWindows(streams, run.windows, theInstance, description_.limits);
+        !good)
+      return good;
+  }
+  if (instance.isCulled && runsScratch_.size() > 1) {
+    return Error{ErrorCode::limitExceeded,
+                 "the instance is culled on the GPU and needs more than one output range: the GPU "
+                 "would choose each part for itself"};
+  }
+  const std::uint64_t step = outputWindowStep(description_.limits);
+  for (std::size_t index = 0; index < runsScratch_.size(); ++index) {
+    const VertexRun& run = runsScratch_[index];
+    key.windows = run.windows;
+    key.firstVertex = run.firstVertex;
+    key.vertexEnd = run.vertexEnd;
+    PlacedRun& placed = index == 0 ? instance.run : instance.furtherRuns.emplace_back();
+    placed.group = groups_.acquire(key, variant, mesh.info.maxInfluences,
+                                   instance.method != Method::linear && palette.mayScale);
+    placed.record[abi::INSTANCE_JOINTS] = palette.jointCount;
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      placed.record[abi::INSTANCE_POSITIONS + stream] =
+          streams[stream].size == 0
+              ? 0u
+              : static_cast<std::uint32_t>(streams[stream].begin(run.firstVertex) -
+                                           run.windows[stream] * step);
+    }
+  }
+  return {};
+}
+
+void Scene::releaseRuns(SceneInstance& instance) {
+  groups_.release(instance.run.group);
+  for (const PlacedRun& run : instance.furtherRuns) groups_.release(run.group);
+  instance.furtherRuns.clear();
+}
+
+void Scene::releaseLastRuns(SceneInstance& instance) {
+  for (const PlacedRun& run : instance.lastRuns) groups_.release(run.group);
+  instance.lastRuns.clear();
+}
+
+/// What was recorded there is still drawn from.
+void Scene::retireTarget(SceneInstance& instance) {
+  if (!instance.target) return;
+  releaseRuns(instance);
+  if (instance.shown != instance.target) retire(Retired::Store::output, instance.target->bytes);
+  instance.target.reset();
+}
+
+void Scene::link(std::uint32_t index) {
+  SceneInstance& instance = instances_.at(index);
+  ScenePalette& palette = palettes_.at(instance.palette);
+  instance.previousOfPalette = notUsed;
+  instance.nextOfPalette = palette.firstInstance;
+  if (palette.firstInstance != notUsed)
+    instances_.at(palette.firstInstance).previousOfPalette = index;
+  palette.firstInstance = index;
+  ++palette.users;
+}
+
+void Scene::unlink(std::uint32_t index) {
+  const SceneInstance& instance = instances_.at(index);
+  ScenePalette& palette = palettes_.at(instance.palette);
+  if (instance.previousOfPalette != notUsed) {
+    instances_.at(instance.previousOfPalette).nextOfPalette = instance.nextOfPalette;
+  } else {
+    palette.firstInstance = instance.nextOfPalette;
+  }
+  if (instance.nextOfPalette != notUsed)
+    instances_.at(instance.nextOfPalette).previousOfPalette = instance.previousOfPalette;
+  --palette.users;
+}
+
+Error Scene::noRoomFor(const SceneInstance& instance) const {
+  const Result<LaidOutVertices> laidOut =
+      layOut(instance.layout, meshes_.at(instance.mesh.index).info.vertexCount);
+  return {ErrorCode::limitExceeded,
+          "the instance takes " + std::to_string(laidOut->size) + " bytes of output, of " +
+              std::to_string(outputStore_.capacity()) + " in the budget " +
+              std::to_string(outputStore_.capacity() - outputStore_.used()) + " are free, " +
+              std::to_string(outputStore_.largestFree()) + " in one piece"};
+}
+
+Result<InstanceHandle> Scene::insert(const InstanceDescription& description, bool isInternal) {
+  SceneInstance instance;
+  instance.palette = description.palette.index;
+  instance.updateInterval = description.updateInterval;
+  instance.method = description.method;
+  instance.isCulled = description.culledOnGpu;
+  instance.hasMotion = description.layout.previousPositions;
+  instance.isInternal = isInternal;
+  instance.mesh = description.mesh;
+  instance.paletteHandle = description.palette;
+  instance.layout = description.layout;
+  instance.box = description.box;
+  instance.bounds = description.bounds;
+  if (Result<void> good = check(instance); !good) return good.error();
+  if (instances_.capacity() >= description_.instanceBudget && !instances_.hasHole()) {
+    return Error{ErrorCode::limitExceeded, "there are as many instances as the budget has, " +
+                                               std::to_string(description_.instanceBudget)};
+  }
+  if (Result<void> good = reserveUnits(instance); !good) return good.error();
+  if (description_.overflow == OverflowPolicy::bindPose && !isInternal) {
+    Result<InstanceHandle> bindPose = acquireBindPose(instance);
+    if (!bindPose) return bindPose.error();
+    instance.bindPose = *bindPose;
+  }
+  instance.extras.box = instance.box;
+  instance.extras.hasBox = isSnormPosition(instance.layout.positions);
+  Result<void> taken = takeResult(instance);
+  Result<bool> found = taken ? findRoom(instance) : Result<bool>(taken.error());
+  if (found && !*found && (isInternal || description_.overflow == OverflowPolicy::refuse))
+    found = noRoomFor(instance);
+  if (!found) {
+    if (instance.extras.result != notUsed) freeResults_.push_back(instance.extras.result);
+    releaseBindPose(instance.bindPose);
+    return found.error();
+  }
+
+  ++meshes_.at(instance.mesh.index).users;
+  const InstanceHandle handle = instances_.add(std::move(instance));
+  SceneInstance& added = instances_.at(handle.index);
+  link(handle.index);
+  if (added.isCulled) {
+    added.owner = ++nextOwner_;
+    added.culledIndex = static_cast<std::uint32_t>(culled_.size());
+    culled_.push_back(handle.index);
+  }
+  added.showsBindPose = !added.target && added.bindPose;
+  (added.target ? shifting_ : waiting_).push_back(handle);
+  makeStale(handle.index);
+  return handle;
+}
+
+void Scene::placeWaiting() {
+  if (!outputWasFreed_ || waiting_.empty()) return;
+  outputWasFreed_ = false;
+  std::erase_if(waiting_, [this](InstanceHandle handle) {
+    SceneInstance& instance = instances_.at(handle.index);
+    const Result<bool> found = findRoom(instance);
+    if (!found || !*found) return false;
+    shifting_.push_back(handle);
+    instance.isUrgent = true;
+    makePending(handle.index);
+    return true;
+  });
+}
+
+}  // namespace dermis

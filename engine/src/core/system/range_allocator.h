@@ -1,0 +1,52 @@
+// Which parts of a buffer are taken.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+namespace dermis {
+
+/// A part of a buffer, in whatever unit the allocator counts.
+struct Range {
+  std::uint64_t offset = 0;
+  std::uint64_t size = 0;
+
+  std::uint64_t end() const { return offset + size; }
+  friend bool operator==(const Range&, const Range&) = default;
+};
+
+/// Gives out ranges of [0, capacity). O(log of the number of gaps), but where an alignment makes
+/// gaps unfit.
+class RangeAllocator {
+ public:
+  explicit RangeAllocator(std::uint64_t capacity = 0);
+
+  /// The smallest gap that holds `size` at a multiple of `alignment`, which need not be a power of
+  /// two; nothing where there is none. `size` is not 0.
+  std::optional<Range> allocate(std::uint64_t size, std::uint64_t alignment);
+  /// The same in the gap of the lowest offset, where the range ends at or before `end`.
+  std::optional<Range> allocateBelow(std::uint64_t size, std::uint64_t alignment,
+                                     std::uint64_t end);
+  void free(const Range& range);
+
+  std::uint64_t capacity() const { return capacity_; }
+  std::uint64_t used() const { return used_; }
+  std::uint64_t largestFree() const;
+
+ private:
+  using Gaps = std::map<std::uint64_t, std::uint64_t>;  // size by offset
+
+  Range take(Gaps::iterator gap, std::uint64_t offset, std::uint64_t size);
+  void addGap(std::uint64_t offset, std::uint64_t size);
+  void removeGap(Gaps::iterator gap);
+
+  std::uint64_t capacity_;
+  std::uint64_t used_ = 0;
+  Gaps gaps_;
+  std::set<std::pair<std::uint64_t, std::uint64_t>> bySize_;  // size, offset
+};
+
+}  // namespace dermis

@@ -1,0 +1,283 @@
+// The books of a SkinningSystem: what there is, where it stands, and what of it has to be skinned.
+// No Vulkan: buffers are byte counts here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dermis/handle.h"
+#include "dermis/instance.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "system/frame_builder.h"
+#include "system/layout.h"
+#include "system/range_allocator.h"
+#include "system/slot_map.h"
+
+namespace dermis {
+
+struct SceneDescription {
+  std::uint32_t framesInFlight = 2;
+  std::uint64_t meshBudget = 0;    ///< bytes
+  std::uint32_t jointBudget = 0;   ///< joints
+  std::uint64_t outputBudget = 0;  ///< bytes
+  std::uint32_t instanceBudget = 0;
+  std::uint32_t boundsBudget = 0;
+  OverflowPolicy overflow = OverflowPolicy::refuse;
+  DeviceLimits limits;
+  Tuning tuning;
+
+  /// Bytes of the buffers that stay.
+  std::uint64_t matricesSize() const {
+    return std::uint64_t{jointBudget} * framesInFlight * sizeof(JointMatrix);
+  }
+  std::uint64_t palettesSize() const { return paletteUnits() * unitBytes; }
+  /// Room for the largest form of every joint, and the status of every palette of two joints.
+  std::uint64_t paletteUnits() const { return std::uint64_t{jointBudget} * 6; }
+  std::uint64_t resultsSize() const { return std::uint64_t{boundsBudget} * sizeof(InstanceResult); }
+};
+
+struct SceneMesh {
+  MeshInfo info;
+  Range bytes;
+  std::uint32_t users = 0;
+};
+
+struct ScenePalette {
+  /// The palette as it was last converted to one of the forms that methods read.
+  struct Form {
+    std::optional<Range> units;
+    std::uint64_t version = 0;    ///< of the pose
+    std::uint64_t plannedIn = 0;  ///< the plan that converts it
+  };
+
+  std::uint32_t jointCount = 0;
+  bool mayScale = true;
+  Range joints;  ///< among the joints of the budget
+  std::uint32_t slot =
+      0;  ///< which of its matrices are the pose of now: one for each frame in flight
+  std::uint64_t poseFrame = 0;  ///< the frame that it was last written in
+  std::uint64_t version = 1;
+  std::array<Form, paletteFormCount> forms;
+  std::uint32_t users = 0;
+  std::uint32_t firstInstance = notUsed;  ///< of its instances, which are a list
+};
+
+/// Where an instance's vertices are, or will be.
+struct Place {
+  Range bytes;
+  MeshHandle mesh;
+  std::uint32_t vertexCount = 0;
+
+  friend bool operator==(const Place&, const Place&) = default;
+};
+
+struct SceneInstance {
+  PlacedRun run;                       ///< the first, and mostly the only one
+  std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
+  std::uint32_t palette = 0;           ///< index
+  std::uint32_t nextOfPalette = notUsed, previousOfPalette = notUsed;
+  std::uint32_t updateInterval = 1;
+  std::uint32_t vertexCount = 0;
+  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
+  std::uint64_t lastFrame = 0;    ///< in which it was skinned
+  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
+  std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
+  Method method = Method::dualQuaternion;
+  bool isStale = false;   ///< something changed since it was skinned
+  bool isListed = false;  ///< among the pending
+  bool isVisible = true;
+  bool isCulled = false;
+  bool hasMotion = false;
+  bool restartsMotion = true;  ///< when it is skinned next
+  bool isUrgent = true;        ///< whatever its interval
+  bool willMove = false;       ///< the plan skins it, and its previous positions are others
+  bool showsBindPose = false;  ///< it waited with one, or does
+  bool isInternal = false;     ///< a bind pose: of no interest to the engine
+
+  // Of those culled on the GPU.
+  std::uint32_t version = 0;         ///< of what it should show
+  std::uint32_t restartVersion = 0;  ///< the one that restarts its motion
+  std::uint32_t owner = 0;           ///< names it on the GPU
+  std::uint32_t culledIndex = notUsed;
+
+  // Seldom looked at.
+  MeshHandle mesh;
+  PaletteHandle paletteHandle;
+  VertexLayout layout;
+  Box box;
+  bool bounds = false;
+  std::uint64_t firstFrame = 0;  ///< in which it was skinned
+  InstanceExtras extras;
+  std::optional<Place> target;  ///< where it is skinned to; nothing while it waits for room
+  std::optional<Place> shown;   ///< where it was last recorded
+  /// Where `shown` has no target beside it: how to settle it.
+  std::vector<PlacedRun> lastRuns;
+  InstanceHandle bindPose;  ///< what stands in for it while it waits
+};
+
+/// Bytes of the output that move.
+struct OutputMove {
+  std::uint64_t from = 0, to = 0, size = 0;
+};
+
+class Scene {
+ public:
+  explicit Scene(const SceneDescription& description);
+
+  Result<MeshHandle> addMesh(const MeshInfo& info);
+  Result<void> removeMesh(MeshHandle mesh);
+  Result<PaletteHandle> addPalette(std::uint32_t jointCount, bool mayScale);
+  Result<void> removePalette(PaletteHandle palette);
+  Result<InstanceHandle> addInstance(const InstanceDescription& description);
+  Result<void> removeInstance(InstanceHandle instance);
+
+  Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
+  /// The byte of the matrices buffer at which the pose of this frame is to be written.
+  Result<std::uint64_t> writePose(PaletteHandle palette);
+  Result<void> setVisible(InstanceHandle instance, bool isVisible);
+  Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
+  Result<void> teleport(InstanceHandle instance);
+  Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
+  Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
+  std::uint64_t compact(std::uint64_t maxBytes);
+
+  /// Plans all that has to be done; nothing of it counts as done before `commit`.
+  Result<void> plan();
+  void commit();
+
+  const FrameBuilder& frame() const { return builder_; }
+  std::span<const OutputMove> moves() const { return moves_; }
+  /// Palettes added since the last record, of which some may be gone, or written.
+  std::span<const PaletteHandle> freshPalettes() const { return fresh_; }
+  std::uint64_t frameNumber() const { return frame_; }
+  std::uint64_t recordNumber() const { return record_; }
+  bool hasBegun() const { return hasBegun_; }
+
+  const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
+  const SlotMap<ScenePalette, PaletteHandle>& palettes() const { return palettes_; }
+  const SlotMap<SceneInstance, InstanceHandle>& instances() const { return instances_; }
+  std::uint64_t poseOffset(const ScenePalette& palette) const;
+  Result<InstanceOutput> output(InstanceHandle instance) const;
+  const SceneDescription& description() const { return description_; }
+  /// Results from this number on are nobody's.
+  std::uint32_t resultCount() const { return nextResult_ == freeResults_.size() ? 0 : nextResult_; }
+  /// Something is recorded for every frame, whether the CPU saw a change or not.
+  bool hasCulled() const { return !culled_.empty(); }
+
+  const RangeAllocator& meshStore() const { return meshStore_; }
+  const RangeAllocator& unitStore() const { return unitStore_; }
+  const RangeAllocator& outputStore() const { return outputStore_; }
+
+  std::span<const InstanceHandle> skinned() const { return skinned_; }
+  std::span<const InstanceHandle> settled() const { return settled_; }
+  std::span<const InstanceHandle> moved() const { return moved_; }
+  struct Counts {
+    std::uint32_t instances = 0, waiting = 0, skinned = 0, settled = 0, palettes = 0, culled = 0;
+    std::uint64_t vertices = 0, writtenBytes = 0, poseBytes = 0;
+  };
+  Counts counts() const;
+
+ private:
+  struct Retired {
+    std::uint64_t frame;
+    enum class Store : std::uint8_t { meshes, joints, units, output } store;
+    Range range;
+  };
+  struct BindPose {
+    MeshHandle mesh;
+    VertexLayout layout;
+    Box box;
+    InstanceHandle instance;
+    PaletteHandle palette;
+    std::uint32_t users = 0;
+  };
+
+  // placement.cpp
+  Result<InstanceHandle> insert(const InstanceDescription& description, bool isInternal);
+  Result<void> check(const SceneInstance& instance) const;
+  Result<void> takeResult(SceneInstance& instance);
+  Result<void> reserveUnits(const SceneInstance& instance);
+  Result<bool> findRoom(SceneInstance& instance);
+  Result<bool> takeBackOrFindRoom(SceneInstance& changed);
+  Result<void> makeRuns(SceneInstance& instance);
+  void releaseRuns(SceneInstance& instance);
+  void releaseLastRuns(SceneInstance& instance);
+  void retireTarget(SceneInstance& instance);
+  void placeWaiting();
+  void link(std::uint32_t index);
+  void unlink(std::uint32_t index);
+  Error noRoomFor(const SceneInstance& instance) const;
+
+  // bind_poses.cpp
+  Result<InstanceHandle> acquireBindPose(const SceneInstance& instance);
+  void releaseBindPose(InstanceHandle bindPose);
+
+  // scene.cpp
+  void makeStale(std::uint32_t index);
+  void makePending(std::uint32_t index);
+  void retire(Retired::Store store, const Range& range);
+  void free(const Retired& retired);
+
+  // gather.cpp
+  void gatherPoses();
+  void gatherPending();
+  void gatherSettling();
+  void gatherCulled();
+  void gatherMoves();
+  void addDue(std::uint32_t index);
+  void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
+  bool isDue(const SceneInstance& instance) const;
+  void convertPalette(const SceneInstance& instance);
+  std::uint32_t paletteUnit(const SceneInstance& instance) const;
+  bool commitShift(SceneInstance& instance, InstanceHandle handle);
+
+  SceneDescription description_;
+  SlotMap<SceneMesh, MeshHandle> meshes_;
+  SlotMap<ScenePalette, PaletteHandle> palettes_;
+  SlotMap<SceneInstance, InstanceHandle> instances_;
+  RangeAllocator meshStore_, jointStore_, unitStore_, outputStore_;
+  std::vector<std::uint32_t> freeResults_;
+  std::uint32_t nextResult_ = 0;
+  FrameGroups groups_;
+  FrameBuilder builder_;
+  std::deque<Retired> retired_;
+  std::vector<BindPose> bindPoses_;
+
+  std::uint64_t frame_ = 0, completed_ = 0;
+  std::uint64_t record_ = 0;         ///< the last that was committed
+  std::uint64_t recordedFrame_ = 0;  ///< its frame
+  bool hasBegun_ = false;
+  std::uint32_t nextVersion_ = 0, nextOwner_ = 0;
+  std::uint32_t internalInstances_ = 0;
+  bool outputWasFreed_ = false;
+  std::vector<VertexRun> runsScratch_;
+
+  std::vector<PaletteHandle> fresh_;       ///< added since the last record
+  std::vector<PaletteHandle> posed_;       ///< written since the last plan
+  std::vector<InstanceHandle> pending_;    ///< stale, visible, placed, and not culled
+  std::vector<InstanceHandle> waiting_;    ///< for room
+  std::vector<InstanceHandle> shifting_;   ///< `target` is not `shown`
+  std::vector<std::uint32_t> culled_;      ///< all that are culled on the GPU
+  std::vector<InstanceHandle> movedLast_;  ///< with motion, skinned by the last record
+
+  // Of the plan.
+  std::uint64_t planNumber_ = 0;
+  std::vector<std::uint32_t> due_;
+  std::vector<std::uint32_t> settling_;
+  std::vector<std::uint32_t> versioned_;  ///< culled, with something new to show
+  struct Conversion {
+    std::uint32_t palette;
+    std::size_t form;
+  };
+  std::vector<Conversion> conversions_;
+  std::vector<OutputMove> moves_;
+  std::vector<InstanceHandle> skinned_, settled_, moved_;
+  std::uint64_t plannedVertices_ = 0, plannedBytes_ = 0, plannedPoseBytes_ = 0;
+};
+
+}  // namespace dermis

@@ -1,0 +1,79 @@
+// Things by handle: found in O(1), noticed where they are gone.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "dermis/handle.h"
+
+namespace dermis {
+
+/// Indices are given again, to the newest hole first; generations tell who had them when. A thing's
+/// address changes when others are added.
+template <typename Thing, typename ThingHandle>
+class SlotMap {
+ public:
+  ThingHandle add(Thing thing) {
+    std::uint32_t index;
+    if (free_.empty()) {
+      index = static_cast<std::uint32_t>(slots_.size());
+      slots_.push_back({std::move(thing), 1, true});
+    } else {
+      index = free_.back();
+      free_.pop_back();
+      slots_[index].thing = std::move(thing);
+      slots_[index].isUsed = true;
+    }
+    ++size_;
+    return {index, slots_[index].generation};
+  }
+
+  /// Of a handle that `find` knows.
+  void remove(ThingHandle handle) {
+    Slot& slot = slots_[handle.index];
+    slot.thing = Thing{};
+    slot.isUsed = false;
+    // After 2^32 things in one place a handle could come again, or be the null one: leave the
+    // place.
+    if (++slot.generation != 0) free_.push_back(handle.index);
+    --size_;
+  }
+
+  Thing* find(ThingHandle handle) {
+    return contains(handle) ? &slots_[handle.index].thing : nullptr;
+  }
+  const Thing* find(ThingHandle handle) const {
+    return contains(handle) ? &slots_[handle.index].thing : nullptr;
+  }
+
+  bool contains(ThingHandle handle) const {
+    return handle.index < slots_.size() && slots_[handle.index].isUsed &&
+           slots_[handle.index].generation == handle.generation;
+  }
+
+  /// Of an index that is used.
+  Thing& at(std::uint32_t index) { return slots_[index].thing; }
+  const Thing& at(std::uint32_t index) const { return slots_[index].thing; }
+  ThingHandle handleOf(std::uint32_t index) const { return {index, slots_[index].generation}; }
+  bool isUsed(std::uint32_t index) const { return slots_[index].isUsed; }
+
+  std::uint32_t size() const { return size_; }
+  /// Whether the next thing gets an index that another had.
+  bool hasHole() const { return !free_.empty(); }
+  /// Larger than every index so far.
+  std::uint32_t capacity() const { return static_cast<std::uint32_t>(slots_.size()); }
+
+ private:
+  struct Slot {
+    Thing thing;
+    std::uint32_t generation = 1;
+    bool isUsed = false;
+  };
+  std::vector<Slot> slots_;
+  std::vector<std::uint32_t> free_;
+  std::uint32_t size_ = 0;
+};
+
+}  // namespace dermis

@@ -1,0 +1,273 @@
+// The commands of a frame.
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <string>
+
+#include "abi.h"
+#include "dermis/vulkan/scope.h"
+#include "vulkan/label.h"
+#include "vulkan/system/state.h"
+
+namespace dermis::vulkan {
+namespace {
+
+constexpr std::uint64_t leastTables = 64 * 1024;
+
+constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+constexpr VkPipelineStageFlags transfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
+constexpr VkAccessFlags shader = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT;
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+void barrier(const DispatchTable& table, VkCommandBuffer commandBuffer, const Scope& source,
+             const Scope& destination) {
+  const VkMemoryBarrier memory = memoryBarrier({source, destination});
+  table.cmdPipelineBarrier(commandBuffer, source.stages, destination.stages, 0, 1, &memory, 0,
+                           nullptr, 0, nullptr);
+}
+
+}  // namespace
+
+/// Tables that are too small are replaced, the old ones kept until their frames are complete.
+Result<void> SkinningSystem::State::makeRoomForTables() {
+  const std::uint64_t needed = scene.frame().plan().buffer(BufferRole::tables).size;
+  std::uint64_t size = std::max(tables.size(), leastTables);
+  while (size < needed) size *= 2;
+  size = std::min(size, scene.description().limits.maxStorageBufferRange & ~std::uint64_t{3});
+  if (tables.size() < needed || tables.size() == 0) {
+    Result<SystemBuffer> made = SystemBuffer::create(
+        source, {size,
+                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
+                 MemoryUse::device, "dermis tables"});
+    if (!made) return made.error();
+    BatchBuffers buffers{meshes.range(),
+                         matrices.range(),
+                         made->range(),
+                         palettes.range(),
+                         OutputBuffers::oneBuffer(output.range()),
+                         results.range()};
+    Result<Bindings> bound = description.context->createBindings(buffers);
+    if (!bound) return bound.error();
+    retired.push_back({scene.frameNumber(), std::exchange(tables, std::move(*made)),
+                       std::exchange(bindings, std::move(*bound))});
+  }
+  FrameSlot& own = slot();
+  if (own.staging.size() >= needed && own.staging.size() != 0) return {};
+  Result<SystemBuffer> staging = SystemBuffer::create(
+      source, {size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::upload, "dermis table upload"});
+  if (!staging) return staging.error();
+  own.staging = std::move(*staging);  // its last frame is complete
+  return {};
+}
+
+/// With the first instance that is culled on the GPU.
+Result<void> SkinningSystem::State::prepareCulling() {
+  if (!visibility.isCreated()) {
+    if (Result<void> made = visibility.create(*context, description.tuning,
+                                              static_cast<std::uint32_t>(slots.size()));
+        !made)
+      return made;
+  }
+  if (history.size() != 0) return {};
+  Result<SystemBuffer> made = SystemBuffer::create(
+      source, {std::uint64_t{description.instanceBudget} * abi::HISTORY_WORDS * 4,
+               VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+               MemoryUse::device, "dermis history"});
+  if (!made) return made.error();
+  history = std::move(*made);
+  return {};
+}
+
+/// Palettes rest in the identity until the engine writes them.
+void SkinningSystem::State::writeFreshPalettes() {
+  for (const PaletteHandle handle : scene.freshPalettes()) {
+    const ScenePalette* palette = scene.palettes().find(handle);
+    if (palette == nullptr || palette->poseFrame != 0) continue;
+    std::byte* place = matrices.bytes().data() + scene.poseOffset(*palette);
+    const JointMatrix identity;
+    for (std::uint32_t joint = 0; joint < palette->jointCount; ++joint)
+      std::memcpy(place + joint * sizeof(JointMatrix), &identity, sizeof(JointMatrix));
+  }
+}
+
+bool SkinningSystem::State::hasWork() const {
+  return !scene.frame().plan().dispatches().empty() || !scene.moves().empty() || !uploads.empty();
+}
+
+Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
+                                                const FrameDescription& frame) {
+  const Stopwatch planning;
+  if (Result<void> planned = scene.plan(); !planned) return planned;
+  const Plan& plan = scene.frame().plan();
+  const bool culls = scene.frame().culled().candidateCount != 0;
+  if (culls && frame.visibility == VK_NULL_HANDLE) {
+    return Error{ErrorCode::invalidArgument,
+                 "FrameDescription::visibility is null, and there are instances that are culled on "
+                 "the GPU"};
+  }
+  if (scene.frame().culled().groupCount > context->limits.maxWorkgroupCountX) {
+    return Error{ErrorCode::limitExceeded,
+                 "instances that are culled on the GPU have " +
+                     std::to_string(scene.frame().culled().groupCount) +
+                     " meshes and layouts, more than the device can count workgroups"};
+  }
+  if (culls) {
+    if (Result<void> ready = prepareCulling(); !ready) return ready;
+  }
+  const bool works = hasWork();
+  if (works) {
+    if (Result<void> room = makeRoomForTables(); !room) return room;
+    if (Result<void> good = bindings.state_->check(plan); !good) return good;
+    writeFreshPalettes();
+    if (Result<void> written = writeTables(plan, slot().staging.bytes()); !written) return written;
+  }
+  const double planSeconds = planning.seconds();
+
+  const Stopwatch recording;
+  frameStatistics = {};
+  FrameSlot& own = slot();
+  own.frame = scene.frameNumber();
+  own.hasCounters = own.hasTimestamps = false;
+  own.resultCount = 0;
+  if (works) recordCommands(commandBuffer, frame);
+  scene.commit();
+
+  const Scene::Counts counts = scene.counts();
+  frameStatistics.frame = scene.frameNumber();
+  frameStatistics.instances = counts.instances;
+  frameStatistics.waitingInstances = counts.waiting;
+  frameStatistics.skinnedInstances = counts.skinned;
+  frameStatistics.settledInstances = counts.settled;
+  frameStatistics.convertedPalettes = counts.palettes;
+  frameStatistics.skinnedVertices = counts.vertices;
+  frameStatistics.culledCandidates = counts.culled;
+  frameStatistics.writtenBytes = counts.writtenBytes;
+  frameStatistics.uploadedBytes += counts.poseBytes;
+  frameStatistics.planSeconds = planSeconds;
+  frameStatistics.recordSeconds = recording.seconds();
+  return {};
+}
+
+void SkinningSystem::State::recordCommands(VkCommandBuffer commandBuffer,
+                                           const FrameDescription& frame) {
+  const DispatchTable& table = context->table;
+  const Label label(table, commandBuffer, "dermis: skin a frame");
+  timestamps.begin(commandBuffer, slotNumber());
+  // Frames before this one have finished with what is overwritten, and what they wrote is seen.
+  barrier(
+      table, commandBuffer,
+      {compute | transfer | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
+       VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT},
+      {compute | transfer, shader | VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT});
+  recordCopies(commandBuffer);
+  barrier(table, commandBuffer, {transfer, VK_ACCESS_TRANSFER_WRITE_BIT}, {compute, shader});
+  recordDispatches(commandBuffer, frame);
+  recordReadBack(commandBuffer);
+  timestamps.end(commandBuffer, slotNumber());
+  slot().hasTimestamps = timestamps.isCreated();
+}
+
+void SkinningSystem::State::recordCopies(VkCommandBuffer commandBuffer) {
+  const Label label(context->table, commandBuffer, "dermis: upload");
+  if (const std::uint64_t size = scene.frame().plan().buffer(BufferRole::tables).size; size != 0) {
+    const VkBufferCopy region{0, 0, size};
+    functions.cmdCopyBuffer(commandBuffer, slot().staging.handle(), tables.handle(), 1, &region);
+    ++frameStatistics.copies;
+    frameStatistics.uploadedBytes += size;
+  }
+  for (MeshUpload& upload : uploads) {
+    const Range bytes = scene.meshes().find(upload.mesh)->bytes;
+    const VkBufferCopy region{0, bytes.offset, bytes.size};
+    functions.cmdCopyBuffer(commandBuffer, upload.staging.handle(), meshes.handle(), 1, &region);
+    ++frameStatistics.copies;
+    frameStatistics.uploadedBytes += bytes.size;
+    retired.push_back({scene.frameNumber(), std::move(upload.staging), {}});
+  }
+  uploads.clear();
+  if (!scene.moves().empty()) {
+    std::vector<VkBufferCopy> regions;
+    for (const OutputMove& move : scene.moves()) {
+      regions.push_back({move.from, move.to, move.size});
+      frameStatistics.movedBytes += move.size;
+    }
+    functions.cmdCopyBuffer(commandBuffer, output.handle(), output.handle(),
+                            static_cast<std::uint32_t>(regions.size()), regions.data());
+    ++frameStatistics.copies;
+  }
+  if (scene.frame().culled().candidateCount == 0) return;
+  functions.cmdFillBuffer(commandBuffer, counters.handle(), 0, VK_WHOLE_SIZE, 0);
+  if (!historyIsClear)
+    functions.cmdFillBuffer(commandBuffer, history.handle(), 0, VK_WHOLE_SIZE, 0);
+  historyIsClear = true;
+}
+
+void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
+                                             const FrameDescription& frame) {
+  const DispatchTable& table = context->table;
+  const FrameBuilder& builder = scene.frame();
+  const CulledTables& culled = builder.culled();
+  if (culled.candidateCount != 0) {
+    const BufferRange chosen{frame.visibility, frame.visibilityOffset,
+                             std::uint64_t{description.instanceBudget} * 4};
+    visibility.record(commandBuffer, culled,
+                      {tables.range(), chosen, history.range(), counters.range(), results.range()},
+                      static_cast<std::uint32_t>(scene.recordNumber() + 1), slotNumber());
+    frameStatistics.dispatches += 2;
+  }
+  bool palettesVisible = false;
+  const std::span<const Dispatch> dispatches = builder.plan().dispatches();
+  for (std::size_t index = 0; index < dispatches.size(); ++index) {
+    const Dispatch& dispatch = dispatches[index];
+    if (dispatch.afterPalettes && !palettesVisible) {
+      recordPaletteBarrier(table, commandBuffer, bindings.state_->buffers);
+      palettesVisible = true;
+    }
+    ++frameStatistics.dispatches;
+    const std::uint32_t indirect = builder.indirectNumber(index);
+    if (indirect == notUsed) {
+      recordDispatch(commandBuffer, dispatch, *bindings.state_, nullptr);
+      frameStatistics.workgroups += dispatch.constants.workgroupCount;
+      continue;
+    }
+    const std::uint64_t offset =
+        (culled.arguments + std::uint64_t{indirect} * abi::INDIRECT_WORDS) * 4;
+    const IndirectArguments arguments{functions.cmdDispatchIndirect, tables.handle(), offset};
+    recordDispatch(commandBuffer, dispatch, *bindings.state_, &arguments);
+  }
+}
+
+/// Counters and boxes, where there are any.
+void SkinningSystem::State::recordReadBack(VkCommandBuffer commandBuffer) {
+  const bool culls = scene.frame().culled().candidateCount != 0;
+  const std::uint32_t resultCount = scene.resultCount();
+  if (!culls && resultCount == 0) return;
+  const DispatchTable& table = context->table;
+  FrameSlot& own = slot();
+  barrier(table, commandBuffer, {compute, VK_ACCESS_SHADER_WRITE_BIT},
+          {transfer, VK_ACCESS_TRANSFER_READ_BIT});
+  const auto copy = [&](const SystemBuffer& from, std::uint64_t size, std::uint64_t place) {
+    const VkBufferCopy region{0, place, size};
+    functions.cmdCopyBuffer(commandBuffer, from.handle(), own.readBack.handle(), 1, &region);
+    ++frameStatistics.copies;
+  };
+  if (culls) copy(counters, counters.size(), 0);
+  if (resultCount != 0) copy(results, resultCount * sizeof(InstanceResult), counters.size());
+  barrier(table, commandBuffer, {transfer, VK_ACCESS_TRANSFER_WRITE_BIT},
+          {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT});
+  own.hasCounters = culls;
+  own.resultCount = resultCount;
+}
+
+}  // namespace dermis::vulkan

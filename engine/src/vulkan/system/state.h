@@ -1,0 +1,89 @@
+// What a SkinningSystem consists of: the books (core) and the buffers.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dermis/vulkan/skinning_system.h"
+#include "system/scene.h"
+#include "vulkan/system/buffer.h"
+#include "vulkan/system/functions.h"
+#include "vulkan/system/memory_blocks.h"
+#include "vulkan/system/timestamps.h"
+#include "vulkan/system/visibility.h"
+
+namespace dermis::vulkan {
+
+/// What one frame in flight has for itself.
+struct FrameSlot {
+  std::uint64_t frame = 0;  ///< that last used it; 0 where none did
+  SystemBuffer staging;     ///< of the tables
+  SystemBuffer readBack;    ///< the counters, then the results
+  bool hasCounters = false;
+  std::uint32_t resultCount = 0;
+  bool hasTimestamps = false;
+};
+
+/// A packed mesh on its way to the GPU.
+struct MeshUpload {
+  MeshHandle mesh;
+  SystemBuffer staging;
+};
+
+struct SkinningSystem::State {
+  State(const SkinningSystemDescription& description, Context::State& context,
+        const SceneDescription& sceneDescription);
+  Result<void> createBuffers();
+
+  // frame.cpp
+  Result<void> makeRoomForTables();
+  Result<void> prepareCulling();
+  void writeFreshPalettes();
+  Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
+  void recordCommands(VkCommandBuffer commandBuffer, const FrameDescription& frame);
+  void recordCopies(VkCommandBuffer commandBuffer);
+  void recordDispatches(VkCommandBuffer commandBuffer, const FrameDescription& frame);
+  void recordReadBack(VkCommandBuffer commandBuffer);
+  bool hasWork() const;
+
+  // read_back.cpp
+  void readBackUpTo(std::uint64_t completedFrame);
+  void readStatistics(const FrameSlot& slot);
+
+  FrameSlot& slot() { return slots[(scene.recordNumber() + 1) % slots.size()]; }
+  std::uint32_t slotNumber() const {
+    return static_cast<std::uint32_t>((scene.recordNumber() + 1) % slots.size());
+  }
+
+  Context::State* context;
+  SkinningSystemDescription description;
+  SystemFunctions functions;
+  std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
+  BufferSource source;
+  Scene scene;
+
+  SystemBuffer meshes, matrices, palettes, output, results, tables, history, counters;
+  bool historyIsClear = false;
+  Bindings bindings;
+  Visibility visibility;
+  Timestamps timestamps;
+  std::vector<FrameSlot> slots;
+  std::vector<MeshUpload> uploads;
+
+  /// What frames in flight may still use.
+  struct Retired {
+    std::uint64_t frame;
+    SystemBuffer buffer;
+    Bindings bindings;
+  };
+  std::deque<Retired> retired;
+
+  FrameStatistics frameStatistics;
+  GpuStatistics gpuStatistics;
+  std::vector<InstanceResult> latestResults;
+  std::uint64_t latestResultsFrame = 0;
+};
+
+}  // namespace dermis::vulkan

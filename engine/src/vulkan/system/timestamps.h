@@ -1,0 +1,34 @@
+// How long the GPU takes for what a SkinningSystem records.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "vulkan/system/functions.h"
+
+namespace dermis::vulkan {
+
+/// Two timestamps for each frame in flight.
+class Timestamps {
+ public:
+  Timestamps() = default;
+  ~Timestamps();
+  Timestamps(const Timestamps&) = delete;
+  Timestamps& operator=(const Timestamps&) = delete;
+
+  Result<void> create(const Context::State& context, const SystemFunctions& functions,
+                      std::uint32_t frames);
+  bool isCreated() const { return pool_ != VK_NULL_HANDLE; }
+
+  void begin(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
+  void end(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
+  /// Of a frame that is complete; nothing where the queue has no timestamps.
+  std::optional<double> seconds(std::uint32_t frame) const;
+
+ private:
+  const Context::State* context_ = nullptr;
+  const SystemFunctions* functions_ = nullptr;
+  VkQueryPool pool_ = VK_NULL_HANDLE;
+};
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,127 @@
+// Instances that the GPU chooses: which of them are visible and have something new to show. In the first pass a workgroup goes over
+// the instances of one group and moves the records of those that stay to the front, in their order (a prefix sum); in the second
+// one goes over the groups of one dispatch, and writes how many workgroups it takes. With ONE_OUTPUT there are no results (4
+// storage buffers in all).
+
+#include "abi.h"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+layout(set = 0, binding = BINDING_TABLES, std430) buffer Tables { uint tables[]; };
+layout(set = 0, binding = BINDING_VISIBILITY, std430) restrict readonly buffer Visibility { uint visibility[]; };
+layout(set = 0, binding = BINDING_HISTORY, std430) buffer History { uint history[]; };
+layout(set = 0, binding = BINDING_COUNTERS, std430) buffer Counters { uint counters[]; };
+#ifndef ONE_OUTPUT
+layout(set = 0, binding = BINDING_RESULTS, std430) writeonly buffer Results { uint results[]; };
+#endif
+
+layout(push_constant) uniform Push { uint push[PUSH_CULLED_WORDS]; };
+
+const uint MOST_INVOCATIONS = 128u;
+shared uint kept[MOST_INVOCATIONS];
+
+uint instanceRecord(uint instance) { return push[PUSH_CULLED_INSTANCES] + instance * INSTANCE_WORDS; }
+
+void clearResult(uint record) {
+#ifndef ONE_OUTPUT
+  uint extension = tables[record + INSTANCE_EXTENSION];
+  if ((tables[record + INSTANCE_FLAGS] & INSTANCE_HAS_RESULT) == 0u) return;
+  uint result = tables[extension + EXTENSION_RESULT];
+  for (uint word = 0u; word < RESULT_WORDS; ++word) results[result + word] = 0u;
+  for (uint axis = 0u; axis < 3u; ++axis) results[result + RESULT_MIN + axis] = 0xffffffffu;
+#endif
+}
+
+// Whether an instance has to be looked at by the skin kernel; `flags` are those of its record.
+bool choose(uint candidate, uint record, inout uint flags) {
+  uint slot = tables[candidate + CANDIDATE_SLOT];
+  if (visibility[slot] == 0u) return false;
+  atomicAdd(counters[COUNTER_VISIBLE], 1u);
+  uint frame = push[PUSH_CULLED_FRAME];
+  uint remembered = slot * HISTORY_WORDS;
+  bool isNew = history[remembered + HISTORY_OWNER] != tables[candidate + CANDIDATE_OWNER];
+  bool wasVisible = !isNew && history[remembered + HISTORY_LAST_VISIBLE] == frame - 1u;
+  bool moved = !isNew && frame > 1u && history[remembered + HISTORY_LAST_MOVED] == frame - 1u;
+  history[remembered + HISTORY_OWNER] = tables[candidate + CANDIDATE_OWNER];
+  history[remembered + HISTORY_LAST_VISIBLE] = frame;
+  uint version = tables[candidate + CANDIDATE_VERSION];
+  if (isNew || history[remembered + HISTORY_VERSION] != version) {
+    history[remembered + HISTORY_VERSION] = version;
+    atomicAdd(counters[COUNTER_SKINNED], 1u);
+    clearResult(record);
+    // What an instance showed before it was out of view is no motion.
+    if (!wasVisible && (flags & INSTANCE_HAS_MOTION) != 0u) flags |= INSTANCE_RESTARTS;
+    // Where motion restarts nothing is left to settle.
+    history[remembered + HISTORY_LAST_MOVED] = (flags & INSTANCE_RESTARTS) != 0u ? 0u : frame;
+    return true;
+  }
+  // It rests where it was: its previous positions become the current ones, once.
+  if ((flags & INSTANCE_HAS_MOTION) == 0u || (wasVisible && !moved)) return false;
+  atomicAdd(counters[COUNTER_SETTLED], 1u);
+  flags |= INSTANCE_SETTLES;
+  return true;
+}
+
+void keepChosen(uint group) {
+  uint own = gl_LocalInvocationID.x;
+  uint size = gl_WorkGroupSize.x;
+  uint first = tables[group + GROUP_FIRST_INSTANCE];
+  uint count = tables[group + GROUP_INSTANCE_COUNT];
+  uint total = 0u;
+  for (uint begin = 0u; begin < count; begin += size) {
+    uint number = begin + own;
+    bool stays = false;
+    uint record[INSTANCE_WORDS];
+    if (number < count) {
+      uint place = instanceRecord(first + number);
+      for (uint word = 0u; word < INSTANCE_WORDS; ++word) record[word] = tables[place + word];
+      uint candidate =
+          push[PUSH_CULLED_CANDIDATES] + (first + number - push[PUSH_CULLED_FIRST_INSTANCE]) * CANDIDATE_WORDS;
+      stays = choose(candidate, place, record[INSTANCE_FLAGS]);
+    }
+    kept[own] = stays ? 1u : 0u;
+    barrier();
+    for (uint step = 1u; step < size; step *= 2u) {
+      uint before = own >= step ? kept[own - step] : 0u;
+      barrier();
+      kept[own] += before;
+      barrier();
+    }
+    // All records of this stretch have been read; those that stay go to places in it, or before it.
+    if (stays) {
+      uint place = instanceRecord(first + total + kept[own] - 1u);
+      for (uint word = 0u; word < INSTANCE_WORDS; ++word) tables[place + word] = record[word];
+    }
+    total += kept[size - 1u];
+    barrier();
+  }
+  if (own == 0u) tables[group + GROUP_INSTANCE_COUNT] = total;
+}
+
+void countWorkgroups(uint dispatch, uint arguments) {
+  uint group = tables[dispatch + CULLED_DISPATCH_GROUPS];
+  uint end = group + tables[dispatch + CULLED_DISPATCH_GROUP_COUNT] * GROUP_WORDS;
+  uint perInvocation = tables[dispatch + CULLED_DISPATCH_INSTANCES];
+  uint workgroups = 0u;
+  for (; group < end; group += GROUP_WORDS) {
+    uint rounds = (tables[group + GROUP_INSTANCE_COUNT] + perInvocation - 1u) / perInvocation;
+    workgroups += tables[group + GROUP_VERTEX_GROUPS] * rounds;
+    tables[group + GROUP_WORKGROUP_END] = workgroups;
+  }
+  uint most = push[PUSH_CULLED_FRAME];
+  uint rows = (workgroups + most - 1u) / most;
+  tables[arguments] = rows == 0u ? 0u : (workgroups + rows - 1u) / rows;
+  tables[arguments + 1u] = rows;
+  tables[arguments + 2u] = 1u;
+  atomicAdd(counters[COUNTER_WORKGROUPS], workgroups);
+}
+
+void main() {
+  uint number = gl_WorkGroupID.x;
+  if (push[PUSH_CULLED_PASS] == 0u) {
+    keepChosen(push[PUSH_CULLED_GROUPS] + number * GROUP_WORDS);
+  } else if (gl_LocalInvocationID.x == 0u) {
+    countWorkgroups(push[PUSH_CULLED_GROUPS] + number * CULLED_DISPATCH_WORDS,
+                    push[PUSH_CULLED_CANDIDATES] + number * INDIRECT_WORDS);
+  }
+}
