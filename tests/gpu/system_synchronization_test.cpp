@@ -32,9 +32,9 @@ class SystemSynchronizationTest : public SystemTest {
   void SetUp() override {
     SystemTest::SetUp();
     if (device_ == nullptr) return;
-    setenv(variable, "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT", 1);
+    for (const auto& [name, value] : layerSettings) setenv(name, value, 1);
     Result<samples::OpenDevice> opened = samples::openDevice(testDeviceOptions());
-    unsetenv(variable);
+    for (const auto& [name, value] : layerSettings) unsetenv(name);
     open_.emplace(must(std::move(opened)));
   }
   void TearDown() override {
@@ -55,7 +55,11 @@ class SystemSynchronizationTest : public SystemTest {
     return strict;
   }
 
-  static constexpr const char* variable = "VK_LAYER_ENABLES";
+  /// The same hazard is to be reported as often as it is there.
+  static constexpr std::pair<const char*, const char*> layerSettings[] = {
+      {"VK_LAYER_ENABLES", "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT"},
+      {"VK_LAYER_DUPLICATE_MESSAGE_LIMIT", "1000000"},
+      {"VK_LAYER_ENABLE_MESSAGE_LIMIT", "false"}};
   std::optional<samples::OpenDevice> open_;
 };
 
@@ -169,8 +173,10 @@ TEST_F(SystemSynchronizationTest, WithoutBarriersInsideACommandBufferTheLayerSpe
   EXPECT_GE(countHazards(strictDevice().takeValidationMessages()), 1u);
 }
 
-// Each barrier of a frame on its own.
-TEST_F(SystemSynchronizationTest, EveryBarrierIsMissedByTheLayer) {
+// Each barrier of a frame on its own. Not reported are the first, which the engine's own barriers
+// make up for here, the last, behind which is the host, whose accesses no layer sees, and the one
+// between the two passes over what is visible, where Debian 12's layer is blind.
+TEST_F(SystemSynchronizationTest, TheLayerMissesBarriersOneByOne) {
   InterceptedDevice intercepted(strictDevice().description());
   CommandLog log(intercepted);
   vulkan::Context forgetful = must(vulkan::Context::create(intercepted.description()));
@@ -188,16 +194,29 @@ TEST_F(SystemSynchronizationTest, EveryBarrierIsMissedByTheLayer) {
     seen.insert(frame % 8);
     if (countHazards(strictDevice().takeValidationMessages()) != 0) reported.insert(frame % 8);
   }
-  EXPECT_FALSE(seen.empty());
-  EXPECT_EQ(seen, reported);
+  const std::set<std::uint32_t> followed{1, 3, 4, 5};  // uploads, indirect, palettes, read-back
+  EXPECT_EQ(seen.size(), 7u);
+  EXPECT_TRUE(std::ranges::includes(reported, followed)) << reported.size();
 }
 
+// Where the system copies nothing back, all that stands between it and who draws is the engine's.
 TEST_F(SystemSynchronizationTest, WithoutTheEnginesBarriersTheLayerSpeaks) {
-  BusyScene scene(strictDevice(), strictDescription());
-  for (int frame = 0; frame < 5; ++frame) scene.runFrame();
+  SingleInstance one(strictDevice(), strictDescription(), motionLayout());
+  const std::uint64_t size = strictDescription().outputBudget;
+  const samples::MappedBuffer drawn = must(
+      samples::MappedBuffer::create(strictDevice(), size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
+  one.engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
+    const VkBufferCopy all{0, 0, size};
+    strictDevice().functions().CmdCopyBuffer(commandBuffer, one.engine->outputBuffer(),
+                                             drawn.handle(), 1, &all);
+  };
+  one.engine.submit();
   EXPECT_TRUE(strictDevice().takeValidationMessages().empty());
-  scene.engine().recordsBarriers = false;
-  for (int frame = 0; frame < 5; ++frame) scene.runFrame();
+  one.engine.begin();
+  one.engine.writePose(one.description.palette, systemPose(2));
+  one.engine.recordsBarriers = false;
+  one.engine.submit();
+  one.engine.finish();
   EXPECT_GE(countHazards(strictDevice().takeValidationMessages()), 1u);
 }
 
