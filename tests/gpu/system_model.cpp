@@ -154,7 +154,7 @@ void SystemModel::checkStatistics(const Lists& lists) const {
     waiting += instance.output.state != OutputState::own;
     waitingInView += instance.output.state != OutputState::own && instance.isVisible;
   }
-  EXPECT_EQ(frame.skinnedVertices, vertices);
+  EXPECT_GE(frame.skinnedVertices, vertices) << "bind poses are skinned besides";
   // What has never been in view may have room all the same.
   EXPECT_LE(frame.waitingInstances, waiting);
   EXPECT_GE(frame.waitingInstances, waitingInView);

@@ -188,7 +188,6 @@ void SystemModelTest::setMesh(ModelInstance& instance) {
   instance.mesh = mesh->first;
   instance.description.mesh = mesh->second.handle;
   instance.vertexCount = vertexCount;
-  instance.morphs = 0;
   instance.isChanged = instance.changesMesh = true;
 }
 
