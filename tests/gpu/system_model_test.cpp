@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <random>
 #include <tuple>
 
@@ -229,7 +230,8 @@ void SystemModelTest::showSome(std::span<std::byte> words) {
     if (!instance.description.culledOnGpu) continue;
     if (chance(20)) instance.isShownByGpu = !instance.isShownByGpu;
     const std::uint32_t index = must(system().visibilityIndex(instance.handle));
-    words[index * 4] = std::byte{instance.isShownByGpu};
+    const std::uint32_t word = instance.isShownByGpu ? 1u << below(32) : 0u;
+    std::memcpy(words.data() + index * 4, &word, sizeof(word));
   }
 }
 
