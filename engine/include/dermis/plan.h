@@ -238,7 +238,7 @@ struct Dispatch {
   std::uint32_t groupCountX = 0;
   std::uint32_t groupCountY = 0;
   DispatchConstants constants;
-  /// It reads what the palette kernel wrote, or adds to results that the palette kernel cleared: a
+  /// It reads what the palette kernel wrote, or may see results that the palette kernel cleared: a
   /// memory barrier stands before this dispatch.
   bool afterPalettes = false;
   std::array<OutputWindow, streamCount> windows;

@@ -235,8 +235,10 @@ Result<void> Plan::State::placeGroups(const Tuning& tuning) {
       const std::uint32_t window = group.key.windows[stream];
       dispatches.back().windows[stream] = {window, window * outputWindowStep(limits)};
     }
+    // A kernel that may name the results counts as one that reads them.
     dispatches.back().afterPalettes =
-        palettesRun && (variant.method != Method::linear || hasResults(variant));
+        palettesRun && (variant.method != Method::linear || variant.motion != Motion::none ||
+                        hasResults(variant));
     begin = end;
   }
   return {};

@@ -21,7 +21,8 @@ std::uint32_t culledFlags(const SceneInstance& instance) {
 /// In frames that are the same for all instances of a palette with one interval, also where the
 /// engine leaves frames out: a multiple of the interval lies between the last record and this one.
 bool Scene::isDue(const SceneInstance& instance) const {
-  if (instance.isUrgent || instance.updateInterval == 1) return true;
+  const bool cameBack = instance.visibleFrom == record_ + 1;
+  if (instance.isUrgent || cameBack || instance.updateInterval == 1) return true;
   const std::uint64_t beat = instance.palette;
   return (frame_ + beat) / instance.updateInterval !=
          (recordedFrame_ + beat) / instance.updateInterval;

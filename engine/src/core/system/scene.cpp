@@ -1,14 +1,13 @@
 // What comes and goes, and what engines set.
 
 #include "system/scene.h"
-#include "system/errors.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "plan/check.h"
 #include "plan/outputs.h"
+#include "system/errors.h"
 
 namespace dermis {
 namespace {

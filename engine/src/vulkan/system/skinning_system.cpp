@@ -194,7 +194,7 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
   job.bounds = description.bounds;
   std::vector<Variant> variants = everyVariant(job, state_->description.tuning);
   if (state_->description.overflow == OverflowPolicy::bindPose) {
-    job.method = Method::linear;
+    job.method = Method::dualQuaternion;
     job.bounds = false;
     const std::vector<Variant> bindPose = everyVariant(job, state_->description.tuning);
     variants.insert(variants.end(), bindPose.begin(), bindPose.end());
@@ -205,7 +205,7 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
         !built)
       return built;
   }
-  return {};
+  return description.culledOnGpu ? state_->prepareVisibility() : Result<void>();
 }
 
 // -- What changes.
