@@ -114,6 +114,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     features.pNext = &storage16Bit;
     functions.GetPhysicalDeviceFeatures2(device, &features);
+    info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
     info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
     info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
@@ -294,6 +295,10 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
+  VkPhysicalDeviceFeatures features{};
+  if (options.pipelineStatistics && info_.pipelineStatistics)
+    features.pipelineStatisticsQuery = VK_TRUE;
+  info.pEnabledFeatures = &features;
   if (const VkResult result = functions_.CreateDevice(physicalDevice_, &info, nullptr, &device_);
       result != VK_SUCCESS) {
     device_ = VK_NULL_HANDLE;

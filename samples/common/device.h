@@ -27,6 +27,7 @@ struct DeviceInfo {
   bool storage8Bit = false;   ///< ... and 1 byte
   bool accelerationStructures = false;
   bool rayQueries = false;
+  bool pipelineStatistics = false;
   std::string unusable;  ///< why Dermis cannot run on it; empty where it can
 };
 
@@ -40,6 +41,8 @@ struct DeviceOptions {
   bool smallStorage = true;     ///< enable stores of 1 and 2 bytes where the device has them
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries where the device has them
+  bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
+                                    ///< them
 };
 
 /// Fails with `missingFeature` where there is no loader, or no instance can be made.

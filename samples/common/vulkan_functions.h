@@ -35,6 +35,8 @@
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
   X(CmdCopyBuffer)                        \
+  X(CmdBeginQuery)                        \
+  X(CmdEndQuery)                          \
   X(CreateQueryPool)                      \
   X(DestroyQueryPool)                     \
   X(CmdResetQueryPool)                    \
