@@ -127,7 +127,7 @@ Result<void> Crowd::comeAndGo(std::uint64_t frame) {
   }
   for (CrowdFigure& figure : figures_) {
     if (figure.isThere() || !figure.now.isPresent) continue;
-    const Result<void> added = add(figure);
+    Result<void> added = add(figure);
     if (added) continue;
     if (Result<void> removed = remove(figure); !removed) return removed;
     if (added.error().code != ErrorCode::limitExceeded) return added;

@@ -135,6 +135,7 @@ std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
   }
   std::ranges::stable_sort(ranked, {}, &std::pair<double, ShownPose>::first);
   std::vector<ShownPose> poses;
+  poses.reserve(ranked.size());
   for (const auto& [distance, pose] : ranked) poses.push_back(pose);
   return poses;
 }
@@ -144,9 +145,9 @@ CrowdCheck::Finding CrowdCheck::check(const Capture& capture, const Instance& in
   Finding likeliest;
   bool isFirst = true;
   for (const ShownPose& pose : byLikelihood(capture, instance)) {
-    const Finding finding = checkPose(capture, instance, pose);
+    Finding finding = checkPose(capture, instance, pose);
     if (!finding.done || finding.passed) return finding;
-    if (std::exchange(isFirst, false)) likeliest = finding;
+    if (std::exchange(isFirst, false)) likeliest = std::move(finding);
   }
   return likeliest;
 }

@@ -57,6 +57,17 @@ Json jsonOf(const vulkan::StoreStatistics& store) {
   return {{"capacity", store.capacity}, {"used", store.used}, {"largestFree", store.largestFree}};
 }
 
+Json jsonOf(const ReportTitle& title) {
+  return {{"device", title.device},
+          {"driver", title.driver},
+          {"model", title.model},
+          {"meshes", title.meshes},
+          {"verticesOfFigure", title.verticesOfFigure},
+          {"framesInFlight", title.framesInFlight},
+          {"policy", title.policy},
+          {"culledOnGpu", title.culledOnGpu}};
+}
+
 Json jsonOf(const CheckTotals& check) {
   return {{"frames", check.frames},       {"instances", check.instances},
           {"bindPoses", check.bindPoses}, {"vertices", check.vertices},
@@ -218,8 +229,7 @@ void CrowdReport::printCheck(const CheckTotals& check) const {
                check.bindPoses);
 }
 
-Result<void> CrowdReport::writeJson(const std::filesystem::path& path,
-                                    const CheckTotals* check) const {
+std::string CrowdReport::json(const CheckTotals* check) const {
   Json rows = Json::array();
   for (const Row& row : rows_) {
     rows.push_back({{"frame", row.lastFrame},
@@ -234,18 +244,7 @@ Result<void> CrowdReport::writeJson(const std::filesystem::path& path,
                     {"gpuSeconds", number(row.gpuSeconds)}});
   }
   const Totals& sums = totals_;
-  const Json json{{"device", title_.device},
-                  {"driver", title_.driver},
-                  {"model", title_.model},
-                  {"meshes", title_.meshes},
-                  {"verticesOfFigure", title_.verticesOfFigure},
-                  {"framesInFlight", title_.framesInFlight},
-                  {"policy", title_.policy},
-                  {"culledOnGpu", title_.culledOnGpu},
-                  {"frames", frames_.size()},
-                  {"rows", rows},
-                  {"totals",
-                   {{"instances", sums.instances},
+  const Json totals{{"instances", sums.instances},
                     {"skinned", sums.skinned},
                     {"outOfView", sums.outOfView},
                     {"withinInterval", sums.displayed - std::min(sums.displayed, sums.skinned)},
@@ -253,15 +252,24 @@ Result<void> CrowdReport::writeJson(const std::filesystem::path& path,
                     {"refusals", sums.refusals},
                     {"vertices", title_.culledOnGpu ? Json() : Json(sums.vertices)},
                     {"verticesPerSecond", number(sums.verticesPerSecond)},
-                    {"cpuSeconds", sums.cpuSeconds}}},
-                  {"memory",
-                   {{"meshes", jsonOf(memory_.meshes)},
+                    {"cpuSeconds", sums.cpuSeconds}};
+  const Json memory{{"meshes", jsonOf(memory_.meshes)},
                     {"palettes", jsonOf(memory_.palettes)},
                     {"outputs", jsonOf(memory_.outputs)},
-                    {"device", memory_.deviceMemory}}},
-                  {"check", check != nullptr ? jsonOf(*check) : Json()}};
+                    {"device", memory_.deviceMemory}};
+  Json all = jsonOf(title_);
+  all["frames"] = frames_.size();
+  all["rows"] = rows;
+  all["totals"] = totals;
+  all["memory"] = memory;
+  all["check"] = check != nullptr ? jsonOf(*check) : Json();
+  return all.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<void> CrowdReport::writeJson(const std::filesystem::path& path,
+                                    const CheckTotals* check) const {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  file << json(check) << '\n';
   file.close();
   if (!file) return Error{ErrorCode::ioError, fmt::format("cannot write '{}'", path.string())};
   return {};

@@ -65,6 +65,7 @@ class CrowdReport {
   void addRow();
   void sumUp();
   void printTotals() const;
+  std::string json(const CheckTotals* check) const;
   std::optional<std::uint32_t> skinnedBy(const Frame& frame) const;
   std::optional<std::uint32_t> settledBy(const Frame& frame) const;
 
