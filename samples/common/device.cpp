@@ -114,6 +114,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     features.pNext = &storage16Bit;
     functions.GetPhysicalDeviceFeatures2(device, &features);
+    info.int64 = features.features.shaderInt64 == VK_TRUE;
     info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
     info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
@@ -264,6 +265,9 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   std::vector<const char*> extensions;
   if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
+  features_.pNext = &storage16Bit_;
   storage16Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
   storage8Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
   if (options.smallStorage && info_.storage16Bit) storage16Bit_.storageBuffer16BitAccess = VK_TRUE;
@@ -289,7 +293,7 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   queueInfo.pQueuePriorities = &priority;
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
-  info.pNext = &storage16Bit_;
+  info.pNext = &features_;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
@@ -325,7 +329,7 @@ vulkan::DeviceDescription Device::description() const {
   description.getInstanceProcAddr = loader_->getInstanceProcAddr;
   description.apiVersion = VK_API_VERSION_1_1;
   description.enabledExtensions = enabledExtensions_;
-  description.enabledFeatures = &storage16Bit_;
+  description.enabledFeatures = &features_;
   return description;
 }
 

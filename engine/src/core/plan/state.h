@@ -104,6 +104,8 @@ struct Plan::State {
   Result<void> placeGroups(const Tuning& tuning);
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
                            const DispatchConstants& constants);
+  void chooseTexels();
+  void listVariants();
   void writeInstances(const Batch& batch, std::uint32_t firstRecord);
   std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
   std::uint32_t appendExtension(const Batch& batch, std::uint32_t jobIndex);
