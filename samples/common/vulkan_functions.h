@@ -45,6 +45,7 @@
   X(QueueSubmit)                          \
   X(CreateFence)                          \
   X(DestroyFence)                         \
+  X(ResetFences)                          \
   X(WaitForFences)                        \
   X(DeviceWaitIdle)
 
