@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "frames.h"
@@ -101,15 +103,52 @@ Result<void> CrowdCheck::prepareReferences(const Capture& capture) {
   return references_.prepare(keys);
 }
 
+/// How far some of an attribute's positions are from a pose, all together.
+double CrowdCheck::distanceFrom(PoseKey pose, std::uint32_t part, const Capture& capture,
+                                const OutputAttribute& attribute) const {
+  constexpr std::size_t samples = 16;
+  const std::vector<reference::Double3>& expected = references_.of({part, pose}).positions;
+  const std::byte* first = capture.output.bytes().data() + attribute.offset;
+  double sum = 0;
+  for (std::size_t sample = 0; sample < samples; ++sample) {
+    const std::size_t vertex = sample * expected.size() / samples;
+    const std::array<double, 3> actual =
+        decodePosition(attribute.format, first + vertex * attribute.stride, {});
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      sum += std::abs(actual[axis] - expected[vertex][axis]);
+  }
+  return sum;
+}
+
+/// The poses that may stand there, the likeliest first.
+std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
+                                                const Instance& instance) const {
+  if (instance.shown.poses.size() < 2) return instance.shown.poses;
+  std::vector<std::pair<double, ShownPose>> ranked;
+  for (const ShownPose& pose : instance.shown.poses) {
+    const std::uint32_t part = instance.shown.part;
+    const double distance =
+        distanceFrom(pose.current, part, capture, instance.output.positions) +
+        distanceFrom(pose.previous, part, capture, instance.output.previousPositions);
+    // Not a number is no likely pose.
+    ranked.emplace_back(std::isnan(distance) ? HUGE_VAL : distance, pose);
+  }
+  std::ranges::stable_sort(ranked, {}, &std::pair<double, ShownPose>::first);
+  std::vector<ShownPose> poses;
+  for (const auto& [distance, pose] : ranked) poses.push_back(pose);
+  return poses;
+}
+
 /// Whether one of the poses that may stand there does: all of one, not some vertices of another.
 CrowdCheck::Finding CrowdCheck::check(const Capture& capture, const Instance& instance) const {
-  Finding nearest;
-  for (const ShownPose& pose : instance.shown.poses) {
-    Finding finding = checkPose(capture, instance, pose);
+  Finding likeliest;
+  bool isFirst = true;
+  for (const ShownPose& pose : byLikelihood(capture, instance)) {
+    const Finding finding = checkPose(capture, instance, pose);
     if (!finding.done || finding.passed) return finding;
-    if (&pose == instance.shown.poses.data() || finding.worst < nearest.worst) nearest = finding;
+    if (std::exchange(isFirst, false)) likeliest = finding;
   }
-  return nearest;
+  return likeliest;
 }
 
 CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance& instance,

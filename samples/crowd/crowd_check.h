@@ -61,6 +61,9 @@ class CrowdCheck {
                                                     const ShownPoses& shown) const;
   dermis::Result<dermis::samples::MappedBuffer> readBackBuffer(std::uint64_t size);
   dermis::Result<void> prepareReferences(const Capture& capture);
+  double distanceFrom(PoseKey pose, std::uint32_t part, const Capture& capture,
+                      const dermis::OutputAttribute& attribute) const;
+  std::vector<ShownPose> byLikelihood(const Capture& capture, const Instance& instance) const;
   Finding check(const Capture& capture, const Instance& instance) const;
   Finding checkPose(const Capture& capture, const Instance& instance, const ShownPose& pose) const;
   void count(const Capture& capture, const Instance& instance, const Finding& finding);
