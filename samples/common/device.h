@@ -25,6 +25,7 @@ struct DeviceInfo {
   bool pushDescriptors = false;
   bool storage16Bit = false;  ///< kernels can store 2 bytes
   bool storage8Bit = false;   ///< ... and 1 byte
+  bool int64 = false;         ///< kernels can use 64-bit integers
   bool accelerationStructures = false;
   bool rayQueries = false;
   bool pipelineStatistics = false;
@@ -102,6 +103,7 @@ class Device {
   std::uint32_t queueFamily_ = 0;
   VkCommandPool commandPool_ = VK_NULL_HANDLE;
   std::vector<const char*> enabledExtensions_;
+  VkPhysicalDeviceFeatures2 features_{};
   VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
   VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
   RayTracingFeatures rayTracing_;

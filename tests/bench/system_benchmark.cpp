@@ -12,6 +12,7 @@
 
 #include "bench_scene.h"
 #include "dermis/pack.h"
+#include "driver_version.h"
 #include "random_rig.h"
 #include "system_engine.h"
 
@@ -171,7 +172,7 @@ int main(int argc, char** argv) {
   if (open == nullptr) return 4;
   const std::uint32_t repetitions = numberOr(argc, argv, 1, 11);
   const std::uint32_t mostInstances = numberOr(argc, argv, 2, 10'000);
-  std::printf("device: %s\n", open->device->info().name.c_str());
+  std::printf("driver: %s\n", dermis::samples::driverVersion(*open->device).c_str());
   std::printf(
       "%u meshes of about %u vertices, %u joints; dual quaternions, positions and normals\n",
       meshCount, meanVertexCount, jointCount);

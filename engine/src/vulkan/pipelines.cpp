@@ -17,6 +17,7 @@ Pipelines::~Pipelines() {
 }
 
 Result<void> Pipelines::createModule(const Variant& variant) {
+  if (moduleOf(variant) != VK_NULL_HANDLE) return {};  // shared with others
   const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
   VkShaderModuleCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
@@ -43,14 +44,19 @@ Result<void> Pipelines::create() {
                                                                     : 1;
   for (const Method method : allMethods) {
     for (const Motion motion : {Motion::none, Motion::kept}) {
+      Variant variant;
+      variant.method = method;
+      variant.motion = motion;
       for (std::uint8_t unit = 4; unit >= leastUnit; unit /= 2) {
-        Variant variant;
-        variant.method = method;
-        variant.motion = motion;
         variant.units[0] = unit;
-        if (moduleOf(variant) != VK_NULL_HANDLE) continue;  // shared with others
         if (Result<void> made = createModule(variant); !made) return made;
       }
+      if (limits_.maxTexelBufferElements == 0) continue;
+      variant.units[0] = 4;
+      variant.texels = true;
+      if (Result<void> made = createModule(variant); !made) return made;
+      variant.pairs = limits_.shaderInt64;
+      if (Result<void> made = createModule(variant); !made) return made;
     }
   }
   return {};

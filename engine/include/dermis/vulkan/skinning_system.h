@@ -57,7 +57,7 @@ struct SkinningSystemDescription {
   MemoryCallbacks memory;
   /// Measure the GPU's time of each `record` by timestamps; the queue's family must have them.
   bool measuresGpuTime = false;
-  Tuning tuning;  ///< `Context::tuning`, or the engine's own
+  std::optional<Tuning> tuning;  ///< nothing: `Context::tuning`
 };
 
 struct FrameDescription {

@@ -5,6 +5,7 @@
 
 #include "plan/check.h"
 #include "plan/outputs.h"
+#include "plan/variant.h"
 #include "system/errors.h"
 #include "system/scene.h"
 
@@ -124,9 +125,9 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
   variant.instancesPerInvocation =
       static_cast<std::uint8_t>(description_.tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(description_.tuning.workgroupSize);
+  const bool mayPair = mayStorePairs(job, description_.limits);
   GroupKey key;
   key.mesh = job.meshOffset;
-  key.variant = variant.key();
   key.isCulled = instance.isCulled;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
@@ -150,6 +151,8 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
     key.windows = run.windows;
     key.firstVertex = run.firstVertex;
     key.vertexEnd = run.vertexEnd;
+    variant.pairs = mayPair && run.windows[0] == run.windows[1];
+    key.variant = variant.key();
     PlacedRun& placed = index == 0 ? instance.run : instance.furtherRuns.emplace_back();
     placed.group = groups_.acquire(key, variant, mesh.info.maxInfluences,
                                    instance.method != Method::linear && palette.mayScale);

@@ -47,10 +47,9 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
   size = std::min(size, scene.description().limits.maxStorageBufferRange & ~std::uint64_t{3});
   if (tables.size() < needed || tables.size() == 0) {
     Result<SystemBuffer> made = SystemBuffer::create(
-        source, {size,
-                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-                     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
-                 MemoryUse::device, "dermis tables"});
+        source,
+        {size, readUsage() | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
+         MemoryUse::device, "dermis tables"});
     if (!made) return made.error();
     BatchBuffers buffers{meshes.range(),
                          matrices.range(),
@@ -75,8 +74,8 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
 Result<void> SkinningSystem::State::prepareVisibility() {
   if (preparedVisibility() != nullptr) return {};
   auto made = std::make_unique<Visibility>();
-  if (Result<void> done =
-          made->create(*context, description.tuning, static_cast<std::uint32_t>(slots.size()));
+  if (Result<void> done = made->create(*context, scene.description().tuning,
+                                       static_cast<std::uint32_t>(slots.size()));
       !done)
     return done;
   const std::lock_guard lock(visibilityMutex);

@@ -36,6 +36,7 @@ struct MeshUpload {
 struct SkinningSystem::State {
   State(const SkinningSystemDescription& description, Context::State& context,
         const SceneDescription& sceneDescription);
+  VkBufferUsageFlags readUsage() const;
   Result<void> createBuffers();
 
   // frame.cpp
