@@ -299,10 +299,8 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
-  VkPhysicalDeviceFeatures features{};
   if (options.pipelineStatistics && info_.pipelineStatistics)
-    features.pipelineStatisticsQuery = VK_TRUE;
-  info.pEnabledFeatures = &features;
+    features_.features.pipelineStatisticsQuery = VK_TRUE;
   if (const VkResult result = functions_.CreateDevice(physicalDevice_, &info, nullptr, &device_);
       result != VK_SUCCESS) {
     device_ = VK_NULL_HANDLE;

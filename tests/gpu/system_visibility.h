@@ -18,6 +18,8 @@ class SystemVisibilityTest : public SystemTest {
  protected:
   void open(samples::Device& device, vulkan::SkinningSystemDescription system, bool culledOnGpu,
             const VertexLayout& layout) {
+    // Workgroups are counted: the more instances one skins, the coarser they are.
+    system.tuning = Tuning{64, 4};
     engine_.emplace(device, system);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);
