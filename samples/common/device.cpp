@@ -268,6 +268,8 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
+  if (options.pipelineStatistics && info_.pipelineStatistics)
+    features_.features.pipelineStatisticsQuery = VK_TRUE;
   features_.pNext = &storage16Bit_;
   storage16Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
   storage8Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
@@ -299,8 +301,6 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
-  if (options.pipelineStatistics && info_.pipelineStatistics)
-    features_.features.pipelineStatisticsQuery = VK_TRUE;
   if (const VkResult result = functions_.CreateDevice(physicalDevice_, &info, nullptr, &device_);
       result != VK_SUCCESS) {
     device_ = VK_NULL_HANDLE;
