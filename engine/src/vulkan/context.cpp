@@ -139,7 +139,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   readFeatures(description.enabledFeatures, state.limits);
   // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
   if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
-    state.tuning.instancesPerInvocation = 32;
+    state.tuning.instancesPerInvocation = 24;
   if (description.texelBuffers && state.limits.maxStorageBuffersPerStage >= storageBuffersWanted) {
     state.limits.maxTexelBufferElements = properties.limits.maxTexelBufferElements;
     state.limits.minStorageBufferOffsetAlignment =
