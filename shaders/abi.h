@@ -31,8 +31,8 @@ DERMIS_CONSTANT BINDING_RESULTS = 7u;
 DERMIS_CONSTANT BINDING_COUNT = 8u;
 
 // Uniform texel buffers, for variants that read through them: the same buffers again.
-DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;    // 16 bytes a texel
-DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;     // 4 bytes a texel
+DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;     // 16 bytes a texel
+DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;      // 4 bytes a texel
 DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 10u;  // 16 bytes a texel
 DERMIS_CONSTANT TEXEL_BINDING_COUNT = 3u;
 

@@ -259,7 +259,10 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
       {"outputBudget", [](SkinningSystemDescription& d) { d.outputBudget = 0; }},
       {"instanceBudget", [](SkinningSystemDescription& d) { d.instanceBudget = 0; }},
       {"memory", [&](SkinningSystemDescription& d) { d.memory.allocate = allocate; }},
-      {"tuning", [](SkinningSystemDescription& d) { d.tuning = Tuning{33, 4}; }},
+      {"tuning",
+       [](SkinningSystemDescription& d) {
+         d.tuning = Tuning{33, 4};
+       }},
   };
   for (const auto& [field, change] : changes) {
     SkinningSystemDescription broken = description();
