@@ -105,7 +105,6 @@ class FrameBuilder {
     add(run, palette, flags, extras);
     candidates_.push_back({static_cast<std::uint32_t>(entries_.size() - 1), candidate});
   }
-  void addVertices(std::uint64_t vertices) { plan_.state_->vertexCount += vertices; }
 
   /// Fails with `limitExceeded` where the tables, or a dispatch, become too large.
   Result<void> finish();

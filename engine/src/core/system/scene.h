@@ -156,7 +156,6 @@ class Scene {
   std::span<const PaletteHandle> freshPalettes() const { return fresh_; }
   std::uint64_t frameNumber() const { return frame_; }
   std::uint64_t recordNumber() const { return record_; }
-  bool hasBegun() const { return hasBegun_; }
 
   const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
   const SlotMap<ScenePalette, PaletteHandle>& palettes() const { return palettes_; }
@@ -166,8 +165,6 @@ class Scene {
   const SceneDescription& description() const { return description_; }
   /// Results from this number on are nobody's.
   std::uint32_t resultCount() const { return nextResult_ == freeResults_.size() ? 0 : nextResult_; }
-  /// Something is recorded for every frame, whether the CPU saw a change or not.
-  bool hasCulled() const { return !culled_.empty(); }
 
   const RangeAllocator& meshStore() const { return meshStore_; }
   const RangeAllocator& unitStore() const { return unitStore_; }

@@ -56,7 +56,7 @@ struct SkinningSystem::State {
   void readBackUpTo(std::uint64_t completedFrame);
   void readStatistics(const FrameSlot& slot);
 
-  FrameSlot& slot() { return slots[(scene.recordNumber() + 1) % slots.size()]; }
+  FrameSlot& slot() { return slots[slotNumber()]; }
   std::uint32_t slotNumber() const {
     return static_cast<std::uint32_t>((scene.recordNumber() + 1) % slots.size());
   }

@@ -23,7 +23,6 @@ class Visibility {
 
   /// Pipeline and layouts. `setCount` is the number of frames whose commands may be in flight.
   Result<void> create(const Context::State& context, const Tuning& tuning, std::uint32_t setCount);
-  bool isCreated() const { return pipeline_ != VK_NULL_HANDLE; }
 
   struct Buffers {
     BufferRange tables, visibility, history, counters, results;
