@@ -16,7 +16,7 @@ namespace {
 /// An orthographic view along a light, around all casters.
 struct LightView {
   glm::mat4 matrix{1.0f};
-  float widest = 0;  ///< of the two sides of the map, in the world
+  float widest = 0;  ///< a side of the map, in the world
   float depth = 0;   ///< from its nearest to its farthest, in the world
 };
 
@@ -36,9 +36,14 @@ LightView lightView(const Box& casters, const glm::vec3& towardsLight) {
   const float margin = 0.03f * radiusOf(casters);
   low -= margin;
   high += margin;
+  // As wide as high, so that a penumbra is round.
+  const float half = std::max(high.x - low.x, high.y - low.y) * 0.5f;
+  const glm::vec2 middle = (glm::vec2(low) + glm::vec2(high)) * 0.5f;
   LightView light;
-  light.matrix = glm::orthoRH_ZO(low.x, high.x, low.y, high.y, -high.z, -low.z) * view;
-  light.widest = std::max(high.x - low.x, high.y - low.y);
+  light.matrix = glm::orthoRH_ZO(middle.x - half, middle.x + half, middle.y - half, middle.y + half,
+                                 -high.z, -low.z) *
+                 view;
+  light.widest = 2 * half;
   light.depth = high.z - low.z;
   return light;
 }
@@ -86,6 +91,8 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.shadow.y = keyView.depth;
   block.shadow.w = 1 / static_cast<float>(sizes.keyMap);
   lightSky(casters, sizes, block);
+  // Of the shadow that the top of a figure throws on the ground, or a little less.
+  block.sky.z = 0.6f * (casters.max[1] - casters.min[1]) * style.keySize / key.y;
 
   block.eye = camera.isOrthographic ? glm::vec4(camera.towardsEye, 0) : glm::vec4(camera.eye, 1);
   block.keyDirection = glm::vec4(key, style.keySize);

@@ -36,8 +36,7 @@ float keyVisibility(vec3 position, vec3 normal) {
   if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 1.0;
   float texel = view.shadow.w;
 
-  float widest = 0.06 * view.shadow.y * view.keyDirection.w / 0.1;  // in the world
-  float reach = max(widest / view.shadow.x, 2.0) * texel;
+  float reach = max(view.sky.z / view.shadow.x, 2.0) * texel;
   float sum = 0.0, count = 0.0;
   for (int i = 0; i < blockerTaps; ++i) {
     float depth = textureLod(keyDepth, uv + reach * discTap(i, blockerTaps), 0.0).r;
