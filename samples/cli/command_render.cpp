@@ -34,7 +34,8 @@ struct RenderOptions {
   std::string method = std::string(methodName(Method::dualQuaternion));
   MethodShares shares;
   std::uint32_t width = 1280, height = 720;
-  render::CameraOptions camera;
+  bool isOrthographic = false;
+  std::optional<double> azimuth, elevation;
   std::string device = "auto";
   bool strict = false;
 };
@@ -57,9 +58,9 @@ ExitStatus checkNumbers(const RenderOptions& options) {
     if (side < 16 || side > largestSide)
       return wrong(fmt::format("--width and --height must be from 16 to {} pixels", largestSide));
   }
-  if (!std::isfinite(options.camera.azimuth) || !std::isfinite(options.camera.elevation))
-    return wrong("--azimuth and --elevation must be numbers of degrees");
-  if (!(std::abs(options.camera.elevation) <= 90))
+  if (!std::isfinite(options.azimuth.value_or(0)))
+    return wrong("--azimuth must be a number of degrees");
+  if (!(std::abs(options.elevation.value_or(0)) <= 90))
     return wrong("--elevation must be from -90 to 90 degrees");
   return checkShares(options.shares);
 }
@@ -110,6 +111,7 @@ class Film {
   Result<void> look(const Role& role, double time, std::optional<Box>& around);
   Result<std::optional<Box>> lookThrough(const Role& role, std::uint32_t poses);
   Result<void> frameFigures();
+  render::CameraOptions cameraOptions() const;
   render::ShadowSizes shadowSizes() const;
   double timeOf(const Role& role, double time) const;
 
@@ -137,6 +139,7 @@ Result<void> Film::prepare() {
                                                 *methodFromName(options_.method));
   if (!drawn) return drawn.error();
   drawn_.emplace(std::move(*drawn));
+  for (const std::string& note : drawn_->notes()) reportNote(note);
   if (Result<void> framed = frameFigures(); !framed) return framed;
   render::FrameDescription description;
   description.width = options_.width;
@@ -157,7 +160,7 @@ render::ShadowSizes Film::shadowSizes() const {
   triangles *= options_.instances;
   render::ShadowSizes sizes;
   sizes.skyLights =
-      static_cast<std::uint32_t>(std::clamp(4e7 / std::max(triangles, 1.0), 4.0, 28.0));
+      static_cast<std::uint32_t>(std::clamp(4e7 / std::max(triangles, 1.0), 3.0, 28.0));
   if (options_.instances > 3) sizes.skyMap = 512;
   if (options_.instances > 20) {
     sizes.keyMap = 4096;
@@ -190,6 +193,21 @@ Result<std::optional<Box>> Film::lookThrough(const Role& role, std::uint32_t pos
     if (Result<void> done = look(role, duration * pose / count, around); !done) return done.error();
   }
   return around;
+}
+
+/// A crowd is seen from higher up and from nearer, so that the last of its rows are seen and the
+/// first are large.
+render::CameraOptions Film::cameraOptions() const {
+  const bool isCrowd = options_.instances > 1;
+  render::CameraOptions camera;
+  camera.isOrthographic = options_.isOrthographic;
+  camera.azimuth = options_.azimuth.value_or(isCrowd ? 20 : 30);
+  camera.elevation = options_.elevation.value_or(isCrowd ? 18 : 12);
+  if (isCrowd) {
+    camera.fieldOfView = 42;
+    camera.margin = 0.04;
+  }
+  return camera;
 }
 
 Result<void> Film::frameFigures() {
@@ -227,9 +245,9 @@ Result<void> Film::frameFigures() {
   view_.casters = casters;
   view_.groundHeight = extent->min[1];
   view_.groundRadius = 5 * radius;
-  if (options_.instances > 20) view_.style.haze = 0.5f;
+  if (options_.instances > 20) view_.style.haze = 0.35f;
   view_.camera =
-      render::frameBoxes(boxes, ground, options_.camera,
+      render::frameBoxes(boxes, ground, cameraOptions(),
                          static_cast<float>(options_.width) / static_cast<float>(options_.height));
   return {};
 }
@@ -312,6 +330,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   MeshPreparation preparation;
   preparation.strict = options.strict;
+  preparation.images = true;
   preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
@@ -363,11 +382,12 @@ Run addRender(CLI::App& app) {
   addShares(*command, options->shares);
   command->add_option("--width", options->width, "Pixels [1280]");
   command->add_option("--height", options->height, "Pixels [720]");
-  command->add_flag("--orthographic", options->camera.isOrthographic, "Without perspective");
-  command->add_option("--azimuth", options->camera.azimuth,
-                      "Degrees that the camera has gone around the model, from its front [30]");
-  command->add_option("--elevation", options->camera.elevation,
-                      "Degrees that the camera stands above the ground [12]");
+  command->add_flag("--orthographic", options->isOrthographic, "Without perspective");
+  command->add_option(
+      "--azimuth", options->azimuth,
+      "Degrees that the camera has gone around the model, from its front [30; a crowd: 20]");
+  command->add_option("--elevation", options->elevation,
+                      "Degrees that the camera stands above the ground [12; a crowd: 18]");
   command->add_option("--device", options->device,
                       "auto, a number of 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");

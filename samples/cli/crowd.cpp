@@ -52,7 +52,7 @@ std::vector<JointMatrix> placeCrowd(const Box& extent, std::uint32_t figures) {
       (static_cast<double>(extent.min[2]) + static_cast<double>(extent.max[2])) / 2;
   const double spacing = 1.2 * std::max(static_cast<double>(extent.max[0] - extent.min[0]),
                                         static_cast<double>(extent.max[2] - extent.min[2]));
-  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(1.5 * figures)));
+  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(0.8 * figures)));
   for (std::uint32_t figure = 0; figure < figures; ++figure) {
     const double row = figure / columns, column = figure % columns;
     // Every other row looks between the heads of the one before.

@@ -30,6 +30,17 @@ Transparency transparencyOf(gltf::AlphaMode mode) {
   }
 }
 
+samples::render::Wrap wrapOf(gltf::Wrap wrap) {
+  switch (wrap) {
+    case gltf::Wrap::mirroredRepeat:
+      return samples::render::Wrap::mirror;
+    case gltf::Wrap::clampToEdge:
+      return samples::render::Wrap::clamp;
+    default:
+      return samples::render::Wrap::repeat;
+  }
+}
+
 Surface surfaceOf(const gltf::Model& model, const gltf::Primitive& primitive) {
   // What the file says nothing of is of no metal: glTF's own default would be dark.
   Surface surface;
@@ -146,13 +157,38 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
   return {};
 }
 
-Result<void> DrawnScene::addSharedParts(samples::render::Renderer&) {
+Result<std::uint32_t> DrawnScene::textureOf(samples::render::Renderer& renderer,
+                                            const gltf::TextureUse& use) {
+  if (use.image == gltf::none) return 0u;
+  const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
+  if (!isNew) return place->second;
+  const gltf::Image& image = scene_->model->images[use.image];
+  const Result<samples::render::TexturePixels> pixels = samples::render::decodeImage(image.bytes);
+  if (!pixels) {
+    notes_.push_back(image.name + ": " + pixels.error().message + "; it is left out");
+    return 0u;
+  }
+  Result<std::uint32_t> texture =
+      renderer.addTexture(*pixels, {wrapOf(use.wrapU), wrapOf(use.wrapV)});
+  if (texture) place->second = *texture;
+  return texture;
+}
+
+Result<void> DrawnScene::addSharedParts(samples::render::Renderer& renderer) {
   std::map<const PreparedMesh*, MeshHandle> meshes;
   for (const ScenePart& part : scene_->parts) {
     SharedPart& shared = shared_.emplace_back();
     shared.surface = surfaceOf(*scene_->model, *part.primitive);
+    gltf::TextureUse use;
+    if (part.primitive->material != gltf::none)
+      use = scene_->model->materials[part.primitive->material].baseColorTexture;
+    if (use.texcoord < part.primitive->texcoords.size()) {
+      const Result<std::uint32_t> texture = textureOf(renderer, use);
+      if (!texture) return texture.error();
+      shared.surface.texture = *texture;
+    }
     if (!geometries_.contains(part.primitive)) {
-      Result<Geometry> geometry = geometryOf(*device_->device, *part.primitive, 0);
+      Result<Geometry> geometry = geometryOf(*device_->device, *part.primitive, use.texcoord);
       if (!geometry) return geometry.error();
       geometries_.emplace(part.primitive, std::move(*geometry));
     }

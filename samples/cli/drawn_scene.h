@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "dermis/vulkan/skinning_system.h"
@@ -65,6 +67,7 @@ class DrawnScene {
   DrawnScene() = default;
   Result<void> makeSystem(std::uint32_t figures);
   Result<void> addSharedParts(samples::render::Renderer& renderer);
+  Result<std::uint32_t> textureOf(samples::render::Renderer& renderer, const gltf::TextureUse& use);
   Result<void> addFigure(Method method);
   Result<void> prepare(Method method);
   InstanceDescription instanceOf(std::size_t part, Method method) const;
@@ -76,6 +79,8 @@ class DrawnScene {
   std::optional<vulkan::SkinningSystem> system_;
   std::uint64_t frame_ = 0;
   std::map<const gltf::Primitive*, samples::render::Geometry> geometries_;
+  /// The renderer's, by image and how it is wrapped; 0 for one that cannot be decoded.
+  std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;
   std::vector<SharedPart> shared_;
   std::vector<Figure> figures_;
   std::vector<std::string> notes_;

@@ -36,29 +36,43 @@ void addCorners(const Box& box, std::vector<glm::vec3>& corners) {
   }
 }
 
-/// Where along one axis of the picture the eye stands, and how far away, so that every point is
-/// between the two borders: |x - centre| <= slope · (distance - z).
-struct Fit {
-  float centre = 0, distance = 0;
-};
-
-Fit fitPerspective(std::span<const glm::vec2> points, float slope) {
-  // x - slope·z at its largest touches the one border, -x - slope·z the other.
+/// How far away the eye must be, on a line of its choice, so that |x - centre| <= slope · (distance
+/// - z) for every point x z.
+float fittingDistance(std::span<const glm::vec2> points, float slope) {
+  // The one border is touched by the largest of x + slope·z, the other by that of -x + slope·z.
   float high = std::numeric_limits<float>::lowest(), low = high;
   for (const glm::vec2& point : points) {
     high = std::max(high, point.x + slope * point.y);
     low = std::max(low, -point.x + slope * point.y);
   }
-  return {(high - low) / 2, (high + low) / (2 * slope)};
+  return (high + low) / (2 * slope);
 }
 
-Fit fitOrthographic(std::span<const glm::vec2> points) {
-  float high = std::numeric_limits<float>::lowest(), low = high;
+/// Where the eye stands so that both borders are equally far from what is seen. The farther it goes
+/// to one side the farther that is on the other: found by halving.
+float middle(std::span<const glm::vec2> points, float distance, bool isOrthographic) {
+  float low = std::numeric_limits<float>::max(), high = -low;
   for (const glm::vec2& point : points) {
+    low = std::min(low, point.x);
     high = std::max(high, point.x);
-    low = std::max(low, -point.x);
   }
-  return {(high - low) / 2, (high + low) / 2};
+  for (int step = 0; step < 40; ++step) {
+    const float centre = (low + high) / 2;
+    float left = 0, right = 0;
+    for (const glm::vec2& point : points) {
+      const float place = (point.x - centre) / (isOrthographic ? 1 : distance - point.y);
+      left = std::max(left, -place);
+      right = std::max(right, place);
+    }
+    (right > left ? low : high) = centre;
+  }
+  return (low + high) / 2;
+}
+
+float halfWidth(std::span<const glm::vec2> points, float centre) {
+  float width = 0;
+  for (const glm::vec2& point : points) width = std::max(width, std::abs(point.x - centre));
+  return width;
 }
 
 }  // namespace
@@ -104,27 +118,24 @@ Camera frameBoxes(std::span<const Box> boxes, const Box& depth, const CameraOpti
   const float used = 1 - 2 * static_cast<float>(options.margin);
   const float slope = std::tan(static_cast<float>(glm::radians(options.fieldOfView)) / 2);
 
-  Fit across, along;
-  if (options.isOrthographic) {
-    across = fitOrthographic(horizontal);
-    along = fitOrthographic(vertical);
-  } else {
-    across = fitPerspective(horizontal, slope * aspect * used);
-    along = fitPerspective(vertical, slope * used);
+  float distance = 4 * radius;
+  if (!options.isOrthographic) {
+    distance = std::max({fittingDistance(horizontal, slope * aspect * used),
+                         fittingDistance(vertical, slope * used), radius * 1e-3f});
   }
-  const glm::vec3 middle = target + axes.right * across.centre + axes.up * along.centre;
-  const float halfHeight =
-      std::max({across.distance / aspect, along.distance, radius * 1e-3f}) / used;
-  const float distance = options.isOrthographic
-                             ? 4 * radius
-                             : std::max({across.distance, along.distance, radius * 1e-3f});
+  const float across = middle(horizontal, distance, options.isOrthographic);
+  const float along = middle(vertical, distance, options.isOrthographic);
+  const glm::vec3 lookedAt = target + axes.right * across + axes.up * along;
+  const float halfHeight = std::max({halfWidth(horizontal, across) / aspect,
+                                     halfWidth(vertical, along), radius * 1e-3f}) /
+                           used;
 
   Camera camera;
   camera.isOrthographic = options.isOrthographic;
   camera.towardsEye = axes.back;
   camera.right = axes.right;
   camera.distance = distance;
-  camera.eye = middle + axes.back * distance;
+  camera.eye = lookedAt + axes.back * distance;
   std::vector<glm::vec3> visible = corners;
   addCorners(depth, visible);
   float farthest = 0, nearest = std::numeric_limits<float>::max();
@@ -132,7 +143,7 @@ Camera frameBoxes(std::span<const Box> boxes, const Box& depth, const CameraOpti
     farthest = std::max(farthest, glm::dot(camera.eye - corner, axes.back));
   for (const glm::vec3& corner : corners)
     nearest = std::min(nearest, glm::dot(camera.eye - corner, axes.back));
-  const glm::mat4 view = glm::lookAtRH(camera.eye, middle, axes.up);
+  const glm::mat4 view = glm::lookAtRH(camera.eye, lookedAt, axes.up);
   glm::mat4 projection;
   if (options.isOrthographic) {
     const float reach = 2 * std::max(farthest, radius);

@@ -92,7 +92,9 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.shadow.w = 1 / static_cast<float>(sizes.keyMap);
   lightSky(casters, sizes, block);
   // Of the shadow that the top of a figure throws on the ground, or a little less.
-  block.sky.z = 0.6f * (casters.max[1] - casters.min[1]) * style.keySize / key.y;
+  const float height = casters.max[1] - casters.min[1];
+  block.sky.w = 0.03f * height * block.sky.y / block.shadow.z;
+  block.sky.z = 0.6f * height * style.keySize / key.y;
 
   block.eye = camera.isOrthographic ? glm::vec4(camera.towardsEye, 0) : glm::vec4(camera.eye, 1);
   block.keyDirection = glm::vec4(key, style.keySize);

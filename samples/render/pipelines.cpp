@@ -243,7 +243,7 @@ Result<Owned<VkPipeline>> Pipelines::build(const Device& device, const PipelineK
   }
   const Specialization numbers{taps_.blockers,
                                taps_.penumbra,
-                               taps_.sky,
+                               key.step == Step::ground ? 2 * taps_.sky : taps_.sky,
                                isOctahedral(key.normals) ? VK_TRUE : VK_FALSE,
                                key.normals == VertexFormat::none ? VK_TRUE : VK_FALSE,
                                static_cast<std::int32_t>(key.transparency)};

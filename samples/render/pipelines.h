@@ -31,7 +31,7 @@ struct PipelineKey {
 
 /// How well shadows are filtered; specialises the fragment shaders.
 struct FilterTaps {
-  std::int32_t blockers = 12, penumbra = 24, sky = 4;
+  std::int32_t blockers = 20, penumbra = 32, sky = 4;
 };
 
 class Pipelines {

@@ -10,9 +10,9 @@ layout(set = 0, binding = 1) uniform sampler2DShadow keyShadow;
 layout(set = 0, binding = 2) uniform sampler2D keyDepth;
 layout(set = 0, binding = 3) uniform sampler2DArrayShadow skyShadows;
 
-layout(constant_id = 0) const int blockerTaps = 12;
-layout(constant_id = 1) const int penumbraTaps = 24;
-layout(constant_id = 2) const int skyTaps = 1;
+layout(constant_id = 0) const int blockerTaps = 20;
+layout(constant_id = 1) const int penumbraTaps = 32;
+layout(constant_id = 2) const int skyTaps = 4;
 
 // Of two taps on a disc of radius 1 none is near the other (Vogel 1979, "A better way to construct
 // the sunflower head").
@@ -55,27 +55,27 @@ float keyVisibility(vec3 position, vec3 normal) {
   return visible / float(penumbraTaps);
 }
 
-float skyVisibility(int light, vec3 position, vec3 normal, float cosine) {
+// `radius`: of the filter, as a part of the map.
+float skyVisibility(int light, vec3 position, vec3 normal, float cosine, float radius) {
   vec3 place =
       (view.skyMatrices[light] * vec4(offsetFromSurface(position, normal, cosine, view.shadow.z), 1.0)).xyz;
   vec2 uv = place.xy * 0.5 + 0.5;
   if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 1.0;
-  if (skyTaps == 1) return texture(skyShadows, vec4(uv, float(light), place.z));
   float visible = 0.0;
   for (int i = 0; i < skyTaps; ++i) {
-    visible += texture(skyShadows, vec4(uv + 1.6 * view.sky.y * discTap(i, skyTaps), float(light), place.z));
+    visible += texture(skyShadows, vec4(uv + radius * discTap(i, skyTaps), float(light), place.z));
   }
   return visible / float(skyTaps);
 }
 
 // What arrives of the sky's light at a surface: x as it is, y were there nothing in the way.
-vec2 skyLight(vec3 position, vec3 normal) {
+vec2 skyLight(vec3 position, vec3 normal, float radius) {
   vec2 light = vec2(0.0);
   for (int i = 0; i < int(view.sky.x); ++i) {
     float cosine = dot(normal, view.skyDirections[i].xyz);
     if (cosine <= 0.0) continue;
     float share = cosine * view.skyDirections[i].w;
-    light += share * vec2(skyVisibility(i, position, normal, cosine), 1.0);
+    light += share * vec2(skyVisibility(i, position, normal, cosine, radius), 1.0);
   }
   return light;
 }
@@ -86,6 +86,15 @@ vec3 backgroundAt(vec2 pixel) {
   vec2 fromCentre = place - vec2(0.5, 0.62);
   float far = smoothstep(0.0, 1.0, length(fromCentre * vec2(0.75, 1.0)) * 1.1);
   return mix(view.horizonColor.rgb, view.zenithColor.rgb, far);
+}
+
+// Bayer 1973, "An optimum method for two-level rendition of continuous-tone pictures": half a step of
+// 8 bits up or down, so that gradients have no rings; in linear light, which the target stores as
+// sRGB.
+vec3 dithered(vec3 color, vec2 pixel) {
+  uvec2 place = uvec2(pixel) & 1u;
+  float amount = (float((place.x ^ place.y) << 1 | place.y) + 0.5) / 4.0 - 0.5;
+  return color + amount * 2.2 / 255.0 * pow(max(color, vec3(1e-4)), vec3(0.545));
 }
 
 #endif

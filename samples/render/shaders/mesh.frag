@@ -76,7 +76,7 @@ void main() {
 
   float cosine = max(dot(normal, view.keyDirection.xyz), 0.0);
   float visible = cosine > 0.0 ? keyVisibility(worldPosition, normal) : 0.0;
-  vec2 sky = skyLight(worldPosition, normal);
+  vec2 sky = skyLight(worldPosition, normal, view.sky.y);
   float open = sky.y > 0.0 ? sky.x / sky.y : 1.0;
   float down = 0.5 - 0.5 * normal.y;
 
@@ -95,5 +95,5 @@ void main() {
     float far = clamp((distance(view.eye.xyz, worldPosition) - view.haze.x) * view.haze.y, 0.0, 1.0);
     color = mix(color, backgroundAt(gl_FragCoord.xy), view.haze.z * far);
   }
-  displayed = vec4(color, alpha);
+  displayed = vec4(dithered(color, gl_FragCoord.xy), alpha);
 }

@@ -16,7 +16,7 @@ layout(std140, set = 0, binding = 0) uniform View {
   vec4 bounceColor;                 // … and above the ground
   vec4 rimDirection;                // towards the light at the back; w: its strength
   vec4 shadow;                      // key: texel, depth range; sky: texel (lengths in the world); w: 1 / map size
-  vec4 sky;                         // x: number of lights, y: 1 / map size; z: widest penumbra of the key light
+  vec4 sky;                         // x: number of lights, y: 1 / map size; z: widest penumbra of the key light, w: of the sky, as a part of its map
   vec4 horizonColor;                // of the background, as displayed, linear
   vec4 zenithColor;
   vec4 ground;                      // centre; w: radius at which it has faded into the background
