@@ -210,6 +210,14 @@ render::CameraOptions Film::cameraOptions() const {
   return camera;
 }
 
+/// The lowest place of the clip, so that no foot goes through it; but under the very foot of a still
+/// that only just hovers. A hair lower, for soles that are as flat as the ground.
+float groundUnder(const Box& pose, const Box& extent) {
+  const float height = extent.max[1] - extent.min[1];
+  const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
+  return (hovers ? pose.min[1] : extent.min[1]) - 1e-3f * render::radiusOf(extent);
+}
+
 Result<void> Film::frameFigures() {
   const Error nothing{ErrorCode::invalidData, "there is nothing to draw: no vertex is finite"};
   const std::uint32_t poses = 24;
@@ -240,10 +248,10 @@ Result<void> Film::frameFigures() {
     ground.min[axis] -= 4 * radius;
     ground.max[axis] += 4 * radius;
   }
-  ground.min[1] = extent->min[1];
+  ground.min[1] = groundUnder(*pose, *extent);
   view_.area.extent = {options_.width, options_.height};
   view_.casters = casters;
-  view_.groundHeight = extent->min[1];
+  view_.groundHeight = groundUnder(*pose, *extent);
   view_.groundRadius = 5 * radius;
   if (options_.instances > 20) view_.style.haze = 0.35f;
   view_.camera =

@@ -15,7 +15,7 @@ struct CameraOptions {
   double azimuth = 30;    ///< degrees around the model; 0 in front of it (+Z), 90 at its left (+X)
   double elevation = 12;  ///< degrees above the ground
   double fieldOfView = 28;  ///< degrees, vertical; a portrait lens
-  double margin = 0.10;     ///< free at each border, as a part of the picture
+  double margin = 0.08;     ///< free at each border, as a part of the picture
 };
 
 struct Camera {
