@@ -14,6 +14,7 @@
 #include "drawn_scene.h"
 #include "frame_name.h"
 #include "method_options.h"
+#include "pass_counter.h"
 #include "picture_writer.h"
 #include "progress.h"
 #include "skinned_scene.h"
@@ -107,7 +108,8 @@ class Film {
   Result<render::Picture> draw(double time);
 
  private:
-  Result<void> submit(DrawnScene& drawn, bool draws);
+  Result<void> skin();
+  Result<void> skinAndDraw();
   Result<void> look(const Role& role, double time, std::optional<Box>& around);
   Result<std::optional<Box>> lookThrough(const Role& role, std::uint32_t poses);
   Result<void> frameFigures();
@@ -174,7 +176,7 @@ Result<void> Film::look(const Role& role, double time, std::optional<Box>& aroun
   if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
   if (Result<void> posed = drawn_->setPose(0, scenePose(scene_, role.clip, time)); !posed)
     return posed;
-  if (Result<void> done = submit(*drawn_, false); !done) return done;
+  if (Result<void> done = skin(); !done) return done;
   if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
   const Result<std::optional<Box>> box = drawn_->bounds(0);
   if (!box) return box.error();
@@ -210,8 +212,8 @@ render::CameraOptions Film::cameraOptions() const {
   return camera;
 }
 
-/// The lowest place of the clip, so that no foot goes through it; but under the very foot of a still
-/// that only just hovers. A hair lower, for soles that are as flat as the ground.
+/// The lowest place of the clip, so that no foot goes through it; but under the very foot of a
+/// still that only just hovers. A hair lower, for soles that are as flat as the ground.
 float groundUnder(const Box& pose, const Box& extent) {
   const float height = extent.max[1] - extent.min[1];
   const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
@@ -260,25 +262,44 @@ Result<void> Film::frameFigures() {
   return {};
 }
 
-/// Skins what was posed and, where there is a frame to draw into, draws it.
-Result<void> Film::submit(DrawnScene& drawn, bool draws) {
+/// Skins what was posed.
+Result<void> Film::skin() {
   const samples::VulkanFunctions& functions = device_.device->functions();
   const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   functions.BeginCommandBuffer(commandBuffer, &begin);
-  Result<void> done = drawn.recordSkinning(commandBuffer);
-  std::vector<render::Draw> all;
-  if (draws) {
-    for (std::uint32_t figure = 0; figure < drawn.figureCount() && done; ++figure)
-      done = drawn.addDraws(figure, places_[figure], all);
-    view_.draws = all;
-    if (done) done = renderer_->record(commandBuffer, *frame_, {&view_, 1});
-    if (done) frame_->target().recordReadBack(*device_.device, commandBuffer);
-    view_.draws = {};
-  }
+  Result<void> done = drawn_->recordSkinning(commandBuffer);
   functions.EndCommandBuffer(commandBuffer);
   if (done) done = device_.device->submitAndWait(commandBuffer);
+  device_.device->freeCommandBuffer(commandBuffer);
+  return done;
+}
+
+/// Skins what was posed and draws it, in one command buffer.
+Result<void> Film::skinAndDraw() {
+  const std::uint32_t passes = 1 + render::Renderer::passCount(*frame_, 1);
+  Result<PassCounter> counter = PassCounter::create(*device_.device, passes);
+  if (!counter) return counter.error();
+  const samples::VulkanFunctions& functions = device_.device->functions();
+  const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  functions.BeginCommandBuffer(commandBuffer, &begin);
+  Result<void> done = drawn_->recordSkinning(commandBuffer);
+  counter->record(commandBuffer);
+  std::vector<render::Draw> draws;
+  for (std::uint32_t figure = 0; figure < drawn_->figureCount() && done; ++figure)
+    done = drawn_->addDraws(figure, places_[figure], draws);
+  view_.draws = draws;
+  const auto afterPass = [&] { counter->record(commandBuffer); };
+  if (done) done = renderer_->record(commandBuffer, *frame_, {&view_, 1}, afterPass);
+  view_.draws = {};
+  if (done) frame_->target().recordReadBack(*device_.device, commandBuffer);
+  functions.EndCommandBuffer(commandBuffer);
+  // Of a film the pictures are counted.
+  Progress progress("rendering", options_.frames ? 1 : passes);
+  if (done) done = counter->submitAndWait(commandBuffer, [&] { progress.step(); });
   device_.device->freeCommandBuffer(commandBuffer);
   return done;
 }
@@ -292,7 +313,7 @@ Result<render::Picture> Film::draw(double time) {
         !posed)
       return posed.error();
   }
-  if (Result<void> done = submit(*drawn_, true); !done) return done.error();
+  if (Result<void> done = skinAndDraw(); !done) return done.error();
   return render::Picture{options_.width, options_.height, frame_->target().pixels()};
 }
 

@@ -149,6 +149,88 @@ VkPipelineColorBlendAttachmentState blendState(const PipelineKey& key) {
   return state;
 }
 
+/// The specialisation of both shaders. Not copied: its parts point at each other.
+class SpecializedConstants {
+ public:
+  SpecializedConstants(const PipelineKey& key, const FilterTaps& taps)
+      : numbers_{taps.blockers, taps.penumbra,
+                 // The ground is large and even: what is coarse is seen there first.
+                 key.step == Step::ground ? 2 * taps.sky : taps.sky,
+                 isOctahedral(key.normals) ? VK_TRUE : VK_FALSE,
+                 key.normals == VertexFormat::none ? VK_TRUE : VK_FALSE,
+                 static_cast<std::int32_t>(key.transparency)} {
+    for (std::uint32_t index = 0; index < specializationCount; ++index)
+      entries_[index] = {index, index * 4, 4};
+    info_ = {specializationCount, entries_.data(), sizeof(numbers_), &numbers_};
+  }
+  SpecializedConstants(const SpecializedConstants&) = delete;
+  SpecializedConstants& operator=(const SpecializedConstants&) = delete;
+
+  const VkSpecializationInfo& info() const { return info_; }
+
+ private:
+  Specialization numbers_;
+  std::array<VkSpecializationMapEntry, specializationCount> entries_{};
+  VkSpecializationInfo info_{};
+};
+
+/// Everything of a pipeline but its shaders. Not copied, likewise.
+class FixedState {
+ public:
+  FixedState(const PipelineKey& key, const VertexState& vertices)
+      : raster_(rasterization(key)), depth_(depthState(key)), attachment_(blendState(key)) {
+    const bool colors = key.step != Step::shadow;
+    vertexInput_.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO;
+    vertexInput_.vertexBindingDescriptionCount =
+        static_cast<std::uint32_t>(vertices.bindings.size());
+    vertexInput_.pVertexBindingDescriptions = vertices.bindings.data();
+    vertexInput_.vertexAttributeDescriptionCount =
+        static_cast<std::uint32_t>(vertices.attributes.size());
+    vertexInput_.pVertexAttributeDescriptions = vertices.attributes.data();
+    assembly_.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO;
+    assembly_.topology = key.step == Step::ground ? VK_PRIMITIVE_TOPOLOGY_TRIANGLE_STRIP
+                                                  : VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
+    viewport_.sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO;
+    viewport_.viewportCount = viewport_.scissorCount = 1;
+    multisample_.sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO;
+    multisample_.rasterizationSamples = colors ? sampleCount : VK_SAMPLE_COUNT_1_BIT;
+    multisample_.alphaToCoverageEnable =
+        key.step == Step::mesh && key.transparency == Transparency::mask ? VK_TRUE : VK_FALSE;
+    blend_.sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO;
+    blend_.attachmentCount = colors ? 1 : 0;
+    blend_.pAttachments = &attachment_;
+    dynamic_.sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO;
+    dynamic_.dynamicStateCount = static_cast<std::uint32_t>(dynamicStates_.size());
+    dynamic_.pDynamicStates = dynamicStates_.data();
+  }
+  FixedState(const FixedState&) = delete;
+  FixedState& operator=(const FixedState&) = delete;
+
+  void addTo(VkGraphicsPipelineCreateInfo& info) const {
+    info.pVertexInputState = &vertexInput_;
+    info.pInputAssemblyState = &assembly_;
+    info.pViewportState = &viewport_;
+    info.pRasterizationState = &raster_;
+    info.pMultisampleState = &multisample_;
+    info.pDepthStencilState = &depth_;
+    info.pColorBlendState = &blend_;
+    info.pDynamicState = &dynamic_;
+  }
+
+ private:
+  VkPipelineVertexInputStateCreateInfo vertexInput_{};
+  VkPipelineInputAssemblyStateCreateInfo assembly_{};
+  VkPipelineViewportStateCreateInfo viewport_{};
+  VkPipelineRasterizationStateCreateInfo raster_;
+  VkPipelineMultisampleStateCreateInfo multisample_{};
+  VkPipelineDepthStencilStateCreateInfo depth_;
+  VkPipelineColorBlendAttachmentState attachment_;
+  VkPipelineColorBlendStateCreateInfo blend_{};
+  const std::array<VkDynamicState, 2> dynamicStates_{VK_DYNAMIC_STATE_VIEWPORT,
+                                                     VK_DYNAMIC_STATE_SCISSOR};
+  VkPipelineDynamicStateCreateInfo dynamic_{};
+};
+
 VkDescriptorSetLayoutBinding binding(std::uint32_t number, VkDescriptorType type,
                                      VkShaderStageFlags stages) {
   return {number, type, 1, stages, nullptr};
@@ -241,20 +323,7 @@ Result<Owned<VkPipeline>> Pipelines::build(const Device& device, const PipelineK
   if (drawsMesh) {
     if (Result<void> checked = checkFormats(key); !checked) return checked.error();
   }
-  const Specialization numbers{taps_.blockers,
-                               taps_.penumbra,
-                               key.step == Step::ground ? 2 * taps_.sky : taps_.sky,
-                               isOctahedral(key.normals) ? VK_TRUE : VK_FALSE,
-                               key.normals == VertexFormat::none ? VK_TRUE : VK_FALSE,
-                               static_cast<std::int32_t>(key.transparency)};
-  std::array<VkSpecializationMapEntry, specializationCount> entries{};
-  for (std::uint32_t index = 0; index < specializationCount; ++index)
-    entries[index] = {index, index * 4, 4};
-  const VkSpecializationInfo specialization{specializationCount, entries.data(), sizeof(numbers),
-                                            &numbers};
-  // Shadows of what is opaque need no fragment shader.
-  const bool colors = key.step != Step::shadow;
-  const bool hasFragmentShader = colors || key.transparency != Transparency::opaque;
+  const SpecializedConstants constants(key, taps_);
   const std::array<std::pair<VkShaderModule, VkShaderModule>, 4> modules{{
       {shadowVertex_.get(), shadowFragment_.get()},
       {backgroundVertex_.get(), backgroundFragment_.get()},
@@ -262,54 +331,19 @@ Result<Owned<VkPipeline>> Pipelines::build(const Device& device, const PipelineK
       {meshVertex_.get(), meshFragment_.get()},
   }};
   const auto& [vertex, fragment] = modules[static_cast<std::size_t>(key.step)];
-  const std::array stages{stage(VK_SHADER_STAGE_VERTEX_BIT, vertex, specialization),
-                          stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment, specialization)};
-
+  const std::array stages{stage(VK_SHADER_STAGE_VERTEX_BIT, vertex, constants.info()),
+                          stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment, constants.info())};
+  // Shadows of what is opaque need no fragment shader.
+  const bool colors = key.step != Step::shadow;
+  const bool hasFragmentShader = colors || key.transparency != Transparency::opaque;
   const VertexState vertices = drawsMesh ? vertexState(key) : VertexState();
-  VkPipelineVertexInputStateCreateInfo vertexInput{};
-  vertexInput.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO;
-  vertexInput.vertexBindingDescriptionCount = static_cast<std::uint32_t>(vertices.bindings.size());
-  vertexInput.pVertexBindingDescriptions = vertices.bindings.data();
-  vertexInput.vertexAttributeDescriptionCount =
-      static_cast<std::uint32_t>(vertices.attributes.size());
-  vertexInput.pVertexAttributeDescriptions = vertices.attributes.data();
-  VkPipelineInputAssemblyStateCreateInfo assembly{};
-  assembly.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO;
-  assembly.topology = key.step == Step::ground ? VK_PRIMITIVE_TOPOLOGY_TRIANGLE_STRIP
-                                               : VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
-  VkPipelineViewportStateCreateInfo viewport{};
-  viewport.sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO;
-  viewport.viewportCount = viewport.scissorCount = 1;
-  const VkPipelineRasterizationStateCreateInfo raster = rasterization(key);
-  VkPipelineMultisampleStateCreateInfo multisample{};
-  multisample.sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO;
-  multisample.rasterizationSamples = colors ? sampleCount : VK_SAMPLE_COUNT_1_BIT;
-  multisample.alphaToCoverageEnable =
-      key.step == Step::mesh && key.transparency == Transparency::mask ? VK_TRUE : VK_FALSE;
-  const VkPipelineDepthStencilStateCreateInfo depth = depthState(key);
-  const VkPipelineColorBlendAttachmentState attachment = blendState(key);
-  VkPipelineColorBlendStateCreateInfo blend{};
-  blend.sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO;
-  blend.attachmentCount = colors ? 1 : 0;
-  blend.pAttachments = &attachment;
-  const std::array dynamicStates{VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR};
-  VkPipelineDynamicStateCreateInfo dynamic{};
-  dynamic.sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO;
-  dynamic.dynamicStateCount = static_cast<std::uint32_t>(dynamicStates.size());
-  dynamic.pDynamicStates = dynamicStates.data();
+  const FixedState fixed(key, vertices);
 
   VkGraphicsPipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO;
   info.stageCount = hasFragmentShader ? 2 : 1;
   info.pStages = stages.data();
-  info.pVertexInputState = &vertexInput;
-  info.pInputAssemblyState = &assembly;
-  info.pViewportState = &viewport;
-  info.pRasterizationState = &raster;
-  info.pMultisampleState = &multisample;
-  info.pDepthStencilState = &depth;
-  info.pColorBlendState = &blend;
-  info.pDynamicState = &dynamic;
+  fixed.addTo(info);
   info.layout = layout_.get();
   info.renderPass = colors ? picturePass_ : shadowPass_;
   VkPipeline pipeline = VK_NULL_HANDLE;

@@ -235,8 +235,15 @@ void Renderer::writeViewSet(RenderFrame::ViewResources& view) const {
       device_->handle(), static_cast<std::uint32_t>(writes.size()), writes.data(), 0, nullptr);
 }
 
+std::uint32_t Renderer::passCount(const RenderFrame& frame, std::size_t views) {
+  std::uint32_t count = 1;
+  for (std::size_t index = 0; index < views && index < frame.views_.size(); ++index)
+    count += 1 + frame.views_[index].maps.sizes().skyLights;
+  return count;
+}
+
 Result<void> Renderer::record(VkCommandBuffer commandBuffer, RenderFrame& frame,
-                              std::span<const View> views) {
+                              std::span<const View> views, const std::function<void()>& afterPass) {
   if (views.size() > frame.views_.size()) {
     return Error{ErrorCode::invalidArgument,
                  "the frame was made for " + std::to_string(frame.views_.size()) +
@@ -252,7 +259,8 @@ Result<void> Renderer::record(VkCommandBuffer commandBuffer, RenderFrame& frame,
         static_cast<float>(view.area.offset.x), static_cast<float>(view.area.offset.y),
         static_cast<float>(view.area.extent.width), static_cast<float>(view.area.extent.height)};
     std::memcpy(resources.block.bytes().data(), &block, sizeof(block));
-    if (Result<void> done = recordShadows(commandBuffer, resources, view); !done) return done;
+    if (Result<void> done = recordShadows(commandBuffer, resources, view, afterPass); !done)
+      return done;
   }
 
   const VulkanFunctions& functions = device_->functions();
@@ -270,11 +278,13 @@ Result<void> Renderer::record(VkCommandBuffer commandBuffer, RenderFrame& frame,
   for (std::size_t index = 0; index < views.size() && done; ++index)
     done = recordView(commandBuffer, frame.views_[index], views[index]);
   functions.CmdEndRenderPass(commandBuffer);
+  if (afterPass) afterPass();
   return done;
 }
 
 Result<void> Renderer::recordShadows(VkCommandBuffer commandBuffer,
-                                     const RenderFrame::ViewResources& frame, const View& view) {
+                                     const RenderFrame::ViewResources& frame, const View& view,
+                                     const std::function<void()>& afterPass) {
   const VulkanFunctions& functions = device_->functions();
   const std::vector<const Draw*> draws = inOrder(view.draws);
   const ShadowSizes& sizes = frame.maps.sizes();
@@ -295,6 +305,7 @@ Result<void> Renderer::recordShadows(VkCommandBuffer commandBuffer,
     setArea(functions, commandBuffer, begin.renderArea);
     done = recordDraws(commandBuffer, frame.set, draws, Step::shadow, index);
     functions.CmdEndRenderPass(commandBuffer);
+    if (afterPass) afterPass();
   }
   return done;
 }

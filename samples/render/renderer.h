@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -75,9 +76,11 @@ class Renderer {
   /// Records shadow maps and picture, outside a render pass. What is in the views need not live
   /// longer than the call, but for buffers and geometry. Builds pipelines when they are first
   /// wanted. Fails with `invalidArgument` for more views than the frame was made for, or a format
-  /// that cannot be drawn from.
+  /// that cannot be drawn from. `afterPass` is called where each shadow map and the picture is
+  /// recorded, outside a render pass, `passCount` times.
   Result<void> record(VkCommandBuffer commandBuffer, RenderFrame& frame,
-                      std::span<const View> views);
+                      std::span<const View> views, const std::function<void()>& afterPass = {});
+  static std::uint32_t passCount(const RenderFrame& frame, std::size_t views);
 
  private:
   struct TextureEntry {
@@ -89,7 +92,7 @@ class Renderer {
   Result<void> makeSamplers();
   void writeViewSet(RenderFrame::ViewResources& view) const;
   Result<void> recordShadows(VkCommandBuffer commandBuffer, const RenderFrame::ViewResources& frame,
-                             const View& view);
+                             const View& view, const std::function<void()>& afterPass);
   Result<void> recordView(VkCommandBuffer commandBuffer, const RenderFrame::ViewResources& frame,
                           const View& view);
   Result<void> recordDraws(VkCommandBuffer commandBuffer, VkDescriptorSet set,
