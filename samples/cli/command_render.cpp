@@ -255,7 +255,7 @@ Result<void> Film::frameFigures() {
   view_.casters = casters;
   view_.groundHeight = groundUnder(*pose, *extent);
   view_.groundRadius = 5 * radius;
-  if (options_.instances > 20) view_.style.haze = 0.35f;
+  if (options_.instances > 1) view_.style.haze = options_.instances > 200 ? 0.3f : 0.12f;
   view_.camera =
       render::frameBoxes(boxes, ground, cameraOptions(),
                          static_cast<float>(options_.width) / static_cast<float>(options_.height));

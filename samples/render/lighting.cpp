@@ -108,7 +108,8 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.ground = glm::vec4(centre.x, groundHeight, centre.z, groundRadius);
   const float radius = radiusOf(casters);
   const bool isHazy = style.haze > 0 && !camera.isOrthographic;
-  block.haze = glm::vec4(camera.distance - radius, 1 / (2 * radius), isHazy ? style.haze : 0, 0);
+  block.haze =
+      glm::vec4(camera.distance - 0.5f * radius, 1 / (1.5f * radius), isHazy ? style.haze : 0, 0);
 }
 
 }  // namespace dermis::samples::render

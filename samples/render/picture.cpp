@@ -6,8 +6,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <limits>
+#include <string>
 #include <utility>
+
+#include <png.h>
 
 #include "stb_headers.h"
 
@@ -57,16 +59,18 @@ Result<std::vector<std::byte>> encodePng(const Picture& picture) {
   opaque.reserve(picture.pixels.size() / 4 * 3);
   for (std::size_t i = 0; i + 3 < picture.pixels.size(); i += 4)
     opaque.insert(opaque.end(), &picture.pixels[i], &picture.pixels[i] + 3);
-  std::vector<std::byte> bytes;
-  const auto append = [](void* context, void* data, int size) {
-    const auto* first = static_cast<const std::byte*>(data);
-    auto& all = *static_cast<std::vector<std::byte>*>(context);
-    all.insert(all.end(), first, first + size);
-  };
-  const int width = static_cast<int>(picture.width), height = static_cast<int>(picture.height);
-  if (stbi_write_png_to_func(append, &bytes, width, height, 3, opaque.data(), width * 3) == 0) {
-    return Error{ErrorCode::limitExceeded, "the picture is too large for a PNG file"};
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = picture.width;
+  image.height = picture.height;
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::vector<std::byte> bytes(size);
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, opaque.data(), 0, nullptr) == 0) {
+    return Error{ErrorCode::limitExceeded,
+                 std::string("the picture cannot be written as PNG: ") + image.message};
   }
+  bytes.resize(size);
   return bytes;
 }
 

@@ -5,8 +5,6 @@
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
 #define STBI_NO_STDIO
-#define STBI_WRITE_NO_STDIO
 
 #include <stb/stb_image.h>
-#include <stb/stb_image_write.h>
 #include <stb/stb_truetype.h>

@@ -10,6 +10,5 @@
 #pragma GCC diagnostic ignored "-Wundef"
 
 #define STB_IMAGE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_TRUETYPE_IMPLEMENTATION
 #include "stb_headers.h"

@@ -69,7 +69,7 @@ TEST(RenderReferenceTest, Crowd) {
 TEST(RenderCommandTest, WritesNumberedPictures) {
   REQUIRE_DEVICE();
   const CommandResult result = render(sampleModel("arm"), outFile("frame%02d.png"),
-                                      {"--frames", "3", "--fps", "2", "--time", "0.5"});
+                                      {"--frames", "3", "--fps", "4", "--time", "0.5"});
   ASSERT_EQ(result.status, 0) << result.errors;
   const auto first = readPng(outFile("frame00.png")), last = readPng(outFile("frame02.png"));
   ASSERT_TRUE(first && last);

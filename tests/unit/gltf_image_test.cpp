@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "gltf_builder.h"
 
@@ -65,8 +66,9 @@ TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
   std::ofstream(folder / "secret.png") << "secret";
   const gltf::Model found = loadedWithImages(textured({{"uri", "skin.png"}}), folder / "inside");
   EXPECT_EQ(imageText(found), "picture");
-  for (const std::string uri : {"../secret.png", (folder / "secret.png").string().c_str(),
-                                "absent.png", "https://example.org/a.png", "%"}) {
+  const std::string absolute = (folder / "secret.png").string();
+  for (const std::string& uri : std::vector<std::string>{"../secret.png", absolute, "absent.png",
+                                                         "https://example.org/a.png", "%"}) {
     SCOPED_TRACE(uri);
     const gltf::Model model = loadedWithImages(textured({{"uri", uri}}), folder / "inside");
     EXPECT_TRUE(model.images.at(0).bytes.empty());
