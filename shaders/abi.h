@@ -30,6 +30,12 @@ DERMIS_CONSTANT BINDING_PREVIOUS = 6u;
 DERMIS_CONSTANT BINDING_RESULTS = 7u;
 DERMIS_CONSTANT BINDING_COUNT = 8u;
 
+// Uniform texel buffers, for variants that read through them: the same buffers again.
+DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;    // 16 bytes a texel
+DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;     // 4 bytes a texel
+DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 10u;  // 16 bytes a texel
+DERMIS_CONSTANT TEXEL_BINDING_COUNT = 3u;
+
 // Specialisation constants.
 DERMIS_CONSTANT CONSTANT_WORKGROUP_SIZE = 0u;
 DERMIS_CONSTANT CONSTANT_METHOD = 1u;
@@ -162,14 +168,14 @@ DERMIS_CONSTANT GROUP_WORDS = 12u;
 // dispatch writes, for the group's first vertex.
 DERMIS_CONSTANT INSTANCE_PALETTE =
     0u;  // unit of the palette's status, or of the first joint matrix for linear
-DERMIS_CONSTANT INSTANCE_JOINTS = 1u;  // joints of the palette
-DERMIS_CONSTANT INSTANCE_FLAGS = 2u;
+DERMIS_CONSTANT INSTANCE_POSITIONS = 1u;
+DERMIS_CONSTANT INSTANCE_NORMALS = 2u;
+DERMIS_CONSTANT INSTANCE_TANGENTS = 3u;
+DERMIS_CONSTANT INSTANCE_PREVIOUS = 4u;  // from here on what many variants need not read
+DERMIS_CONSTANT INSTANCE_JOINTS = 5u;    // joints of the palette
+DERMIS_CONSTANT INSTANCE_FLAGS = 6u;
 DERMIS_CONSTANT INSTANCE_EXTENSION =
-    3u;  // word offset of its extension in the tables, where it has one
-DERMIS_CONSTANT INSTANCE_POSITIONS = 4u;
-DERMIS_CONSTANT INSTANCE_NORMALS = 5u;
-DERMIS_CONSTANT INSTANCE_TANGENTS = 6u;
-DERMIS_CONSTANT INSTANCE_PREVIOUS = 7u;
+    7u;  // word offset of its extension in the tables, where it has one
 DERMIS_CONSTANT INSTANCE_WORDS = 8u;
 
 DERMIS_CONSTANT INSTANCE_RESTARTS = 1u;  // previous positions are the current ones

@@ -14,15 +14,8 @@
 #include "center_of_rotation.glsl"
 #endif
 
-// A vertex without influences stays in bind pose.
-Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
-                  bool withTangent) {
-  if (influences.count == 0u) {
-    Vertex still = vertex;
-    if (withNormal) still.normal = unitOr(vertex.normal, vec3(0.0));
-    if (withTangent) still.tangent = tangentOf(unitOr(vertex.tangent.xyz, vec3(0.0)), vertex.tangent.w, 1.0);
-    return still;
-  }
+Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
+                    bool withTangent) {
   switch (METHOD) {
 #ifdef COMPARISON
     case METHOD_LOG_MATRIX:
@@ -46,4 +39,23 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uin
       return skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
 #endif
   }
+}
+
+// A vertex without influences stays in bind pose.
+Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
+                  bool withTangent) {
+  // Where up to four influences were read they are joint 0 for such a vertex. Most meshes have none: choosing afterwards costs
+  // less than a branch around everything, unless the method goes on until it converges.
+#ifdef COMPARISON
+  const bool branches = true;
+#else
+  const bool branches = INFLUENCES == 0u;
+#endif
+  bool still = influences.count == 0u;
+  Vertex rest = vertex;
+  if (!UNIT_BEFORE) makeDirectionsUnit(rest, withNormal, withTangent);
+  if (branches && still) return rest;
+  Vertex skinned = skinByMethod(vertex, influences, inputs, palette, jointCount, withNormal, withTangent);
+  if (still) skinned = rest;
+  return skinned;
 }

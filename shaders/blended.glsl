@@ -32,7 +32,9 @@ Vertex skinBlended(Vertex vertex, Influences influences, uint palette, uint join
     r1 += weight * vec4(row1, translation.y);
     r2 += weight * vec4(row2, translation.z);
   }
-  Vertex straight = throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
+  Vertex unscaled = vertex;
+  if (!UNIT_BEFORE) makeDirectionsUnit(unscaled, withNormal, withTangent);
+  Vertex straight = throughMatrix(unscaled, r0, r1, r2, withNormal, withTangent);
   Vertex skinned = skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
   if (share >= 1.0) return skinned;
   precise float rest = 1.0 - share;

@@ -41,7 +41,8 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
   float pivotWeight = influenceWeight(influences, 0u);
   precise vec4 real = pivotWeight * pivot;
   precise vec4 dual = pivotWeight * paletteDual(palette, pivotJoint);
-  for (uint slot = 1u; slot < influences.count; ++slot) {
+  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
+    if (slot >= influences.count) break;
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
     vec4 rotation = paletteRotation(palette, joint);
@@ -52,7 +53,7 @@ Blend blendJoints(Influences influences, uint palette, uint jointCount, bool two
   return Blend(real, dual, blendScaleShear(influences, palette, jointCount, twoPhase));
 }
 
-// The first phase: a vertex scaled and sheared in bind space, its directions of any length.
+// The first phase: a vertex scaled and sheared in bind space. Its directions are of unit length.
 struct Scaled {
   Vertex vertex;
   float side;  // -1 where it was mirrored
@@ -78,18 +79,18 @@ Scaled scaleVertex(Vertex vertex, ScaleShear part, bool twoPhase, bool withNorma
       if (withTangent) scaled.vertex.tangent.xyz = mapTangent(map, vertex.tangent.xyz);
     }
   }
+  if (!UNIT_BEFORE) makeDirectionsUnit(scaled.vertex, withNormal, withTangent);
   return scaled;
 }
 
-// The second phase: turned by a quaternion of any length but 0, then moved.
+// The second phase: turned by a quaternion of any length but 0, then moved. Directions stay of unit length.
 Vertex turnVertex(Scaled scaled, vec4 real, float squaredLength, vec3 translation, bool withNormal, bool withTangent) {
   Vertex skinned = scaled.vertex;
   precise vec3 position = rotateBy(real, squaredLength, scaled.vertex.position) + translation;
   skinned.position = position;
-  if (withNormal) skinned.normal = unitOr(rotateBy(real, squaredLength, scaled.vertex.normal), vec3(0.0));
+  if (withNormal) skinned.normal = rotateBy(real, squaredLength, scaled.vertex.normal);
   if (withTangent) {
-    vec3 direction = unitOr(rotateBy(real, squaredLength, scaled.vertex.tangent.xyz), vec3(0.0));
-    skinned.tangent = tangentOf(direction, scaled.vertex.tangent.w, scaled.side);
+    skinned.tangent = tangentOf(rotateBy(real, squaredLength, scaled.vertex.tangent.xyz), scaled.vertex.tangent.w, scaled.side);
   }
   return skinned;
 }

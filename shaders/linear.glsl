@@ -23,7 +23,8 @@ Vertex skinLinear(Vertex vertex, Influences influences, uint palette, bool withN
   precise vec4 r0 = pivotWeight * paletteRow(palette, pivotJoint, 0u);
   precise vec4 r1 = pivotWeight * paletteRow(palette, pivotJoint, 1u);
   precise vec4 r2 = pivotWeight * paletteRow(palette, pivotJoint, 2u);
-  for (uint slot = 1u; slot < influences.count; ++slot) {
+  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
+    if (slot >= influences.count) break;
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
     r0 += weight * paletteRow(palette, joint, 0u);

@@ -1,13 +1,21 @@
 // How a packed mesh is read. Needs abi.h.
 
+#ifdef TEXELS
+layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
+
+uint meshWord(uint word) { return texelFetch(meshTexels, int(word)).x; }
+#else
 layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Meshes { uint meshes[]; };
 
+uint meshWord(uint word) { return meshes[word]; }
+#endif
+
 vec3 meshVector(uint word) {
-  return vec3(uintBitsToFloat(meshes[word]), uintBitsToFloat(meshes[word + 1u]), uintBitsToFloat(meshes[word + 2u]));
+  return vec3(uintBitsToFloat(meshWord(word)), uintBitsToFloat(meshWord(word + 1u)), uintBitsToFloat(meshWord(word + 2u)));
 }
 
 // The word at which a section begins.
-uint meshSection(uint mesh, uint header) { return mesh + meshes[mesh + header]; }
+uint meshSection(uint mesh, uint header) { return mesh + meshWord(mesh + header); }
 
 // The influences of one vertex. Up to four are read once, for all instances.
 struct Influences {
@@ -18,17 +26,17 @@ struct Influences {
 };
 
 float readWeight(uint word, uint slot) {
-  return uintBitsToFloat(meshes[word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT]);
+  return uintBitsToFloat(meshWord(word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT));
 }
 
-uint readJoint(uint word, uint slot) { return meshes[word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT]; }
+uint readJoint(uint word, uint slot) { return meshWord(word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT); }
 
 Influences influencesOf(uint mesh, uint vertex) {
   uint firsts = meshSection(mesh, MESH_HEADER_FIRSTS) + vertex;
-  uint first = meshes[firsts];
+  uint first = meshWord(firsts);
   Influences influences;
   influences.word = meshSection(mesh, MESH_HEADER_INFLUENCES) + first * INFLUENCE_WORDS;
-  influences.count = meshes[firsts + 1u] - first;
+  influences.count = meshWord(firsts + 1u) - first;
   influences.weights = vec4(0.0);
   influences.joints = uvec4(0u);
   if (INFLUENCES != 0u) {
@@ -57,8 +65,8 @@ struct MethodInputs {
 };
 
 float meshShare(uint mesh, uint vertex, uint values, uint value) {
-  uint section = meshes[mesh + values];
-  return uintBitsToFloat(section == 0u ? meshes[mesh + value] : meshes[mesh + section + vertex]);
+  uint section = meshWord(mesh + values);
+  return uintBitsToFloat(section == 0u ? meshWord(mesh + value) : meshWord(mesh + section + vertex));
 }
 
 MethodInputs methodInputsOf(uint mesh, uint vertex) {

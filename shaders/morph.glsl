@@ -2,18 +2,18 @@
 
 // The displacement of a vertex by a target, at `word`; false where the target leaves it alone.
 bool findDisplacement(uint mesh, uint target, uint vertex, out uint word) {
-  uint block = vertex / MORPH_BLOCK_VERTICES - meshes[target + MORPH_FIRST_BLOCK];
+  uint block = vertex / MORPH_BLOCK_VERTICES - meshWord(target + MORPH_FIRST_BLOCK);
   // A block before the first wraps around.
-  if (block >= meshes[target + MORPH_BLOCK_COUNT]) return false;
+  if (block >= meshWord(target + MORPH_BLOCK_COUNT)) return false;
   uint entry = meshSection(mesh, target - mesh + MORPH_BLOCKS) + block * MORPH_BLOCK_WORDS;
   uint lane = vertex % MORPH_BLOCK_VERTICES;
-  uint low = meshes[entry + MORPH_BLOCK_MASK];
-  uint mask = lane < 32u ? low : meshes[entry + MORPH_BLOCK_MASK + 1u];
+  uint low = meshWord(entry + MORPH_BLOCK_MASK);
+  uint mask = lane < 32u ? low : meshWord(entry + MORPH_BLOCK_MASK + 1u);
   uint bit = 1u << (lane % 32u);
   if ((mask & bit) == 0u) return false;
   uint before = uint(bitCount(mask & (bit - 1u))) + (lane < 32u ? 0u : uint(bitCount(low)));
-  uint words = 3u * uint(bitCount(meshes[target + MORPH_ATTRIBUTES]));
-  word = mesh + meshes[entry + MORPH_BLOCK_DISPLACEMENTS] + before * words;
+  uint words = 3u * uint(bitCount(meshWord(target + MORPH_ATTRIBUTES)));
+  word = mesh + meshWord(entry + MORPH_BLOCK_DISPLACEMENTS) + before * words;
   return true;
 }
 
@@ -28,7 +28,7 @@ void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint c
     float weight = uintBitsToFloat(tables[first + i * ACTIVE_WORDS + ACTIVE_WEIGHT]);
     uint word;
     if (!findDisplacement(mesh, target, number, word)) continue;
-    uint attributes = meshes[target + MORPH_ATTRIBUTES];
+    uint attributes = meshWord(target + MORPH_ATTRIBUTES);
     if ((attributes & MORPH_HAS_POSITIONS) != 0u) {
       position += weight * meshVector(word);
       word += 3u;

@@ -1,6 +1,18 @@
 // How skinned attributes are written. Each has a buffer of its own, which may be one and the same; with ONE_OUTPUT it is, for
 // devices that have no more storage buffers a stage. Needs abi.h.
 
+#ifdef STORE_PAIRS
+layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
+
+// A position and the normal behind it, two words at a time: drivers that store lane by lane take half as long.
+void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
+  uint pair = place / 8u;
+  positionsPairs[pair] = packUint2x32(position.xy);
+  positionsPairs[pair + 1u] = packUint2x32(uvec2(position.z, normal.x));
+  positionsPairs[pair + 2u] = packUint2x32(normal.yz);
+}
+#endif
+
 #define STREAM_BINDING BINDING_POSITIONS
 #define STREAM_WORDS_BLOCK PositionsWords
 #define STREAM_WORDS positionsWords

@@ -1,12 +1,20 @@
 // How the palette is read. A status unit, then each joint's rotation and dual part, or its logarithm, then the scale/shear
 // parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
 
+#ifdef TEXELS
+layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
+
+uvec4 paletteBits(uint unit) { return texelFetch(paletteTexels, int(unit)); }
+#else
 layout(set = 0, binding = BINDING_PALETTES, std430) restrict readonly buffer Palettes { uvec4 palettes[]; };
 
-vec4 paletteUnit(uint unit) { return uintBitsToFloat(palettes[unit]); }
+uvec4 paletteBits(uint unit) { return palettes[unit]; }
+#endif
+
+vec4 paletteUnit(uint unit) { return uintBitsToFloat(paletteBits(unit)); }
 
 // A branch that some drivers execute whatever its condition is left out where no palette may scale.
-bool paletteIsTwoPhase(uint palette) { return SCALES && palettes[palette][STATUS_TWO_PHASE] != 0u; }
+bool paletteIsTwoPhase(uint palette) { return SCALES && paletteBits(palette)[STATUS_TWO_PHASE] != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }

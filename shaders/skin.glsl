@@ -5,6 +5,9 @@
 //   EXTRAS                      previous positions and results; kept out of other modules, since layers and drivers take what
 //                               a module names for used, whatever its constants say
 //   COMPARISON                  the methods that are there for comparison, instead of those for every day
+//   STORE_PAIRS                 positions and normals, float32x3 each, are stored together (needs 64-bit integers)
+//   TEXELS                      tables, meshes and palettes are read as uniform texel buffers: typed reads, which several drivers
+//                               do much faster
 //   ONE_OUTPUT                  all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #include "abi.h"
@@ -35,6 +38,8 @@ layout(constant_id = CONSTANT_BOUNDS) const bool BOUNDS = false;
 const bool BOUNDS = false;
 #endif
 
+// Bounds loops over influences by a constant, so that drivers may unroll them.
+const uint MOST_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 0xffffffffu;
 const bool NORMALS = NORMAL_FORMAT != FORMAT_NONE;
 const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 
@@ -74,7 +79,7 @@ Vertex bindVertex(uint mesh, uint vertex) {
   if (NORMALS) bind.normal = meshVector(meshSection(mesh, MESH_HEADER_NORMALS) + vertex * 3u);
   if (TANGENTS) {
     uint word = meshSection(mesh, MESH_HEADER_TANGENTS) + vertex * 4u;
-    bind.tangent = vec4(meshVector(word), uintBitsToFloat(meshes[word + 3u]));
+    bind.tangent = vec4(meshVector(word), uintBitsToFloat(meshWord(word + 3u)));
   }
   return bind;
 }
@@ -96,19 +101,46 @@ uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
   return encodeComponents(POSITION_FORMAT, v);
 }
 
-// One instance's record, and this invocation's vertex in it.
-struct Instance {
-  uint record;
-  uint extension;
-  uint flags;
-  uint position;  // the byte at which the position goes
+// The records of a group and of an instance, each read by four words.
+struct Group {
+  uint mesh;
+  uint firstVertex;
+  uint vertexEnd;
+  uint vertexGroups;
+  uint firstInstance;
+  uint instanceCount;
+  uvec4 strides;  // of positions, normals, tangents and previous positions
 };
+
+Group readGroup(uint record) {
+  uvec4 first = tableUnit(record);
+  uvec4 second = tableUnit(record + 4u);
+  uvec4 third = tableUnit(record + 8u);
+  return Group(first[GROUP_MESH], first[GROUP_FIRST_VERTEX], first[GROUP_VERTEX_END], second[GROUP_VERTEX_GROUPS - 4u],
+               second[GROUP_FIRST_INSTANCE - 4u], second[GROUP_INSTANCE_COUNT - 4u],
+               uvec4(second[GROUP_POSITION_STRIDE - 4u], third.xyz));
+}
+
+struct Instance {
+  uint palette;
+  uint jointCount;
+  uint flags;
+  uint extension;
+  uvec4 places;  // the bytes at which this invocation's vertex goes
+};
+
+Instance readInstance(uint record, uvec4 offsets) {
+  uvec4 first = tableUnit(record);
+  uvec4 second = tableUnit(record + 4u);
+  return Instance(first[INSTANCE_PALETTE], second[INSTANCE_JOINTS - 4u], second[INSTANCE_FLAGS - 4u],
+                  second[INSTANCE_EXTENSION - 4u], uvec4(first.yzw, second.x) + offsets);
+}
 
 #ifdef HAS_MOTION
 uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences influences, MethodInputs inputs, uint mesh,
                        uint vertex) {
   if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
-  if (MOTION == MOTION_KEPT) return loadPositions(instance.position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
   Vertex before = bind;
   if (MORPHS) {
     morphVertex(before, mesh, vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
@@ -124,62 +156,62 @@ void main() {
   uint number = workgroupNumber();
   if (number >= push[PUSH_WORKGROUP_COUNT]) return;
   uint index = findGroup(number);
-  uint group = push[PUSH_FIRST_RECORD] + index * GROUP_WORDS;
-  uint local = index == 0u ? number : number - tables[group - GROUP_WORDS + GROUP_WORKGROUP_END];
+  uint record = push[PUSH_FIRST_RECORD] + index * GROUP_WORDS;
+  uint local = index == 0u ? number : number - tables[record - GROUP_WORDS + GROUP_WORKGROUP_END];
+  Group group = readGroup(record);
 
   // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
-  uint vertexGroups = tables[group + GROUP_VERTEX_GROUPS];
-  uint firstVertex = tables[group + GROUP_FIRST_VERTEX];
-  uint run = (local % vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-  uint vertex = firstVertex + run;
-  if (vertex >= tables[group + GROUP_VERTEX_END]) return;
-  uint firstInstance = (local / vertexGroups) * INSTANCES;
-  uint instanceEnd = min(firstInstance + INSTANCES, tables[group + GROUP_INSTANCE_COUNT]);
+  uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+  uint vertex = group.firstVertex + run;
+  if (vertex >= group.vertexEnd) return;
+  uint firstInstance = (local / group.vertexGroups) * INSTANCES;
+  uint instanceEnd = min(firstInstance + INSTANCES, group.instanceCount);
 
-  uint mesh = tables[group + GROUP_MESH];
-  Vertex bind = bindVertex(mesh, vertex);
-  MethodInputs inputs = methodInputsOf(mesh, vertex);
-  Influences influences = influencesOf(mesh, vertex);
+  Vertex bind = bindVertex(group.mesh, vertex);
+  if (UNIT_BEFORE && !MORPHS) makeDirectionsUnit(bind, NORMALS, TANGENTS);
+  MethodInputs inputs = methodInputsOf(group.mesh, vertex);
+  Influences influences = influencesOf(group.mesh, vertex);
 
+  // Outside the loop: some drivers read push constants, too, as often as they stand there.
+  uint records = push[PUSH_INSTANCE_RECORDS] + group.firstInstance * INSTANCE_WORDS;
+  uvec4 offsets = run * group.strides;
   for (uint number = firstInstance; number < instanceEnd; ++number) {
-    Instance instance;
-    instance.record = push[PUSH_INSTANCE_RECORDS] + (tables[group + GROUP_FIRST_INSTANCE] + number) * INSTANCE_WORDS;
-    instance.extension = tables[instance.record + INSTANCE_EXTENSION];
-    instance.flags = tables[instance.record + INSTANCE_FLAGS];
-    instance.position = tables[instance.record + INSTANCE_POSITIONS] + run * tables[group + GROUP_POSITION_STRIDE];
+    Instance instance = readInstance(records + number * INSTANCE_WORDS, offsets);
 
 #ifdef HAS_MOTION
-    uint previous = tables[instance.record + INSTANCE_PREVIOUS] + run * tables[group + GROUP_PREVIOUS_STRIDE];
     if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
-      uvec4 words = loadPositions(instance.position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-      storePrevious(previous, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+      uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+      storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
       continue;
     }
 #endif
 
     Vertex morphed = bind;
     if (MORPHS) {
-      morphVertex(morphed, mesh, vertex, tables[instance.extension + EXTENSION_MORPHS],
+      morphVertex(morphed, group.mesh, vertex, tables[instance.extension + EXTENSION_MORPHS],
                   tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
+      if (UNIT_BEFORE) makeDirectionsUnit(morphed, NORMALS, TANGENTS);
     }
-    Vertex skinned = skinVertex(morphed, influences, inputs, tables[instance.record + INSTANCE_PALETTE],
-                                tables[instance.record + INSTANCE_JOINTS], NORMALS, TANGENTS);
+    Vertex skinned =
+        skinVertex(morphed, influences, inputs, instance.palette, instance.jointCount, NORMALS, TANGENTS);
     if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
     uvec4 position = encodePosition(skinned.position, instance.extension, true);
 #ifdef HAS_MOTION
     if (MOTION != MOTION_NONE) {
-      uvec4 words = previousPosition(instance, position, bind, influences, inputs, mesh, vertex);
-      storePrevious(previous, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+      uvec4 words = previousPosition(instance, position, bind, influences, inputs, group.mesh, vertex);
+      storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     }
 #endif
-    storePositions(instance.position, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-    if (NORMALS) {
-      uint place = tables[instance.record + INSTANCE_NORMALS] + run * tables[group + GROUP_NORMAL_STRIDE];
-      storeNormals(place, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
-    }
+#ifdef STORE_PAIRS
+    storePositionAndNormal(instance.places.x, position.xyz, floatBitsToUint(skinned.normal));
+#else
+    storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+    if (NORMALS)
+      storeNormals(instance.places.y, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+#endif
     if (TANGENTS) {
-      uint place = tables[instance.record + INSTANCE_TANGENTS] + run * tables[group + GROUP_TANGENT_STRIDE];
-      storeTangents(place, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+      storeTangents(instance.places.z, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT),
+                    TANGENT_UNIT);
     }
   }
 }

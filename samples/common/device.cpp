@@ -114,6 +114,8 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     features.pNext = &storage16Bit;
     functions.GetPhysicalDeviceFeatures2(device, &features);
+    info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
+    info.int64 = features.features.shaderInt64 == VK_TRUE;
     info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
     info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
@@ -269,6 +271,9 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   std::vector<const char*> extensions;
   if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
+  features_.pNext = &storage16Bit_;
   storage16Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
   storage8Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
   if (options.smallStorage && info_.storage16Bit) storage16Bit_.storageBuffer16BitAccess = VK_TRUE;
@@ -294,11 +299,13 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   queueInfo.pQueuePriorities = &priority;
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
-  info.pNext = &storage16Bit_;
+  info.pNext = &features_;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queueInfo;
   info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
+  if (options.pipelineStatistics && info_.pipelineStatistics)
+    features_.features.pipelineStatisticsQuery = VK_TRUE;
   if (const VkResult result = functions_.CreateDevice(physicalDevice_, &info, nullptr, &device_);
       result != VK_SUCCESS) {
     device_ = VK_NULL_HANDLE;
@@ -330,7 +337,7 @@ vulkan::DeviceDescription Device::description() const {
   description.getInstanceProcAddr = loader_->getInstanceProcAddr;
   description.apiVersion = VK_API_VERSION_1_1;
   description.enabledExtensions = enabledExtensions_;
-  description.enabledFeatures = &storage16Bit_;
+  description.enabledFeatures = &features_;
   return description;
 }
 

@@ -25,8 +25,10 @@ struct DeviceInfo {
   bool pushDescriptors = false;
   bool storage16Bit = false;  ///< kernels can store 2 bytes
   bool storage8Bit = false;   ///< ... and 1 byte
+  bool int64 = false;         ///< kernels can use 64-bit integers
   bool accelerationStructures = false;
   bool rayQueries = false;
+  bool pipelineStatistics = false;
   std::string unusable;  ///< why Dermis cannot run on it; empty where it can
 };
 
@@ -41,6 +43,8 @@ struct DeviceOptions {
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries where the device has them
   bool graphics = false;        ///< the queue draws too; fails where the device has none that does
+  bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
+                                    ///< them
 };
 
 /// Fails with `missingFeature` where there is no loader, or no instance can be made.
@@ -101,6 +105,7 @@ class Device {
   std::uint32_t queueFamily_ = 0;
   VkCommandPool commandPool_ = VK_NULL_HANDLE;
   std::vector<const char*> enabledExtensions_;
+  VkPhysicalDeviceFeatures2 features_{};
   VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
   VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
   RayTracingFeatures rayTracing_;

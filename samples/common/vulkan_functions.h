@@ -76,6 +76,9 @@
   X(EndCommandBuffer)                     \
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
+  X(CmdCopyBuffer)                        \
+  X(CmdBeginQuery)                        \
+  X(CmdEndQuery)                          \
   X(CreateQueryPool)                      \
   X(DestroyQueryPool)                     \
   X(CmdResetQueryPool)                    \
@@ -84,6 +87,7 @@
   X(QueueSubmit)                          \
   X(CreateFence)                          \
   X(DestroyFence)                         \
+  X(ResetFences)                          \
   X(WaitForFences)                        \
   X(DeviceWaitIdle)                       \
   DERMIS_SAMPLE_GRAPHICS_FUNCTIONS(X)

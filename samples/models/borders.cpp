@@ -81,7 +81,8 @@ void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t
 void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colours) {
   const std::size_t noRegion = colours.size();
   const std::size_t vertexCount = mesh.positions.size();
-  std::vector<std::size_t> regions(vertexCount, noRegion);
+  std::vector<std::size_t>& regions = mesh.regions;
+  regions.assign(vertexCount, noRegion);
   // copies[vertex * regions + region]: the vertex that stands for this one in that region.
   std::vector<std::uint32_t> copies(vertexCount * colours.size(), 0);
   mesh.colours.assign(vertexCount, Vec3(0.0));
@@ -105,6 +106,7 @@ void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colour
         mesh.normals.push_back(Vec3(mesh.normals[vertex]));
         mesh.influences.push_back(Influences(mesh.influences[vertex]));
         mesh.colours.push_back(colours[region]);
+        regions.push_back(region);
       }
       mesh.indices[corner] = copy;
     }

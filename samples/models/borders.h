@@ -17,8 +17,8 @@ using RegionAt = std::function<std::size_t(const Vec3&)>;
 void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t>& indices,
                    const RegionAt& regionAt, const Field& field);
 
-// Gives each triangle the colour of its region. A vertex between regions is doubled, as it needs
-// two colours.
+// Gives each triangle the colour of its region, and its vertices the region. A vertex between
+// regions is doubled, as it needs two colours.
 void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colours);
 
 }  // namespace dermis::models

@@ -15,6 +15,7 @@ Model figureModel() {
   model.mesh.indices = surface.indices;
   model.mesh.influences = figureWeights(shape, model.mesh);
   paint(model.mesh, figureRegions(shape), figureColours());
+  model.parts = figureParts();
   model.clips = {walkClip(), idleClip(), waveClip()};
   return model;
 }

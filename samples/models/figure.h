@@ -92,6 +92,8 @@ std::vector<Influences> figureWeights(const FigureShape& shape, const Mesh& mesh
 // is returned.
 RegionAt figureRegions(const FigureShape& shape);
 const std::vector<Vec3>& figureColours();
+// Body, hair, shirt, trousers, shoes: as characters come, each with a material of its own.
+std::vector<Part> figureParts();
 
 // ---- Clips
 // --------------------------------------------------------------------------------------------------------

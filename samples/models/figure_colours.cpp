@@ -49,6 +49,14 @@ const std::vector<Vec3>& figureColours() {
   return colours;
 }
 
+std::vector<Part> figureParts() {
+  return {{"body", {skin, eyes}},
+          {"hair", {hair}},
+          {"shirt", {shirt}},
+          {"trousers", {trousers}},
+          {"shoes", {shoes, soles}}};
+}
+
 RegionAt figureRegions(const FigureShape& shape) {
   return [&shape](const Vec3& point) {
     return static_cast<std::size_t>(regionOfLeft({std::abs(point.x), point.y, point.z}, shape));

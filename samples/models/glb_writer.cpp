@@ -63,7 +63,7 @@ int putColours(Buffer& buffer, const std::vector<Vec3>& colours) {
   return accessor;
 }
 
-Json putPrimitive(Buffer& buffer, const Mesh& mesh) {
+Json putPrimitive(Buffer& buffer, const Mesh& mesh, std::size_t material) {
   Json attributes;
   attributes["POSITION"] = putPositions(buffer, mesh.positions);
   attributes["NORMAL"] = putVectors(buffer, mesh.normals, GlbTarget::vertices);
@@ -86,7 +86,30 @@ Json putPrimitive(Buffer& buffer, const Mesh& mesh) {
   for (const std::uint32_t index : mesh.indices) buffer.put(index, 2);
   const int indices =
       buffer.end(GlbComponent::unsignedShort, "SCALAR", mesh.indices.size(), GlbTarget::indices);
-  return {{"attributes", attributes}, {"indices", indices}, {"material", 0}, {"mode", 4}};
+  return {{"attributes", attributes}, {"indices", indices}, {"material", material}, {"mode", 4}};
+}
+
+Json putPrimitives(Buffer& buffer, const Model& model) {
+  if (model.parts.empty()) return Json::array({putPrimitive(buffer, model.mesh, 0)});
+  Json primitives = Json::array();
+  for (const Part& part : model.parts)
+    primitives.push_back(putPrimitive(buffer, partOf(model.mesh, part), primitives.size()));
+  return primitives;
+}
+
+Json materialOf(const Model& model, const std::string& name) {
+  return {{"name", name},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", {1, 1, 1, 1}},
+            {"metallicFactor", 0},
+            {"roughnessFactor", model.roughness}}}};
+}
+
+Json materialsOf(const Model& model) {
+  if (model.parts.empty()) return Json::array({materialOf(model, model.name)});
+  Json materials = Json::array();
+  for (const Part& part : model.parts) materials.push_back(materialOf(model, part.name));
+  return materials;
 }
 
 int putInverseBindMatrices(Buffer& buffer, const Skeleton& skeleton) {
@@ -187,7 +210,7 @@ std::vector<std::byte> writeGlb(const Model& model) {
   // mesh.
   constexpr int firstJointNode = 1;
   Buffer buffer;
-  const Json primitive = putPrimitive(buffer, model.mesh);
+  const Json primitives = putPrimitives(buffer, model);
   const int inverseBindMatrices = putInverseBindMatrices(buffer, model.skeleton);
 
   Json nodes = Json::array({{{"name", model.name}, {"mesh", 0}, {"skin", 0}}});
@@ -206,16 +229,12 @@ std::vector<std::byte> writeGlb(const Model& model) {
   document["scene"] = 0;
   document["scenes"] = Json::array({{{"name", model.name}, {"nodes", {0, firstJointNode}}}});
   document["nodes"] = nodes;
-  document["meshes"] = Json::array({{{"name", model.name}, {"primitives", {primitive}}}});
+  document["meshes"] = Json::array({{{"name", model.name}, {"primitives", primitives}}});
   document["skins"] = Json::array({{{"name", model.name},
                                     {"inverseBindMatrices", inverseBindMatrices},
                                     {"skeleton", firstJointNode},
                                     {"joints", joints}}});
-  document["materials"] = Json::array({{{"name", model.name},
-                                        {"pbrMetallicRoughness",
-                                         {{"baseColorFactor", {1, 1, 1, 1}},
-                                          {"metallicFactor", 0},
-                                          {"roughnessFactor", model.roughness}}}}});
+  document["materials"] = materialsOf(model);
   document["animations"] = animations;
   return samples::glbFile(std::move(document), buffer);
 }

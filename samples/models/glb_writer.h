@@ -1,4 +1,5 @@
-// Binary glTF 2.0 of a sample model: one skinned mesh, one skin, its clips.
+// Binary glTF 2.0 of a sample model: one skinned mesh of one primitive or several, one skin, its
+// clips.
 #pragma once
 
 #include <cstddef>
@@ -14,6 +15,7 @@ struct Model {
   std::string name;
   Skeleton skeleton;
   Mesh mesh;
+  std::vector<Part> parts;  // a primitive and a material each; empty: the mesh is all one
   std::vector<Clip> clips;
   double roughness = 0.8;
 };

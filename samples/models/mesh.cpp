@@ -5,6 +5,29 @@
 
 namespace dermis::models {
 
+Mesh partOf(const Mesh& mesh, const Part& part) {
+  Mesh result;
+  std::vector<std::uint32_t> places(mesh.positions.size(), 0);
+  std::vector<bool> isInside(mesh.positions.size(), false);
+  for (std::size_t vertex = 0; vertex < mesh.positions.size(); ++vertex) {
+    const std::size_t region = mesh.regions[vertex];
+    if (std::find(part.regions.begin(), part.regions.end(), region) == part.regions.end()) continue;
+    isInside[vertex] = true;
+    places[vertex] = static_cast<std::uint32_t>(result.positions.size());
+    result.positions.push_back(mesh.positions[vertex]);
+    result.normals.push_back(mesh.normals[vertex]);
+    result.colours.push_back(mesh.colours[vertex]);
+    result.influences.push_back(mesh.influences[vertex]);
+    result.regions.push_back(region);
+  }
+  for (std::size_t first = 0; first < mesh.indices.size(); first += 3) {
+    if (!isInside[mesh.indices[first]]) continue;
+    for (std::size_t corner = first; corner < first + 3; ++corner)
+      result.indices.push_back(places[mesh.indices[corner]]);
+  }
+  return result;
+}
+
 std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,
                                                      const std::vector<std::uint32_t>& indices) {
   std::vector<std::vector<std::uint32_t>> neighbours(vertexCount);

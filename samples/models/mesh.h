@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "maths.h"
@@ -20,10 +21,21 @@ struct Influences {
 struct Mesh {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
-  std::vector<Vec3> colours;  // linear red, green, blue, 0 to 1
+  std::vector<Vec3> colours;         // linear red, green, blue, 0 to 1
+  std::vector<std::size_t> regions;  // that each vertex belongs to; empty where nobody asked
   std::vector<Influences> influences;
   std::vector<std::uint32_t> indices;  // triangles, counter-clockwise seen from outside
 };
+
+// Some of a mesh' regions.
+struct Part {
+  std::string name;
+  std::vector<std::size_t> regions;
+};
+
+// The vertices of the part, in their order, with their triangles. No triangle of the mesh has
+// corners in two regions, and every vertex of the part is used.
+Mesh partOf(const Mesh& mesh, const Part& part);
 
 // For each vertex, its neighbours along triangle edges, in ascending order.
 std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,

@@ -16,7 +16,8 @@ Model barModel();
 // An arm of three joints along x, palm to +z. Clip "bend": the elbow bends to 140° and back.
 Model armModel();
 
-// A person of 1.75 m in an A-pose, facing +z. Clips "walk", "idle", "wave".
+// A person of 1.75 m in an A-pose, facing +z, in several meshes on one skeleton. Clips "walk",
+// "idle", "wave".
 Model figureModel();
 
 std::vector<std::byte> makeBar();

@@ -41,6 +41,12 @@ samples::OpenDevice* benchDevice() {
   return open ? &*open : nullptr;
 }
 
+double timedSubmission(samples::Device& device, VkCommandBuffer commandBuffer) {
+  const auto begin = std::chrono::steady_clock::now();
+  orStop(device.submitAndWait(commandBuffer));
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinRequest> requests,
                        const samples::OutputLayout& output, const Tuning& tuning)
     : open_(open), layout_(samples::layOutBatch(requests, output)) {
@@ -83,9 +89,7 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
 }
 
 double BenchScene::skin() {
-  const auto begin = std::chrono::steady_clock::now();
-  orStop(open_.device->submitAndWait(commandBuffer_));
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return timedSubmission(*open_.device, commandBuffer_);
 }
 
 }  // namespace dermis::bench

@@ -16,6 +16,9 @@ namespace dermis::bench {
 /// error. DERMIS_DEVICE in the environment names another than the best.
 samples::OpenDevice* benchDevice();
 
+/// Submits, waits, and returns the seconds that both took. Ends the process where that fails.
+double timedSubmission(samples::Device& device, VkCommandBuffer commandBuffer);
+
 class BenchScene {
  public:
   /// Ends the process with a message where the batch cannot be skinned: there is nothing to measure
@@ -27,6 +30,8 @@ class BenchScene {
   double skin();
 
   std::uint64_t vertexCount() const { return plan_.vertexCount(); }
+  /// Where one buffer holds all attributes.
+  std::span<const std::byte> output() const { return output_.bytes(); }
 
  private:
   samples::OpenDevice& open_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench_scene.h"
+#include "crowd_benchmark.h"
 #include "random_rig.h"
 #include "ratio_reporter.h"
 
@@ -216,7 +217,9 @@ int main(int argc, char** argv) {
   if (open == nullptr) return 4;
   std::printf("device: %s\n", open->device->info().name.c_str());
   registerAll();
-  RatioReporter reporter(ratios);
+  std::vector<Ratio> reported = ratios;
+  for (Ratio& ratio : registerCrowdBenchmarks()) reported.push_back(std::move(ratio));
+  RatioReporter reporter(std::move(reported));
   benchmark::RunSpecifiedBenchmarks(&reporter);
   benchmark::Shutdown();
   return 0;

@@ -153,7 +153,8 @@ class AccelerationStructureTest : public DeviceTest,
   void makeMesh() {
     mesh_ = randomMesh(1, vertexCount, jointCount, 4, false);
     packed_.emplace(*pack(mesh_.view(), jointCount));
-    meshes_ = makeBuffer(packed_->bytes().size(), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    meshes_ = makeBuffer(packed_->bytes().size(), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                                                      VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
     std::memcpy(meshes_.bytes().data(), packed_->bytes().data(), packed_->bytes().size());
   }
 

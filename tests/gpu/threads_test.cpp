@@ -99,7 +99,8 @@ TEST_F(ThreadsTest, ManyRecordWhileOnePrepares) {
   OwnedMesh mesh = randomMesh(1, 500, 10, 4);
   const PackedMesh packed = *pack(mesh.view(), 10);
   const samples::MappedBuffer meshes = *samples::MappedBuffer::create(
-      device(), packed.bytes().size(), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+      device(), packed.bytes().size(),
+      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
   std::memcpy(meshes.bytes().data(), packed.bytes().data(), packed.bytes().size());
   std::array<Work, threadCount> works;
   for (std::size_t i = 0; i < threadCount; ++i)

@@ -40,6 +40,10 @@ void remember(const VkPipelineLayoutCreateInfo&, VkPipelineLayout) {}
 void remember(const VkDescriptorPoolCreateInfo& info, VkDescriptorPool) {
   mock->setsInPool = info.maxSets;
   mock->descriptorsInPool = info.pPoolSizes[0].descriptorCount;
+  mock->texelDescriptorsInPool = info.poolSizeCount > 1 ? info.pPoolSizes[1].descriptorCount : 0;
+}
+void remember(const VkBufferViewCreateInfo& info, VkBufferView view) {
+  mock->views[view] = info;
 }
 
 #define MOCK_CREATE(name, Info, Handle)                                                            \
@@ -56,6 +60,7 @@ MOCK_CREATE(ShaderModule, VkShaderModuleCreateInfo, VkShaderModule)
 MOCK_CREATE(DescriptorSetLayout, VkDescriptorSetLayoutCreateInfo, VkDescriptorSetLayout)
 MOCK_CREATE(PipelineLayout, VkPipelineLayoutCreateInfo, VkPipelineLayout)
 MOCK_CREATE(DescriptorPool, VkDescriptorPoolCreateInfo, VkDescriptorPool)
+MOCK_CREATE(BufferView, VkBufferViewCreateInfo, VkBufferView)
 
 VkResult VKAPI_CALL createComputePipelines(VkDevice, VkPipelineCache, std::uint32_t,
                                            const VkComputePipelineCreateInfo* info,
@@ -78,6 +83,11 @@ VkResult VKAPI_CALL allocateDescriptorSets(VkDevice, const VkDescriptorSetAlloca
   return VK_SUCCESS;
 }
 void write(const VkWriteDescriptorSet& descriptor, MockDescriptors& descriptors) {
+  if (descriptor.descriptorType == VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER) {
+    const VkBufferViewCreateInfo& view = mock->views.at(*descriptor.pTexelBufferView);
+    descriptors[descriptor.dstBinding] = {view.buffer, view.offset, view.range};
+    return;
+  }
   const VkDescriptorBufferInfo& info = *descriptor.pBufferInfo;
   descriptors[descriptor.dstBinding] = {info.buffer, info.offset, info.range};
 }
@@ -153,6 +163,8 @@ PFN_vkVoidFunction find(const char* name) {
       MOCK_FUNCTION("vkDestroyPipeline", destroyPipeline),
       MOCK_FUNCTION("vkAllocateDescriptorSets", allocateDescriptorSets),
       MOCK_FUNCTION("vkUpdateDescriptorSets", updateDescriptorSets),
+      MOCK_FUNCTION("vkCreateBufferView", createBufferView),
+      MOCK_FUNCTION("vkDestroyBufferView", destroyBufferView),
       MOCK_FUNCTION("vkCmdBindPipeline", cmdBindPipeline),
       MOCK_FUNCTION("vkCmdBindDescriptorSets", cmdBindDescriptorSets),
       MOCK_FUNCTION("vkCmdPushDescriptorSetKHR", cmdPushDescriptorSet),

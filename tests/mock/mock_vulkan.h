@@ -13,7 +13,7 @@
 
 namespace dermis::test {
 
-/// What a binding refers to.
+/// What a binding refers to, itself or by a view.
 struct MockDescriptor {
   VkBuffer buffer = VK_NULL_HANDLE;
   VkDeviceSize offset = 0, range = 0;
@@ -62,7 +62,8 @@ struct MockVulkan {
   std::vector<MockSetLayout> setLayouts;
   std::vector<MockDispatch> dispatches;
   std::map<VkDescriptorSet, MockDescriptors> sets;
-  std::uint32_t setsInPool = 0, descriptorsInPool = 0;
+  std::uint32_t setsInPool = 0, descriptorsInPool = 0, texelDescriptorsInPool = 0;
+  std::map<VkBufferView, VkBufferViewCreateInfo> views;
 
   // The state of the command buffer, and what handles stand for.
   std::map<VkShaderModule, const std::uint32_t*> codeOfModule;

@@ -421,7 +421,7 @@ TEST_F(RecordTest, WhatEveryVariantListsIsEnough) {
   const MockBatch batch = richBatch(context->limits());
   ASSERT_NE(batch.batch.jobs[0].method, batch.batch.jobs[1].method);
   for (const Job& job : batch.batch.jobs)
-    ASSERT_TRUE(context->prepare(everyVariant(job, context->tuning())).ok());
+    ASSERT_TRUE(context->prepare(everyVariant(job, context->limits(), context->tuning())).ok());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
   EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
 }

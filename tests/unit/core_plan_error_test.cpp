@@ -504,11 +504,11 @@ TEST_F(PlanErrors, Tunings) {
     expectInvalid({"tuning", "workgroup"});
   }
   tuning = {};
-  for (const std::uint32_t instances : {1u, 5u, 16u}) {
+  for (const std::uint32_t instances : {1u, 5u, 32u}) {
     tuning.instancesPerInvocation = instances;
     expectGood();
   }
-  for (const std::uint32_t instances : {0u, 17u, 256u, 257u}) {
+  for (const std::uint32_t instances : {0u, 33u, 256u, 257u}) {
     tuning.instancesPerInvocation = instances;
     expectInvalid({"tuning", "instances"});
   }

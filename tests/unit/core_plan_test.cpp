@@ -145,7 +145,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
   for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
     for (const Method method : allMethods) {
       for (const Motion motion : {Motion::none, Motion::kept, Motion::reskinned}) {
-        for (const int flags : {0, 1, 2, 3, 4, 5, 6, 7}) {
+        for (int flags = 0; flags < 32; ++flags) {
           for (const std::uint8_t influences : Bytes{0, 1, 2, 4}) {
             for (const std::uint8_t instances : Bytes{1, 2, 3, 4, 16, 255}) {
               for (const std::uint16_t size : Shorts{8, 64, 128, 65535}) {
@@ -154,7 +154,9 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
                 variant.motion = motion;
                 variant.morphs = flags % 2 != 0;
                 variant.bounds = flags / 2 % 2 != 0;
-                variant.scales = flags / 4 != 0;
+                variant.scales = flags / 4 % 2 != 0;
+                variant.texels = flags / 8 % 2 != 0;
+                variant.pairs = flags / 16 != 0;
                 variant.influences = influences;
                 variant.instancesPerInvocation = instances;
                 variant.workgroupSize = size;
@@ -171,8 +173,8 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
 
 /// Every plan of one job with this layout and method, whatever its mesh and morph targets; removes
 /// from `unused` what they need.
-void planEverything(const Job& layout, const Tuning& tuning, const std::vector<Variant>& all,
-                    std::set<std::uint64_t>& unused) {
+void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning& tuning,
+                    const std::vector<Variant>& all, std::set<std::uint64_t>& unused) {
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u}) {
     OwnedBatch batch;
     batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
@@ -186,7 +188,7 @@ void planEverything(const Job& layout, const Tuning& tuning, const std::vector<V
         batch.jobs[0].morphs = batch.keep({{1, weight}});
         batch.outputSize = 10000;
         Plan out;
-        ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), tuning, out));
+        ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, tuning, out));
         for (const Variant& variant : out.variants()) {
           EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
           unused.erase(variant.key());
@@ -211,19 +213,23 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   layouts[3].tangents = {5000, 4, VertexFormat::octahedral16x2};
   layouts[3].motion = Motion::reskinned;
   layouts[3].previousPositions = {2000, 6, VertexFormat::none};
-  for (const Tuning& tuning : {Tuning{}, Tuning{8, 1}, Tuning{128, 16}}) {
+  DeviceLimits texelLimits = richLimits();
+  texelLimits.maxTexelBufferElements = 1 << 27;
+  for (const auto& [limits, tuning] : {std::pair{richLimits(), Tuning{}},
+                                       {richLimits(), Tuning{8, 1}},
+                                       {texelLimits, Tuning{128, 16}}}) {
     for (const Job& layout : layouts) {
       for (const Method method : allMethods) {
         Job job = layout;
         job.method = method;
-        const std::vector<Variant> all = everyVariant(job, tuning);
+        const std::vector<Variant> all = everyVariant(job, limits, tuning);
         std::set<std::uint64_t> unused;
         for (const Variant& variant : all) unused.insert(variant.key());
         EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
         // Of joints that may scale or may not, which linear blending does not ask; with and without
         // morph targets; for 1, 2, 4 and any number of influences; and palettes.
         EXPECT_EQ(all.size(), (method == Method::linear ? 1u : 2u) * 2 * 4 + 1u);
-        ASSERT_NO_FATAL_FAILURE(planEverything(job, tuning, all, unused));
+        ASSERT_NO_FATAL_FAILURE(planEverything(job, limits, tuning, all, unused));
         // Whoever prepares for linear jobs has the palette kernel too: it clears the results.
         if (method == Method::linear && !hasResults(all.back())) {
           EXPECT_EQ(unused, std::set{all.front().key()});

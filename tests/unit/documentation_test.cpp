@@ -1,10 +1,10 @@
-// The code in README.md is code that is compiled: the marked regions of samples/embed, word for
-// word.
+// The code in README.md is code that is compiled: the marked regions of the samples, word for word.
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -21,15 +21,19 @@ std::string region(const std::string& text, const std::string& name) {
   return text.substr(first + begin.size(), last - first - begin.size());
 }
 
-TEST(DocumentationTest, TheReadmesCodeIsTheSamplesCode) {
-  const std::string readme = readText("README.md"),
-                    sample = readText("samples/embed/skinned_crowd.cpp");
-  for (const char* name : {"plan", "set-up", "frame"}) {
-    const std::string code = region(sample, name);
-    ASSERT_FALSE(code.empty()) << name;
-    EXPECT_NE(readme.find("```cpp\n" + code + "```"), std::string::npos)
+void expectRegions(const std::string& sample, const std::vector<std::string>& names) {
+  const std::string readme = readText("README.md"), code = readText(sample);
+  for (const std::string& name : names) {
+    const std::string marked = region(code, name);
+    ASSERT_FALSE(marked.empty()) << name;
+    EXPECT_NE(readme.find("```cpp\n" + marked + "```"), std::string::npos)
         << "region " << name << " differs";
   }
+}
+
+TEST(DocumentationTest, TheReadmesCodeIsTheSamplesCode) {
+  expectRegions("samples/embed/skinned_crowd.cpp", {"plan", "set-up", "frame"});
+  expectRegions("samples/crowd/crowd.cpp", {"crowd-set-up", "crowd-add", "crowd-frame"});
 }
 
 }  // namespace

@@ -133,8 +133,8 @@ constexpr std::size_t barSize = 194744;
 constexpr std::uint64_t barHash = 0xF46A22FE4EBF4314U;
 constexpr std::size_t armSize = 346180;
 constexpr std::uint64_t armHash = 0xB607E1AA2607AC86U;
-constexpr std::size_t figureSize = 645116;
-constexpr std::uint64_t figureHash = 0x2AD93950E8C7EA22U;
+constexpr std::size_t figureSize = 649856;
+constexpr std::uint64_t figureHash = 0xA2525DA45729B15CU;
 
 TEST(SampleModels, BytesArePinned) {
   const std::vector<std::byte> bar = makeBar();
@@ -179,6 +179,23 @@ TEST(SampleModels, FigureIsAPersonOfOneMetreSeventyFive) {
   EXPECT_NEAR(low.y, 0.0, 0.001);
   EXPECT_NEAR(high.y, 1.75, 0.005);
   EXPECT_NEAR(low.x, -high.x, 0.001);
+}
+
+TEST(SampleModels, TheFiguresPartsAreAllOfIt) {
+  const Model figure = figureModel();
+  EXPECT_EQ(figure.parts.size(), 5U);
+  std::size_t vertices = 0;
+  std::size_t corners = 0;
+  for (const Part& part : figure.parts) {
+    const Mesh mesh = partOf(figure.mesh, part);
+    EXPECT_GT(mesh.indices.size(), 0U) << part.name;
+    EXPECT_EQ(mesh.influences.size(), mesh.positions.size()) << part.name;
+    for (const std::uint32_t index : mesh.indices) ASSERT_LT(index, mesh.positions.size());
+    vertices += mesh.positions.size();
+    corners += mesh.indices.size();
+  }
+  EXPECT_EQ(vertices, figure.mesh.positions.size());
+  EXPECT_EQ(corners, figure.mesh.indices.size());
 }
 
 // The bones of one side, by their names.

@@ -24,7 +24,8 @@ namespace dermis {
 /// defaults are what every Vulkan device has.
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes
-  std::uint32_t minStorageBufferOffsetAlignment = 256;           ///< bytes, a power of two
+  /// Bytes, a power of two; also that of texel buffers, where they are read.
+  std::uint32_t minStorageBufferOffsetAlignment = 256;
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
   /// Storage buffers that one kernel may see. With fewer than `storageBuffersWanted` all attributes
@@ -36,6 +37,12 @@ struct DeviceLimits {
   /// Without, attributes must fill whole words.
   bool storage16Bit = false;
   bool storage8Bit = false;
+  /// Texels of a uniform texel buffer. Where they suffice for a batch, kernels read its tables,
+  /// meshes and palettes through such buffers, which is faster on some drivers. 0: never.
+  std::uint32_t maxTexelBufferElements = 0;
+  /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64): to store two
+  /// words at a time, which is faster on some drivers.
+  bool shaderInt64 = false;
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
@@ -47,7 +54,7 @@ inline constexpr std::uint32_t storageBuffersWanted = 8;
 struct Tuning {
   std::uint32_t workgroupSize = 64;  ///< invocations; a power of two from 8 to 128
   std::uint32_t instancesPerInvocation =
-      4;  ///< instances for which one invocation skins its vertex, 1 to 16
+      4;  ///< instances for which one invocation skins its vertex, 1 to 32
 };
 
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.
@@ -144,9 +151,13 @@ struct OutputSizes {
   std::uint64_t normals = 0;
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
+  /// All attributes go to one and the same buffer. `record` holds the bindings to that where it
+  /// matters (`Variant::pairs`).
+  bool isOneBuffer = false;
 
-  /// All attributes in one buffer.
-  static constexpr OutputSizes oneBuffer(std::uint64_t size) { return {size, size, size, size}; }
+  static constexpr OutputSizes oneBuffer(std::uint64_t size) {
+    return {size, size, size, size, true};
+  }
 };
 
 /// Everything that one `record` skins, and the sizes of the buffers it works on.
@@ -179,6 +190,12 @@ struct Variant {
   bool bounds = false;
   /// Dual quaternions: whether joints may scale or shear (`Palette::mayScale`).
   bool scales = false;
+  /// Tables, meshes and palettes are read as uniform texel buffers, not as storage buffers.
+  bool texels = false;
+  /// Positions and, right behind each, normals in the same buffer, float32x3 both and at multiples
+  /// of 8 bytes, are stored together, two words at a time. Only with `texels`, without motion and
+  /// results, and with `DeviceLimits::shaderInt64`.
+  bool pairs = false;
   /// 1, 2, 4, or 0 for any number of influences a vertex.
   std::uint8_t influences = 0;
   std::uint8_t instancesPerInvocation = 1;
@@ -193,9 +210,10 @@ struct Variant {
 bool hasResults(const Variant& variant);
 
 /// Every variant that jobs with the method, outputs, motion and bounds of this one may need,
-/// whatever their mesh, palette and morph targets: for an engine that cannot foresee its batches
-/// but knows its vertex layouts, to hand to `Context::prepare` while loading.
-std::vector<Variant> everyVariant(const Job& job, const Tuning& tuning);
+/// whatever their mesh, palette and morph targets, and the sizes of their buffers, which decide on
+/// `texels` and `pairs`: for an engine that cannot foresee its batches but knows its vertex
+/// layouts, to hand to `Context::prepare` while loading.
+std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The buffers of a batch.
 enum class BufferRole : std::uint8_t {
@@ -238,7 +256,7 @@ struct Dispatch {
   std::uint32_t groupCountX = 0;
   std::uint32_t groupCountY = 0;
   DispatchConstants constants;
-  /// It reads what the palette kernel wrote, or adds to results that the palette kernel cleared: a
+  /// It reads what the palette kernel wrote, or may see results that the palette kernel cleared: a
   /// memory barrier stands before this dispatch.
   bool afterPalettes = false;
   std::array<OutputWindow, streamCount> windows;

@@ -7,6 +7,7 @@
 
 #include "abi.h"
 #include "vulkan/descriptor_writes.h"
+#include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
 
@@ -47,8 +48,10 @@ VkDescriptorBufferInfo infoOf(const BufferRange& range) {
 }  // namespace
 
 Bindings::State::~State() {
-  if (context != nullptr)
-    context->table.destroyDescriptorPool(context->device, pool, context->allocator);
+  if (context == nullptr) return;
+  for (const VkBufferView view : {tableTexels, meshTexels, matrixTexels, paletteTexels})
+    context->table.destroyBufferView(context->device, view, context->allocator);
+  context->table.destroyDescriptorPool(context->device, pool, context->allocator);
 }
 
 const BufferRange& Bindings::State::output(std::size_t stream) const {
@@ -69,40 +72,76 @@ BoundBuffers Bindings::State::paletteKernel() const {
   const auto orElse = [](const BufferRange& range, const BufferRange& other) {
     return infoOf(range.buffer != VK_NULL_HANDLE ? range : other);
   };
-  BoundBuffers bound{};
-  bound[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound[abi::BINDING_MESHES] = orElse(buffers.matrices, buffers.tables);
-  bound[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
+  BoundBuffers bound;
+  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
+  bound.buffers[abi::BINDING_MESHES] = orElse(buffers.matrices, buffers.tables);
+  bound.buffers[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
   if (context->bindingCount() == abi::BINDING_COUNT)
-    bound[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
+    bound.buffers[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
   return bound;
 }
 
 BoundBuffers Bindings::State::skinKernel(Method method, const Windows& windows) const {
-  BoundBuffers bound{};
-  bound[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound[abi::BINDING_MESHES] = infoOf(buffers.meshes);
-  bound[abi::BINDING_PALETTES] =
+  BoundBuffers bound;
+  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
+  bound.buffers[abi::BINDING_MESHES] = infoOf(buffers.meshes);
+  bound.buffers[abi::BINDING_PALETTES] =
       infoOf(method == Method::linear ? buffers.matrices : buffers.palettes);
   const bool oneOutput = context->bindingCount() != abi::BINDING_COUNT;
   for (std::size_t stream = 0; stream < (oneOutput ? 1 : streamCount); ++stream) {
     const BufferRange& range = output(stream);
-    VkDescriptorBufferInfo& info = bound[abi::BINDING_POSITIONS + stream];
+    VkDescriptorBufferInfo& info = bound.buffers[abi::BINDING_POSITIONS + stream];
     info = infoOf(range);
     if (range.buffer == VK_NULL_HANDLE) {
-      if (stream != 0) info = bound[abi::BINDING_POSITIONS];
+      if (stream != 0) info = bound.buffers[abi::BINDING_POSITIONS];
       continue;
     }
     const std::uint64_t begin = std::min(windows[stream], windowCount(stream) - 1) * windowStep;
     info.offset += begin;
     info.range = std::min(range.size - begin, context->limits.maxStorageBufferRange);
   }
+  bound.texels[abi::BINDING_TABLE_TEXELS - abi::BINDING_COUNT] = tableTexels;
+  bound.texels[abi::BINDING_MESH_TEXELS - abi::BINDING_COUNT] = meshTexels;
+  bound.texels[abi::BINDING_PALETTE_TEXELS - abi::BINDING_COUNT] =
+      method == Method::linear ? matrixTexels : paletteTexels;
   // Not to an output: a layer would see results read there that another dispatch wrote.
   if (!oneOutput) {
-    bound[abi::BINDING_RESULTS] =
+    bound.buffers[abi::BINDING_RESULTS] =
         infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : buffers.tables);
   }
   return bound;
+}
+
+Result<void> Bindings::State::createTexelViews() {
+  if (context->texelBindingCount() == 0) return {};
+  const auto create = [this](const BufferRange& range, VkFormat format, std::uint32_t texelSize,
+                             VkBufferView& view) -> Result<void> {
+    // What does not fit no plan reads so; a part of a texel at the end is nothing that is read so.
+    const std::uint64_t texels =
+        std::min<std::uint64_t>(range.size / texelSize, context->limits.maxTexelBufferElements);
+    if (range.buffer == VK_NULL_HANDLE || texels == 0) return {};
+    VkBufferViewCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
+    info.buffer = range.buffer;
+    info.format = format;
+    info.offset = range.offset;
+    info.range = texels * texelSize;
+    if (const VkResult result =
+            context->table.createBufferView(context->device, &info, context->allocator, &view);
+        result != VK_SUCCESS) {
+      view = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
+      return vulkanError("vkCreateBufferView", result);
+    }
+    return {};
+  };
+  // Unsigned: no NaN is changed on its way. Every device has both formats for uniform texel
+  // buffers.
+  constexpr VkFormat unit = VK_FORMAT_R32G32B32A32_UINT;
+  if (Result<void> good = create(buffers.tables, unit, 16, tableTexels); !good) return good;
+  if (Result<void> good = create(buffers.meshes, VK_FORMAT_R32_UINT, 4, meshTexels); !good)
+    return good;
+  if (Result<void> good = create(buffers.matrices, unit, 16, matrixTexels); !good) return good;
+  return create(buffers.palettes, unit, 16, paletteTexels);
 }
 
 std::uint32_t Bindings::State::windowCount(std::size_t stream) const {
@@ -141,6 +180,57 @@ std::optional<std::uint32_t> Bindings::State::commonWindow(const Dispatch& dispa
       return std::nullopt;
   }
   return common;
+}
+
+/// Descriptor sets for every kernel and window.
+Result<void> Bindings::State::createSets() {
+  const std::uint32_t windows = mostWindows();
+  const std::uint32_t setCount = 1 + windows * 2;
+  const std::array<VkDescriptorPoolSize, 2> sizes{
+      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, setCount * context->bindingCount()},
+       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, setCount * context->texelBindingCount()}}};
+  VkDescriptorPoolCreateInfo poolInfo{};
+  poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  poolInfo.maxSets = setCount;
+  poolInfo.poolSizeCount = context->texelBindingCount() != 0 ? 2 : 1;
+  poolInfo.pPoolSizes = sizes.data();
+  if (const VkResult result = context->table.createDescriptorPool(context->device, &poolInfo,
+                                                                  context->allocator, &pool);
+      result != VK_SUCCESS) {
+    pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
+    return vulkanError("vkCreateDescriptorPool", result);
+  }
+  nameObject(context->table, context->device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
+  const std::vector<VkDescriptorSetLayout> layouts(setCount, context->setLayout);
+  sets.resize(setCount);
+  VkDescriptorSetAllocateInfo allocateInfo{};
+  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  allocateInfo.descriptorPool = pool;
+  allocateInfo.descriptorSetCount = setCount;
+  allocateInfo.pSetLayouts = layouts.data();
+  if (const VkResult result =
+          context->table.allocateDescriptorSets(context->device, &allocateInfo, sets.data());
+      result != VK_SUCCESS) {
+    return vulkanError("vkAllocateDescriptorSets", result);
+  }
+
+  const auto update = [&](const BoundBuffers& bound, VkDescriptorSet set) {
+    const DescriptorWrites writes(bound, set);
+    if (writes.count() != 0) {
+      context->table.updateDescriptorSets(context->device, writes.count(), writes.data(), 0,
+                                          nullptr);
+    }
+  };
+  update(paletteKernel(), sets[0]);
+  for (std::uint32_t window = 0; window < windows; ++window) {
+    for (const Method method : {Method::linear, Method::dualQuaternion}) {
+      Variant variant;
+      variant.method = method;
+      update(skinKernel(method, {window, window, window, window}),
+             sets[Bindings::State::setIndex(variant, window)]);
+    }
+  }
+  return {};
 }
 
 Bindings::Bindings() = default;
@@ -182,51 +272,9 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   state.context = &context;
   state.buffers = buffers;
   state.windowStep = outputWindowStep(context.limits);
+  if (Result<void> good = state.createTexelViews(); !good) return good.error();
   if (context.pushesDescriptors()) return bindings;
-
-  const std::uint32_t windows = state.mostWindows();
-  const std::uint32_t setCount = 1 + windows * 2;
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-                                  setCount * context.bindingCount()};
-  VkDescriptorPoolCreateInfo poolInfo{};
-  poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-  poolInfo.maxSets = setCount;
-  poolInfo.poolSizeCount = 1;
-  poolInfo.pPoolSizes = &size;
-  if (const VkResult result = context.table.createDescriptorPool(context.device, &poolInfo,
-                                                                 context.allocator, &state.pool);
-      result != VK_SUCCESS) {
-    state.pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
-    return vulkanError("vkCreateDescriptorPool", result);
-  }
-  const std::vector<VkDescriptorSetLayout> layouts(setCount, context.setLayout);
-  state.sets.resize(setCount);
-  VkDescriptorSetAllocateInfo allocateInfo{};
-  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  allocateInfo.descriptorPool = state.pool;
-  allocateInfo.descriptorSetCount = setCount;
-  allocateInfo.pSetLayouts = layouts.data();
-  if (const VkResult result =
-          context.table.allocateDescriptorSets(context.device, &allocateInfo, state.sets.data());
-      result != VK_SUCCESS) {
-    return vulkanError("vkAllocateDescriptorSets", result);
-  }
-
-  const auto update = [&](const BoundBuffers& bound, VkDescriptorSet set) {
-    const DescriptorWrites writes(bound, set);
-    if (writes.count() != 0) {
-      context.table.updateDescriptorSets(context.device, writes.count(), writes.data(), 0, nullptr);
-    }
-  };
-  update(state.paletteKernel(), state.sets[0]);
-  for (std::uint32_t window = 0; window < windows; ++window) {
-    for (const Method method : {Method::linear, Method::dualQuaternion}) {
-      Variant variant;
-      variant.method = method;
-      update(state.skinKernel(method, {window, window, window, window}),
-             state.sets[Bindings::State::setIndex(variant, window)]);
-    }
-  }
+  if (Result<void> good = state.createSets(); !good) return good.error();
   return bindings;
 }
 

@@ -1,9 +1,11 @@
 #include "dermis/vulkan/context.h"
 
+#include <algorithm>
 #include <array>
 #include <string>
 
 #include "abi.h"
+#include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
 
@@ -28,7 +30,7 @@ Result<void> checkDescription(const DeviceDescription& description) {
   return {};
 }
 
-/// The storage features among the structures of a pNext chain.
+/// The features that are used, among the structures of a pNext chain.
 void readFeatures(const void* chain, DeviceLimits& limits) {
   for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
        next = next->pNext) {
@@ -49,6 +51,11 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
         limits.storage8Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)
                                   ->storageBuffer8BitAccess == VK_TRUE;
         break;
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2:
+        limits.shaderInt64 |=
+            reinterpret_cast<const VkPhysicalDeviceFeatures2*>(next)->features.shaderInt64 ==
+            VK_TRUE;
+        break;
       default:
         break;
     }
@@ -66,15 +73,19 @@ Context::State::~State() {
 }
 
 Result<void> Context::State::createLayouts() {
-  std::array<VkDescriptorSetLayoutBinding, abi::BINDING_COUNT> bindings{};
-  for (std::uint32_t binding = 0; binding < bindingCount(); ++binding) {
-    bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
-                         nullptr};
+  std::array<VkDescriptorSetLayoutBinding, abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT>
+      bindings{};
+  const std::uint32_t count = bindingCount() + texelBindingCount();
+  for (std::uint32_t binding = 0; binding < count; ++binding) {
+    bindings[binding] = {binding,
+                         binding < bindingCount() ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
+                                                  : VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                         1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
   }
   VkDescriptorSetLayoutCreateInfo setInfo{};
   setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   if (pushesDescriptors()) setInfo.flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR;
-  setInfo.bindingCount = bindingCount();
+  setInfo.bindingCount = count;
   setInfo.pBindings = bindings.data();
   if (const VkResult result =
           table.createDescriptorSetLayout(device, &setInfo, allocator, &setLayout);
@@ -95,6 +106,8 @@ Result<void> Context::State::createLayouts() {
     pipelineLayout = VK_NULL_HANDLE;
     return vulkanError("vkCreatePipelineLayout", result);
   }
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT, setLayout, "dermis");
+  nameObject(table, device, VK_OBJECT_TYPE_PIPELINE_LAYOUT, pipelineLayout, "dermis");
   return {};
 }
 
@@ -124,6 +137,15 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
+  // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
+  if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
+    state.tuning.instancesPerInvocation = 32;
+  if (description.texelBuffers && state.limits.maxStorageBuffersPerStage >= storageBuffersWanted) {
+    state.limits.maxTexelBufferElements = properties.limits.maxTexelBufferElements;
+    state.limits.minStorageBufferOffsetAlignment =
+        std::max(state.limits.minStorageBufferOffsetAlignment,
+                 static_cast<std::uint32_t>(properties.limits.minTexelBufferOffsetAlignment));
+  }
   if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +
@@ -143,7 +165,7 @@ const DeviceLimits& Context::limits() const {
 }
 
 Tuning Context::tuning() const {
-  return {};
+  return state_->tuning;
 }
 
 Result<void> Context::prepare(std::span<const Variant> variants) {

@@ -13,18 +13,17 @@ namespace dermis::vulkan {
 
 class DescriptorWrites {
  public:
-  /// Bindings without a buffer are left out: the kernel does not use them. `bound` must outlive
-  /// this object.
+  /// Bindings with nothing behind them are left out: the kernel does not use them. `bound` must
+  /// outlive this object.
   explicit DescriptorWrites(const BoundBuffers& bound, VkDescriptorSet set = VK_NULL_HANDLE) {
-    for (std::uint32_t binding = 0; binding < bound.size(); ++binding) {
-      if (bound[binding].buffer == VK_NULL_HANDLE) continue;
-      VkWriteDescriptorSet& write = writes_[count_++];
-      write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-      write.dstSet = set;
-      write.dstBinding = binding;
-      write.descriptorCount = 1;
-      write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-      write.pBufferInfo = &bound[binding];
+    for (std::uint32_t binding = 0; binding < bound.buffers.size(); ++binding) {
+      if (bound.buffers[binding].buffer == VK_NULL_HANDLE) continue;
+      add(set, binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER).pBufferInfo = &bound.buffers[binding];
+    }
+    for (std::uint32_t index = 0; index < bound.texels.size(); ++index) {
+      if (bound.texels[index] == VK_NULL_HANDLE) continue;
+      add(set, abi::BINDING_COUNT + index, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER)
+          .pTexelBufferView = &bound.texels[index];
     }
   }
 
@@ -32,7 +31,17 @@ class DescriptorWrites {
   const VkWriteDescriptorSet* data() const { return writes_.data(); }
 
  private:
-  std::array<VkWriteDescriptorSet, BoundBuffers().size()> writes_{};
+  VkWriteDescriptorSet& add(VkDescriptorSet set, std::uint32_t binding, VkDescriptorType type) {
+    VkWriteDescriptorSet& write = writes_[count_++];
+    write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+    write.dstSet = set;
+    write.dstBinding = binding;
+    write.descriptorCount = 1;
+    write.descriptorType = type;
+    return write;
+  }
+
+  std::array<VkWriteDescriptorSet, abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT> writes_{};
   std::uint32_t count_ = 0;
 };
 

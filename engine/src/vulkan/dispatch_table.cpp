@@ -66,6 +66,8 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
   loader.deviceFunction("vkDestroyDescriptorPool", table.destroyDescriptorPool);
   loader.deviceFunction("vkAllocateDescriptorSets", table.allocateDescriptorSets);
   loader.deviceFunction("vkUpdateDescriptorSets", table.updateDescriptorSets);
+  loader.deviceFunction("vkCreateBufferView", table.createBufferView);
+  loader.deviceFunction("vkDestroyBufferView", table.destroyBufferView);
   loader.deviceFunction("vkCmdBindPipeline", table.cmdBindPipeline);
   loader.deviceFunction("vkCmdBindDescriptorSets", table.cmdBindDescriptorSets);
   loader.deviceFunction("vkCmdPushConstants", table.cmdPushConstants);

@@ -25,6 +25,8 @@ struct DispatchTable {
   PFN_vkDestroyDescriptorPool destroyDescriptorPool = nullptr;
   PFN_vkAllocateDescriptorSets allocateDescriptorSets = nullptr;
   PFN_vkUpdateDescriptorSets updateDescriptorSets = nullptr;
+  PFN_vkCreateBufferView createBufferView = nullptr;
+  PFN_vkDestroyBufferView destroyBufferView = nullptr;
 
   PFN_vkCmdBindPipeline cmdBindPipeline = nullptr;
   PFN_vkCmdBindDescriptorSets cmdBindDescriptorSets = nullptr;

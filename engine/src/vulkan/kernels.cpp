@@ -36,6 +36,9 @@ static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexForm
 static_assert(abi::MOTION_NONE == static_cast<std::uint32_t>(Motion::none));
 static_assert(abi::MOTION_KEPT == static_cast<std::uint32_t>(Motion::kept));
 static_assert(abi::MOTION_RESKINNED == static_cast<std::uint32_t>(Motion::reskinned));
+// Records are read by four words.
+static_assert(abi::PALETTE_WORDS % 4 == 0 && abi::GROUP_WORDS % 4 == 0 &&
+              abi::INSTANCE_WORDS % 4 == 0);
 static_assert(sizeof(InstanceResult) == abi::RESULT_WORDS * 4);
 static_assert(sizeof(DispatchConstants) == abi::PUSH_WORDS * 4);
 static_assert(sizeof(PaletteStatus) == 16 && abi::STATUS_TWO_PHASE == 0 &&
@@ -49,6 +52,7 @@ using Spirv = std::span<const std::uint32_t>;
 /// The modules of a group of methods, by the bytes of the smallest store: 4, 2, 1.
 struct SkinModules {
   std::array<Spirv, 3> plain, extras;
+  Spirv plainTexels, pairsTexels, extrasTexels;
   Spirv oneOutput;
 };
 
@@ -63,10 +67,16 @@ SkinModules skinModules(Method method) {
     return {{skin_comparison_spirv, skin_comparison_halves_spirv, skin_comparison_bytes_spirv},
             {skin_comparison_extras_spirv, skin_comparison_extras_halves_spirv,
              skin_comparison_extras_bytes_spirv},
+            skin_comparison_texels_spirv,
+            skin_comparison_texels_pairs_spirv,
+            skin_comparison_extras_texels_spirv,
             skin_comparison_one_output_spirv};
   }
   return {{skin_spirv, skin_halves_spirv, skin_bytes_spirv},
           {skin_extras_spirv, skin_extras_halves_spirv, skin_extras_bytes_spirv},
+          skin_texels_spirv,
+          skin_texels_pairs_spirv,
+          skin_extras_texels_spirv,
           skin_one_output_spirv};
 }
 
@@ -79,6 +89,8 @@ std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceL
   const SkinModules modules = skinModules(variant.method);
   if (oneOutput) return modules.oneOutput;
   const bool extras = variant.motion != Motion::none || hasResults(variant);
+  if (variant.pairs) return modules.pairsTexels;
+  if (variant.texels) return extras ? modules.extrasTexels : modules.plainTexels;
   const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
   return (extras ? modules.extras : modules.plain)[smallest == 4 ? 0 : smallest == 2 ? 1 : 2];
 }

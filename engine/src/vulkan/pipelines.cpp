@@ -4,6 +4,7 @@
 #include <string>
 
 #include "dermis/vulkan/kernels.h"
+#include "vulkan/object_name.h"
 #include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
@@ -16,6 +17,7 @@ Pipelines::~Pipelines() {
 }
 
 Result<void> Pipelines::createModule(const Variant& variant) {
+  if (moduleOf(variant) != VK_NULL_HANDLE) return {};  // shared with others
   const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
   VkShaderModuleCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
@@ -26,6 +28,8 @@ Result<void> Pipelines::createModule(const Variant& variant) {
       result != VK_SUCCESS) {
     return vulkanError("vkCreateShaderModule", result);
   }
+  nameObject(table_, device_, VK_OBJECT_TYPE_SHADER_MODULE, module.module,
+             variant.kernel == Kernel::palette ? "dermis palette" : "dermis skin");
   modules_.push_back(module);
   return {};
 }
@@ -40,14 +44,19 @@ Result<void> Pipelines::create() {
                                                                     : 1;
   for (const Method method : allMethods) {
     for (const Motion motion : {Motion::none, Motion::kept}) {
+      Variant variant;
+      variant.method = method;
+      variant.motion = motion;
       for (std::uint8_t unit = 4; unit >= leastUnit; unit /= 2) {
-        Variant variant;
-        variant.method = method;
-        variant.motion = motion;
         variant.units[0] = unit;
-        if (moduleOf(variant) != VK_NULL_HANDLE) continue;  // shared with others
         if (Result<void> made = createModule(variant); !made) return made;
       }
+      if (limits_.maxTexelBufferElements == 0) continue;
+      variant.units[0] = 4;
+      variant.texels = true;
+      if (Result<void> made = createModule(variant); !made) return made;
+      variant.pairs = limits_.shaderInt64;
+      if (Result<void> made = createModule(variant); !made) return made;
     }
   }
   return {};
@@ -95,17 +104,10 @@ Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
       result != VK_SUCCESS) {
     return vulkanError("vkCreateComputePipelines", result);
   }
-  if (table_.setDebugUtilsObjectName != nullptr) {
-    const std::string name = variant.kernel == Kernel::palette
-                                 ? std::string("dermis palette")
-                                 : "dermis skin " + std::string(methodName(variant.method));
-    VkDebugUtilsObjectNameInfoEXT nameInfo{};
-    nameInfo.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
-    nameInfo.objectType = VK_OBJECT_TYPE_PIPELINE;
-    nameInfo.objectHandle = reinterpret_cast<std::uint64_t>(pipeline);
-    nameInfo.pObjectName = name.c_str();
-    table_.setDebugUtilsObjectName(device_, &nameInfo);
-  }
+  const std::string name = variant.kernel == Kernel::palette
+                               ? std::string("dermis palette")
+                               : "dermis skin " + std::string(methodName(variant.method));
+  nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
 
   const std::unique_lock lock(mutex_);
   if (!pipelines_.try_emplace(variant.key(), pipeline).second) {

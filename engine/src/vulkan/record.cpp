@@ -66,6 +66,18 @@ Result<void> Bindings::State::checkBuffers(const Plan& plan) const {
   return {};
 }
 
+/// Variants that store pairs write normals through the binding of the positions.
+Result<void> Bindings::State::checkPairs(const Plan& plan) const {
+  const bool stores = std::any_of(plan.variants().begin(), plan.variants().end(),
+                                  [](const Variant& variant) { return variant.pairs; });
+  const BufferRange& positions = buffers.outputs.positions;
+  const BufferRange& normals = buffers.outputs.normals;
+  if (!stores || (positions.buffer == normals.buffer && positions.offset == normals.offset))
+    return {};
+  return Error{ErrorCode::invalidArgument,
+               "the plan was made for outputs in one buffer, the bindings have normals in another"};
+}
+
 Result<void> Bindings::State::checkVariants(const Plan& plan) const {
   for (const Variant& variant : plan.variants()) {
     if (context->pipelines->find(variant) == VK_NULL_HANDLE)
@@ -81,6 +93,7 @@ Result<void> Bindings::State::check(const Plan& plan) const {
         ErrorCode::invalidArgument,
         "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
   }
+  if (Result<void> good = checkPairs(plan); !good) return good;
   if (Result<void> good = checkVariants(plan); !good) return good;
   if (context->pushesDescriptors()) return {};
   for (const Dispatch& dispatch : plan.dispatches()) {

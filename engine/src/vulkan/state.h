@@ -27,6 +27,10 @@ struct Context::State {
     return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::BINDING_COUNT_LEAST
                                                                    : abi::BINDING_COUNT;
   }
+  /// They follow the storage buffers: a device with fewer of those reads no texels.
+  std::uint32_t texelBindingCount() const {
+    return limits.maxTexelBufferElements != 0 ? abi::TEXEL_BINDING_COUNT : 0;
+  }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
 
@@ -38,13 +42,17 @@ struct Context::State {
   float timestampPeriod = 1;  ///< nanoseconds
   DispatchTable table;
   DeviceLimits limits;
+  Tuning tuning;
   VkDescriptorSetLayout setLayout = VK_NULL_HANDLE;
   VkPipelineLayout pipelineLayout = VK_NULL_HANDLE;
   std::unique_ptr<Pipelines> pipelines;
 };
 
-/// The buffers behind the bindings of a kernel, by binding number.
-using BoundBuffers = std::array<VkDescriptorBufferInfo, abi::BINDING_COUNT>;
+/// What is behind the bindings of a kernel, by binding number.
+struct BoundBuffers {
+  std::array<VkDescriptorBufferInfo, abi::BINDING_COUNT> buffers{};
+  std::array<VkBufferView, abi::TEXEL_BINDING_COUNT> texels{};  ///< from BINDING_COUNT on
+};
 
 /// The windows of the four outputs that a kernel sees.
 using Windows = std::array<std::uint32_t, streamCount>;
@@ -55,6 +63,11 @@ struct Bindings::State {
   const Context::State* context = nullptr;
   BatchBuffers buffers;
   std::uint64_t windowStep = 0;
+  /// Of buffers that kernels read through texels, where there are such buffers.
+  VkBufferView tableTexels = VK_NULL_HANDLE;
+  VkBufferView meshTexels = VK_NULL_HANDLE;
+  VkBufferView matrixTexels = VK_NULL_HANDLE;
+  VkBufferView paletteTexels = VK_NULL_HANDLE;
 
   const BufferRange& output(std::size_t stream) const;
   std::uint32_t windowCount(std::size_t stream) const;
@@ -63,6 +76,8 @@ struct Bindings::State {
   /// uses: a descriptor that the module names must be valid.
   BoundBuffers paletteKernel() const;
   BoundBuffers skinKernel(Method method, const Windows& windows) const;
+
+  Result<void> createTexelViews();
 
   // Without push descriptors: a set for the palette kernel, then for each window one a kind of
   // palette, all outputs at windows of one number.
@@ -81,8 +96,11 @@ struct Bindings::State {
   /// Whether a plan can be recorded with these buffers and the pipelines that there are.
   Result<void> check(const Plan& plan) const;
 
+  Result<void> createSets();
+
  private:
   Result<void> checkBuffers(const Plan& plan) const;
+  Result<void> checkPairs(const Plan& plan) const;
   Result<void> checkVariants(const Plan& plan) const;
 };
 

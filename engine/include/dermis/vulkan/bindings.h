@@ -27,10 +27,13 @@ struct OutputBuffers {
   static OutputBuffers oneBuffer(const BufferRange& range) { return {range, range, range, range}; }
 };
 
-/// The buffers of a batch, each with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT; `Plan::buffer` tells their
-/// sizes. The engine owns them. One that a plan does not need may be left empty: meshes and outputs
-/// only where there is no job at all, matrices and tables likewise, palettes where no job uses dual
-/// quaternions, results where no job has any, an attribute's output where no job wants it.
+/// The buffers of a batch, each with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and, where
+/// `DeviceLimits::maxTexelBufferElements` is not 0, meshes, matrices, tables and palettes with
+/// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT too; `Plan::buffer` tells their sizes and usage. An
+/// engine that cannot give them that usage says so in `DeviceDescription::texelBuffers`. The engine
+/// owns them. One that a plan does not need may be left empty: meshes and outputs only where there
+/// is no job at all, matrices and tables likewise, palettes where no job uses dual quaternions,
+/// results where no job has any, an attribute's output where no job wants it.
 struct BatchBuffers {
   BufferRange meshes;    ///< packed meshes at the jobs' `meshOffset`
   BufferRange matrices;  ///< joint matrices at the palettes' `matrixOffset`
@@ -40,10 +43,10 @@ struct BatchBuffers {
   BufferRange results;  ///< what `record` finds out: `InstanceResult` at `Plan::resultOffset`
 };
 
-/// Descriptor sets for one set of buffers, made by `Context::createBindings`. It must outlive every
-/// command buffer that `record` used it in, until the GPU is done with them; destroy it before the
-/// Context. Movable, not thread-safe to destroy while in use; any number of threads may `record`
-/// with it.
+/// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. It
+/// must outlive every command buffer that `record` used it in, until the GPU is done with them;
+/// destroy it before the Context. Movable, not thread-safe to destroy while in use; any number of
+/// threads may `record` with it.
 class Bindings {
  public:
   Bindings();

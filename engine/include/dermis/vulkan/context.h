@@ -33,8 +33,13 @@ struct DeviceDescription {
   /// The features that were enabled: the structures that hung in VkDeviceCreateInfo::pNext, as they
   /// were. Used where enabled: storageBuffer16BitAccess and storageBuffer8BitAccess, of
   /// VkPhysicalDevice16BitStorageFeatures, VkPhysicalDevice8BitStorageFeatures, or
-  /// VkPhysicalDeviceVulkan11Features and ...12Features. Read by `create` only.
+  /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64, of VkPhysicalDeviceFeatures2.
+  /// Read by `create` only.
   const void* enabledFeatures = nullptr;
+  /// Whether the engine gives its buffers the usage that `Plan::buffer` tells,
+  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT among it: then kernels read through texel buffers
+  /// where they can. Turn it off for buffers that are made elsewhere and are storage buffers only.
+  bool texelBuffers = true;
   /// Every pipeline is built with it, where given; the engine stores and loads it.
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;
   /// Used for every object that Dermis creates, where given; must outlive the Context.
@@ -67,9 +72,9 @@ class Context {
   /// from a loading thread. Where it fails (`vulkanError`), what was built before stays built.
   Result<void> prepare(std::span<const Variant> variants);
 
-  /// Makes the descriptor sets for a set of buffers. Fails with `invalidArgument` (misaligned, no
-  /// size), `limitExceeded` (larger than a storage buffer range where that is not allowed;
-  /// different outputs on a device with fewer than `storageBuffersWanted` a stage) or
+  /// Makes the descriptor sets and buffer views for a set of buffers. Fails with `invalidArgument`
+  /// (misaligned, no size), `limitExceeded` (larger than a storage buffer range where that is not
+  /// allowed; different outputs on a device with fewer than `storageBuffersWanted` a stage) or
   /// `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 

@@ -2,8 +2,9 @@
 // no Vulkan device.
 //
 // Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers or, on a device that
-// has fewer a stage, four; binding numbers, records and push constants are in shaders/abi.h, which
-// compiles as C++.
+// has fewer a stage, four. Variants with `texels` have uniform texel buffers behind them, views of
+// the same ranges in VK_FORMAT_R32G32B32A32_UINT, of meshes in VK_FORMAT_R32_UINT; binding numbers,
+// records and push constants are in shaders/abi.h, which compiles as C++.
 #pragma once
 
 #include <array>

@@ -57,7 +57,7 @@ struct SkinningSystemDescription {
   MemoryCallbacks memory;
   /// Measure the GPU's time of each `record` by timestamps; the queue's family must have them.
   bool measuresGpuTime = false;
-  Tuning tuning;  ///< `Context::tuning`, or the engine's own
+  std::optional<Tuning> tuning;  ///< nothing: `Context::tuning`
 };
 
 struct FrameDescription {
@@ -195,10 +195,10 @@ class SkinningSystem {
   /// pass. The engine puts `inputScope(PreviousUse)` of what last read the output before it, and
   /// `outputScope(Consumer)` behind.
   ///
-  /// Fails with `notPrepared`, `invalidArgument` (no `beginFrame`; instances culled on the GPU but
-  /// no visibility), `limitExceeded` (tables larger than a storage buffer range), `vulkanError`, or
-  /// what `MemoryCallbacks::allocate` fails with; nothing is recorded then, and all that changed is
-  /// tried again the next time.
+  /// Fails with `notPrepared` (`prepare` was not called for such instances), `invalidArgument` (no
+  /// `beginFrame`; instances culled on the GPU but no visibility), `limitExceeded` (tables larger
+  /// than a storage buffer range), `vulkanError`, or what `MemoryCallbacks::allocate` fails with;
+  /// nothing is recorded then, and all that changed is tried again the next time.
   Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
 
   // -- What came of it, as of the last `record`.

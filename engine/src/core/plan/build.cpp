@@ -77,7 +77,7 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
     const OutputStreams streams = outputStreams(job);
     GroupKey key;
     key.mesh = job.meshOffset;
-    key.variant = variant.key();
+    const bool mayPair = batch.outputs.isOneBuffer && mayStorePairs(job, limits);
     for (std::size_t stream = 0; stream < streamCount; ++stream)
       key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
     cutIntoRuns(streams, job.mesh.vertexCount, sizes, limits, runs);
@@ -85,6 +85,8 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
       key.windows = run.windows;
       key.firstVertex = run.firstVertex;
       key.vertexEnd = run.vertexEnd;
+      variant.pairs = mayPair && run.windows[0] == run.windows[1];
+      key.variant = variant.key();
       if (Result<void> good = checkWindows(streams, run.windows, {"job", index}, limits); !good)
         return good;
       addPiece(job, static_cast<std::uint32_t>(index), key, variant, mayScale(batch, job));
@@ -112,8 +114,6 @@ Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t work
       static_cast<std::uint32_t>(divideUp(workgroups, limits.maxWorkgroupCountX));
   dispatch.groupCountX = static_cast<std::uint32_t>(divideUp(workgroups, dispatch.groupCountY));
   dispatches.push_back(dispatch);
-  if (std::find(variants.begin(), variants.end(), variant) == variants.end())
-    variants.push_back(variant);
   return {};
 }
 
@@ -174,6 +174,7 @@ Result<void> Plan::State::addPaletteDispatch(const Tuning& tuning, std::uint32_t
                                              std::span<const std::uint32_t> clearedResults) {
   if (palettes == 0 && clearedResults.empty()) return {};
   tables.insert(tables.end(), clearedResults.begin(), clearedResults.end());
+  tables.resize(divideUp(tables.size(), 4) * 4);  // records behind it are read by four words
   // Behind the workgroups of the palettes come those that clear the results.
   return addDispatch(paletteVariant(tuning),
                      palettes + divideUp(clearedResults.size(), tuning.workgroupSize),
@@ -235,11 +236,31 @@ Result<void> Plan::State::placeGroups(const Tuning& tuning) {
       const std::uint32_t window = group.key.windows[stream];
       dispatches.back().windows[stream] = {window, window * outputWindowStep(limits)};
     }
+    // A kernel that may name the results counts as one that reads them.
     dispatches.back().afterPalettes =
-        palettesRun && (variant.method != Method::linear || hasResults(variant));
+        palettesRun &&
+        (variant.method != Method::linear || variant.motion != Motion::none || hasResults(variant));
     begin = end;
   }
   return {};
+}
+
+/// All that a variant reads through texels has to fit, or nothing is read so.
+void Plan::State::chooseTexels() {
+  const bool fits = fitsUnitTexels(tables.size() * 4, limits) && fitsWordTexels(meshesSize, limits);
+  for (Dispatch& dispatch : dispatches) {
+    Variant& variant = dispatch.variant;
+    const std::uint64_t palettes = variant.method == Method::linear ? matricesSize : palettesSize;
+    variant.texels = fits && fitsUnitTexels(palettes, limits) && mayReadTexels(variant, limits);
+    variant.pairs &= variant.texels;
+  }
+}
+
+void Plan::State::listVariants() {
+  for (const Dispatch& dispatch : dispatches) {
+    if (std::find(variants.begin(), variants.end(), dispatch.variant) == variants.end())
+      variants.push_back(dispatch.variant);
+  }
 }
 
 Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& deviceLimits,
@@ -259,6 +280,8 @@ Result<void> Plan::State::build(const Batch& batch, const DeviceLimits& deviceLi
     return Error{ErrorCode::limitExceeded,
                  "the tables of the batch are larger than a storage buffer range; split it"};
   }
+  chooseTexels();
+  listVariants();
   return {};
 }
 

@@ -243,8 +243,8 @@ Result<void> checkTuning(const Tuning& tuning) {
     return invalid("tuning: a workgroup has a power of two of invocations from 8 to 128, not " +
                    std::to_string(tuning.workgroupSize));
   }
-  if (tuning.instancesPerInvocation < 1 || tuning.instancesPerInvocation > 16) {
-    return invalid("tuning: an invocation skins 1 to 16 instances, not " +
+  if (tuning.instancesPerInvocation < 1 || tuning.instancesPerInvocation > 32) {
+    return invalid("tuning: an invocation skins 1 to 32 instances, not " +
                    std::to_string(tuning.instancesPerInvocation));
   }
   return {};

@@ -11,6 +11,7 @@ namespace dermis {
 namespace {
 
 constexpr std::uint32_t storageBufferUsage = 0x20;   // VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+constexpr std::uint32_t texelBufferUsage = 0x04;     // VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
 constexpr std::uint32_t transferTargetUsage = 0x02;  // VK_BUFFER_USAGE_TRANSFER_DST_BIT
 
 float fromOrdered(std::uint32_t bits) {
@@ -66,16 +67,18 @@ std::uint64_t Plan::resultOffset(std::uint32_t job) const {
 BufferRequirement Plan::buffer(BufferRole role) const {
   // What the host fills may be staged: written to another buffer, and copied.
   constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
+  // Whether or not this plan reads texels: a later one that does may use the same buffers.
+  const std::uint32_t texels = state_->limits.maxTexelBufferElements != 0 ? texelBufferUsage : 0;
   const std::uint32_t alignment = state_->limits.minStorageBufferOffsetAlignment;
   switch (role) {
     case BufferRole::meshes:
-      return {state_->meshesSize, alignment, filled, false, true};
+      return {state_->meshesSize, alignment, filled | texels, false, true};
     case BufferRole::matrices:
-      return {state_->matricesSize, alignment, filled, true, true};
+      return {state_->matricesSize, alignment, filled | texels, true, true};
     case BufferRole::tables:
-      return {state_->tables.size() * 4, alignment, filled, true, true};
+      return {state_->tables.size() * 4, alignment, filled | texels, true, true};
     case BufferRole::palettes:
-      return {state_->palettesSize, alignment, storageBufferUsage, true, false};
+      return {state_->palettesSize, alignment, storageBufferUsage | texels, true, false};
     case BufferRole::results:
       return {state_->resultCount * std::uint64_t{sizeof(InstanceResult)}, alignment,
               storageBufferUsage, true, false};

@@ -119,6 +119,9 @@ struct Plan::State {
                                   std::span<const std::uint32_t> clearedResults);
   /// Appends a record for each of `groups`, whose instances follow, and the dispatches.
   Result<void> placeGroups(const Tuning& tuning);
+  /// When all tables have been written: how the dispatches read, and which variants there are.
+  void chooseTexels();
+  void listVariants();
 
  private:
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,

@@ -29,7 +29,8 @@ Result<InstanceHandle> Scene::acquireBindPose(const SceneInstance& instance) {
   InstanceDescription description;
   description.mesh = instance.mesh;
   description.palette = *palette;
-  description.method = Method::linear;
+  // Exact for identities: no sum of weights stands in the result, unlike that of linear.
+  description.method = Method::dualQuaternion;
   description.layout = instance.layout;
   description.box = instance.box;
   Result<InstanceHandle> added = insert(description, true);

@@ -77,6 +77,8 @@ Result<void> FrameBuilder::finish() {
     return Error{ErrorCode::limitExceeded,
                  "the tables of the frame are larger than a storage buffer range"};
   }
+  state.chooseTexels();
+  state.listVariants();
   return {};
 }
 

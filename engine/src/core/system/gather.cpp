@@ -21,7 +21,8 @@ std::uint32_t culledFlags(const SceneInstance& instance) {
 /// In frames that are the same for all instances of a palette with one interval, also where the
 /// engine leaves frames out: a multiple of the interval lies between the last record and this one.
 bool Scene::isDue(const SceneInstance& instance) const {
-  if (instance.isUrgent || instance.updateInterval == 1) return true;
+  const bool cameBack = instance.visibleFrom == record_ + 1;
+  if (instance.isUrgent || cameBack || instance.updateInterval == 1) return true;
   const std::uint64_t beat = instance.palette;
   return (frame_ + beat) / instance.updateInterval !=
          (recordedFrame_ + beat) / instance.updateInterval;
@@ -183,10 +184,10 @@ bool Scene::commitShift(SceneInstance& instance, InstanceHandle handle) {
   if (!instance.target) return true;  // waiting; listed again when it is placed
   const bool isMove = instance.shown && instance.shown->mesh == instance.target->mesh;
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
-  if (instance.shown && instance.shown != instance.target) {
-    retire(Retired::Store::output, instance.shown->bytes);
-    if (!instance.isInternal) moved_.push_back(handle);
-  }
+  const bool moves = instance.shown && instance.shown != instance.target;
+  if (moves) retire(Retired::Store::output, instance.shown->bytes);
+  if ((moves && !instance.isInternal) || instance.showsBindPose) moved_.push_back(handle);
+  instance.showsBindPose = false;
   instance.shown = instance.target;
   return true;
 }

@@ -1,29 +1,18 @@
 // Instances: how they are added, changed and removed.
 
 #include <algorithm>
-#include <string>
 
+#include "system/errors.h"
 #include "system/scene.h"
 
 namespace dermis {
-namespace {
-
-Error stale(InstanceHandle handle) {
-  if (!handle) return {ErrorCode::invalidArgument, "a null instance handle"};
-  return {ErrorCode::invalidArgument, "there is no instance " + std::to_string(handle.index) +
-                                          " of generation " + std::to_string(handle.generation) +
-                                          "; it was removed, or is another system's"};
-}
-
-}  // namespace
-
 Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
   return insert(description, false);
 }
 
 Result<void> Scene::removeInstance(InstanceHandle handle) {
   SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr || instance->isInternal) return stale(handle);
+  if (instance == nullptr || instance->isInternal) return unknownHandle("instance", handle);
   unlink(handle.index);
   --meshes_.at(instance->mesh.index).users;
   retireTarget(*instance);
@@ -53,7 +42,7 @@ Result<bool> Scene::takeBackOrFindRoom(SceneInstance& changed) {
 
 Result<void> Scene::setMesh(InstanceHandle handle, MeshHandle mesh) {
   SceneInstance* found = instances_.find(handle);
-  if (found == nullptr || found->isInternal) return stale(handle);
+  if (found == nullptr || found->isInternal) return unknownHandle("instance", handle);
   if (found->mesh == mesh && meshes_.contains(mesh)) return {};
   SceneInstance changed = *found;
   changed.mesh = mesh;
@@ -101,6 +90,7 @@ Result<void> Scene::setMesh(InstanceHandle handle, MeshHandle mesh) {
     shifting_.push_back(handle);
   } else {
     waiting_.push_back(handle);
+    instance.showsBindPose = static_cast<bool>(instance.bindPose);
     if (description_.overflow == OverflowPolicy::bindPose && instance.shown) {
       retire(Retired::Store::output, instance.shown->bytes);
       instance.shown.reset();
@@ -151,7 +141,7 @@ std::uint64_t Scene::compact(std::uint64_t maxBytes) {
 
 Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   const SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr || instance->isInternal) return stale(handle);
+  if (instance == nullptr || instance->isInternal) return unknownHandle("instance", handle);
   InstanceOutput output;
   const std::optional<Place>* place = &instance->shown;
   if (instance->shown) {

@@ -5,6 +5,8 @@
 
 #include "plan/check.h"
 #include "plan/outputs.h"
+#include "plan/variant.h"
+#include "system/errors.h"
 #include "system/scene.h"
 
 namespace dermis {
@@ -32,22 +34,14 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVer
   return job;
 }
 
-template <typename ThingHandle>
-Error unknown(const char* kind, ThingHandle handle) {
-  return {ErrorCode::invalidArgument, "the instance's " + std::string(kind) + " handle, " +
-                                          std::to_string(handle.index) + " of generation " +
-                                          std::to_string(handle.generation) +
-                                          ", is null, of something removed, or another system's"};
-}
-
 }  // namespace
 
 /// Whether it could be skinned, were there room.
 Result<void> Scene::check(const SceneInstance& instance) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
-  if (mesh == nullptr) return unknown("mesh", instance.mesh);
+  if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
   const ScenePalette* palette = palettes_.find(instance.paletteHandle);
-  if (palette == nullptr) return unknown("palette", instance.paletteHandle);
+  if (palette == nullptr) return unknownHandle("palette", instance.paletteHandle);
   if (instance.updateInterval == 0) {
     return invalid("the instance's update interval is 1 or more frames, not 0");
   }
@@ -131,9 +125,9 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
   variant.instancesPerInvocation =
       static_cast<std::uint8_t>(description_.tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(description_.tuning.workgroupSize);
+  const bool mayPair = mayStorePairs(job, description_.limits);
   GroupKey key;
   key.mesh = job.meshOffset;
-  key.variant = variant.key();
   key.isCulled = instance.isCulled;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
@@ -157,6 +151,8 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
     key.windows = run.windows;
     key.firstVertex = run.firstVertex;
     key.vertexEnd = run.vertexEnd;
+    variant.pairs = mayPair && run.windows[0] == run.windows[1];
+    key.variant = variant.key();
     PlacedRun& placed = index == 0 ? instance.run : instance.furtherRuns.emplace_back();
     placed.group = groups_.acquire(key, variant, mesh.info.maxInfluences,
                                    instance.method != Method::linear && palette.mayScale);
@@ -270,6 +266,7 @@ Result<InstanceHandle> Scene::insert(const InstanceDescription& description, boo
     added.culledIndex = static_cast<std::uint32_t>(culled_.size());
     culled_.push_back(handle.index);
   }
+  added.showsBindPose = !added.target && added.bindPose;
   (added.target ? shifting_ : waiting_).push_back(handle);
   makeStale(handle.index);
   return handle;

@@ -3,23 +3,14 @@
 #include "system/scene.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "plan/check.h"
 #include "plan/outputs.h"
+#include "system/errors.h"
 
 namespace dermis {
 namespace {
-
-template <typename ThingHandle>
-Error stale(const char* kind, ThingHandle handle) {
-  if (!handle) return {ErrorCode::invalidArgument, std::string("a null ") + kind + " handle"};
-  return {ErrorCode::invalidArgument, "there is no " + std::string(kind) + " " +
-                                          std::to_string(handle.index) + " of generation " +
-                                          std::to_string(handle.generation) +
-                                          "; it was removed, or is another system's"};
-}
 
 Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
   return {ErrorCode::invalidArgument, std::string(kind) + " " + std::to_string(index) +
@@ -57,7 +48,7 @@ Result<MeshHandle> Scene::addMesh(const MeshInfo& info) {
 
 Result<void> Scene::removeMesh(MeshHandle handle) {
   const SceneMesh* mesh = meshes_.find(handle);
-  if (mesh == nullptr) return stale("mesh", handle);
+  if (mesh == nullptr) return unknownHandle("mesh", handle);
   if (mesh->users != 0) return isUsed("mesh", handle.index, mesh->users);
   retire(Retired::Store::meshes, mesh->bytes);
   meshes_.remove(handle);
@@ -86,7 +77,7 @@ Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale)
 
 Result<void> Scene::removePalette(PaletteHandle handle) {
   const ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return stale("palette", handle);
+  if (palette == nullptr) return unknownHandle("palette", handle);
   if (palette->users != 0) return isUsed("palette", handle.index, palette->users);
   retire(Retired::Store::joints, palette->joints);
   for (const ScenePalette::Form& form : palette->forms) {
@@ -157,7 +148,7 @@ Result<std::uint64_t> Scene::writePose(PaletteHandle handle) {
                  "memory the GPU is done with"};
   }
   ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return stale("palette", handle);
+  if (palette == nullptr) return unknownHandle("palette", handle);
   if (palette->poseFrame != frame_) {
     // The next of its slots: the GPU is done with it, since it was superseded at least as many
     // frames ago as there may be in flight.
@@ -186,7 +177,7 @@ void Scene::makePending(std::uint32_t index) {
 
 Result<void> Scene::setVisible(InstanceHandle handle, bool isVisible) {
   SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return stale("instance", handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
   if (instance->isVisible == isVisible) return {};
   instance->isVisible = isVisible;
   if (!isVisible) {
@@ -204,7 +195,7 @@ Result<void> Scene::setVisible(InstanceHandle handle, bool isVisible) {
 
 Result<void> Scene::setUpdateInterval(InstanceHandle handle, std::uint32_t interval) {
   SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return stale("instance", handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
   if (interval == 0) {
     return Error{ErrorCode::invalidArgument, "instance " + std::to_string(handle.index) +
                                                  ": an update interval is 1 or more frames, not 0"};
@@ -215,7 +206,7 @@ Result<void> Scene::setUpdateInterval(InstanceHandle handle, std::uint32_t inter
 
 Result<void> Scene::teleport(InstanceHandle handle) {
   SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return stale("instance", handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
   instance->restartsMotion = true;
   instance->isUrgent = true;
   makeStale(handle.index);
@@ -224,7 +215,7 @@ Result<void> Scene::teleport(InstanceHandle handle) {
 
 Result<void> Scene::setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs) {
   SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return stale("instance", handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
   const SceneMesh& mesh = meshes_.at(instance->mesh.index);
   if (Result<void> good =
           checkMorphs(morphs, mesh.info.morphTargetCount, {"instance", handle.index});

@@ -96,6 +96,7 @@ struct SceneInstance {
   bool restartsMotion = true;  ///< when it is skinned next
   bool isUrgent = true;        ///< whatever its interval
   bool willMove = false;       ///< the plan skins it, and its previous positions are others
+  bool showsBindPose = false;  ///< it waited with one, or does
   bool isInternal = false;     ///< a bind pose: of no interest to the engine
 
   // Of those culled on the GPU.

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "vulkan/object_name.h"
 #include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
@@ -41,14 +42,7 @@ Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Descriptio
           functions.bindBufferMemory(context.device, handle, memory->memory, memory->offset);
       result != VK_SUCCESS)
     return vulkanError("vkBindBufferMemory", result);
-  if (context.table.setDebugUtilsObjectName != nullptr) {
-    VkDebugUtilsObjectNameInfoEXT name{};
-    name.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
-    name.objectType = VK_OBJECT_TYPE_BUFFER;
-    name.objectHandle = reinterpret_cast<std::uint64_t>(handle);
-    name.pObjectName = description.name;
-    context.table.setDebugUtilsObjectName(context.device, &name);
-  }
+  nameObject(context.table, context.device, VK_OBJECT_TYPE_BUFFER, handle, description.name);
   if (description.use != MemoryUse::device && memory->mapped == nullptr) {
     return Error{ErrorCode::invalidArgument,
                  std::string("MemoryCallbacks::allocate gave memory that is not mapped for the "

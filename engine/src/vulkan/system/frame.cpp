@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <string>
 
 #include "abi.h"
 #include "dermis/vulkan/scope.h"
@@ -46,10 +47,9 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
   size = std::min(size, scene.description().limits.maxStorageBufferRange & ~std::uint64_t{3});
   if (tables.size() < needed || tables.size() == 0) {
     Result<SystemBuffer> made = SystemBuffer::create(
-        source, {size,
-                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-                     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
-                 MemoryUse::device, "dermis tables"});
+        source,
+        {size, readUsage() | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
+         MemoryUse::device, "dermis tables"});
     if (!made) return made.error();
     BatchBuffers buffers{meshes.range(),
                          matrices.range(),
@@ -71,14 +71,25 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
   return {};
 }
 
+Result<void> SkinningSystem::State::prepareVisibility() {
+  if (preparedVisibility() != nullptr) return {};
+  auto made = std::make_unique<Visibility>();
+  if (Result<void> done = made->create(*context, scene.description().tuning,
+                                       static_cast<std::uint32_t>(slots.size()));
+      !done)
+    return done;
+  const std::lock_guard lock(visibilityMutex);
+  if (visibility == nullptr) visibility = std::move(made);  // another thread may have been faster
+  return {};
+}
+
+const Visibility* SkinningSystem::State::preparedVisibility() {
+  const std::lock_guard lock(visibilityMutex);
+  return visibility.get();
+}
+
 /// With the first instance that is culled on the GPU.
-Result<void> SkinningSystem::State::prepareCulling() {
-  if (!visibility.isCreated()) {
-    if (Result<void> made = visibility.create(*context, description.tuning,
-                                              static_cast<std::uint32_t>(slots.size()));
-        !made)
-      return made;
-  }
+Result<void> SkinningSystem::State::makeHistory() {
   if (history.size() != 0) return {};
   Result<SystemBuffer> made = SystemBuffer::create(
       source, {std::uint64_t{description.instanceBudget} * abi::HISTORY_WORDS * 4,
@@ -116,8 +127,18 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
                  "FrameDescription::visibility is null, and there are instances that are culled on "
                  "the GPU"};
   }
+  if (scene.frame().culled().groupCount > context->limits.maxWorkgroupCountX) {
+    return Error{ErrorCode::limitExceeded,
+                 "instances that are culled on the GPU have " +
+                     std::to_string(scene.frame().culled().groupCount) +
+                     " meshes and layouts, more than the device can count workgroups"};
+  }
+  if (culls && preparedVisibility() == nullptr) {
+    return Error{ErrorCode::notPrepared,
+                 "there are instances that are culled on the GPU, and none such has been prepared"};
+  }
   if (culls) {
-    if (Result<void> ready = prepareCulling(); !ready) return ready;
+    if (Result<void> made = makeHistory(); !made) return made;
   }
   const bool works = hasWork();
   if (works) {
@@ -214,9 +235,10 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
   if (culled.candidateCount != 0) {
     const BufferRange chosen{frame.visibility, frame.visibilityOffset,
                              std::uint64_t{description.instanceBudget} * 4};
-    visibility.record(commandBuffer, culled,
-                      {tables.range(), chosen, history.range(), counters.range(), results.range()},
-                      static_cast<std::uint32_t>(scene.recordNumber() + 1), slotNumber());
+    preparedVisibility()->record(
+        commandBuffer, culled,
+        {tables.range(), chosen, history.range(), counters.range(), results.range()},
+        static_cast<std::uint32_t>(scene.recordNumber() + 1), slotNumber());
     frameStatistics.dispatches += 2;
   }
   bool palettesVisible = false;

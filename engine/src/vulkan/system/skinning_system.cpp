@@ -46,14 +46,16 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
     if (bytes > limits.maxStorageBufferRange) return tooLarge(field, bytes, limits);
   }
   if (Result<void> good = checkLimits(limits); !good) return good;
-  return checkTuning(description.tuning);
+  return checkTuning(scene.tuning);
 }
 
 std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
   return (value + multiple - 1) / multiple * multiple;
 }
 
-SceneDescription sceneOf(const SkinningSystemDescription& description, const DeviceLimits& limits) {
+SceneDescription sceneOf(const SkinningSystemDescription& description,
+                         const Context::State& context) {
+  const DeviceLimits& limits = context.limits;
   SceneDescription scene;
   scene.framesInFlight = description.framesInFlight;
   scene.meshBudget = roundUp(description.meshBudget, packedMeshAlignment);
@@ -64,7 +66,7 @@ SceneDescription sceneOf(const SkinningSystemDescription& description, const Dev
       limits.maxStorageBuffersPerStage < storageBuffersWanted ? 0 : description.boundsBudget;
   scene.overflow = description.overflow;
   scene.limits = limits;
-  scene.tuning = description.tuning;
+  scene.tuning = description.tuning.value_or(context.tuning);
   return scene;
 }
 
@@ -79,7 +81,15 @@ SkinningSystem::State::State(const SkinningSystemDescription& described,
                              Context::State& contextState, const SceneDescription& sceneDescription)
     : context(&contextState), description(described), scene(sceneDescription) {}
 
+/// Of what kernels read, through texel buffers where the device has them.
+VkBufferUsageFlags SkinningSystem::State::readUsage() const {
+  return VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+         (context->limits.maxTexelBufferElements != 0 ? VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
+                                                      : 0);
+}
+
 Result<void> SkinningSystem::State::createBuffers() {
+  const VkBufferUsageFlags read = readUsage();
   constexpr VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
   constexpr VkBufferUsageFlags to = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   constexpr VkBufferUsageFlags from = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
@@ -89,9 +99,9 @@ Result<void> SkinningSystem::State::createBuffers() {
     SystemBuffer::Description description;
   };
   for (const Wanted& wanted :
-       {Wanted{&meshes, {sizes.meshBudget, storage | to, MemoryUse::device, "dermis meshes"}},
-        {&matrices, {sizes.matricesSize(), storage, MemoryUse::upload, "dermis matrices"}},
-        {&palettes, {sizes.palettesSize(), storage, MemoryUse::device, "dermis palettes"}},
+       {Wanted{&meshes, {sizes.meshBudget, read | to, MemoryUse::device, "dermis meshes"}},
+        {&matrices, {sizes.matricesSize(), read, MemoryUse::upload, "dermis matrices"}},
+        {&palettes, {sizes.palettesSize(), read, MemoryUse::device, "dermis palettes"}},
         {&output,
          {sizes.outputBudget, storage | to | from | description.outputUsage, MemoryUse::device,
           "dermis output"}},
@@ -116,7 +126,7 @@ Result<void> SkinningSystem::State::createBuffers() {
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
   if (description.context == nullptr) return wrongField("context is null");
   Context::State& context = *description.context->state_;
-  const SceneDescription scene = sceneOf(description, context.limits);
+  const SceneDescription scene = sceneOf(description, context);
   if (Result<void> good = checkBudgets(description, scene); !good) return good.error();
   Result<SystemFunctions> functions = loadSystemFunctions(context);
   if (!functions) return functions.error();
@@ -192,11 +202,13 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
   job.previousPositions = laidOut->attributes[3];
   job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
   job.bounds = description.bounds;
-  std::vector<Variant> variants = everyVariant(job, state_->description.tuning);
+  const DeviceLimits& limits = state_->context->limits;
+  const Tuning& tuning = state_->scene.description().tuning;
+  std::vector<Variant> variants = everyVariant(job, limits, tuning);
   if (state_->description.overflow == OverflowPolicy::bindPose) {
-    job.method = Method::linear;
+    job.method = Method::dualQuaternion;
     job.bounds = false;
-    const std::vector<Variant> bindPose = everyVariant(job, state_->description.tuning);
+    const std::vector<Variant> bindPose = everyVariant(job, limits, tuning);
     variants.insert(variants.end(), bindPose.begin(), bindPose.end());
   }
   for (const Variant& variant : variants) {
@@ -205,7 +217,7 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
         !built)
       return built;
   }
-  return {};
+  return description.culledOnGpu ? state_->prepareVisibility() : Result<void>();
 }
 
 // -- What changes.

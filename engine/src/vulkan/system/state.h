@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -35,11 +36,14 @@ struct MeshUpload {
 struct SkinningSystem::State {
   State(const SkinningSystemDescription& description, Context::State& context,
         const SceneDescription& sceneDescription);
+  VkBufferUsageFlags readUsage() const;
   Result<void> createBuffers();
 
   // frame.cpp
   Result<void> makeRoomForTables();
-  Result<void> prepareCulling();
+  Result<void> prepareVisibility();
+  const Visibility* preparedVisibility();
+  Result<void> makeHistory();
   void writeFreshPalettes();
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   void recordCommands(VkCommandBuffer commandBuffer, const FrameDescription& frame);
@@ -67,7 +71,9 @@ struct SkinningSystem::State {
   SystemBuffer meshes, matrices, palettes, output, results, tables, history, counters;
   bool historyIsClear = false;
   Bindings bindings;
-  Visibility visibility;
+  /// Made by `prepare`, on any thread.
+  std::mutex visibilityMutex;
+  std::unique_ptr<const Visibility> visibility;
   Timestamps timestamps;
   std::vector<FrameSlot> slots;
   std::vector<MeshUpload> uploads;

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "vulkan/object_name.h"
 #include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
@@ -25,6 +26,7 @@ Result<void> Timestamps::create(const Context::State& context, const SystemFunct
     pool_ = VK_NULL_HANDLE;
     return vulkanError("vkCreateQueryPool", result);
   }
+  nameObject(context.table, context.device, VK_OBJECT_TYPE_QUERY_POOL, pool_, "dermis timestamps");
   return {};
 }
 

@@ -5,6 +5,7 @@
 #include "abi.h"
 #include "dermis_kernels.h"
 #include "vulkan/label.h"
+#include "vulkan/object_name.h"
 #include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
@@ -131,6 +132,11 @@ Result<void> Visibility::createPipeline(const Tuning& tuning) {
     pipeline_ = VK_NULL_HANDLE;
     return vulkanError("vkCreateComputePipelines", result);
   }
+  const VkDevice device = context_->device;
+  nameObject(table, device, VK_OBJECT_TYPE_PIPELINE, pipeline_, "dermis visibility");
+  nameObject(table, device, VK_OBJECT_TYPE_PIPELINE_LAYOUT, pipelineLayout_, "dermis visibility");
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT, setLayout_, "dermis visibility");
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool_, "dermis visibility");
   return {};
 }
 

@@ -1,0 +1,80 @@
+#include "character.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+using namespace dermis;
+
+namespace crowd {
+namespace {
+
+constexpr std::uint32_t mostTicks = 120;
+
+}  // namespace
+
+Result<Character> Character::load(const std::filesystem::path& path) {
+  Result<gltf::Model> loaded = gltf::load(path);
+  if (!loaded) return loaded.error();
+  Character character;
+  character.model_ = std::make_unique<gltf::Model>(std::move(*loaded));
+  const gltf::Model& model = *character.model_;
+
+  std::vector<std::uint32_t> skins;
+  for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
+    const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
+    if (primitive.influences.empty()) continue;
+    const auto found = std::ranges::find(skins, source.skin);
+    const auto skin = static_cast<std::uint32_t>(found - skins.begin());
+    const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
+    if (found == skins.end()) {
+      skins.push_back(source.skin);
+      character.jointCounts_.push_back(jointCount);
+    }
+    gltf::PrimitiveView view(primitive);
+    Result<PackedMesh> packed = pack(view.mesh(), jointCount);
+    if (!packed) return packed.error();
+    character.parts_.push_back({std::move(view), std::move(*packed), skin});
+  }
+  if (character.parts_.empty()) {
+    return Error{ErrorCode::invalidData,
+                 fmt::format("'{}' has no skinned mesh with joints and weights in its scene",
+                             path.filename().string())};
+  }
+  character.clips_.resize(std::max<std::size_t>(model.clips.size(), 1));
+  for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip)
+    character.sampleClip(clip, skins);
+  return character;
+}
+
+void Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins) {
+  const bool isRest = model_->clips.empty();
+  const double duration = isRest ? 0 : model_->clips[clip].duration;
+  Clip& sampled = clips_[clip];
+  sampled.tickCount = static_cast<std::uint32_t>(
+      std::clamp(std::round(duration * ticksPerSecond), 1.0, double{mostTicks}));
+  for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
+    const std::vector<gltf::GlobalTransform> globals =
+        gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);
+    for (const std::uint32_t skin : skins)
+      sampled.poses.push_back(gltf::palette(*model_, skin, globals));
+  }
+}
+
+std::uint64_t Character::vertexCount() const {
+  std::uint64_t count = 0;
+  for (const Part& part : parts_) count += part.packed.vertexCount();
+  return count;
+}
+
+std::uint32_t Character::tickCount(std::uint32_t clip) const {
+  return clips_[clip].tickCount;
+}
+
+std::span<const JointMatrix> Character::pose(PoseKey key, std::uint32_t skin) const {
+  return clips_[key.clip].poses[key.tick * jointCounts_.size() + skin];
+}
+
+}  // namespace crowd

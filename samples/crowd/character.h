@@ -1,0 +1,68 @@
+// The character that the crowd is made of: its meshes, packed, and its poses. An engine has both in
+// its assets.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/gltf.h"
+#include "dermis/mesh.h"
+#include "dermis/pack.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace crowd {
+
+/// A skinned primitive of the file: body, hair, shirt, …
+struct Part {
+  dermis::gltf::PrimitiveView primitive;
+  dermis::PackedMesh packed;
+  std::uint32_t skin = 0;  ///< index into `Character::jointCounts`
+};
+
+/// A moment of a clip.
+struct PoseKey {
+  std::uint32_t clip = 0;
+  std::uint32_t tick = 0;
+
+  friend auto operator<=>(const PoseKey&, const PoseKey&) = default;
+};
+
+class Character {
+ public:
+  static constexpr double ticksPerSecond = 30;
+
+  /// Fails as `gltf::load` and `pack` do, and with `invalidData` where nothing is skinned.
+  static dermis::Result<Character> load(const std::filesystem::path& path);
+
+  const std::vector<Part>& parts() const { return parts_; }
+  /// By skin: of those that parts hang on. Parts of one skin share its palette.
+  const std::vector<std::uint32_t>& jointCounts() const { return jointCounts_; }
+  std::uint64_t vertexCount() const;  ///< of all parts
+
+  std::uint32_t clipCount() const { return static_cast<std::uint32_t>(clips_.size()); }
+  std::uint32_t tickCount(std::uint32_t clip) const;
+  std::span<const dermis::JointMatrix> pose(PoseKey key, std::uint32_t skin) const;
+
+ private:
+  /// Sampled once: figures that are in the same moment of a clip are in the same pose.
+  struct Clip {
+    std::uint32_t tickCount = 1;
+    std::vector<std::vector<dermis::JointMatrix>> poses;  ///< by tick, then skin
+  };
+
+  Character() = default;
+  void sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins);
+
+  std::unique_ptr<dermis::gltf::Model> model_;  ///< parts point into it
+  std::vector<Part> parts_;
+  std::vector<std::uint32_t> jointCounts_;
+  std::vector<Clip> clips_;
+};
+
+}  // namespace crowd

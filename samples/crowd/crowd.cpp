@@ -1,0 +1,206 @@
+#include "crowd.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "frames.h"
+
+using namespace dermis;
+
+namespace crowd {
+namespace {
+
+/// Gaps are closed by so many bytes a frame, so that no frame has to move much.
+constexpr std::uint64_t mostMovedBytes = std::uint64_t{1} << 20;
+
+VertexLayout layoutOf(const Part& part) {
+  VertexLayout layout;
+  layout.positions = VertexFormat::float32x3;
+  if (part.packed.info().hasNormals) layout.normals = VertexFormat::octahedral16x2;
+  layout.previousPositions = true;  // for motion vectors
+  return layout;
+}
+
+/// What goes is free when the GPU is done with it: room for a quarter more than there are.
+std::uint64_t withSlack(std::uint64_t count) {
+  return count + count / 4 + 64;
+}
+
+vulkan::SkinningSystemDescription budgets(const Character& character, std::uint32_t figures,
+                                          const CrowdOptions& options) {
+  vulkan::SkinningSystemDescription budget;
+  budget.meshBudget = 0;
+  std::uint64_t joints = 0, outputBytes = 0;
+  for (const std::uint32_t count : character.jointCounts()) joints += count;
+  for (const Part& part : character.parts()) {
+    const MeshInfo mesh = part.packed.info();
+    const VertexLayout layout = layoutOf(part);
+    budget.meshBudget += mesh.byteSize;
+    outputBytes += mesh.vertexCount *
+                   std::uint64_t{2 * formatSize(layout.positions) + formatSize(layout.normals)};
+  }
+  const std::uint64_t parts = character.parts().size();
+  budget.jointBudget = static_cast<std::uint32_t>(withSlack(figures * joints + parts * joints));
+  budget.instanceBudget = static_cast<std::uint32_t>(withSlack(figures * parts + parts));
+  budget.outputBudget =
+      options.outputBudget != 0 ? options.outputBudget : withSlack((figures + 1) * outputBytes);
+  return budget;
+}
+
+}  // namespace
+
+// [crowd-set-up]
+Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
+                            const Character& character, const Figures& script,
+                            const CrowdOptions& options) {
+  // How much there may be, in bytes, joints and instances. It is taken now; nothing grows later.
+  vulkan::SkinningSystemDescription description = budgets(character, script.count(), options);
+  description.context = &context;
+  description.framesInFlight = options.framesInFlight;
+  description.overflow = options.policy;
+  description.measuresGpuTime = options.measuresGpuTime;
+  description.tuning = context.tuning();
+  Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
+  if (!system) return system.error();
+
+  Crowd crowd(device, character, script, options, std::move(*system));
+  for (const Part& part : character.parts()) {
+    Result<MeshHandle> mesh = crowd.system_.addMesh(part.packed);
+    if (!mesh) return mesh.error();
+    crowd.meshes_.push_back(*mesh);
+    if (Result<void> built = crowd.system_.prepare(crowd.describe(part)); !built)
+      return built.error();
+  }
+  return crowd;
+}
+// [/crowd-set-up]
+
+InstanceDescription Crowd::describe(const Part& part) const {
+  InstanceDescription description;
+  description.method = Method::dualQuaternion;
+  description.layout = layoutOf(part);
+  description.culledOnGpu = options_.culledOnGpu;
+  return description;
+}
+
+// [crowd-add]
+/// A figure is a pose and some meshes that share it: body, hair, clothes.
+Result<void> Crowd::add(CrowdFigure& figure) {
+  for (const std::uint32_t jointCount : character_->jointCounts()) {
+    Result<PaletteHandle> palette = system_.addPalette(jointCount);
+    if (!palette) return palette.error();
+    figure.palettes.push_back(*palette);
+  }
+  for (std::size_t index = 0; index < meshes_.size(); ++index) {
+    const Part& part = character_->parts()[index];
+    InstanceDescription description = describe(part);
+    description.mesh = meshes_[index];
+    description.palette = figure.palettes[part.skin];
+    Result<InstanceHandle> instance = system_.addInstance(description);
+    if (!instance) return instance.error();
+    figure.instances.push_back(*instance);
+  }
+  return {};
+}
+
+/// At any time: what frames in flight still draw from stays until they are complete.
+Result<void> Crowd::remove(CrowdFigure& figure) {
+  for (const InstanceHandle instance : std::exchange(figure.instances, {})) {
+    if (Result<void> removed = system_.removeInstance(instance); !removed) return removed;
+  }
+  for (const PaletteHandle palette : std::exchange(figure.palettes, {})) {
+    if (Result<void> removed = system_.removePalette(palette); !removed) return removed;
+  }
+  return {};
+}
+// [/crowd-add]
+
+Result<void> Crowd::comeAndGo(std::uint64_t frame) {
+  bool hasGaps = false;
+  for (std::uint32_t index = 0; index < script_->count(); ++index) {
+    CrowdFigure& figure = figures_[index];
+    figure.now = script_->at(index, frame);
+    if (!figure.isThere() || figure.now.isPresent) continue;
+    if (Result<void> removed = remove(figure); !removed) return removed;
+    hasGaps = true;
+  }
+  for (CrowdFigure& figure : figures_) {
+    if (figure.isThere() || !figure.now.isPresent) continue;
+    Result<void> added = add(figure);
+    if (added) continue;
+    if (Result<void> removed = remove(figure); !removed) return removed;
+    if (added.error().code != ErrorCode::limitExceeded) return added;
+    ++refusals_;  // it comes when others have gone
+    break;
+  }
+  if (hasGaps) system_.compact(mostMovedBytes);
+  return {};
+}
+
+// [crowd-frame]
+Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
+                              VkCommandBuffer commandBuffer) {
+  if (Result<void> begun = system_.beginFrame(frame, completedFrame); !begun) return begun;
+  if (Result<void> done = comeAndGo(frame); !done) return done;
+  for (const CrowdFigure& figure : figures_) {
+    if (!figure.isThere()) continue;
+    if (Result<void> done = move(figure); !done) return done;
+  }
+  vulkan::FrameDescription description;
+  if (options_.culledOnGpu) {
+    Result<VkBuffer> visibility = writeVisibility(frame);
+    if (!visibility) return visibility.error();
+    description.visibility = *visibility;
+  }
+
+  // This program copies the vertices, to look at them; one that draws says vertexInput, twice.
+  recordBarrier(*device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
+  if (Result<void> done = system_.record(commandBuffer, description); !done) return done;
+  recordBarrier(*device_, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+  return {};
+}
+
+Result<void> Crowd::move(const CrowdFigure& figure) {
+  const FigureFrame& now = figure.now;
+  // Where it is the CPU that knows who is out of view, he need not be animated.
+  const bool isAnimated = now.isInView || options_.culledOnGpu;
+  for (std::uint32_t skin = 0; isAnimated && skin < figure.palettes.size(); ++skin) {
+    const Result<std::span<JointMatrix>> pose = system_.writePose(figure.palettes[skin]);
+    if (!pose) return pose.error();
+    std::ranges::copy(character_->pose(now.pose, skin), pose->begin());
+  }
+  for (const InstanceHandle instance : figure.instances) {
+    Result<void> done = system_.setUpdateInterval(instance, now.updateInterval);
+    if (done && !options_.culledOnGpu) done = system_.setVisible(instance, now.isInView);
+    if (done && now.teleports) done = system_.teleport(instance);
+    if (!done) return done;
+  }
+  return {};
+}
+// [/crowd-frame]
+
+/// A word for each instance. Here the CPU writes them to mapped memory before the submission, which
+/// needs no barrier.
+Result<VkBuffer> Crowd::writeVisibility(std::uint64_t frame) {
+  visibility_.resize(options_.framesInFlight);
+  samples::MappedBuffer& buffer = visibility_[frame % options_.framesInFlight];
+  if (buffer.handle() == VK_NULL_HANDLE) {
+    Result<samples::MappedBuffer> made =
+        samples::MappedBuffer::create(*device_, std::uint64_t{system_.instanceCapacity()} * 4,
+                                      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    if (!made) return made.error();
+    buffer = std::move(*made);
+  }
+  for (const CrowdFigure& figure : figures_) {
+    const std::uint32_t word = figure.now.isInView ? 1 : 0;
+    for (const InstanceHandle instance : figure.instances) {
+      const Result<std::uint32_t> index = system_.visibilityIndex(instance);
+      if (!index) return index.error();
+      std::memcpy(buffer.bytes().data() + std::size_t{*index} * 4, &word, 4);
+    }
+  }
+  return buffer.handle();
+}
+
+}  // namespace crowd

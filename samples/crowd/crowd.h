@@ -1,0 +1,87 @@
+// What an engine adds to skin a crowd: a SkinningSystem, and for each figure the handles of its
+// pose and its meshes.
+//
+// Figures are skinned in the character's own space. Where one stands is a matter for its draw: a
+// transform that the vertex shader applies, so that whoever walks without moving a limb is not
+// skinned, and float32 is as exact far from the origin as near it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "buffer.h"
+#include "character.h"
+#include "dermis/dermis.h"
+#include "dermis/vulkan/vulkan.h"
+#include "device.h"
+#include "figures.h"
+
+namespace crowd {
+
+struct CrowdOptions {
+  std::uint32_t framesInFlight = 3;
+  dermis::OverflowPolicy policy = dermis::OverflowPolicy::refuse;
+  std::uint64_t outputBudget = 0;  ///< bytes; 0: enough for all figures
+  bool culledOnGpu = false;        ///< the GPU decides which instances are visible
+  bool measuresGpuTime = false;    ///< the queue has timestamps
+};
+
+/// A figure as the engine knows it.
+struct CrowdFigure {
+  std::vector<dermis::PaletteHandle> palettes;    ///< by skin; empty: it is not there
+  std::vector<dermis::InstanceHandle> instances;  ///< by part
+  FigureFrame now;
+
+  bool isThere() const { return !instances.empty(); }
+};
+
+class Crowd {
+ public:
+  /// On a loading thread: it builds pipelines. What is passed must outlive the crowd.
+  static dermis::Result<Crowd> create(dermis::samples::Device& device,
+                                      dermis::vulkan::Context& context, const Character& character,
+                                      const Figures& script, const CrowdOptions& options);
+
+  /// Each frame, outside a render pass.
+  dermis::Result<void> skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
+                                 VkCommandBuffer commandBuffer);
+
+  const dermis::vulkan::SkinningSystem& system() const { return system_; }
+  std::span<const CrowdFigure> figures() const { return figures_; }
+  bool isCulledOnGpu() const { return options_.culledOnGpu; }
+  /// How often a figure found no room; it comes when there is some.
+  std::uint64_t refusals() const { return refusals_; }
+
+ private:
+  Crowd(dermis::samples::Device& device, const Character& character, const Figures& script,
+        const CrowdOptions& options, dermis::vulkan::SkinningSystem system)
+      : device_(&device),
+        character_(&character),
+        script_(&script),
+        options_(options),
+        system_(std::move(system)),
+        figures_(script.count()) {}
+
+  dermis::InstanceDescription describe(const Part& part) const;
+  dermis::Result<void> add(CrowdFigure& figure);
+  dermis::Result<void> remove(CrowdFigure& figure);
+  dermis::Result<void> comeAndGo(std::uint64_t frame);
+  dermis::Result<void> move(const CrowdFigure& figure);
+  dermis::Result<VkBuffer> writeVisibility(std::uint64_t frame);
+
+  dermis::samples::Device* device_;
+  const Character* character_;
+  const Figures* script_;
+  CrowdOptions options_;
+  dermis::vulkan::SkinningSystem system_;
+  std::vector<dermis::MeshHandle> meshes_;  ///< by part
+  std::vector<CrowdFigure> figures_;
+  /// For culling on the GPU: what a culling kernel would write, one for each frame in flight.
+  std::vector<dermis::samples::MappedBuffer> visibility_;
+  std::uint64_t refusals_ = 0;
+};
+
+}  // namespace crowd

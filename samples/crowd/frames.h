@@ -1,0 +1,57 @@
+// The frame loop of a small engine: a command buffer and a fence for each frame in flight.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <vulkan/vulkan_core.h>
+
+#include "dermis/result.h"
+#include "dermis/vulkan/scope.h"
+#include "device.h"
+
+namespace crowd {
+
+/// Frames count from 1. The CPU is ahead of the GPU by as many as may be in flight: it waits for
+/// the oldest, and only when the next one needs its place.
+class FrameLoop {
+ public:
+  /// Fails with `vulkanError`.
+  static dermis::Result<FrameLoop> create(dermis::samples::Device& device,
+                                          std::uint32_t framesInFlight);
+  /// Waits for all frames.
+  ~FrameLoop();
+  FrameLoop(FrameLoop&& other) noexcept;
+  FrameLoop& operator=(FrameLoop&&) = delete;
+
+  /// Waits until there is a place for the next frame, and begins its command buffer.
+  dermis::Result<VkCommandBuffer> begin();
+  dermis::Result<void> submit();
+  /// Waits for all that has been submitted.
+  dermis::Result<void> finish();
+
+  std::uint64_t frame() const { return frame_; }          ///< the one that was begun last
+  std::uint64_t completed() const { return completed_; }  ///< the newest that was waited for
+
+ private:
+  struct Slot {
+    VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
+    VkFence fence = VK_NULL_HANDLE;
+    bool isSubmitted = false;
+  };
+
+  explicit FrameLoop(dermis::samples::Device& device) : device_(&device) {}
+  Slot& slotOf(std::uint64_t frame) { return slots_[frame % slots_.size()]; }
+  dermis::Result<void> waitFor(std::uint64_t frame);
+
+  dermis::samples::Device* device_;
+  std::vector<Slot> slots_;
+  std::uint64_t frame_ = 0;
+  std::uint64_t completed_ = 0;
+};
+
+/// A global memory barrier.
+void recordBarrier(const dermis::samples::Device& device, VkCommandBuffer commandBuffer,
+                   const dermis::vulkan::Dependency& dependency);
+
+}  // namespace crowd

@@ -1,0 +1,156 @@
+// Plays the engine of crowd.h: figures in several meshes, each in a clip and phase of its own, that
+// come, go, jump and walk out of view while frames are in flight.
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "crowd.h"
+#include "crowd_check.h"
+#include "crowd_report.h"
+#include "driver_version.h"
+#include "frames.h"
+#include "open_device.h"
+#include "options.h"
+#include "shown_poses.h"
+#include "timestamps.h"
+
+namespace {
+
+using namespace dermis;
+using namespace crowd;
+
+ExitStatus reportDeviceError(const Error& error) {
+  const bool noDevice =
+      error.code == ErrorCode::missingFeature || error.code == ErrorCode::missingEntryPoint;
+  return reportError(noDevice ? ExitStatus::noDevice : ExitStatus::stopped, error.message);
+}
+
+/// The loop is declared last, so that it goes first: it waits for frames that use the others.
+struct Show {
+  Crowd crowd;
+  ShownPoses shown;
+  CrowdCheck check;
+  CrowdReport report;
+  FrameLoop loop;
+};
+
+Result<void> playFrame(Show& show, const Options& options) {
+  const Result<VkCommandBuffer> commandBuffer = show.loop.begin();
+  if (!commandBuffer) return commandBuffer.error();
+  const std::uint64_t frame = show.loop.frame();
+  if (Result<void> done = show.check.compareUpTo(show.loop.completed()); !done) return done;
+  if (Result<void> done = show.crowd.skinFrame(frame, show.loop.completed(), *commandBuffer); !done)
+    return done;
+  show.shown.follow(show.crowd, frame);
+  show.report.add(show.crowd, show.shown.counts());
+  if (options.verifies && (frame % options.checkInterval == 0 || frame == options.frames)) {
+    if (Result<void> done = show.check.capture(show.crowd, show.shown, frame, *commandBuffer);
+        !done)
+      return done;
+  }
+  return show.loop.submit();
+}
+
+Result<void> play(Show& show, const Options& options) {
+  show.report.printTitle();
+  for (std::uint32_t frame = 0; frame < options.frames; ++frame) {
+    if (Result<void> done = playFrame(show, options); !done) return done;
+  }
+  if (Result<void> done = show.loop.finish(); !done) return done;
+  if (Result<void> done = show.check.compareUpTo(show.loop.completed()); !done) return done;
+  show.report.finish(show.crowd);
+  return {};
+}
+
+Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Character& character,
+                                       const Figures& script, const Options& options) {
+  CrowdOptions crowdOptions = options.crowd;
+  const Result<samples::Timestamps> timestamps = samples::Timestamps::create(*open.device);
+  if (!timestamps) return timestamps.error();
+  crowdOptions.measuresGpuTime = timestamps->has();
+  Result<Crowd> crowd = Crowd::create(*open.device, open.context, character, script, crowdOptions);
+  if (!crowd) return crowd.error();
+  Result<FrameLoop> loop = FrameLoop::create(*open.device, options.crowd.framesInFlight);
+  if (!loop) return loop.error();
+  ReportTitle title;
+  title.device = open.device->info().name;
+  title.driver = samples::driverVersion(*open.device);
+  title.model = std::filesystem::path(options.model).filename().string();
+  title.meshes = character.parts().size();
+  title.verticesOfFigure = character.vertexCount();
+  title.framesInFlight = options.crowd.framesInFlight;
+  title.policy = options.policy;
+  title.culledOnGpu = options.crowd.culledOnGpu;
+  return std::make_unique<Show>(Show{std::move(*crowd), ShownPoses(character),
+                                     CrowdCheck(*open.device, character),
+                                     CrowdReport(std::move(title)), std::move(*loop)});
+}
+
+/// What speaks against the result; empty where nothing does.
+std::string verdict(const Show& show, samples::Device& device) {
+  const std::vector<std::string> messages = device.takeValidationMessages();
+  if (!messages.empty()) return "the validation layer says: " + messages.front();
+  const CheckTotals& totals = show.check.totals();
+  if (totals.failures != 0) {
+    return fmt::format("{} of {} instances are not as they must be; the first: {}", totals.failures,
+                       totals.instances, totals.firstFailure);
+  }
+  if (show.shown.overdue() != 0) {
+    return fmt::format("{} times an instance was not skinned although it was due",
+                       show.shown.overdue());
+  }
+  return {};
+}
+
+ExitStatus run(const Options& options) {
+  const Result<Character> character = Character::load(options.model);
+  if (!character) return reportError(ExitStatus::badInput, character.error().message);
+  samples::DeviceOptions deviceOptions;
+  deviceOptions.device = options.device;
+  deviceOptions.validation = options.validates;
+  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
+  if (!open) return reportDeviceError(open.error());
+
+  const Figures script(*character, options.figures);
+  Result<std::unique_ptr<Show>> show = makeShow(*open, *character, script, options);
+  if (!show) return reportDeviceError(show.error());
+  if (Result<void> played = play(**show, options); !played)
+    return reportDeviceError(played.error());
+
+  const CheckTotals* totals = options.verifies ? &(*show)->check.totals() : nullptr;
+  if (totals != nullptr) (*show)->report.printCheck(*totals);
+  if (!options.json.empty()) {
+    if (Result<void> written = (*show)->report.writeJson(options.json, totals); !written)
+      return reportError(ExitStatus::stopped, written.error().message);
+  }
+  const std::string complaint = verdict(**show, *open->device);
+  return complaint.empty() ? ExitStatus::done
+                           : reportError(ExitStatus::verificationFailed, complaint);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ExitStatus status = ExitStatus::stopped;
+  try {
+    Options options;
+    const std::optional<ExitStatus> ended = readOptions(argc, argv, options);
+    status = ended ? *ended : run(options);
+  } catch (const std::bad_alloc&) {
+    status = reportError(ExitStatus::stopped, "out of memory");
+  } catch (const std::exception& error) {
+    status = reportError(ExitStatus::stopped, error.what());
+  }
+  if (std::fflush(stdout) != 0 && status == ExitStatus::done)
+    status = reportError(ExitStatus::stopped, "standard output cannot be written");
+  return static_cast<int>(status);
+}

@@ -1,0 +1,85 @@
+#include "options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <map>
+
+using namespace dermis;
+
+namespace crowd {
+namespace {
+
+constexpr std::uint32_t mostFigures = 100'000, mostFrames = 1'000'000, mostFramesInFlight = 16;
+constexpr std::uint32_t mostMebibytes = 1u << 20;
+
+const std::map<std::string, OverflowPolicy>& policies() {
+  static const std::map<std::string, OverflowPolicy> names{{"refuse", OverflowPolicy::refuse},
+                                                           {"keep", OverflowPolicy::keepLast},
+                                                           {"bind", OverflowPolicy::bindPose}};
+  return names;
+}
+
+}  // namespace
+
+ExitStatus reportError(ExitStatus status, const std::string& message) {
+  std::string line = message;
+  std::ranges::replace_if(
+      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
+  std::fflush(stdout);
+  fmt::print(stderr, "dermis_crowd: error: {}\n", line);
+  return status;
+}
+
+std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
+  CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and proves every vertex right.",
+               "dermis_crowd");
+  app.footer(
+      "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable "
+      "device,\n"
+      "5 anything else that stopped it.");
+  bool skipsVerification = false;
+  std::uint32_t outputMebibytes = 0;
+  app.add_option("--figures", options.figures, "How many there are [200]")
+      ->check(CLI::Range(1u, mostFigures));
+  app.add_option("--frames", options.frames, "How many are skinned [120]")
+      ->check(CLI::Range(1u, mostFrames));
+  app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
+  app.add_option("--device", options.device,
+                 "auto, a number of 'dermis devices', or part of a name");
+  app.add_option("--frames-in-flight", options.crowd.framesInFlight,
+                 "Frames that the CPU is ahead of the GPU [3]")
+      ->check(CLI::Range(1u, mostFramesInFlight));
+  app.add_option(
+         "--policy", options.policy,
+         "What becomes of figures without room in the output: refuse, keep or bind [refuse]")
+      ->check(CLI::IsMember(policies()));
+  app.add_option("--output-budget", outputMebibytes,
+                 "MiB of skinned vertices [enough for all figures]")
+      ->check(CLI::Range(1u, mostMebibytes));
+  app.add_option("--json", options.json, "Write the same numbers to a file");
+  app.add_option("--check-every", options.checkInterval,
+                 "Compare every vertex in each frame of so many, and in the last [10]")
+      ->check(CLI::Range(1u, mostFrames));
+  app.add_flag("--no-verify", skipsVerification, "Do not read back: for times that count");
+  app.add_flag("--gpu-culling", options.crowd.culledOnGpu,
+               "Let the GPU choose which instances are visible");
+  app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    app.exit(success);  // --help
+    return ExitStatus::done;
+  } catch (const CLI::ParseError& error) {
+    return reportError(ExitStatus::wrongUsage,
+                       fmt::format("{} (dermis_crowd --help tells more)", error.what()));
+  }
+  options.verifies = !skipsVerification;
+  options.crowd.policy = policies().at(options.policy);
+  options.crowd.outputBudget = std::uint64_t{outputMebibytes} << 20;
+  return std::nullopt;
+}
+
+}  // namespace crowd

@@ -1,0 +1,44 @@
+// The right answer for every mesh in every pose that was asked for, kept.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+
+#include "character.h"
+#include "dermis/reference.h"
+#include "dermis/result.h"
+
+namespace crowd {
+
+struct ReferenceKey {
+  std::uint32_t part = 0;
+  PoseKey pose;
+
+  friend auto operator<=>(const ReferenceKey&, const ReferenceKey&) = default;
+};
+
+class References {
+ public:
+  explicit References(const Character& character) : character_(&character) {}
+
+  /// Finds what is missing of them, on all cores.
+  dermis::Result<void> prepare(std::span<const ReferenceKey> keys);
+  /// Of a key that has been prepared. For `bindPose`, of the mesh as it is.
+  const dermis::reference::SkinnedMesh& of(const ReferenceKey& key) const;
+
+  /// The pose of instances that have no room of their own: the identity in every joint.
+  static constexpr PoseKey bindPose{0xffffffffu, 0};
+
+ private:
+  dermis::Result<dermis::reference::SkinnedMesh> skin(const ReferenceKey& key) const;
+
+  const Character* character_;
+  std::map<ReferenceKey, std::unique_ptr<dermis::reference::SkinnedMesh>> kept_;
+};
+
+/// What the skin kernel was asked to do.
+dermis::Method methodOf(PoseKey pose);
+
+}  // namespace crowd

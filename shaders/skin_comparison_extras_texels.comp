@@ -1,0 +1,10 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+
+// skin_extras_texels.comp for the methods that are there for comparison.
+
+#define COMPARISON
+#define EXTRAS
+#define TEXELS
+#include "skin.glsl"

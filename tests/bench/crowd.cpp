@@ -1,0 +1,98 @@
+#include "crowd.h"
+
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "dermis/gltf.h"
+
+namespace dermis::bench {
+namespace {
+
+template <typename T>
+T read(const std::vector<std::byte>& bytes, std::size_t index) {
+  T value;
+  std::memcpy(&value, bytes.data() + index * sizeof(T), sizeof(T));
+  return value;
+}
+
+std::uint16_t jointOf(const gltf::Influences& influences, std::size_t index) {
+  if (influences.jointType == ComponentType::uint8)
+    return read<std::uint8_t>(influences.joints, index);
+  return read<std::uint16_t>(influences.joints, index);
+}
+
+float weightOf(const gltf::Influences& influences, std::size_t index) {
+  switch (influences.weightType) {
+    case ComponentType::unorm8:
+      return static_cast<float>(read<std::uint8_t>(influences.weights, index)) / 255;
+    case ComponentType::unorm16:
+      return static_cast<float>(read<std::uint16_t>(influences.weights, index)) / 65535;
+    default:
+      return read<float>(influences.weights, index);
+  }
+}
+
+PlainVertex plainVertex(const gltf::Primitive& primitive, std::size_t vertex) {
+  PlainVertex plain{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    plain.position[axis] = primitive.positions[vertex * 3 + axis];
+    plain.normal[axis] = primitive.normals[vertex * 3 + axis];
+  }
+  for (std::size_t slot = 0; slot < 4; ++slot) {
+    plain.joints[slot] = jointOf(primitive.influences[0], vertex * 4 + slot);
+    plain.weights[slot] = weightOf(primitive.influences[0], vertex * 4 + slot);
+  }
+  const float sum = std::accumulate(plain.weights.begin(), plain.weights.end(), 0.0f);
+  for (float& weight : plain.weights) weight /= sum;
+  return plain;
+}
+
+}  // namespace
+
+std::vector<samples::SkinRequest> Crowd::requests(Method method) const {
+  std::vector<samples::SkinRequest> requests;
+  for (const std::vector<JointMatrix>& pose : poses) {
+    samples::SkinRequest& request = requests.emplace_back();
+    request.mesh = &*mesh;
+    request.palette = pose;
+    request.mayScale = false;  // nor does the plain kernel know of scale
+    request.method = method;
+  }
+  return requests;
+}
+
+Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount) {
+  const Result<gltf::Model> model = gltf::load(path);
+  if (!model) return model.error();
+  Crowd crowd;
+  crowd.name = path.stem().string();
+  const auto refuse = [&](const char* reason) {
+    return Error{ErrorCode::invalidData, "'" + crowd.name + "' " + reason};
+  };
+  if (model->skinnedPrimitives.empty()) return refuse("has no skinned primitive");
+  const gltf::SkinnedPrimitive& source = model->skinnedPrimitives.front();
+  const gltf::Primitive& primitive = model->meshes[source.mesh].primitives[source.primitive];
+  if (primitive.normals.empty()) return refuse("has no normals");
+  if (primitive.influences.size() != 1) return refuse("has not four influences a vertex");
+
+  const auto jointCount = static_cast<std::uint32_t>(model->skins[source.skin].joints.size());
+  const gltf::PrimitiveView view(primitive);
+  Result<PackedMesh> packed = pack(view.mesh(), jointCount);
+  if (!packed) return packed.error();
+  crowd.mesh.emplace(std::move(*packed));
+  for (std::size_t vertex = 0; vertex < primitive.vertexCount; ++vertex)
+    crowd.vertices.push_back(plainVertex(primitive, vertex));
+
+  const std::uint32_t clip = model->clips.empty() ? gltf::none : 0;
+  const double duration = clip == gltf::none ? 0 : model->clips[clip].duration;
+  // Multiples of the golden ratio spread evenly: no two instances are in step.
+  const double step = (std::sqrt(5.0) - 1) / 2;
+  for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
+    const double phase = std::fmod(instance * step, 1.0);
+    crowd.poses.push_back(gltf::palette(*model, source.skin, clip, phase * duration));
+  }
+  return crowd;
+}
+
+}  // namespace dermis::bench

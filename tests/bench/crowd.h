@@ -1,0 +1,42 @@
+// A crowd of one model: what both Dermis and the plain kernel are given to skin.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "batch_layout.h"
+#include "dermis/pack.h"
+#include "dermis/result.h"
+
+namespace dermis::bench {
+
+/// A vertex as the plain kernel reads it, with four influences whether it needs them or not.
+struct PlainVertex {
+  std::array<float, 3> position;
+  std::array<float, 3> normal;
+  std::array<std::uint16_t, 4> joints;
+  std::array<float, 4> weights;
+};
+static_assert(sizeof(PlainVertex) == 48);
+
+struct Crowd {
+  std::string name;
+  std::vector<PlainVertex> vertices;
+  std::optional<PackedMesh> mesh;               ///< of the same vertices
+  std::vector<std::vector<JointMatrix>> poses;  ///< one an instance, rigid
+
+  std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(vertices.size()); }
+  std::uint32_t jointCount() const { return static_cast<std::uint32_t>(poses.front().size()); }
+  std::uint32_t instanceCount() const { return static_cast<std::uint32_t>(poses.size()); }
+  std::vector<samples::SkinRequest> requests(Method method) const;
+};
+
+/// The first skinned primitive of a file, so many times, each instance at another time of the
+/// file's first clip. Fails where the file has none with normals and four influences a vertex.
+Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
+
+}  // namespace dermis::bench

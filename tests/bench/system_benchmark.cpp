@@ -1,0 +1,186 @@
+// What a scene costs in a SkinningSystem, from one instance to ten thousand of twenty meshes: the
+// GPU's time, the CPU's, and memory. Prints a table of medians.
+//
+//   dermis_system_benchmark [REPETITIONS [MOST-INSTANCES]]
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "bench_scene.h"
+#include "dermis/pack.h"
+#include "driver_version.h"
+#include "random_rig.h"
+#include "system_engine.h"
+
+namespace dermis::bench {
+namespace {
+
+using test::must;
+
+constexpr std::uint32_t meshCount = 20;
+constexpr std::uint32_t meanVertexCount = 3000;
+constexpr std::uint32_t jointCount = 24;
+
+double secondsSince(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+/// Joints are near each other, as in real meshes.
+PackedMesh meshOf(std::uint32_t number) {
+  const std::uint32_t vertexCount = meanVertexCount - 950 + number * 100;
+  samples::OwnedMesh mesh = samples::randomMesh(number, vertexCount, jointCount, 4);
+  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+    for (std::uint32_t slot = 0; slot < 4; ++slot) {
+      mesh.joints[vertex * 4 + slot] = (vertex * jointCount / vertexCount + slot) % jointCount;
+      mesh.weights[vertex * 4 + slot] = 1.0f / static_cast<float>(slot + 1);
+    }
+  }
+  return must(pack(mesh.view(), jointCount));
+}
+
+/// Seconds of one frame.
+struct FrameCost {
+  double gpu = 0, wall = 0;
+  double record = 0;  ///< plan and record, on the CPU
+  double poses = 0;   ///< writing all of them
+};
+
+/// Instances of twenty meshes in turn, each with a pose of its own.
+class Scene {
+ public:
+  Scene(samples::OpenDevice& open, std::uint32_t instanceCount)
+      : engine_(*open.device, description(open, instanceCount)) {
+    engine_.begin();
+    std::vector<MeshHandle> meshes;
+    for (std::uint32_t mesh = 0; mesh < std::min(meshCount, instanceCount); ++mesh)
+      meshes.push_back(engine_.addMesh(meshOf(mesh)));
+    InstanceDescription instance;
+    instance.layout.normals = VertexFormat::float32x3;
+    for (std::uint32_t i = 0; i < instanceCount; ++i) {
+      instance.mesh = meshes[i % meshes.size()];
+      vertexCount_ += engine_.vertexCount(instance.mesh);
+      instance.palette = palettes_.emplace_back(engine_.addPalette(poses_[0], false));
+      if (i == 0) must(engine_->prepare(instance));
+      must(engine_->addInstance(instance));
+    }
+    engine_.submit();
+    engine_.finish();
+  }
+
+  /// A frame in which all instances move, or none.
+  FrameCost run(bool moves) {
+    engine_.begin();
+    FrameCost cost;
+    const auto beforePoses = std::chrono::steady_clock::now();
+    const std::vector<JointMatrix>& pose = poses_[engine_.frame() % 2];
+    for (std::size_t i = 0; moves && i < palettes_.size(); ++i)
+      engine_.writePose(palettes_[i], pose);
+    cost.poses = secondsSince(beforePoses);
+    const auto beforeSubmission = std::chrono::steady_clock::now();
+    engine_.submit();
+    engine_.finish();
+    lastFrame_ = engine_.lastFrame();
+    cost.record = lastFrame_.planSeconds + lastFrame_.recordSeconds;
+    cost.wall = secondsSince(beforeSubmission) - cost.record;
+    engine_.begin();
+    cost.gpu = engine_->statistics().lastCompletedFrame.seconds.value_or(0);
+    engine_.submit();
+    engine_.finish();
+    return cost;
+  }
+
+  std::uint64_t vertexCount() const { return vertexCount_; }
+  const vulkan::FrameStatistics& lastFrame() const { return lastFrame_; }
+  std::uint64_t deviceMemory() { return engine_->statistics().deviceMemory; }
+
+ private:
+  static vulkan::SkinningSystemDescription description(samples::OpenDevice& open,
+                                                       std::uint32_t instanceCount) {
+    vulkan::SkinningSystemDescription description;
+    description.context = &open.context;
+    description.tuning = open.context.tuning();
+    description.jointBudget = instanceCount * jointCount;
+    description.instanceBudget = instanceCount;
+    description.boundsBudget = 0;
+    description.outputBudget = std::uint64_t{instanceCount} * (meanVertexCount + 1000) * 24;
+    description.measuresGpuTime = true;
+    return description;
+  }
+
+  const std::vector<std::vector<JointMatrix>> poses_{
+      samples::randomPose(1, jointCount, samples::Rigidity::rigid),
+      samples::randomPose(2, jointCount, samples::Rigidity::rigid)};
+  test::SystemEngine engine_;
+  std::vector<PaletteHandle> palettes_;
+  std::uint64_t vertexCount_ = 0;
+  vulkan::FrameStatistics lastFrame_;
+};
+
+struct Medians {
+  FrameCost cost;
+  vulkan::FrameStatistics frame;
+};
+
+Medians measure(Scene& scene, bool moves, std::uint32_t repetitions) {
+  std::vector<double> gpu, wall, record, poses;
+  for (std::uint32_t i = 0; i < repetitions; ++i) {
+    const FrameCost cost = scene.run(moves);
+    gpu.push_back(cost.gpu);
+    wall.push_back(cost.wall);
+    record.push_back(cost.record);
+    poses.push_back(cost.poses);
+  }
+  return {{median(gpu), median(wall), median(record), median(poses)}, scene.lastFrame()};
+}
+
+void printRow(samples::OpenDevice& open, std::uint32_t instances, std::uint32_t repetitions) {
+  Scene scene(open, instances);
+  // Few instances are over soon, so that there is time for more frames.
+  const std::uint32_t frames = repetitions * (instances <= 100 ? 10 : 1);
+  measure(scene, true, 2);  // drivers compile, memory is touched
+  const Medians moving = measure(scene, true, frames), resting = measure(scene, false, frames);
+  const auto vertices = static_cast<double>(scene.vertexCount()), count = double{1} * instances;
+  std::printf("%9u %9.2f %9.2f %9.2f %9.1f %9.1f %9.1f %10u %6u %8.1f\n", instances, vertices / 1e6,
+              moving.cost.gpu / vertices * 1e9, moving.cost.wall / vertices * 1e9,
+              moving.cost.record / count * 1e9, resting.cost.record / count * 1e9,
+              moving.cost.poses / count * 1e9, moving.frame.dispatches, moving.frame.copies,
+              static_cast<double>(scene.deviceMemory()) / (1 << 20));
+  std::fflush(stdout);
+}
+
+std::uint32_t numberOr(int argc, char** argv, int index, std::uint32_t fallback) {
+  std::uint32_t number = fallback;
+  if (index < argc) std::from_chars(argv[index], argv[index] + std::strlen(argv[index]), number);
+  return std::max(number, 1u);
+}
+
+}  // namespace
+}  // namespace dermis::bench
+
+int main(int argc, char** argv) {
+  using namespace dermis::bench;
+  auto* open = benchDevice();
+  if (open == nullptr) return 4;
+  const std::uint32_t repetitions = numberOr(argc, argv, 1, 11);
+  const std::uint32_t mostInstances = numberOr(argc, argv, 2, 10'000);
+  std::printf("driver: %s\n", dermis::samples::driverVersion(*open->device).c_str());
+  std::printf(
+      "%u meshes of about %u vertices, %u joints; dual quaternions, positions and normals\n",
+      meshCount, meanVertexCount, jointCount);
+  std::printf("%9s %9s %9s %9s %9s %9s %9s %10s %6s %8s\n", "", "million", "GPU ns", "wall ns",
+              "CPU ns/", "instance", "pose ns", "", "", "memory");
+  std::printf("%9s %9s %9s %9s %9s %9s %9s %10s %6s %8s\n", "instances", "vertices", "/vertex",
+              "/vertex", "moving", "at rest", "/palette", "dispatches", "copies", "MiB");
+  for (std::uint32_t instances = 1; instances <= mostInstances; instances *= 10)
+    printRow(*open, instances, repetitions);
+  return 0;
+}

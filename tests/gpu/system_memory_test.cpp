@@ -1,0 +1,289 @@
+// Where a system has its memory from, and that it gives all of it back, whatever fails on the way.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "command_log.h"
+#include "system_test.h"
+
+namespace dermis::test {
+namespace {
+
+using vulkan::MemoryBlock;
+using vulkan::MemoryRequest;
+using vulkan::MemoryUse;
+using vulkan::SkinningSystem;
+
+/// An engine's allocator: a VkDeviceMemory each, counted.
+class CountingMemory {
+ public:
+  explicit CountingMemory(samples::Device& device) : device_(device) {}
+
+  vulkan::MemoryCallbacks callbacks() { return {this, allocate, free}; }
+
+  std::uint32_t allocations = 0, frees = 0;
+  std::uint64_t bytes = 0;
+  std::uint32_t failsAt = ~0u;  ///< the number of the allocation that fails
+  std::set<MemoryUse> uses;
+  std::set<std::string> names;
+
+ private:
+  static Result<MemoryBlock> allocate(void* user, const MemoryRequest& request) {
+    auto& self = *static_cast<CountingMemory*>(user);
+    if (self.allocations == self.failsAt)
+      return Error{ErrorCode::ioError, "the engine's allocator has had enough", 7};
+    return self.allocate(request);
+  }
+  Result<MemoryBlock> allocate(const MemoryRequest& request) {
+    const bool isMapped = request.use != MemoryUse::device;
+    const Result<std::uint32_t> type = device_.memoryType(
+        request.requirements.memoryTypeBits,
+        isMapped ? VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT
+                 : VkMemoryPropertyFlags{0},
+        VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+    if (!type) return type.error();
+    VkMemoryAllocateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+    info.allocationSize = request.requirements.size;
+    info.memoryTypeIndex = *type;
+    MemoryBlock block;
+    const samples::VulkanFunctions& functions = device_.functions();
+    if (functions.AllocateMemory(device_.handle(), &info, nullptr, &block.memory) != VK_SUCCESS)
+      return Error{ErrorCode::vulkanError, "vkAllocateMemory failed"};
+    if (isMapped)
+      functions.MapMemory(device_.handle(), block.memory, 0, VK_WHOLE_SIZE, 0, &block.mapped);
+    block.owner = new std::uint64_t{request.requirements.size};
+    ++allocations;
+    bytes += request.requirements.size;
+    uses.insert(request.use);
+    names.insert(request.name);
+    return block;
+  }
+  static void free(void* user, const MemoryBlock& block) {
+    auto& self = *static_cast<CountingMemory*>(user);
+    ++self.frees;
+    const auto* size = static_cast<std::uint64_t*>(block.owner);
+    self.bytes -= *size;
+    delete size;
+    self.device_.functions().FreeMemory(self.device_.handle(), block.memory, nullptr);
+  }
+
+  samples::Device& device_;
+};
+
+class SystemMemoryTest : public SystemTest {
+ protected:
+  /// Everything for which a system may want memory: culling, bounds, copies of many frames.
+  void use(SystemEngine& engine) {
+    const samples::MappedBuffer visibility = must(samples::MappedBuffer::create(
+        device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    const PackedMesh packed = systemMesh(1, 100);
+    engine.begin();
+    InstanceDescription instance;
+    instance.layout = motionLayout();
+    instance.bounds = true;
+    instance.mesh = engine.addMesh(packed);
+    instance.palette = engine.addPalette(systemPose(1));
+    for (int frame = 0; frame < 4; ++frame) {
+      if (frame != 0) engine.begin(1);
+      for (int i = 0; i < 40; ++i) {
+        instance.culledOnGpu = i % 2 == 0;
+        engine.addInstance(instance);
+      }
+      engine.writePose(instance.palette, systemPose(2));
+      engine.submit({visibility.handle(), 0});
+    }
+    engine.finish();
+  }
+};
+
+TEST_F(SystemMemoryTest, AllThatTheEngineGivesComesBack) {
+  CountingMemory memory(device());
+  vulkan::SkinningSystemDescription own = description();
+  own.memory = memory.callbacks();
+  {
+    SystemEngine engine(device(), own);
+    EXPECT_GE(memory.bytes, own.meshBudget + own.outputBudget) << "taken when it is made";
+    use(engine);
+    EXPECT_EQ(engine->statistics().deviceMemory, memory.bytes);
+  }
+  EXPECT_GT(memory.allocations, 0u);
+  EXPECT_EQ(memory.allocations, memory.frees);
+  EXPECT_EQ(memory.bytes, 0u);
+  EXPECT_TRUE(memory.uses.contains(MemoryUse::device));
+  EXPECT_TRUE(memory.uses.contains(MemoryUse::upload));
+  for (const std::string& name : memory.names) EXPECT_TRUE(name.starts_with("dermis ")) << name;
+}
+
+TEST_F(SystemMemoryTest, AllocatorsThatFailLeaveNothingBehind) {
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
+  bool succeeded = false;
+  for (std::uint32_t failsAt = 0; !succeeded && failsAt < 100; ++failsAt) {
+    CountingMemory memory(device());
+    memory.failsAt = failsAt;
+    vulkan::SkinningSystemDescription own = description();
+    own.context = &watched;
+    own.memory = memory.callbacks();
+    {
+      const Result<SkinningSystem> system = SkinningSystem::create(own);
+      succeeded = system.ok();
+      if (!succeeded) {
+        EXPECT_EQ(system.error().code, ErrorCode::ioError);
+        EXPECT_EQ(system.error().message, "the engine's allocator has had enough");
+        EXPECT_EQ(system.error().vulkanResult, 7);
+      }
+    }
+    EXPECT_EQ(memory.allocations, failsAt);
+    EXPECT_EQ(memory.frees, failsAt);
+    EXPECT_EQ(log.buffersAlive, 0);
+  }
+  EXPECT_TRUE(succeeded);
+}
+
+TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
+  vulkan::SkinningSystemDescription system = description();
+  system.context = &watched;
+  system.measuresGpuTime = true;
+  for (const char* function : {"vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMemory",
+                               "vkMapMemory", "vkCreateQueryPool"}) {
+    log.failures = {{function, VK_ERROR_OUT_OF_DEVICE_MEMORY}};
+    const Result<SkinningSystem> made = SkinningSystem::create(system);
+    ASSERT_FALSE(made.ok()) << function;
+    EXPECT_EQ(made.error().code, ErrorCode::vulkanError) << function;
+    EXPECT_EQ(made.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY) << function;
+    EXPECT_NE(made.error().message.find(function), std::string::npos) << made.error().message;
+    EXPECT_EQ(log.buffersAlive, 0) << function;
+    EXPECT_EQ(log.allocationsAlive, 0) << function;
+  }
+  log.failures.clear();
+  EXPECT_TRUE(SkinningSystem::create(system).ok());
+}
+
+// An allocator that fails in the middle of a game: nothing is recorded, and all is tried again.
+TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
+  CountingMemory memory(device());
+  vulkan::SkinningSystemDescription own = description();
+  own.memory = memory.callbacks();
+  SystemEngine engine(device(), own);
+  const PackedMesh packed = systemMesh(1, 20);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.mesh = engine.addMesh(packed);
+  instance.palette = engine.addPalette(systemPose(1));
+  std::vector<InstanceHandle> instances{engine.addInstance(instance)};
+  engine.submit();
+  // So many that whatever was prepared for does not do.
+  engine.begin();
+  engine.writePose(instance.palette, systemPose(2));
+  while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
+  memory.failsAt = memory.allocations;
+  const Result<void> recorded = engine.trySubmit();
+  if (!recorded) {
+    EXPECT_EQ(recorded.error().code, ErrorCode::ioError);
+    memory.failsAt = ~0u;
+    engine.runFrame();
+  }
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 3000u);
+  const std::vector<std::byte> bytes = engine.readOutput();
+  const Streams expected = alone(packed, systemPose(2), instance);
+  for (const std::size_t i : {std::size_t{0}, std::size_t{1}, std::size_t{1500}, std::size_t{2999}})
+    expectSkinned(engine.read(bytes, instances[i]), expected);
+}
+
+TEST_F(SystemMemoryTest, MemoryOfItsOwnIsTakenInFewBlocks) {
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
+  vulkan::SkinningSystemDescription system = description();
+  system.context = &watched;
+  {
+    SystemEngine engine(device(), system);
+    use(engine);
+    EXPECT_LE(log.count("vkAllocateMemory"), 4u);
+    EXPECT_LE(engine->statistics().deviceMemory, log.allocatedBytes);
+    EXPECT_GE(engine->statistics().deviceMemory, system.meshBudget + system.outputBudget);
+  }
+  EXPECT_EQ(log.buffersAlive, 0);
+  EXPECT_EQ(log.allocationsAlive, 0);
+}
+
+TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
+  vulkan::SkinningSystemDescription system = description();
+  system.context = &watched;
+  SystemEngine engine(device(), system);
+  const PackedMesh packed = systemMesh(1, 100);
+  std::uint32_t allocations = 0;
+  for (int round = 0; round < 60; ++round) {
+    engine.begin(1);
+    InstanceDescription instance;
+    instance.layout = motionLayout();
+    instance.mesh = engine.addMesh(packed);
+    instance.palette = engine.addPalette(systemPose(1));
+    std::vector<InstanceHandle> instances;
+    for (int i = 0; i < 50; ++i) instances.push_back(engine.addInstance(instance));
+    engine.submit();
+    engine.begin(1);
+    for (const InstanceHandle handle : instances) must(engine->removeInstance(handle));
+    must(engine->removePalette(instance.palette));
+    must(engine->removeMesh(instance.mesh));
+    engine.submit();
+    if (round == 10) allocations = log.count("vkAllocateMemory");
+  }
+  EXPECT_EQ(log.count("vkAllocateMemory"), allocations);
+  engine.runFrame();
+  engine.begin();
+  const vulkan::SystemStatistics statistics = engine->statistics();
+  EXPECT_EQ(statistics.meshes.used, 0u);
+  EXPECT_EQ(statistics.palettes.used, 0u);
+  EXPECT_EQ(statistics.outputs.used, 0u);
+  for (const vulkan::StoreStatistics& store :
+       {statistics.meshes, statistics.palettes, statistics.outputs})
+    EXPECT_EQ(store.largestFree, store.capacity);
+}
+
+TEST_F(SystemMemoryTest, TheGpusTimeIsKnownWhereItIsMeasured) {
+  vulkan::SkinningSystemDescription measured = description();
+  for (const bool measures : {true, false}) {
+    measured.measuresGpuTime = measures;
+    SingleInstance one(device(), measured, motionLayout(), 2000);
+    one.engine.submit();
+    one.engine.begin();
+    const vulkan::GpuStatistics gpu = one.engine->statistics().lastCompletedFrame;
+    EXPECT_EQ(gpu.frame, 1u);
+    EXPECT_EQ(gpu.seconds.has_value(), measures);
+    EXPECT_GE(gpu.seconds.value_or(0), 0.0);
+    one.engine.submit();
+  }
+}
+
+TEST_F(SystemMemoryTest, StatisticsAddUp) {
+  SingleInstance one(device(), description(), motionLayout());
+  const vulkan::SystemStatistics statistics = one.engine->statistics();
+  EXPECT_EQ(statistics.meshes.used, one.packed.bytes().size());
+  EXPECT_EQ(statistics.outputs.used, 100u * 36);
+  EXPECT_GE(statistics.outputs.capacity, 4u << 20);
+  EXPECT_GE(statistics.meshes.capacity, 4u << 20);
+  for (const vulkan::StoreStatistics& store :
+       {statistics.meshes, statistics.palettes, statistics.outputs}) {
+    EXPECT_GT(store.used, 0u);
+    EXPECT_LE(store.used + store.largestFree, store.capacity);
+  }
+  one.engine.submit();
+  EXPECT_EQ(one.engine.lastFrame().frame, 1u);
+  EXPECT_GE(one.engine.lastFrame().uploadedBytes, one.packed.bytes().size() + 8 * 48);
+  EXPECT_GE(one.engine.lastFrame().planSeconds, 0.0);
+  EXPECT_GE(one.engine.lastFrame().recordSeconds, 0.0);
+}
+
+}  // namespace
+}  // namespace dermis::test

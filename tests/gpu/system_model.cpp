@@ -1,0 +1,180 @@
+#include "system_model.h"
+
+#include <algorithm>
+
+namespace dermis::test {
+
+bool SystemModel::isPaletteUsed(std::uint32_t palette) const {
+  return std::ranges::any_of(
+      instances, [&](const ModelInstance& instance) { return instance.palette == palette; });
+}
+
+bool SystemModel::isMeshUsed(std::uint32_t mesh) const {
+  return std::ranges::any_of(instances,
+                             [&](const ModelInstance& instance) { return instance.mesh == mesh; });
+}
+
+void SystemModel::writePose(std::uint32_t palette, std::uint32_t pose) {
+  palettes.at(palette).pose = pose;
+  for (ModelInstance& instance : instances) {
+    if (instance.palette == palette) instance.isChanged = true;
+  }
+}
+
+void SystemModel::lock(const InstanceOutput& output) {
+  locked_.push_back({output.offset, output.offset + output.size, engine_.frame()});
+}
+
+void SystemModel::remove(std::size_t index) {
+  if (instances[index].hasPlace()) lock(instances[index].output);
+  std::swap(instances[index], instances.back());
+  instances.pop_back();
+}
+
+void SystemModel::beginFrame() {
+  std::erase_if(locked_,
+                [&](const Place& place) { return place.frame <= engine_.completedFrame(); });
+}
+
+void SystemModel::checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed) {
+  const bool hasPlace = output.state == OutputState::own || output.state == OutputState::last;
+  const bool hadPlace = instance.hasPlace();
+  const bool stays = hasPlace && hadPlace && output.offset == instance.output.offset &&
+                     output.size == instance.output.size;
+  EXPECT_TRUE(isListed || stays || !hadPlace || !hasPlace) << "it moved";
+  EXPECT_FALSE(isListed && stays) << "it did not move";
+  // Where another stood that a frame under way may still read.
+  for (const Place& place : locked_) {
+    EXPECT_TRUE(!hasPlace || stays || output.offset >= place.end ||
+                output.offset + output.size <= place.begin)
+        << "a place of a frame under way is used again";
+  }
+}
+
+void SystemModel::checkPlacesAreApart() const {
+  std::map<std::uint64_t, std::uint64_t> places;
+  for (const ModelInstance& instance : instances) {
+    if (!instance.hasPlace()) continue;
+    EXPECT_TRUE(places.emplace(instance.output.offset, instance.output.size).second);
+  }
+  std::uint64_t end = 0;
+  for (const auto& [offset, size] : places) {
+    EXPECT_GE(offset, end) << "two instances overlap";
+    end = offset + size;
+  }
+}
+
+bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
+  const bool comesBack = !instance.wasDisplayed;
+  const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
+  const bool isForced = isPlaced || instance.teleports || isOwed;
+  if (instance.description.culledOnGpu) return isForced || comesBack;
+  const bool isSkinned = lists.skinned.contains(instance.handle.index);
+  if (isForced) {
+    EXPECT_TRUE(isSkinned) << "it changed";
+  } else if (!instance.isChanged && !comesBack) {
+    EXPECT_FALSE(isSkinned) << "it did not change";
+  } else if (!comesBack) {
+    const std::pair beat{instance.palette, instance.description.updateInterval};
+    EXPECT_EQ(lists.beats.emplace(beat, isSkinned).first->second, isSkinned)
+        << "instances of one palette take the same frames";
+  }
+  return isSkinned;
+}
+
+void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
+  const bool comesBack = !instance.wasDisplayed;
+  const bool hasPrevious = instance.description.layout.previousPositions;
+  const bool isSettled = lists.settled.contains(instance.handle.index);
+  if (isSkinnedNow(instance, isPlaced, lists)) {
+    EXPECT_FALSE(isSettled) << "it was skinned";
+    const bool restarts = isPlaced || instance.teleports || comesBack;
+    const ShownPose now = wantedPose(instance);
+    instance.before = restarts ? now : instance.shown;
+    instance.shown = now;
+    instance.isMoving = hasPrevious && !restarts;
+    instance.isChanged = false;
+    instance.waitedFrames = 0;
+  } else {
+    EXPECT_TRUE(instance.description.culledOnGpu || comesBack || isSettled == instance.isMoving)
+        << "it settles in the frame after it moved, and in no other";
+    instance.before = instance.shown;
+    instance.isMoving = false;
+    if (instance.isChanged) ++instance.waitedFrames;
+    EXPECT_LT(instance.waitedFrames, instance.description.updateInterval) << "it waits too long";
+  }
+  instance.wasDisplayed = true;
+}
+
+void SystemModel::updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
+  EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
+  if (instance.output.state == OutputState::own) {
+    const bool isSettled = lists.settled.contains(instance.handle.index);
+    EXPECT_FALSE(isSettled && !instance.isMoving) << "it did not move";
+    if (isSettled) instance.before = instance.shown;
+    if (isPlaced) instance.shown = instance.before = std::nullopt;
+  } else {
+    // Whether the last result of an old mesh settles is not said.
+    if (instance.output.state != OutputState::last) instance.shown = std::nullopt;
+    instance.before = std::nullopt;
+  }
+  instance.isMoving = false;
+  instance.wasDisplayed = false;
+}
+
+void SystemModel::update(ModelInstance& instance, Lists& lists) {
+  const InstanceOutput output = must(engine_->output(instance.handle));
+  checkPlace(instance, output, lists.moved.contains(instance.handle.index));
+  const bool isOwn = output.state == OutputState::own;
+  const bool isPlaced = isOwn && output.mesh == instance.description.mesh &&
+                        (instance.output.state != OutputState::own || instance.changesMesh);
+  if (instance.hasPlace() && output.offset != instance.output.offset) lock(instance.output);
+  instance.output = output;
+  // Out of view it has the place and the vertices of its old mesh until somebody looks.
+  const bool isWanted = output.mesh == instance.description.mesh;
+  if (isOwn && isWanted) instance.changesMesh = false;
+  EXPECT_TRUE(!isOwn || isWanted || !instance.isVisible);
+  if (isOwn && instance.isDisplayed()) {
+    updateDisplayed(instance, isPlaced, lists);
+  } else {
+    updateHidden(instance, isPlaced, lists);
+  }
+  instance.teleports = false;
+}
+
+void SystemModel::checkStatistics(const Lists& lists) const {
+  const vulkan::FrameStatistics frame = engine_->statistics().lastFrame;
+  EXPECT_EQ(frame.frame, engine_.frame());
+  EXPECT_EQ(frame.instances, instances.size());
+  EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());
+  EXPECT_EQ(frame.settledInstances, lists.settled.size());
+  std::uint64_t vertices = 0, waiting = 0, waitingInView = 0;
+  for (const ModelInstance& instance : instances) {
+    if (lists.skinned.contains(instance.handle.index)) vertices += instance.vertexCount;
+    waiting += instance.output.state != OutputState::own;
+    waitingInView += instance.output.state != OutputState::own && instance.isVisible;
+  }
+  EXPECT_GE(frame.skinnedVertices, vertices) << "bind poses are skinned besides";
+  // What has never been in view may have room all the same.
+  EXPECT_LE(frame.waitingInstances, waiting);
+  EXPECT_GE(frame.waitingInstances, waitingInView);
+  const bool didNothing =
+      lists.skinned.empty() && lists.settled.empty() && frame.culledCandidates == 0;
+  EXPECT_TRUE(!didNothing || frame.copies != 0 || frame.dispatches == 0) << "nothing changed";
+}
+
+void SystemModel::afterRecord() {
+  Lists lists{indicesOf(engine_->skinnedInstances()),
+              indicesOf(engine_->settledInstances()),
+              indicesOf(engine_->movedInstances()),
+              {}};
+  for (ModelInstance& instance : instances) {
+    SCOPED_TRACE("frame " + std::to_string(engine_.frame()) + ", instance " +
+                 std::to_string(instance.handle.index));
+    update(instance, lists);
+  }
+  checkPlacesAreApart();
+  checkStatistics(lists);
+}
+
+}  // namespace dermis::test

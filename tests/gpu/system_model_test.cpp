@@ -1,0 +1,325 @@
+// Thousands of random steps of a system beside a model of it: meshes, palettes and instances come
+// and go, move, hide, wait for room and are moved about while frames are under way, and every
+// instance's output stays, bit for bit, what it would be alone.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <random>
+#include <tuple>
+
+#include "system_model.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint32_t framesInFlight = 3;
+constexpr std::uint32_t stepCount = 4000;
+constexpr std::uint32_t poseCount = 12;
+constexpr std::uint32_t meshKinds = 8;
+
+const std::array<std::vector<MorphWeight>, 3> morphSets{
+    std::vector<MorphWeight>{}, {{0, 0.5f}}, {{1, 0.25f}, {2, 1.0f}}};
+const std::array<Method, 3> methods{Method::linear, Method::dualQuaternion, Method::blended};
+
+/// Layouts of several strides, with and without previous positions.
+std::array<VertexLayout, 3> someLayouts() {
+  std::array<VertexLayout, 3> layouts{plainLayout(), motionLayout(), motionLayout()};
+  layouts[2].arrangement = Arrangement::planar;
+  layouts[2].tangents = VertexFormat::octahedral16x2;
+  return layouts;
+}
+
+struct ModelMesh {
+  MeshHandle handle;
+  std::uint32_t kind = 0;
+};
+
+class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<OverflowPolicy> {
+ protected:
+  void SetUp() override {
+    SystemTest::SetUp();
+    if (device_ == nullptr) return;
+    for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
+      kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
+    vulkan::SkinningSystemDescription small = description();
+    small.overflow = GetParam();
+    small.framesInFlight = framesInFlight;
+    small.meshBudget = 512 << 10;
+    small.jointBudget = 8 * 80;
+    small.instanceBudget = 200;
+    small.outputBudget = 120 << 10;  // so small that it is full at times
+    engine_.emplace(device(), small);
+    model_.emplace(*engine_);
+    for (samples::MappedBuffer& words : words_)
+      words = must(
+          samples::MappedBuffer::create(device(), 4096 * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    engine_->begin();
+  }
+  void TearDown() override {
+    engine_.reset();
+    for (samples::MappedBuffer& words : words_) words = {};
+    SystemTest::TearDown();
+  }
+
+  vulkan::SkinningSystem& system() { return engine_->system(); }
+  std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
+  bool chance(std::uint32_t percent) { return below(100) < percent; }
+  ModelInstance& anyInstance() { return model_->instances[below(model_->instances.size())]; }
+  auto anyPalette() { return std::next(model_->palettes.begin(), below(model_->palettes.size())); }
+  auto anyMesh() { return std::next(meshes_.begin(), below(meshes_.size())); }
+
+  // The steps.
+  void addMesh();
+  void removeMesh();
+  void addPalette();
+  void removePalette();
+  void addInstance();
+  void removeInstance();
+  void changeInstance();
+  void setMesh(ModelInstance& instance);
+  void tryStaleHandle();
+  void runFrame();
+  void step();
+
+  void showSome(std::span<std::byte> words);
+  void expectRoomIsMissing(const Error& error, std::uint64_t size);
+  const Streams& expected(const ModelInstance& instance, const ShownPose& shown);
+  void expectOutputs();
+
+  std::mt19937 random_{1};
+  std::vector<PackedMesh> kinds_;
+  std::optional<SystemEngine> engine_;
+  std::optional<SystemModel> model_;
+  std::map<std::uint32_t, ModelMesh> meshes_;
+  std::uint32_t nextNumber_ = 0;
+  std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
+  std::vector<InstanceHandle> gone_;
+  std::array<samples::MappedBuffer, framesInFlight> words_;
+  std::map<std::tuple<ShownPose, Method, VertexFormat>, Streams> expected_;
+  std::uint64_t waitingInstances_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
+};
+
+void SystemModelTest::addMesh() {
+  if (meshes_.size() >= 12) return;
+  const std::uint32_t kind = below(meshKinds);
+  kindOf_[nextNumber_] = kind;
+  meshes_[nextNumber_++] = {engine_->addMesh(kinds_[kind]), kind};
+}
+
+void SystemModelTest::removeMesh() {
+  if (meshes_.size() < 3) return;
+  const auto mesh = anyMesh();
+  const Result<void> removed = system().removeMesh(mesh->second.handle);
+  EXPECT_NE(removed.ok(), model_->isMeshUsed(mesh->first));
+  if (removed) meshes_.erase(mesh);
+}
+
+void SystemModelTest::addPalette() {
+  if (model_->palettes.size() >= 30) return;
+  const std::uint32_t pose = below(poseCount);
+  const Result<PaletteHandle> added = system().addPalette(8);
+  if (!added) return;  // places of palettes that went are not free yet
+  model_->palettes[nextNumber_++] = {*added, pose};
+  engine_->writePose(*added, systemPose(pose));
+}
+
+void SystemModelTest::removePalette() {
+  if (model_->palettes.size() < 3) return;
+  const auto palette = anyPalette();
+  const Result<void> removed = system().removePalette(palette->second.handle);
+  EXPECT_NE(removed.ok(), model_->isPaletteUsed(palette->first));
+  if (removed) model_->palettes.erase(palette);
+}
+
+/// Refused where there is no room, and only there.
+void SystemModelTest::expectRoomIsMissing(const Error& error, std::uint64_t size) {
+  EXPECT_EQ(error.code, ErrorCode::limitExceeded) << error.message;
+  EXPECT_NE(GetParam(), OverflowPolicy::keepLast) << error.message;
+  // The bind pose wants room besides.
+  if (GetParam() == OverflowPolicy::bindPose) return;
+  EXPECT_LT(system().statistics().outputs.largestFree, size + 256) << error.message;
+}
+
+void SystemModelTest::addInstance() {
+  if (meshes_.empty() || model_->palettes.empty()) return;
+  const auto mesh = anyMesh();
+  const auto palette = anyPalette();
+  ModelInstance instance;
+  instance.mesh = mesh->first;
+  instance.palette = palette->first;
+  instance.vertexCount = kinds_[mesh->second.kind].vertexCount();
+  InstanceDescription& description = instance.description;
+  description.mesh = mesh->second.handle;
+  description.palette = palette->second.handle;
+  description.method = methods[below(methods.size())];
+  description.layout = someLayouts()[below(3)];
+  description.culledOnGpu = chance(25);
+  if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
+  must(system().prepare(description));
+  const Result<InstanceHandle> added = system().addInstance(description);
+  if (!added) {
+    expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
+    return;
+  }
+  instance.handle = *added;
+  model_->instances.push_back(instance);
+}
+
+void SystemModelTest::removeInstance() {
+  if (model_->instances.empty()) return;
+  const std::uint32_t index = below(model_->instances.size());
+  gone_.push_back(model_->instances[index].handle);
+  must(system().removeInstance(gone_.back()));
+  model_->remove(index);
+}
+
+void SystemModelTest::setMesh(ModelInstance& instance) {
+  // Twice between two frames would leave open whether its output has been another's.
+  if (instance.changesMesh) return;
+  const auto mesh = anyMesh();
+  if (mesh->first == instance.mesh) return;
+  const std::uint32_t vertexCount = kinds_[mesh->second.kind].vertexCount();
+  if (const Result<void> set = system().setMesh(instance.handle, mesh->second.handle); !set) {
+    expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
+    return;
+  }
+  instance.mesh = mesh->first;
+  instance.description.mesh = mesh->second.handle;
+  instance.vertexCount = vertexCount;
+  instance.isChanged = instance.changesMesh = true;
+}
+
+void SystemModelTest::changeInstance() {
+  if (model_->instances.empty()) return;
+  ModelInstance& instance = anyInstance();
+  switch (below(6)) {
+    case 0:
+    case 1:
+      instance.isVisible = !instance.isVisible || chance(30);
+      return must(system().setVisible(instance.handle, instance.isVisible));
+    case 2:
+      instance.morphs = (instance.morphs + 1 + below(2)) % 3;
+      instance.isChanged = true;
+      return must(system().setMorphWeights(instance.handle, morphSets[instance.morphs]));
+    case 3:
+      if (instance.description.culledOnGpu) return;
+      instance.description.updateInterval = chance(50) ? 1 : 2 + below(4);
+      instance.waitedFrames = 0;
+      return must(system().setUpdateInterval(instance.handle, instance.description.updateInterval));
+    case 4:
+      instance.teleports = true;
+      return must(system().teleport(instance.handle));
+    default:
+      return setMesh(instance);
+  }
+}
+
+void SystemModelTest::tryStaleHandle() {
+  if (gone_.empty()) return;
+  const InstanceHandle stale = gone_[below(gone_.size())];
+  EXPECT_FALSE(system().removeInstance(stale).ok());
+  EXPECT_FALSE(system().setVisible(stale, true).ok());
+  EXPECT_FALSE(system().output(stale).ok());
+}
+
+void SystemModelTest::showSome(std::span<std::byte> words) {
+  for (ModelInstance& instance : model_->instances) {
+    if (!instance.description.culledOnGpu) continue;
+    if (chance(20)) instance.isShownByGpu = !instance.isShownByGpu;
+    const std::uint32_t index = must(system().visibilityIndex(instance.handle));
+    const std::uint32_t word = instance.isShownByGpu ? 1u << below(32) : 0u;
+    std::memcpy(words.data() + index * 4, &word, sizeof(word));
+  }
+}
+
+void SystemModelTest::runFrame() {
+  for (auto& [number, palette] : model_->palettes) {
+    if (!chance(60)) continue;
+    const std::uint32_t pose = below(poseCount);
+    engine_->writePose(palette.handle, systemPose(pose));
+    model_->writePose(number, pose);
+  }
+  if (chance(15)) system().compact(below(40'000));
+  samples::MappedBuffer& words = words_[engine_->frame() % framesInFlight];
+  showSome(words.bytes());
+  engine_->submit({words.handle(), 0});
+  model_->afterRecord();
+  waitingInstances_ += engine_->lastFrame().waitingInstances;
+  movedInstances_ += system().movedInstances().size();
+  if (engine_->frame() % 8 == 0) expectOutputs();
+  engine_->begin(below(framesInFlight));
+  model_->beginFrame();
+}
+
+const Streams& SystemModelTest::expected(const ModelInstance& instance, const ShownPose& shown) {
+  // Meshes are told apart by what is in them, of which there are few.
+  const std::uint32_t kind = kindOf_.at(shown.mesh);
+  const ShownPose content{kind, shown.pose, shown.morphs};
+  const InstanceDescription& description = instance.description;
+  Streams& streams = expected_[{content, description.method, description.layout.tangents}];
+  if (streams[positionStream].empty())
+    streams = alone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
+  return streams;
+}
+
+void SystemModelTest::expectOutputs() {
+  const std::vector<std::byte> bytes = engine_->readOutput();
+  for (const ModelInstance& instance : model_->instances) {
+    if (!instance.shown) continue;
+    SCOPED_TRACE("frame " + std::to_string(engine_->frame()) + ", instance " +
+                 std::to_string(instance.handle.index));
+    const Streams streams = engine_->read(bytes, instance.handle);
+    expectSkinned(streams, expected(instance, *instance.shown));
+    ++checkedInstances_;
+    if (!instance.description.layout.previousPositions || !instance.before) continue;
+    EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
+        << "previous positions";
+  }
+}
+
+void SystemModelTest::step() {
+  const std::uint32_t kind = below(100);
+  const bool isCrowded = model_->instances.size() > 60;
+  if (kind < 4) return addMesh();
+  if (kind < 7) return removeMesh();
+  if (kind < 13) return addPalette();
+  if (kind < 17) return removePalette();
+  if (kind < 38) return isCrowded ? removeInstance() : addInstance();
+  if (kind < 50) return removeInstance();
+  if (kind < 75) return changeInstance();
+  if (kind < 78) return tryStaleHandle();
+  runFrame();
+}
+
+TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
+  for (std::uint32_t number = 0; number < stepCount && !HasFailure(); ++number) {
+    SCOPED_TRACE("step " + std::to_string(number));
+    step();
+  }
+  runFrame();
+  expectOutputs();
+  // Or else nothing was tested.
+  EXPECT_GT(checkedInstances_, 1000u);
+  EXPECT_GT(movedInstances_, 20u);
+  EXPECT_EQ(waitingInstances_ > 20, GetParam() != OverflowPolicy::refuse);
+}
+
+INSTANTIATE_TEST_SUITE_P(Policies, SystemModelTest,
+                         ::testing::Values(OverflowPolicy::refuse, OverflowPolicy::keepLast,
+                                           OverflowPolicy::bindPose),
+                         [](const ::testing::TestParamInfo<OverflowPolicy>& policy) {
+                           switch (policy.param) {
+                             case OverflowPolicy::refuse:
+                               return "refuse";
+                             case OverflowPolicy::keepLast:
+                               return "keepLast";
+                             default:
+                               return "bindPose";
+                           }
+                         });
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,223 @@
+// What a system skins of each instance, by how many commands, and what it tells of it.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "system_test.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint32_t meshCount = 20;
+
+class SystemOutputTest : public SystemTest {};
+
+TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
+  vulkan::SkinningSystemDescription large = description();
+  large.outputBudget = 32 << 20;
+  large.jointBudget = 10'000 * 4;
+  large.instanceBudget = 10'000;
+  SystemEngine engine(device(), large);
+  engine.begin();
+  std::vector<MeshHandle> meshes;
+  for (std::uint32_t mesh = 0; mesh < meshCount; ++mesh)
+    meshes.push_back(engine.addMesh(systemMesh(mesh, 40 + mesh, 4)));
+  const Pose pose = systemPose(1, 4);
+  std::vector<PaletteHandle> palettes;
+  for (std::uint32_t i = 0; i < 10'000; ++i) {
+    InstanceDescription instance;
+    instance.mesh = meshes[i % meshCount];
+    instance.palette = palettes.emplace_back(engine.addPalette(pose));
+    instance.method = i % 3 == 0 ? Method::linear : Method::dualQuaternion;
+    instance.layout = motionLayout();
+    engine.addInstance(instance);
+  }
+  engine.submit();
+  // The second frame has no meshes to bring along, as most frames have not.
+  for (int number = 0; number < 2; ++number) {
+    EXPECT_LE(engine.lastFrame().dispatches, 6u);
+    EXPECT_EQ(engine.lastFrame().skinnedInstances, 10'000u);
+    if (number == 1) {
+      EXPECT_LE(engine.lastFrame().copies, 1u);
+      break;
+    }
+    engine.begin();
+    for (const PaletteHandle palette : palettes) engine.writePose(palette, pose);
+    engine.submit();
+  }
+}
+
+TEST_F(SystemOutputTest, NothingIsRecordedWhereNothingChanged) {
+  SingleInstance one(device(), description(), motionLayout());
+  one.engine.submit();
+  one.engine.runFrame();  // it comes to rest, at the latest
+  one.engine.runFrame();
+  const vulkan::FrameStatistics frame = one.engine.lastFrame();
+  EXPECT_EQ(frame.frame, 3u);
+  EXPECT_EQ(frame.instances, 1u);
+  EXPECT_EQ(frame.dispatches, 0u);
+  EXPECT_EQ(frame.copies, 0u);
+  EXPECT_EQ(frame.workgroups, 0u);
+  EXPECT_EQ(frame.skinnedInstances, 0u);
+  EXPECT_EQ(frame.settledInstances, 0u);
+  EXPECT_EQ(frame.skinnedVertices, 0u);
+  EXPECT_EQ(frame.convertedPalettes, 0u);
+  EXPECT_EQ(frame.uploadedBytes, 0u);
+  EXPECT_EQ(frame.writtenBytes, 0u);
+  EXPECT_TRUE(one.engine->skinnedInstances().empty());
+}
+
+TEST_F(SystemOutputTest, APaletteThatManyMeshesShareIsConvertedOnce) {
+  SystemEngine engine(device(), description());
+  engine.begin();
+  const Pose first = systemPose(1), second = systemPose(2);
+  const PaletteHandle shared = engine.addPalette(first), own = engine.addPalette(second);
+  std::vector<PackedMesh> meshes;
+  std::vector<InstanceHandle> instances;
+  InstanceDescription instance;
+  instance.layout = plainLayout();
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    meshes.push_back(systemMesh(i, 50 + 10 * i));
+    instance.mesh = engine.addMesh(meshes.back());
+    instance.palette = i < 4 ? shared : own;
+    instances.push_back(engine.addInstance(instance));
+  }
+  engine.submit();
+  EXPECT_EQ(engine.lastFrame().convertedPalettes, 2u);
+  for (std::size_t i = 0; i < 5; ++i)
+    expectSkinned(engine.read(instances[i]), alone(meshes[i], i < 4 ? first : second, instance));
+  engine.begin();
+  engine.writePose(shared, second);
+  engine.submit();
+  EXPECT_EQ(engine.lastFrame().convertedPalettes, 1u);
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 4u);
+  EXPECT_EQ(engine.lastFrame().skinnedVertices, 50u + 60 + 70 + 80);
+  for (std::size_t i = 0; i < 5; ++i)
+    expectSkinned(engine.read(instances[i]), alone(meshes[i], second, instance));
+}
+
+TEST_F(SystemOutputTest, AnUnwrittenPoseIsTheIdentity) {
+  SystemEngine engine(device(), description());
+  const PackedMesh packed = systemMesh(1, 100);
+  InstanceDescription instance;
+  instance.layout = plainLayout();
+  instance.mesh = engine.addMesh(packed);
+  instance.palette = must(engine->addPalette(8));
+  const InstanceHandle handle = engine.addInstance(instance);  // all of it before any frame
+  engine.runFrame();
+  expectSkinned(engine.read(handle), alone(packed, Pose(8), instance));
+}
+
+// A palette's place is given to another: nothing of the old pose must show.
+TEST_F(SystemOutputTest, ThePoseOfANewPaletteIsTheIdentityAgain) {
+  vulkan::SkinningSystemDescription small = description();
+  small.jointBudget = 8;
+  SingleInstance one(device(), small, plainLayout());
+  one.engine.submit();
+  must(one.engine->removeInstance(one.instance));
+  must(one.engine->removePalette(one.description.palette));
+  one.engine.runFrame();
+  one.engine.runFrame();
+  one.engine.begin();
+  one.description.palette = must(one.engine->addPalette(8));
+  one.instance = one.engine.addInstance(one.description);
+  one.engine.submit();
+  expectSkinned(one.engine.read(one.instance), alone(one.packed, Pose(8), one.description));
+}
+
+TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
+  SystemEngine engine(device(), description());
+  engine.begin();
+  const PackedMesh packed = systemMesh(1, 100);
+  const Pose pose = randomPose(1, 8, Rigidity::shear);
+  InstanceDescription instance;
+  instance.layout = plainLayout();
+  instance.mesh = engine.addMesh(packed);
+  for (const bool mayScale : {true, false}) {
+    instance.palette = engine.addPalette(pose, mayScale);
+    const InstanceHandle handle = engine.addInstance(instance);
+    if (mayScale) engine.submit();
+    if (!mayScale) engine.submit();
+    expectSkinned(engine.read(handle), alone(packed, pose, instance, {}, mayScale));
+    engine.begin();
+  }
+  engine.submit();
+}
+
+TEST_F(SystemOutputTest, MorphWeightsAreThoseThatWereSetLast) {
+  SingleInstance one(device(), description(), plainLayout());
+  const std::vector<MorphWeight> smile{{0, 0.5f}, {2, 0.25f}}, frown{{1, 1.0f}};
+  must(one.engine->setMorphWeights(one.instance, frown));
+  must(one.engine->setMorphWeights(one.instance, smile));
+  one.engine.submit();
+  const Pose pose = systemPose(1);
+  expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description, smile));
+  one.engine.begin();
+  must(one.engine->setMorphWeights(one.instance, frown));
+  one.engine.submit();
+  EXPECT_EQ(one.engine.lastFrame().skinnedInstances, 1u);
+  expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description, frown));
+  one.engine.begin();
+  must(one.engine->setMorphWeights(one.instance, {}));
+  one.engine.submit();
+  expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description));
+}
+
+TEST_F(SystemOutputTest, BoundsAreThoseOfTheNewestCompleteFrame) {
+  SingleInstance one(device(), description(), plainLayout());
+  InstanceDescription bounded = one.description;
+  bounded.bounds = true;
+  const InstanceHandle instance = one.engine.addInstance(bounded);
+  const auto boxOf = [&](const Pose& pose) {
+    const Streams streams = alone(one.packed, pose, bounded);
+    std::vector<float> values(streams[positionStream].size() / 4);
+    std::memcpy(values.data(), streams[positionStream].data(), streams[positionStream].size());
+    Box box{{values[0], values[1], values[2]}, {values[0], values[1], values[2]}};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      box.min[i % 3] = std::min(box.min[i % 3], values[i]);
+      box.max[i % 3] = std::max(box.max[i % 3], values[i]);
+    }
+    return box;
+  };
+  const auto expectBox = [&](const Box& expected) {
+    const std::optional<Box> box = must(one.engine->bounds(instance));
+    ASSERT_TRUE(box.has_value());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(box->min[axis], expected.min[axis]);
+      EXPECT_EQ(box->max[axis], expected.max[axis]);
+    }
+  };
+  EXPECT_FALSE(must(one.engine->bounds(instance)).has_value()) << "no frame is complete";
+  one.engine.submit();
+  one.engine.begin();
+  ASSERT_NO_FATAL_FAILURE(expectBox(boxOf(systemPose(1))));
+  EXPECT_FALSE(must(one.engine->bounds(one.instance)).has_value()) << "it did not ask for one";
+  one.engine.writePose(bounded.palette, systemPose(2));
+  one.engine.submit();
+  one.engine.begin();
+  ASSERT_NO_FATAL_FAILURE(expectBox(boxOf(systemPose(2))));
+  one.engine.submit();
+  // What was not skinned since keeps its box.
+  for (int i = 0; i < 4; ++i) one.engine.runFrame();
+  ASSERT_NO_FATAL_FAILURE(expectBox(boxOf(systemPose(2))));
+}
+
+// The frame with the box and an idle one become complete together.
+TEST_F(SystemOutputTest, BoxesAreNotLostWhereTheNextFrameDoesNothing) {
+  SingleInstance one(device(), description(), plainLayout());
+  InstanceDescription bounded = one.description;
+  bounded.bounds = true;
+  const InstanceHandle instance = one.engine.addInstance(bounded);
+  one.engine.submit();
+  one.engine.begin(1);
+  one.engine.submit();
+  one.engine.begin();
+  EXPECT_EQ(one.engine.completedFrame(), 2u);
+  EXPECT_TRUE(must(one.engine->bounds(instance)).has_value());
+  one.engine.submit();
+}
+
+}  // namespace
+}  // namespace dermis::test

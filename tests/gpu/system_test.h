@@ -1,0 +1,70 @@
+// What the tests of SkinningSystem share: meshes, poses, and each instance skinned alone by
+// makePlan and `Context::record`, which is what the system must give, bit for bit.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/pack.h"
+#include "dermis/vulkan/skinning_system.h"
+#include "random_rig.h"
+#include "system_engine.h"
+#include "test_device.h"
+
+namespace dermis::test {
+
+inline constexpr auto positionStream = static_cast<std::size_t>(Stream::positions);
+inline constexpr auto normalStream = static_cast<std::size_t>(Stream::normals);
+inline constexpr auto previousStream = static_cast<std::size_t>(Stream::previousPositions);
+
+using Pose = std::vector<JointMatrix>;
+
+/// A random mesh with everything that methods and layouts may want, for poses of so many joints.
+PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount = 8,
+                      std::uint32_t influences = 4);
+
+inline Pose systemPose(std::uint32_t seed, std::uint32_t jointCount = 8) {
+  return randomPose(seed, jointCount, seed % 5 == 4 ? Rigidity::shear : Rigidity::rigid);
+}
+
+/// Positions and normals in float32.
+VertexLayout plainLayout();
+/// The same with previous positions.
+VertexLayout motionLayout();
+
+/// Of instances that the last `record` skinned or settled, in an order that can be compared.
+std::set<std::uint32_t> indicesOf(std::span<const InstanceHandle> instances);
+
+class SystemTest : public DeviceTest {
+ protected:
+  /// Small, and with an output that the engine may copy from and fill.
+  vulkan::SkinningSystemDescription description();
+
+  /// What tier 1 makes of it as the only job. Previous positions are the current ones.
+  Streams alone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
+                const InstanceDescription& description, std::span<const MorphWeight> morphs = {},
+                bool mayScale = true);
+
+  /// Expects the positions, normals and tangents of an instance to be those of the job alone.
+  static void expectSkinned(const Streams& skinned, const Streams& expected);
+};
+
+/// One mesh, one palette and one instance, in an engine.
+struct SingleInstance {
+  SingleInstance(samples::Device& device, const vulkan::SkinningSystemDescription& system,
+                 const VertexLayout& layout, std::uint32_t vertexCount = 100);
+
+  PackedMesh packed;
+  SystemEngine engine;
+  InstanceDescription description;
+  InstanceHandle instance;
+};
+
+}  // namespace dermis::test

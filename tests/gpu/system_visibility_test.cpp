@@ -1,0 +1,207 @@
+// What is skipped is not skinned: instances that rest, are hidden by the engine, or culled on the
+// GPU.
+
+#include "system_visibility.h"
+
+namespace dermis::test {
+namespace {
+
+TEST_F(SystemVisibilityTest, OnlyWhatMovesIsDispatched) {
+  open(false, plainLayout());
+  engine_->submit();
+  const vulkan::FrameStatistics all = engine_->lastFrame();
+  EXPECT_EQ(all.skinnedVertices, instanceCount * vertexCount);
+  EXPECT_EQ(all.writtenBytes, instanceCount * vertexCount * 24u);
+  engine_->begin();
+  for (std::uint32_t i = 0; i < 6; ++i) engine_->writePose(palettes_[i * 10], systemPose(i));
+  engine_->submit();
+  const vulkan::FrameStatistics few = engine_->lastFrame();
+  EXPECT_EQ(few.skinnedInstances, 6u);
+  EXPECT_EQ(few.skinnedVertices, 6u * vertexCount);
+  EXPECT_EQ(few.writtenBytes, 6u * vertexCount * 24u);
+  EXPECT_EQ(few.convertedPalettes, 6u);
+  // Several instances share an invocation, so that the last group may hold fewer than it could.
+  EXPECT_LE(few.workgroups * 5, all.workgroups);
+}
+
+TEST_F(SystemVisibilityTest, HiddenInstancesAreNotDispatched) {
+  open(false, plainLayout());
+  engine_->submit();
+  const std::uint64_t allWorkgroups = engine_->lastFrame().workgroups;
+  engine_->finish();
+  engine_->fillOutput(poison);
+  engine_->begin();
+  moveAll(100);
+  for (std::uint32_t i = 0; i < instanceCount; ++i)
+    must((*engine_)->setVisible(instances_[i], i % 6 == 0));
+  engine_->submit();
+  const vulkan::FrameStatistics few = engine_->lastFrame();
+  EXPECT_EQ(few.skinnedInstances, 10u);
+  EXPECT_EQ(few.skinnedVertices, 10u * vertexCount);
+  EXPECT_LE(few.workgroups * 4, allWorkgroups);
+  EXPECT_EQ(few.convertedPalettes, 10u) << "nobody looks at the others";
+  const std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) {
+    if (i % 6 == 0) {
+      EXPECT_TRUE(engine_->read(bytes, instances_[i])[positionStream] == positionsIn(i + 100));
+    } else {
+      expectPoisoned(bytes, i);
+    }
+  }
+}
+
+TEST_F(SystemVisibilityTest, TheEngineMayCullOnTheGpu) {
+  open(true, motionLayout());
+  submit();
+  EXPECT_EQ(engine_->lastFrame().culledCandidates, instanceCount);
+  EXPECT_EQ(engine_->lastFrame().skinnedInstances, 0u) << "the CPU does not know";
+  std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, 0, 0);
+  vulkan::GpuStatistics gpu = completed();
+  EXPECT_EQ(gpu.visibleInstances, instanceCount);
+  EXPECT_EQ(gpu.skinnedInstances, instanceCount);
+  EXPECT_GT(gpu.workgroups, 0u);
+  const std::uint32_t allWorkgroups = gpu.workgroups;
+
+  show(0, 10);
+  moveAll(100);
+  submit();
+  bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, i < 10 ? 100 : 0, 0);
+  gpu = completed();
+  EXPECT_EQ(gpu.visibleInstances, 10u);
+  EXPECT_EQ(gpu.skinnedInstances, 10u);
+  EXPECT_LE(gpu.workgroups * 4, allWorkgroups);
+  submit();
+}
+
+TEST_F(SystemVisibilityTest, WhatIsCulledKeepsItsBytes) {
+  open(true, motionLayout());
+  submit();
+  engine_->finish();
+  engine_->fillOutput(poison);
+  show(20, 5);
+  moveAllInFrame(100);
+  const std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) {
+    if (i < 20 || i >= 25) {
+      expectPoisoned(bytes, i);
+    } else {
+      EXPECT_TRUE(engine_->read(bytes, instances_[i])[positionStream] == positionsIn(i + 100));
+    }
+  }
+}
+
+TEST_F(SystemVisibilityTest, WhatTheGpuShowsAgainDoesNotMove) {
+  open(true, motionLayout());
+  submit();
+  moveAllInFrame(100);
+  show(0, 10);
+  moveAllInFrame(200);
+  engine_->begin();
+  submit();  // the ten settle, in poses that the others have not been skinned in yet
+  show(0, 30);
+  engine_->begin();
+  submit();
+  std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < 30; ++i) expectMotion(bytes, i, 200, 200);
+  for (std::uint32_t i = 30; i < instanceCount; ++i) expectMotion(bytes, i, 100, 0);
+  show(0, instanceCount);
+  moveAllInFrame(300);
+  bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < 30; ++i) expectMotion(bytes, i, 300, 200);
+  for (std::uint32_t i = 30; i < instanceCount; ++i) expectMotion(bytes, i, 300, 300);
+}
+
+TEST_F(SystemVisibilityTest, WhatRestsInViewOfTheGpuSettlesAndIsNotSkinnedAgain) {
+  open(true, motionLayout());
+  submit();
+  moveAllInFrame(100);
+  engine_->begin();
+  submit();
+  vulkan::GpuStatistics gpu = completed();
+  EXPECT_EQ(gpu.skinnedInstances, 0u);
+  EXPECT_EQ(gpu.settledInstances, instanceCount);
+  std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, 100, 100);
+  submit();
+  gpu = completed();
+  EXPECT_EQ(gpu.skinnedInstances, 0u);
+  EXPECT_EQ(gpu.settledInstances, 0u);
+  EXPECT_EQ(gpu.workgroups, 0u);
+  engine_->fillOutput(poison);
+  submit();
+  engine_->begin();
+  submit();
+  bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) expectPoisoned(bytes, i);
+}
+
+TEST_F(SystemVisibilityTest, SomeAreCulledOnTheGpuAndSomeAreNot) {
+  open(true, motionLayout());
+  InstanceDescription other = instance_;
+  other.culledOnGpu = false;
+  const InstanceHandle free = engine_->addInstance(other);
+  show(0, 1);
+  submit();
+  EXPECT_EQ(engine_->lastFrame().skinnedInstances, 1u);
+  EXPECT_EQ(indicesOf((*engine_)->skinnedInstances()), std::set<std::uint32_t>{free.index});
+  EXPECT_TRUE(engine_->read(free)[positionStream] == positionsIn(instanceCount - 1));
+  EXPECT_EQ(completed().visibleInstances, 1u);
+  // The engine hides one that the GPU would show.
+  show(0, 2);
+  must((*engine_)->setVisible(instances_[1], false));
+  moveAll(100);
+  submit();
+  EXPECT_EQ(completed().skinnedInstances, 1u);
+  submit();
+}
+
+TEST_F(SystemVisibilityTest, ATeleportReachesWhatIsCulledOnTheGpu) {
+  open(true, motionLayout());
+  submit();
+  engine_->begin();
+  moveAll(100);
+  must((*engine_)->teleport(instances_[3]));
+  submit();
+  const std::vector<std::byte> bytes = engine_->readOutput();
+  expectMotion(bytes, 3, 100, 100);
+  expectMotion(bytes, 4, 100, 0);
+}
+
+TEST_F(SystemVisibilityTest, CullingOnTheGpuNeedsTheWords) {
+  open(true, motionLayout());
+  const Result<void> recorded = engine_->trySubmit({});
+  ASSERT_FALSE(recorded.ok());
+  EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
+  engine_->begin();
+  submit();
+  EXPECT_EQ(completed().skinnedInstances, instanceCount);
+  submit();
+}
+
+// An instance that comes in the place of one that went must be skinned, whatever the GPU remembers
+// of the old one.
+TEST_F(SystemVisibilityTest, ANewInstanceIsNotTakenForTheOneBefore) {
+  open(true, motionLayout());
+  submit();
+  for (std::uint32_t round = 1; round < 4; ++round) {
+    engine_->begin();
+    for (std::uint32_t i = 0; i < 10; ++i) {
+      must((*engine_)->removeInstance(instances_[i]));
+      instance_.palette = palettes_[i + 20];
+      instances_[i] = engine_->addInstance(instance_);
+    }
+    show(0, instanceCount);
+    submit();
+    const std::vector<std::byte> bytes = engine_->readOutput();
+    for (std::uint32_t i = 0; i < 10; ++i) {
+      const Streams streams = engine_->read(bytes, instances_[i]);
+      EXPECT_TRUE(streams[positionStream] == positionsIn(i + 20)) << i;
+      EXPECT_TRUE(streams[previousStream] == positionsIn(i + 20)) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,229 @@
+// Reading through uniform texel buffers, on a driver that is only pretended: which variants do so,
+// and what is bound for them.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/vulkan/vulkan.h"
+#include "mock_batch.h"
+#include "mock_vulkan.h"
+
+namespace dermis::test {
+namespace {
+
+struct TexelTest : public ::testing::Test {
+  TexelTest() {
+    mock.limits.maxTexelBufferElements = 1 << 27;
+    mock.limits.minTexelBufferOffsetAlignment = 16;
+  }
+  void create(bool push = false, bool texelBuffers = true) {
+    mock.extensions.clear();
+    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
+    vulkan::DeviceDescription description = mock.description();
+    description.texelBuffers = texelBuffers;
+    Result<vulkan::Context> made = vulkan::Context::create(description);
+    ASSERT_TRUE(made.ok());
+    context.emplace(std::move(*made));
+  }
+  Result<void> record(const MockBatch& batch, const vulkan::BatchBuffers& buffers) {
+    mock.dispatches.clear();
+    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
+    const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
+    if (!bindings) return bindings.error();
+    return context->record(commandBuffer, batch.plan, *bindings);
+  }
+
+  MockVulkan mock;
+  std::optional<vulkan::Context> context;
+};
+
+TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
+  for (const bool push : {false, true}) {
+    ASSERT_NO_FATAL_FAILURE(create(push));
+    mock.texelDescriptorsInPool = 0;
+    const MockBatch batch = MockBatch::withAllMethods(context->limits());
+    vulkan::BatchBuffers buffers = batch.buffers();
+    buffers.meshes.offset = 512;
+    ASSERT_TRUE(record(batch, buffers).ok());
+    ASSERT_EQ(mock.dispatches.size(), 1 + allMethods.size());
+    for (std::size_t index = 1; index < mock.dispatches.size(); ++index) {
+      const Variant& variant = batch.plan.dispatches()[index].variant;
+      EXPECT_TRUE(variant.texels);
+      const MockDescriptors& bound = mock.dispatches[index].descriptors;
+      const vulkan::BufferRange& palettes =
+          variant.method == Method::linear ? buffers.matrices : buffers.palettes;
+      const auto expectBound = [&](std::uint32_t binding, const vulkan::BufferRange& range,
+                                   VkDeviceSize texel) {
+        ASSERT_TRUE(bound.contains(binding)) << binding;
+        EXPECT_EQ(bound.at(binding).buffer, range.buffer);
+        EXPECT_EQ(bound.at(binding).offset, range.offset);
+        EXPECT_EQ(bound.at(binding).range, range.size / texel * texel);
+      };
+      expectBound(abi::BINDING_TABLE_TEXELS, buffers.tables, 16);
+      expectBound(abi::BINDING_MESH_TEXELS, buffers.meshes, 4);
+      expectBound(abi::BINDING_PALETTE_TEXELS, palettes, 16);
+    }
+    EXPECT_EQ(mock.alive["BufferView"], 0) << "views go with their bindings";
+    EXPECT_EQ(mock.texelDescriptorsInPool, push ? 0u : mock.setsInPool * abi::TEXEL_BINDING_COUNT);
+  }
+}
+
+TEST_F(TexelTest, LayoutsHaveTexelBuffersWhereTheDeviceReadsThem) {
+  for (const bool texelBuffers : {false, true}) {
+    mock.setLayouts.clear();
+    ASSERT_NO_FATAL_FAILURE(create(false, texelBuffers));
+    ASSERT_EQ(mock.setLayouts.size(), 1u);
+    const std::vector<VkDescriptorSetLayoutBinding>& bindings = mock.setLayouts[0].bindings;
+    ASSERT_EQ(bindings.size(), abi::BINDING_COUNT + (texelBuffers ? abi::TEXEL_BINDING_COUNT : 0));
+    for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {
+      EXPECT_EQ(bindings[binding].binding, binding);
+      EXPECT_EQ(bindings[binding].descriptorType, binding < abi::BINDING_COUNT
+                                                      ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
+                                                      : VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER);
+    }
+  }
+}
+
+TEST_F(TexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
+  ASSERT_NO_FATAL_FAILURE(create(false, false));
+  EXPECT_EQ(context->limits().maxTexelBufferElements, 0u);
+  const MockBatch batch = MockBatch::withAllMethods(context->limits());
+  EXPECT_EQ(batch.plan.buffer(BufferRole::meshes).usage & 0x04u, 0u);
+  for (const Variant& variant : batch.plan.variants()) EXPECT_FALSE(variant.texels);
+  ASSERT_TRUE(record(batch, batch.buffers()).ok());
+  EXPECT_TRUE(mock.views.empty());
+}
+
+// What Vulkan guarantees: 65,536 texels, 256 KiB of meshes.
+TEST_F(TexelTest, WhatDoesNotFitIsReadAsStorageBuffers) {
+  mock.limits.maxTexelBufferElements = 65536;
+  ASSERT_NO_FATAL_FAILURE(create());
+  MockBatch batch = MockBatch::withAllMethods(context->limits());
+  EXPECT_TRUE(batch.plan.variants()[1].texels);
+  batch.batch.meshesSize = (65536 + 1) * 4;
+  batch.makePlan(context->limits());
+  for (const Variant& variant : batch.plan.variants()) EXPECT_FALSE(variant.texels);
+  EXPECT_NE(batch.plan.buffer(BufferRole::meshes).usage & 0x04u, 0u) << "another plan may fit";
+  ASSERT_TRUE(record(batch, batch.buffers()).ok());
+  for (const auto& [view, info] : mock.views) EXPECT_LE(info.range, 65536u * 16);
+}
+
+TEST_F(TexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
+  DeviceLimits limits = richLimits();
+  limits.maxTexelBufferElements = 1 << 27;
+  MockBatch batch;
+  Job job = batch.batch.jobOf(0, 0, Method::dualQuaternion);
+  job.positions.format = VertexFormat::float16x3;
+  batch.batch.place(job, Arrangement::separate);
+  batch.makePlan(limits);
+  ASSERT_EQ(batch.plan.variants().size(), 2u);
+  EXPECT_EQ(batch.plan.variants()[1].units[0], 2);
+  EXPECT_FALSE(batch.plan.variants()[1].texels);
+}
+
+// Positions and normals that stand together are stored together.
+TEST_F(TexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
+  DeviceLimits limits = richLimits();
+  limits.maxTexelBufferElements = 1 << 27;
+  limits.shaderInt64 = true;
+  const auto pairs = [&](auto change) {
+    MockBatch mockBatch;
+    mockBatch.batch.addJob(0, 0, Method::dualQuaternion, true);
+    Job job = mockBatch.batch.jobs[0];
+    Batch batch = mockBatch.batch.batch();
+    batch.outputs = OutputSizes::oneBuffer(1 << 20);
+    job.positions = {64, 32, VertexFormat::float32x3};
+    job.normals = {76, 32, VertexFormat::float32x3};
+    DeviceLimits changed = limits;
+    change(job, batch, changed);
+    batch.jobs = {&job, 1};
+    Plan plan;
+    EXPECT_TRUE(dermis::makePlan(batch, changed, {}, plan).ok());
+    const std::vector<Variant> foreseen = everyVariant(job, changed, {});
+    for (const Variant& variant : plan.variants())
+      EXPECT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
+    return plan.variants().back().pairs;
+  };
+  EXPECT_TRUE(pairs([](Job&, Batch&, DeviceLimits&) {}));
+  EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.method = Method::logMatrix; }));
+  EXPECT_FALSE(pairs([](Job&, Batch&, DeviceLimits& device) { device.shaderInt64 = false; }));
+  EXPECT_FALSE(
+      pairs([](Job&, Batch&, DeviceLimits& device) { device.maxTexelBufferElements = 0; }));
+  EXPECT_FALSE(pairs([](Job&, Batch& batch, DeviceLimits&) { batch.outputs.isOneBuffer = false; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.bounds = true; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.offset += 4; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.stride += 8; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals = {}; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) {
+    job.positions.offset += 4;
+    job.normals.offset += 4;
+  }));
+  EXPECT_FALSE(pairs(
+      [](Job& job, Batch&, DeviceLimits&) { job.positions.stride = job.normals.stride = 36; }));
+}
+
+TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
+  VkPhysicalDeviceFeatures2 features{};
+  features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  features.features.shaderInt64 = VK_TRUE;
+  vulkan::DeviceDescription description = mock.description();
+  description.enabledFeatures = &features;
+  Result<vulkan::Context> made = vulkan::Context::create(description);
+  ASSERT_TRUE(made.ok());
+  context.emplace(std::move(*made));
+  ASSERT_TRUE(context->limits().shaderInt64);
+  MockBatch batch;
+  batch.batch.addJob(0, 0, Method::dualQuaternion, true);
+  Job job = batch.batch.jobs[0];
+  job.positions = {0, 24, VertexFormat::float32x3};
+  job.normals = {12, 24, VertexFormat::float32x3};
+  Batch described = batch.batch.batch();
+  described.jobs = {&job, 1};
+  described.outputs = OutputSizes::oneBuffer(100 * 24);
+  ASSERT_TRUE(makePlan(described, context->limits(), {}, batch.plan).ok());
+  ASSERT_TRUE(batch.plan.variants().back().pairs);
+  vulkan::BatchBuffers buffers = batch.buffers();
+  EXPECT_TRUE(record(batch, buffers).ok());
+  buffers.outputs.normals.buffer = bufferOf(BufferRole::normals);
+  const Result<void> recorded = record(batch, buffers);
+  ASSERT_FALSE(recorded.ok());
+  EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
+  EXPECT_NE(recorded.error().message.find("one buffer"), std::string::npos);
+}
+
+TEST_F(TexelTest, AlignmentIsTheGreaterOfBoth) {
+  mock.limits.minTexelBufferOffsetAlignment = 1024;
+  ASSERT_NO_FATAL_FAILURE(create());
+  EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 1024u);
+  ASSERT_NO_FATAL_FAILURE(create(false, false));
+  EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 256u);
+}
+
+TEST_F(TexelTest, AFailedViewIsAnErrorAndLeaksNothing) {
+  const VkAllocationCallbacks callbacks{};
+  mock.allocator = &callbacks;
+  for (const bool push : {false, true}) {
+    for (int failAfter = 0; failAfter <= 4; ++failAfter) {
+      ASSERT_NO_FATAL_FAILURE(create(push));
+      const MockBatch batch = MockBatch::withAllMethods(context->limits());
+      mock.failing = "vkCreateBufferView";
+      mock.failAfter = failAfter;
+      const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
+      mock.failing.clear();
+      ASSERT_EQ(bindings.ok(), failAfter == 4);
+      if (bindings) continue;
+      EXPECT_EQ(bindings.error().code, ErrorCode::vulkanError);
+      EXPECT_NE(bindings.error().message.find("vkCreateBufferView"), std::string::npos);
+      EXPECT_EQ(mock.alive["BufferView"], 0);
+    }
+  }
+  EXPECT_FALSE(mock.wrongAllocator);
+}
+
+}  // namespace
+}  // namespace dermis::test

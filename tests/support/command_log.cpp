@@ -1,0 +1,148 @@
+#include "command_log.h"
+
+namespace dermis::test {
+namespace {
+
+CommandLog* commandLog = nullptr;
+
+/// The driver's own functions.
+struct RealFunctions {
+  PFN_vkCmdDispatch CmdDispatch;
+  PFN_vkCmdDispatchIndirect CmdDispatchIndirect;
+  PFN_vkCmdCopyBuffer CmdCopyBuffer;
+  PFN_vkCmdFillBuffer CmdFillBuffer;
+  PFN_vkCmdUpdateBuffer CmdUpdateBuffer;
+  PFN_vkCmdPipelineBarrier CmdPipelineBarrier;
+  PFN_vkCreateBuffer CreateBuffer;
+  PFN_vkDestroyBuffer DestroyBuffer;
+  PFN_vkAllocateMemory AllocateMemory;
+  PFN_vkFreeMemory FreeMemory;
+  PFN_vkBindBufferMemory BindBufferMemory;
+  PFN_vkMapMemory MapMemory;
+  PFN_vkCreateQueryPool CreateQueryPool;
+} real;
+
+/// Counts the call; whether it fails, and with what.
+bool fails(const char* name, VkResult& result) {
+  ++commandLog->calls[name];
+  const auto failure = commandLog->failures.find(name);
+  if (failure == commandLog->failures.end()) return false;
+  result = failure->second;
+  return true;
+}
+
+void VKAPI_CALL cmdDispatch(VkCommandBuffer commandBuffer, std::uint32_t x, std::uint32_t y,
+                            std::uint32_t z) {
+  ++commandLog->calls["vkCmdDispatch"];
+  real.CmdDispatch(commandBuffer, x, y, z);
+}
+void VKAPI_CALL cmdDispatchIndirect(VkCommandBuffer commandBuffer, VkBuffer buffer,
+                                    VkDeviceSize offset) {
+  ++commandLog->calls["vkCmdDispatchIndirect"];
+  real.CmdDispatchIndirect(commandBuffer, buffer, offset);
+}
+void VKAPI_CALL cmdCopyBuffer(VkCommandBuffer commandBuffer, VkBuffer source, VkBuffer destination,
+                              std::uint32_t count, const VkBufferCopy* regions) {
+  ++commandLog->calls["vkCmdCopyBuffer"];
+  real.CmdCopyBuffer(commandBuffer, source, destination, count, regions);
+}
+void VKAPI_CALL cmdFillBuffer(VkCommandBuffer commandBuffer, VkBuffer buffer, VkDeviceSize offset,
+                              VkDeviceSize size, std::uint32_t value) {
+  ++commandLog->calls["vkCmdFillBuffer"];
+  real.CmdFillBuffer(commandBuffer, buffer, offset, size, value);
+}
+void VKAPI_CALL cmdUpdateBuffer(VkCommandBuffer commandBuffer, VkBuffer buffer, VkDeviceSize offset,
+                                VkDeviceSize size, const void* data) {
+  ++commandLog->calls["vkCmdUpdateBuffer"];
+  real.CmdUpdateBuffer(commandBuffer, buffer, offset, size, data);
+}
+void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer commandBuffer, VkPipelineStageFlags source,
+                                   VkPipelineStageFlags destination, VkDependencyFlags flags,
+                                   std::uint32_t memoryCount, const VkMemoryBarrier* memory,
+                                   std::uint32_t bufferCount, const VkBufferMemoryBarrier* buffers,
+                                   std::uint32_t imageCount, const VkImageMemoryBarrier* images) {
+  const std::uint32_t number = commandLog->calls["vkCmdPipelineBarrier"]++;
+  if (commandLog->forgetsBarrier && commandLog->forgetsBarrier(number)) return;
+  real.CmdPipelineBarrier(commandBuffer, source, destination, flags, memoryCount, memory,
+                          bufferCount, buffers, imageCount, images);
+}
+
+VkResult VKAPI_CALL createBuffer(VkDevice device, const VkBufferCreateInfo* info,
+                                 const VkAllocationCallbacks* allocator, VkBuffer* buffer) {
+  VkResult result = VK_SUCCESS;
+  if (fails("vkCreateBuffer", result)) return result;
+  result = real.CreateBuffer(device, info, allocator, buffer);
+  if (result == VK_SUCCESS) ++commandLog->buffersAlive;
+  return result;
+}
+void VKAPI_CALL destroyBuffer(VkDevice device, VkBuffer buffer,
+                              const VkAllocationCallbacks* allocator) {
+  if (buffer != VK_NULL_HANDLE) --commandLog->buffersAlive;
+  real.DestroyBuffer(device, buffer, allocator);
+}
+VkResult VKAPI_CALL allocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
+                                   const VkAllocationCallbacks* allocator, VkDeviceMemory* memory) {
+  VkResult result = VK_SUCCESS;
+  if (fails("vkAllocateMemory", result)) return result;
+  result = real.AllocateMemory(device, info, allocator, memory);
+  if (result != VK_SUCCESS) return result;
+  ++commandLog->allocationsAlive;
+  commandLog->allocatedBytes += info->allocationSize;
+  return result;
+}
+void VKAPI_CALL freeMemory(VkDevice device, VkDeviceMemory memory,
+                           const VkAllocationCallbacks* allocator) {
+  if (memory != VK_NULL_HANDLE) --commandLog->allocationsAlive;
+  real.FreeMemory(device, memory, allocator);
+}
+VkResult VKAPI_CALL bindBufferMemory(VkDevice device, VkBuffer buffer, VkDeviceMemory memory,
+                                     VkDeviceSize offset) {
+  VkResult result = VK_SUCCESS;
+  if (fails("vkBindBufferMemory", result)) return result;
+  return real.BindBufferMemory(device, buffer, memory, offset);
+}
+VkResult VKAPI_CALL mapMemory(VkDevice device, VkDeviceMemory memory, VkDeviceSize offset,
+                              VkDeviceSize size, VkMemoryMapFlags flags, void** data) {
+  VkResult result = VK_SUCCESS;
+  if (fails("vkMapMemory", result)) return result;
+  return real.MapMemory(device, memory, offset, size, flags, data);
+}
+VkResult VKAPI_CALL createQueryPool(VkDevice device, const VkQueryPoolCreateInfo* info,
+                                    const VkAllocationCallbacks* allocator, VkQueryPool* pool) {
+  VkResult result = VK_SUCCESS;
+  if (fails("vkCreateQueryPool", result)) return result;
+  return real.CreateQueryPool(device, info, allocator, pool);
+}
+
+}  // namespace
+
+CommandLog::CommandLog(InterceptedDevice& device) {
+  commandLog = this;
+  const vulkan::DeviceDescription description = device.description();
+  const auto getDeviceProcAddr = reinterpret_cast<PFN_vkGetDeviceProcAddr>(
+      description.getInstanceProcAddr(description.instance, "vkGetDeviceProcAddr"));
+  const auto intercept = [&]<typename Function>(const char* name, Function& realFunction,
+                                                Function replacement) {
+    realFunction = reinterpret_cast<Function>(getDeviceProcAddr(description.device, name));
+    device.replace(name, replacement);
+  };
+  intercept("vkCmdDispatch", real.CmdDispatch, cmdDispatch);
+  intercept("vkCmdDispatchIndirect", real.CmdDispatchIndirect, cmdDispatchIndirect);
+  intercept("vkCmdCopyBuffer", real.CmdCopyBuffer, cmdCopyBuffer);
+  intercept("vkCmdFillBuffer", real.CmdFillBuffer, cmdFillBuffer);
+  intercept("vkCmdUpdateBuffer", real.CmdUpdateBuffer, cmdUpdateBuffer);
+  intercept("vkCmdPipelineBarrier", real.CmdPipelineBarrier, cmdPipelineBarrier);
+  intercept("vkCreateBuffer", real.CreateBuffer, createBuffer);
+  intercept("vkDestroyBuffer", real.DestroyBuffer, destroyBuffer);
+  intercept("vkAllocateMemory", real.AllocateMemory, allocateMemory);
+  intercept("vkFreeMemory", real.FreeMemory, freeMemory);
+  intercept("vkBindBufferMemory", real.BindBufferMemory, bindBufferMemory);
+  intercept("vkMapMemory", real.MapMemory, mapMemory);
+  intercept("vkCreateQueryPool", real.CreateQueryPool, createQueryPool);
+}
+
+CommandLog::~CommandLog() {
+  commandLog = nullptr;
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,188 @@
+#include "system_engine.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "dermis/vertex_format.h"
+
+namespace dermis::test {
+
+using vulkan::Consumer;
+using vulkan::Dependency;
+using vulkan::PreviousUse;
+
+std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output) {
+  return {output.positions, output.normals, output.tangents, output.previousPositions};
+}
+
+std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
+                                     const OutputAttribute& attribute, std::uint32_t vertexCount) {
+  const std::size_t size = formatSize(attribute.format);
+  std::vector<std::byte> copy(size * vertexCount);
+  for (std::size_t vertex = 0; size != 0 && vertex < vertexCount; ++vertex) {
+    const std::size_t place = attribute.offset + vertex * attribute.stride;
+    if (place + size > bytes.size()) throw std::runtime_error("an attribute leaves the output");
+    std::memcpy(copy.data() + vertex * size, bytes.data() + place, size);
+  }
+  return copy;
+}
+
+SystemEngine::SystemEngine(samples::Device& device,
+                           const vulkan::SkinningSystemDescription& description)
+    : device_(device),
+      outputSize_(description.outputBudget / 4 * 4),
+      system_(must(vulkan::SkinningSystem::create(description))) {}
+
+SystemEngine::~SystemEngine() {
+  device_.functions().DeviceWaitIdle(device_.handle());
+  for (const SubmittedFrame& frame : submitted_) waitFor(frame);
+}
+
+MeshHandle SystemEngine::addMesh(const PackedMesh& mesh) {
+  const MeshHandle handle = must(system_.addMesh(mesh));
+  vertexCounts_[key(handle)] = mesh.vertexCount();
+  return handle;
+}
+
+PaletteHandle SystemEngine::addPalette(std::span<const JointMatrix> pose, bool mayScale) {
+  const PaletteHandle handle =
+      must(system_.addPalette(static_cast<std::uint32_t>(pose.size()), mayScale));
+  writePose(handle, pose);
+  return handle;
+}
+
+InstanceHandle SystemEngine::addInstance(const InstanceDescription& description) {
+  must(system_.prepare(description));
+  return must(system_.addInstance(description));
+}
+
+void SystemEngine::writePose(PaletteHandle palette, std::span<const JointMatrix> pose) {
+  const std::span<JointMatrix> mapped = must(system_.writePose(palette));
+  if (mapped.size() != pose.size()) throw std::runtime_error("the pose has another size");
+  std::ranges::copy(pose, mapped.begin());
+}
+
+void SystemEngine::begin(std::uint32_t underWay) {
+  waitUntilUnderWay(underWay);
+  ++frame_;
+  must(system_.beginFrame(frame_, completedFrame_));
+}
+
+Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
+                                       const vulkan::FrameDescription& frame) {
+  if (beforeRecord) beforeRecord(commandBuffer);
+  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transfer));
+  const Result<void> recorded = system_.record(commandBuffer, frame);
+  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::outputScope(Consumer::transfer));
+  if (afterRecord) afterRecord(commandBuffer);
+  return recorded;
+}
+
+Result<void> SystemEngine::trySubmit(const vulkan::FrameDescription& frame) {
+  const VkCommandBuffer commandBuffer = beginCommands();
+  const Result<void> recorded = recordFrame(commandBuffer, frame);
+  submitted_.push_back({frame_, submitCommands(commandBuffer), commandBuffer});
+  return recorded;
+}
+
+VkCommandBuffer SystemEngine::beginCommands() {
+  const VkCommandBuffer commandBuffer = device_.allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  device_.functions().BeginCommandBuffer(commandBuffer, &begin);
+  return commandBuffer;
+}
+
+VkFence SystemEngine::submitCommands(VkCommandBuffer commandBuffer) {
+  device_.functions().EndCommandBuffer(commandBuffer);
+  VkFenceCreateInfo fenceInfo{};
+  fenceInfo.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+  VkFence fence = VK_NULL_HANDLE;
+  VkSubmitInfo submit{};
+  submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+  submit.commandBufferCount = 1;
+  submit.pCommandBuffers = &commandBuffer;
+  if (device_.functions().CreateFence(device_.handle(), &fenceInfo, nullptr, &fence) !=
+          VK_SUCCESS ||
+      device_.functions().QueueSubmit(device_.queue(), 1, &submit, fence) != VK_SUCCESS)
+    throw std::runtime_error("a frame could not be submitted");
+  return fence;
+}
+
+void SystemEngine::waitFor(const SubmittedFrame& frame) {
+  device_.functions().WaitForFences(device_.handle(), 1, &frame.fence, VK_TRUE, UINT64_MAX);
+  device_.functions().DestroyFence(device_.handle(), frame.fence, nullptr);
+  device_.freeCommandBuffer(frame.commandBuffer);
+}
+
+void SystemEngine::waitUntilUnderWay(std::uint32_t count) {
+  while (submitted_.size() > count) {
+    waitFor(submitted_.front());
+    completedFrame_ = submitted_.front().frame;
+    submitted_.pop_front();
+  }
+}
+
+void SystemEngine::submitNow(const std::function<void(VkCommandBuffer)>& record) {
+  const VkCommandBuffer commandBuffer = beginCommands();
+  record(commandBuffer);
+  waitFor({0, submitCommands(commandBuffer), commandBuffer});
+}
+
+void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer,
+                                 const Dependency& dependency) const {
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
+  device_.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
+                                         dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
+                                         0, nullptr);
+}
+
+std::vector<std::byte> SystemEngine::readOutput() {
+  if (readBack_.bytes().empty()) {
+    readBack_ = must(samples::MappedBuffer::create(device_, outputSize_,
+                                                   VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
+  }
+  submitNow([this](VkCommandBuffer commandBuffer) {
+    recordBarrier(commandBuffer, vulkan::outputScope(Consumer::transfer));
+    const VkBufferCopy all{0, 0, outputSize_};
+    device_.functions().CmdCopyBuffer(commandBuffer, system_.outputBuffer(), readBack_.handle(), 1,
+                                      &all);
+    recordBarrier(commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
+                                  {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+  });
+  const std::span<const std::byte> bytes = readBack_.bytes();
+  return {bytes.begin(), bytes.end()};
+}
+
+void SystemEngine::fillOutput(std::byte value) {
+  submitNow([&](VkCommandBuffer commandBuffer) {
+    const Dependency before =
+        vulkan::inputScope(PreviousUse::previousRecord);  // its writes; ours are a transfer's
+    recordBarrier(commandBuffer,
+                  {before.source, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}});
+    device_.functions().CmdFillBuffer(commandBuffer, system_.outputBuffer(), 0, VK_WHOLE_SIZE,
+                                      std::to_integer<std::uint32_t>(value) * 0x01010101u);
+    recordBarrier(commandBuffer,
+                  {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
+                   {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                    VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
+                        VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT}});
+  });
+}
+
+Streams SystemEngine::read(InstanceHandle instance) {
+  return read(readOutput(), instance);
+}
+
+Streams SystemEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
+  const InstanceOutput output = must(system_.output(instance));
+  const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
+  Streams streams;
+  if (output.state == OutputState::none) return streams;
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    streams[stream] = readAttribute(bytes, attributes[stream], vertexCount(output.mesh));
+  return streams;
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,119 @@
+// A small engine around a SkinningSystem: frames with a fence each, several under way at once, and
+// its output read back.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "buffer.h"
+#include "dermis/instance.h"
+#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/skinning_system.h"
+#include "device.h"
+
+namespace dermis::test {
+
+/// The value; where there is none the test fails with the error's message, and ends.
+template <typename T>
+T must(Result<T> result) {
+  if (!result) throw std::runtime_error(result.error().message);
+  return std::move(*result);
+}
+inline void must(const Result<void>& result) {
+  if (!result) throw std::runtime_error(result.error().message);
+}
+
+/// The attributes of an instance as they are stored, tightly packed, by `Stream`.
+using Streams = std::array<std::vector<std::byte>, streamCount>;
+
+/// The attributes of an output, by `Stream`.
+std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output);
+
+/// One attribute of so many vertices out of the bytes of an output buffer.
+std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
+                                     const OutputAttribute& attribute, std::uint32_t vertexCount);
+
+class SystemEngine {
+ public:
+  SystemEngine(samples::Device& device, const vulkan::SkinningSystemDescription& description);
+  ~SystemEngine();
+  SystemEngine(const SystemEngine&) = delete;
+  SystemEngine& operator=(const SystemEngine&) = delete;
+
+  vulkan::SkinningSystem& system() { return system_; }
+  vulkan::SkinningSystem* operator->() { return &system_; }
+
+  // -- What is in it. Vertices are counted, and pipelines prepared.
+  MeshHandle addMesh(const PackedMesh& mesh);
+  PaletteHandle addPalette(std::span<const JointMatrix> pose, bool mayScale = true);
+  InstanceHandle addInstance(const InstanceDescription& description);
+  void writePose(PaletteHandle palette, std::span<const JointMatrix> pose);
+
+  // -- Frames.
+  /// Begins the next one, once at most `underWay` of those before are not complete.
+  void begin(std::uint32_t underWay = 0);
+  /// Records it, with the engine's barriers around, and submits it.
+  void submit(const vulkan::FrameDescription& frame = {}) { must(trySubmit(frame)); }
+  /// Where `record` fails an empty command buffer is submitted.
+  Result<void> trySubmit(const vulkan::FrameDescription& frame = {});
+  void runFrame() {
+    begin();
+    submit();
+  }
+  /// Waits for all frames. The system learns of it by the next `begin`.
+  void finish() { waitUntilUnderWay(0); }
+  std::uint64_t frame() const { return frame_; }
+  std::uint64_t completedFrame() const { return completedFrame_; }
+  /// Of the last `record`.
+  vulkan::FrameStatistics lastFrame() const { return system_.statistics().lastFrame; }
+
+  // -- The output.
+  /// All bytes, as of the last frame that was submitted.
+  std::vector<std::byte> readOutput();
+  void fillOutput(std::byte value);
+  Streams read(InstanceHandle instance);
+  Streams read(std::span<const std::byte> bytes, InstanceHandle instance) const;
+  std::uint32_t vertexCount(MeshHandle mesh) const { return vertexCounts_.at(key(mesh)); }
+
+  /// Submits what `record` records, and waits for it and all before.
+  void submitNow(const std::function<void(VkCommandBuffer)>& record);
+  void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) const;
+
+  /// Called in each frame before and behind the system's commands.
+  std::function<void(VkCommandBuffer)> beforeRecord, afterRecord;
+  /// For tests of what happens without: the engine's own barriers.
+  bool recordsBarriers = true;
+
+ private:
+  struct SubmittedFrame {
+    std::uint64_t frame = 0;
+    VkFence fence = VK_NULL_HANDLE;
+    VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
+  };
+  static std::pair<std::uint32_t, std::uint32_t> key(MeshHandle mesh) {
+    return {mesh.index, mesh.generation};
+  }
+  VkCommandBuffer beginCommands();
+  Result<void> recordFrame(VkCommandBuffer commandBuffer, const vulkan::FrameDescription& frame);
+  VkFence submitCommands(VkCommandBuffer commandBuffer);
+  void waitFor(const SubmittedFrame& frame);
+  void waitUntilUnderWay(std::uint32_t count);
+
+  samples::Device& device_;
+  std::uint64_t outputSize_;
+  vulkan::SkinningSystem system_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
+  std::deque<SubmittedFrame> submitted_;
+  std::uint64_t frame_ = 0, completedFrame_ = 0;
+  samples::MappedBuffer readBack_;
+};
+
+}  // namespace dermis::test
