@@ -6,7 +6,7 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 # dermis_embed_shaders(TARGET name
 #                      [NAMESPACE dermis::kernels]       # C++ namespace of the symbols
 #                      [ALLOW_CONTRACTION]               # do not demand `precise` everywhere
-#                      KERNELS skin.comp ...             # relative to the current source folder
+#                      KERNELS skin.comp ...             # relative to the current source folder; or .vert, .frag
 #                      [INCLUDES abi.h ...]              # shown in an IDE; dependencies are found
 #                      [INCLUDE_FOLDERS folder ...]      # where #include is looked up as well
 #                      [DEFINES NAME=VALUE ...])
@@ -14,6 +14,8 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 # Makes the OBJECT library `name`, with the header name.h, which declares for each kernel
 #
 #     namespace dermis::kernels { extern const std::span<const std::uint32_t> skin_spirv; }
+#
+# and `mesh_vert_spirv` for mesh.vert: the two stages of a pipeline have one name.
 #
 # A kernel is compiled again when it or a file that it includes changes. It has to pass the compiler,
 # the check that all arithmetic is decorated NoContraction, and spirv-val for Vulkan 1.1.
@@ -49,6 +51,10 @@ function(dermis_embed_shaders)
   foreach(kernel IN LISTS arg_KERNELS)
     cmake_path(ABSOLUTE_PATH kernel BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
     cmake_path(GET kernel STEM LAST_ONLY stem)
+    cmake_path(GET kernel EXTENSION LAST_ONLY extension)
+    if(NOT extension STREQUAL ".comp")
+      string(APPEND stem ${extension})
+    endif()
     string(MAKE_C_IDENTIFIER "${stem}" name)
     set(module ${folder}/${name}.spv)
     # Only a module that spirv-val accepts gets its name: a failed build does not leave one behind.

@@ -4,10 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <iterator>
 #include <memory>
 #include <optional>
-#include <regex>
 #include <span>
 #include <string>
 #include <tuple>
@@ -15,8 +13,10 @@
 #include <vector>
 
 #include "batch_runner.h"
+#include "bind_pose.h"
 #include "commands.h"
 #include "dermis/reference.h"
+#include "frame_name.h"
 #include "mesh_output.h"
 #include "method_options.h"
 #include "open_device.h"
@@ -40,34 +40,8 @@ struct SkinOptions {
   bool strict = false;
 };
 
-/// One part in one pose.
-struct SkinnedPart {
-  std::vector<float> positions;  ///< 3 a vertex
-  std::vector<float> normals;    ///< 3 a vertex, or empty
-  std::vector<float> tangents;   ///< 4 a vertex, or empty
-};
-
 /// Every part of the scene in a pose. Tangents where they are wanted and a mesh has them.
 using SkinParts = std::function<Result<std::vector<SkinnedPart>>(const ScenePose& pose)>;
-
-/// Adds to the first three of every `components` values.
-void addDisplacements(std::vector<float>& values, std::size_t components,
-                      const std::vector<float>& displacements, float weight) {
-  for (std::size_t i = 0; i / 3 * components < values.size() && i < displacements.size(); ++i)
-    values[i / 3 * components + i % 3] += weight * displacements[i];
-}
-
-/// A part without influences: morphed, but where it is.
-SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs) {
-  SkinnedPart skinned{part.primitive->positions, part.primitive->normals, part.primitive->tangents};
-  for (const MorphWeight& morph : morphs) {
-    const gltf::MorphTarget& target = part.primitive->morphTargets[morph.target];
-    addDisplacements(skinned.positions, 3, target.positions, morph.weight);
-    addDisplacements(skinned.normals, 3, target.normals, morph.weight);
-    addDisplacements(skinned.tangents, 4, target.tangents, morph.weight);
-  }
-  return skinned;
-}
 
 template <typename Vector>
 std::vector<float> toFloats(const std::vector<Vector>& vectors) {
@@ -155,25 +129,6 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
     }
   }
   return mesh;
-}
-
-/// The name of a frame: %0Nd in the pattern replaced by its number, or nothing where there is no
-/// such place.
-std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
-  static const std::regex place("%0([1-9])d");
-  std::smatch match;
-  if (!std::regex_search(pattern, match, place)) return std::nullopt;
-  return match.prefix().str() + fmt::format("{:0{}}", frame, std::stoi(match[1].str())) +
-         match.suffix().str();
-}
-
-/// Whether a name looks as if a number were meant to go into it in a way, or as often, as none
-/// goes.
-bool hasWrongPattern(const std::string& name) {
-  static const std::regex anyPlace("%[0-9]*d");
-  const auto places = std::distance(std::sregex_iterator(name.begin(), name.end(), anyPlace),
-                                    std::sregex_iterator());
-  return places > 1 || (places == 1 && !frameName(name, 0));
 }
 
 ExitStatus checkUsage(const SkinOptions& options) {

@@ -15,6 +15,7 @@ using Run = std::function<ExitStatus()>;
 Run addCompare(CLI::App& app);
 Run addDevices(CLI::App& app);
 Run addInfo(CLI::App& app);
+Run addRender(CLI::App& app);
 Run addSkin(CLI::App& app);
 Run addVerify(CLI::App& app);
 

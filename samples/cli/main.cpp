@@ -27,10 +27,11 @@ ExitStatus run(int argc, char** argv) {
       "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable "
       "device,\n"
       "5 anything else that stopped it.");
-  const std::array<std::pair<const char*, dermis::cli::Run>, 5> commands{{
+  const std::array<std::pair<const char*, dermis::cli::Run>, 6> commands{{
       {"devices", dermis::cli::addDevices(app)},
       {"info", dermis::cli::addInfo(app)},
       {"skin", dermis::cli::addSkin(app)},
+      {"render", dermis::cli::addRender(app)},
       {"verify", dermis::cli::addVerify(app)},
       {"compare", dermis::cli::addCompare(app)},
   }};

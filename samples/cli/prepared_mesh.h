@@ -22,6 +22,7 @@ struct MeshPreparation {
   bool centersOfRotation = false;
   float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< of every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
+  bool images = false;                                           ///< read what base colours show
 };
 
 /// Gives the primitive's centres of rotation, 3 floats a vertex, or none.

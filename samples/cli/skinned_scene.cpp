@@ -43,7 +43,7 @@ void addFindings(Scene& scene, const MeshReport& report) {
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
-  Result<gltf::Model> loaded = gltf::load(path);
+  Result<gltf::Model> loaded = gltf::load(path, {.images = preparation.images});
   if (!loaded) return loaded.error();
 
   Scene scene;

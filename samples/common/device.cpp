@@ -78,15 +78,15 @@ std::vector<VkExtensionProperties> deviceExtensions(const VulkanFunctions& funct
   return extensions;
 }
 
-/// The first family with compute, or nothing.
-bool findComputeFamily(const VulkanFunctions& functions, VkPhysicalDevice device,
-                       std::uint32_t& family) {
+/// The first family that can do all of it, or nothing.
+bool findFamily(const VulkanFunctions& functions, VkPhysicalDevice device, VkQueueFlags wanted,
+                std::uint32_t& family) {
   std::uint32_t count = 0;
   functions.GetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   functions.GetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
   for (family = 0; family < count; ++family) {
-    if ((families[family].queueFlags & VK_QUEUE_COMPUTE_BIT) != 0) return true;
+    if ((families[family].queueFlags & wanted) == wanted) return true;
   }
   return false;
 }
@@ -125,7 +125,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
   std::uint32_t family = 0;
   if (properties.apiVersion < VK_API_VERSION_1_1) {
     info.unusable = "it has no Vulkan 1.1";
-  } else if (!findComputeFamily(functions, device, family)) {
+  } else if (!findFamily(functions, device, VK_QUEUE_COMPUTE_BIT, family)) {
     info.unusable = "it has no compute queue";
   }
   return info;
@@ -261,8 +261,13 @@ Result<void> Device::choose(const std::string& wanted) {
 }
 
 Result<void> Device::createDevice(const DeviceOptions& options) {
-  if (!findComputeFamily(functions_, physicalDevice_, queueFamily_))
-    return unusable("no compute queue");
+  // Where there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
+  VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT;
+  if (options.graphics) wanted |= VK_QUEUE_GRAPHICS_BIT;
+  if (!findFamily(functions_, physicalDevice_, wanted, queueFamily_)) {
+    return unusable("device '" + info_.name + "' has no queue that can " +
+                    (options.graphics ? "draw" : "compute"));
+  }
   std::vector<const char*> extensions;
   if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);

@@ -42,6 +42,7 @@ struct DeviceOptions {
   bool smallStorage = true;     ///< enable stores of 1 and 2 bytes where the device has them
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries where the device has them
+  bool graphics = false;        ///< the queue draws too; fails where the device has none that does
   bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
                                     ///< them
 };
@@ -51,8 +52,8 @@ Result<std::vector<DeviceInfo>> listDevices();
 
 class Device {
  public:
-  /// Fails with `missingFeature`: no loader, no device of that name, no compute queue, no
-  /// validation layer.
+  /// Fails with `missingFeature`: no loader, no device of that name, no compute queue or none that
+  /// draws, no validation layer.
   static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
   ~Device();
   Device(const Device&) = delete;
@@ -64,6 +65,7 @@ class Device {
   const DeviceInfo& info() const { return info_; }
   const VulkanFunctions& functions() const { return functions_; }
   VkDevice handle() const { return device_; }
+  VkPhysicalDevice physicalDevice() const { return physicalDevice_; }
   VkQueue queue() const { return queue_; }
   std::uint32_t queueFamily() const { return queueFamily_; }
 

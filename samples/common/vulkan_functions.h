@@ -10,11 +10,53 @@
   X(GetPhysicalDeviceProperties)            \
   X(GetPhysicalDeviceProperties2)           \
   X(GetPhysicalDeviceFeatures2)             \
+  X(GetPhysicalDeviceFormatProperties)      \
   X(GetPhysicalDeviceMemoryProperties)      \
   X(GetPhysicalDeviceQueueFamilyProperties) \
   X(EnumerateDeviceExtensionProperties)     \
   X(CreateDevice)                           \
   X(GetDeviceProcAddr)
+
+/// Those of the sample renderer.
+#define DERMIS_SAMPLE_GRAPHICS_FUNCTIONS(X) \
+  X(CreateImage)                            \
+  X(DestroyImage)                           \
+  X(GetImageMemoryRequirements)             \
+  X(BindImageMemory)                        \
+  X(CreateImageView)                        \
+  X(DestroyImageView)                       \
+  X(CreateSampler)                          \
+  X(DestroySampler)                         \
+  X(CreateRenderPass)                       \
+  X(DestroyRenderPass)                      \
+  X(CreateFramebuffer)                      \
+  X(DestroyFramebuffer)                     \
+  X(CreateShaderModule)                     \
+  X(DestroyShaderModule)                    \
+  X(CreateDescriptorSetLayout)              \
+  X(DestroyDescriptorSetLayout)             \
+  X(CreateDescriptorPool)                   \
+  X(DestroyDescriptorPool)                  \
+  X(AllocateDescriptorSets)                 \
+  X(UpdateDescriptorSets)                   \
+  X(CreatePipelineLayout)                   \
+  X(DestroyPipelineLayout)                  \
+  X(CreateGraphicsPipelines)                \
+  X(DestroyPipeline)                        \
+  X(CmdBeginRenderPass)                     \
+  X(CmdEndRenderPass)                       \
+  X(CmdBindPipeline)                        \
+  X(CmdBindDescriptorSets)                  \
+  X(CmdBindVertexBuffers)                   \
+  X(CmdBindIndexBuffer)                     \
+  X(CmdPushConstants)                       \
+  X(CmdSetViewport)                         \
+  X(CmdSetScissor)                          \
+  X(CmdDraw)                                \
+  X(CmdDrawIndexed)                         \
+  X(CmdBlitImage)                           \
+  X(CmdCopyBufferToImage)                   \
+  X(CmdCopyImageToBuffer)
 
 #define DERMIS_SAMPLE_DEVICE_FUNCTIONS(X) \
   X(DestroyDevice)                        \
@@ -47,7 +89,8 @@
   X(DestroyFence)                         \
   X(ResetFences)                          \
   X(WaitForFences)                        \
-  X(DeviceWaitIdle)
+  X(DeviceWaitIdle)                       \
+  DERMIS_SAMPLE_GRAPHICS_FUNCTIONS(X)
 
 namespace dermis::samples {
 

@@ -53,11 +53,25 @@ struct Skin {
 
 enum class AlphaMode : std::uint8_t { opaque, mask, blend };
 
-/// The factors of a material; what the file leaves out has the default of glTF 2.0. Textures are
-/// not read.
+/// An image as it stands in the file: PNG or JPEG, not decoded.
+struct Image {
+  std::string name;  ///< "image 2 'skin'", for messages
+  std::vector<std::byte> bytes;
+};
+
+enum class Wrap : std::uint8_t { repeat, mirroredRepeat, clampToEdge };
+
+struct TextureUse {
+  std::uint32_t image = none;  ///< In `Model::images`; it has bytes.
+  std::uint32_t texcoord = 0;  ///< TEXCOORD_n, which a primitive need not have
+  Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
+};
+
+/// The factors of a material; what the file leaves out has the default of glTF 2.0.
 struct Material {
   std::string name;
   std::array<float, 4> baseColor{1, 1, 1, 1};  ///< Linear red, green, blue, and alpha.
+  TextureUse baseColorTexture;                 ///< Only where `LoadOptions::images` is set.
   float metallic = 1;
   float roughness = 1;
   std::array<float, 3> emissive{0, 0, 0};
@@ -170,14 +184,21 @@ struct Model {
   std::vector<Mesh> meshes;
   std::vector<Skin> skins;
   std::vector<Material> materials;
+  std::vector<Image> images;  ///< Those that no base colour shows are empty.
   std::vector<Clip> clips;
   std::vector<SkinnedPrimitive> skinnedPrimitives;
   /// What was mended or left out, a sentence each ("12 rotation keys … have been normalised").
   std::vector<std::string> notes;
 };
 
+struct LoadOptions {
+  /// Read the images that base colours show, by the same rules as buffers. One that cannot be had
+  /// is left out, with a note.
+  bool images = false;
+};
+
 /// Reads a .gltf or .glb file (told apart by their first bytes) and every buffer that it names:
-/// data URIs and files beside it; nothing outside the file's folder is opened. Images are not read.
+/// data URIs and files beside it; nothing outside the file's folder is opened.
 /// Meshes that no skinned node of the default scene uses are left undecoded (no primitives). The
 /// default scene is `scene`; scene 0 where the file does not say; all root nodes where it has no
 /// scenes. Fails with
@@ -186,11 +207,12 @@ struct Model {
 /// - `unsupportedFeature`: a required extension that is not known (mesh compression, for one), or
 ///   glTF 1.0;
 /// - `limitExceeded`: it asks for more memory than a file of its size justifies.
-Result<Model> load(const std::filesystem::path& path);
+Result<Model> load(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The same from memory; `folder` is where the file's relative URIs are looked up, empty for
 /// nowhere. Nothing refers to `bytes` afterwards.
-Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder);
+Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder,
+                             const LoadOptions& options = {});
 
 /// The clip of that number or, where there is none of that number, the first of that name.
 std::optional<std::uint32_t> findClip(const Model& model, std::string_view numberOrName);

@@ -248,6 +248,14 @@ const std::byte* Source::viewData(int view) const {
   return buffer.bytes.data() + range.byteOffset;
 }
 
+std::span<const std::byte> Source::viewBytes(std::uint64_t view, const std::string& where) const {
+  if (view >= content().bufferViews.size()) failInvalid(where, ": there is no bufferView ", view);
+  const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
+  if (buffers_[static_cast<std::size_t>(range.buffer)].bytes.empty())
+    failInvalid(where, ": its buffer has no bytes");
+  return {viewData(static_cast<int>(view)), range.byteLength};
+}
+
 void Source::require(int index, int type, std::span<const Format> formats,
                      const std::string& where) const {
   const tinygltf::Accessor& accessor = content().accessors[static_cast<std::size_t>(index)];

@@ -79,17 +79,6 @@ std::filesystem::path sidePath(std::string_view uri, const std::filesystem::path
   return folder / relative;
 }
 
-std::vector<std::byte> loadSideFile(const BufferDescription& description,
-                                    const std::filesystem::path& folder, const std::string& where) {
-  const std::filesystem::path path = sidePath(*description.uri, folder, where);
-  std::error_code error;
-  // Not a device or a pipe, which might never end.
-  if (!std::filesystem::is_regular_file(path, error)) {
-    fail(ErrorCode::ioError, join(where, ": there is no file ", inQuotes(path.string())));
-  }
-  return readFile(path, description.byteLength, where);
-}
-
 Buffer loadBuffer(const BufferDescription& description,
                   const std::optional<std::span<const std::byte>>& binaryChunk,
                   const std::filesystem::path& folder, const std::string& where) {
@@ -101,7 +90,7 @@ Buffer loadBuffer(const BufferDescription& description,
   } else {
     buffer.storage = description.uri->starts_with("data:")
                          ? decodeDataUri(*description.uri, where)
-                         : loadSideFile(description, folder, where);
+                         : loadSideFile(*description.uri, description.byteLength, folder, where);
     buffer.bytes = buffer.storage;
   }
   if (buffer.bytes.size() < description.byteLength) {
@@ -113,6 +102,17 @@ Buffer loadBuffer(const BufferDescription& description,
 }
 
 }  // namespace
+
+std::vector<std::byte> loadSideFile(std::string_view uri, std::uint64_t limit,
+                                    const std::filesystem::path& folder, const std::string& where) {
+  const std::filesystem::path path = sidePath(uri, folder, where);
+  std::error_code error;
+  // Not a device or a pipe, which might never end.
+  if (!std::filesystem::is_regular_file(path, error)) {
+    fail(ErrorCode::ioError, join(where, ": there is no file ", inQuotes(path.string())));
+  }
+  return readFile(path, limit, where);
+}
 
 std::string decodePercent(std::string_view text, const std::string& where) {
   std::string decoded;

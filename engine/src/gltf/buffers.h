@@ -32,6 +32,11 @@ std::vector<Buffer> loadBuffers(const std::vector<BufferDescription>& descriptio
 /// The bytes of a data URI (RFC 2397), base64 or percent-encoded. `where` names it in messages.
 std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& where);
 
+/// At most `limit` bytes of a file that a relative URI names. Throws `Failure` with `ioError` where
+/// it is outside the folder, or cannot be read.
+std::vector<std::byte> loadSideFile(std::string_view uri, std::uint64_t limit,
+                                    const std::filesystem::path& folder, const std::string& where);
+
 /// `%20` to a space and so on. Throws `Failure` where a '%' is not followed by two hexadecimal
 /// digits.
 std::string decodePercent(std::string_view text, const std::string& where);

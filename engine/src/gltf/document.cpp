@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gltf/failure.h"
+#include "gltf/images.h"
 
 namespace dermis::gltf {
 namespace {
@@ -167,7 +168,7 @@ tinygltf::Model parseContent(json root) {
 
 }  // namespace
 
-Document parseDocument(std::string_view text) {
+Document parseDocument(std::string_view text, Appearance* appearance) {
   checkNesting(text);
   json root = parseJson(text);
   if (!root.is_object()) failInvalid("the JSON text is not an object");
@@ -175,6 +176,8 @@ Document parseDocument(std::string_view text) {
 
   Document document;
   document.quantized = usesQuantization(root);
+  // What is checked has lost its textures.
+  if (appearance != nullptr) *appearance = findAppearance(root);
   checkReferences(root);
   document.buffers = takeBuffers(root);
   document.content = parseContent(std::move(root));

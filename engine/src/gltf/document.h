@@ -32,8 +32,10 @@ struct Document {
   bool quantized = false;  ///< KHR_mesh_quantization is in use.
 };
 
-/// Parses and checks. Throws `Failure`.
-Document parseDocument(std::string_view text);
+struct Appearance;
+
+/// Parses and checks. `appearance` is filled in where it is wanted. Throws `Failure`.
+Document parseDocument(std::string_view text, Appearance* appearance = nullptr);
 
 /// Checks every index and every type in `root`, as `parseDocument` needs it; whole numbers written
 /// with a fraction of zero become integers. Throws `Failure`.

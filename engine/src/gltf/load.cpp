@@ -10,14 +10,17 @@
 #include "gltf/container.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
+#include "gltf/images.h"
 #include "gltf/reader.h"
 
 namespace dermis::gltf {
 namespace {
 
-Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& folder) {
+Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& folder,
+                const LoadOptions& options) {
   const Container container = openContainer(bytes);
-  Document document = parseDocument(container.json);
+  Appearance appearance;
+  Document document = parseDocument(container.json, options.images ? &appearance : nullptr);
   std::vector<Buffer> buffers = loadBuffers(document.buffers, container.binaryChunk, folder);
   Source source(std::move(document), std::move(buffers), bytes.size());
 
@@ -28,6 +31,7 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   checkPrimitives(source);
   readScene(source, model);
   readAnimations(source, model);
+  if (options.images) readImages(appearance, source, folder, model);
   return model;
 }
 
@@ -47,12 +51,12 @@ Result<Model> guarded(Function function) {
 
 }  // namespace
 
-Result<Model> loadFromMemory(std::span<const std::byte> bytes,
-                             const std::filesystem::path& folder) {
-  return guarded([&] { return readModel(bytes, folder); });
+Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder,
+                             const LoadOptions& options) {
+  return guarded([&] { return readModel(bytes, folder, options); });
 }
 
-Result<Model> load(const std::filesystem::path& path) {
+Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
   return guarded([&] {
     std::error_code error;
     // Not a device or a pipe, which might never end. What does not exist is left to readFile.
@@ -64,7 +68,7 @@ Result<Model> load(const std::filesystem::path& path) {
     // none.
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     try {
-      return readModel(bytes, folder);
+      return readModel(bytes, folder, options);
     } catch (Failure& failure) {
       failure.error.message = join(inQuotes(path.filename().string()), ": ", failure.error.message);
       throw;

@@ -1,0 +1,21 @@
+// Parts of a scene that no joint moves.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+
+/// One part in one pose.
+struct SkinnedPart {
+  std::vector<float> positions;  ///< 3 a vertex
+  std::vector<float> normals;    ///< 3 a vertex, or empty
+  std::vector<float> tangents;   ///< 4 a vertex, or empty
+};
+
+/// A part without influences: morphed, but where it is. Directions are not of unit length.
+SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs);
+
+}  // namespace dermis::cli

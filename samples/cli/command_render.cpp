@@ -1,0 +1,426 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "commands.h"
+#include "crowd.h"
+#include "drawn_scene.h"
+#include "frame_name.h"
+#include "method_options.h"
+#include "pass_counter.h"
+#include "picture_writer.h"
+#include "progress.h"
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+namespace {
+
+namespace render = samples::render;
+
+struct RenderOptions {
+  std::string model;
+  std::string output;
+  std::optional<std::string> animation;
+  double time = 0;
+  std::optional<std::uint32_t> frames;
+  double framesPerSecond = 30;
+  std::uint32_t instances = 1;
+  std::string method = std::string(methodName(Method::dualQuaternion));
+  MethodShares shares;
+  std::uint32_t width = 1280, height = 720;
+  bool isOrthographic = false;
+  std::optional<double> azimuth, elevation;
+  std::string device = "auto";
+  bool strict = false;
+};
+
+constexpr std::uint32_t largestSide = 16384;
+constexpr std::uint32_t mostInstances = 100'000;
+
+ExitStatus wrong(const std::string& message) {
+  return reportError(ExitStatus::wrongUsage, message);
+}
+
+ExitStatus checkNumbers(const RenderOptions& options) {
+  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond))
+    return wrong("--fps must be a number above 0");
+  if (options.frames && *options.frames == 0) return wrong("--frames must be at least 1");
+  if (options.instances == 0 || options.instances > mostInstances)
+    return wrong(fmt::format("--instances must be from 1 to {}", mostInstances));
+  for (const std::uint32_t side : {options.width, options.height}) {
+    if (side < 16 || side > largestSide)
+      return wrong(fmt::format("--width and --height must be from 16 to {} pixels", largestSide));
+  }
+  if (!std::isfinite(options.azimuth.value_or(0)))
+    return wrong("--azimuth must be a number of degrees");
+  if (!(std::abs(options.elevation.value_or(0)) <= 90))
+    return wrong("--elevation must be from -90 to 90 degrees");
+  return checkShares(options.shares);
+}
+
+ExitStatus checkUsage(const RenderOptions& options) {
+  const std::optional<PictureKind> kind = pictureKind(options.output);
+  if (!kind) {
+    return wrong(
+        fmt::format("OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
+  }
+  if (!methodFromName(options.method)) {
+    return wrong(
+        fmt::format("there is no method '{}'; there are {}", options.method, methodNames("and")));
+  }
+  if (options.device == "cpu")
+    return wrong("--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+  if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
+  if (*kind != PictureKind::png)
+    return options.frames ? ExitStatus::done : wrong("a film needs --frames, how many it has");
+  if (hasWrongPattern(options.output))
+    return wrong("the place for a number in OUT is %01d to %09d, and there is one at most");
+  const bool pattern = frameName(options.output, 0).has_value();
+  if (options.frames && !pattern) {
+    return wrong(
+        "--frames needs a place for the number in OUT, such as frame%04d.png, or a film: .mp4, "
+        ".gif or .apng");
+  }
+  if (!options.frames && pattern)
+    return wrong("OUT has a place for a number; --frames says how many there are");
+  return ExitStatus::done;
+}
+
+/// Everything between a scene and its pictures.
+class Film {
+ public:
+  Film(const RenderOptions& options, const Scene& scene, std::uint32_t clip,
+       samples::OpenDevice& device)
+      : options_(options),
+        scene_(scene),
+        device_(device),
+        roles_(castCrowd(*scene.model, clip, !options.animation, options.instances)) {}
+
+  Result<void> prepare();
+  Result<render::Picture> draw(double time);
+
+ private:
+  Result<void> skin();
+  Result<void> skinAndDraw();
+  Result<void> look(const Role& role, double time, std::optional<Box>& around);
+  Result<std::optional<Box>> lookThrough(const Role& role, std::uint32_t poses);
+  Result<void> frameFigures();
+  render::CameraOptions cameraOptions() const;
+  render::ShadowSizes shadowSizes() const;
+  double timeOf(const Role& role, double time) const;
+
+  const RenderOptions& options_;
+  const Scene& scene_;
+  samples::OpenDevice& device_;
+  std::vector<Role> roles_;
+  std::optional<render::Renderer> renderer_;
+  std::optional<DrawnScene> drawn_;
+  std::optional<render::RenderFrame> frame_;
+  std::vector<JointMatrix> places_;
+  render::View view_;
+};
+
+/// In a still the pose that was asked for; crowds and films go on and on.
+double Film::timeOf(const Role& role, double time) const {
+  return options_.frames || roles_.size() > 1 ? timeInClip(*scene_.model, role, time) : time;
+}
+
+Result<void> Film::prepare() {
+  Result<render::Renderer> renderer = render::Renderer::create(*device_.device);
+  if (!renderer) return renderer.error();
+  renderer_.emplace(std::move(*renderer));
+  Result<DrawnScene> drawn = DrawnScene::create(device_, *renderer_, scene_, options_.instances,
+                                                *methodFromName(options_.method));
+  if (!drawn) return drawn.error();
+  drawn_.emplace(std::move(*drawn));
+  for (const std::string& note : drawn_->notes()) reportNote(note);
+  if (Result<void> framed = frameFigures(); !framed) return framed;
+  render::FrameDescription description;
+  description.width = options_.width;
+  description.height = options_.height;
+  description.shadows = shadowSizes();
+  Result<render::RenderFrame> frame = renderer_->createFrame(description);
+  if (!frame) return frame.error();
+  frame_.emplace(std::move(*frame));
+  return {};
+}
+
+/// Each map draws everything once more: large crowds get fewer, and finer ones, as their figures
+/// are small.
+render::ShadowSizes Film::shadowSizes() const {
+  double triangles = 0;
+  for (const ScenePart& part : scene_.parts)
+    triangles += static_cast<double>(part.primitive->triangles.size()) / 3;
+  triangles *= options_.instances;
+  render::ShadowSizes sizes;
+  sizes.skyLights =
+      static_cast<std::uint32_t>(std::clamp(4e7 / std::max(triangles, 1.0), 3.0, 28.0));
+  if (options_.instances > 3) sizes.skyMap = 512;
+  if (options_.instances > 20) {
+    sizes.keyMap = 4096;
+    sizes.skyMap = 1024;
+  }
+  return sizes;
+}
+
+/// Poses the first figure and widens the box by it.
+Result<void> Film::look(const Role& role, double time, std::optional<Box>& around) {
+  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
+  if (Result<void> posed = drawn_->setPose(0, scenePose(scene_, role.clip, time)); !posed)
+    return posed;
+  if (Result<void> done = skin(); !done) return done;
+  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
+  const Result<std::optional<Box>> box = drawn_->bounds(0);
+  if (!box) return box.error();
+  if (!*box) return {};
+  around = around ? render::unite(std::vector<Box>{*around, **box}) : *box;
+  return {};
+}
+
+/// The box around a clip.
+Result<std::optional<Box>> Film::lookThrough(const Role& role, std::uint32_t poses) {
+  std::optional<Box> around;
+  const double duration =
+      role.clip < scene_.model->clips.size() ? scene_.model->clips[role.clip].duration : 0;
+  const std::uint32_t count = duration > 0 ? poses : 1;
+  for (std::uint32_t pose = 0; pose < count; ++pose) {
+    if (Result<void> done = look(role, duration * pose / count, around); !done) return done.error();
+  }
+  return around;
+}
+
+/// A crowd is seen from higher up and from nearer, so that the last of its rows are seen and the
+/// first are large.
+render::CameraOptions Film::cameraOptions() const {
+  const bool isCrowd = options_.instances > 1;
+  render::CameraOptions camera;
+  camera.isOrthographic = options_.isOrthographic;
+  camera.azimuth = options_.azimuth.value_or(isCrowd ? 20 : 30);
+  camera.elevation = options_.elevation.value_or(isCrowd ? 18 : 12);
+  if (isCrowd) {
+    camera.fieldOfView = 42;
+    camera.margin = 0.04;
+  }
+  return camera;
+}
+
+/// The lowest place of the clip, so that no foot goes through it; but under the very foot of a
+/// still that only just hovers. A hair lower, for soles that are as flat as the ground.
+float groundUnder(const Box& pose, const Box& extent) {
+  const float height = extent.max[1] - extent.min[1];
+  const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
+  return (hovers ? pose.min[1] : extent.min[1]) - 1e-3f * render::radiusOf(extent);
+}
+
+Result<void> Film::frameFigures() {
+  const Error nothing{ErrorCode::invalidData, "there is nothing to draw: no vertex is finite"};
+  const std::uint32_t poses = 24;
+  std::optional<Box> extent;
+  std::set<std::uint32_t> clips;
+  for (const Role& role : roles_) {
+    if (!clips.insert(role.clip).second) continue;
+    const Result<std::optional<Box>> box = lookThrough(role, poses);
+    if (!box) return box.error();
+    if (*box) extent = extent ? render::unite(std::vector<Box>{*extent, **box}) : **box;
+  }
+  std::optional<Box> pose;
+  const bool isStill = !options_.frames && roles_.size() == 1;
+  if (isStill) {
+    if (Result<void> done = look(roles_[0], options_.time, pose); !done) return done;
+    if (pose) extent = extent ? render::unite(std::vector<Box>{*extent, *pose}) : *pose;
+  }
+  if (!extent) return nothing;
+  if (!pose) pose = extent;
+
+  places_ = placeCrowd(*extent, options_.instances);
+  std::vector<Box> boxes;
+  for (const JointMatrix& place : places_) boxes.push_back(moved(*pose, place));
+  const Box casters = render::unite(boxes);
+  const float radius = render::radiusOf(casters);
+  Box ground = casters;
+  for (const std::size_t axis : {0u, 2u}) {
+    ground.min[axis] -= 4 * radius;
+    ground.max[axis] += 4 * radius;
+  }
+  ground.min[1] = groundUnder(*pose, *extent);
+  view_.area.extent = {options_.width, options_.height};
+  view_.casters = casters;
+  view_.groundHeight = groundUnder(*pose, *extent);
+  view_.groundRadius = 5 * radius;
+  if (options_.instances > 1) view_.style.haze = options_.instances > 200 ? 0.3f : 0.12f;
+  view_.camera =
+      render::frameBoxes(boxes, ground, cameraOptions(),
+                         static_cast<float>(options_.width) / static_cast<float>(options_.height));
+  return {};
+}
+
+/// Skins what was posed.
+Result<void> Film::skin() {
+  const samples::VulkanFunctions& functions = device_.device->functions();
+  const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  functions.BeginCommandBuffer(commandBuffer, &begin);
+  Result<void> done = drawn_->recordSkinning(commandBuffer);
+  functions.EndCommandBuffer(commandBuffer);
+  if (done) done = device_.device->submitAndWait(commandBuffer);
+  device_.device->freeCommandBuffer(commandBuffer);
+  return done;
+}
+
+/// Skins what was posed and draws it, in one command buffer.
+Result<void> Film::skinAndDraw() {
+  const std::uint32_t passes = 1 + render::Renderer::passCount(*frame_, 1);
+  Result<PassCounter> counter = PassCounter::create(*device_.device, passes);
+  if (!counter) return counter.error();
+  const samples::VulkanFunctions& functions = device_.device->functions();
+  const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  functions.BeginCommandBuffer(commandBuffer, &begin);
+  Result<void> done = drawn_->recordSkinning(commandBuffer);
+  counter->record(commandBuffer);
+  std::vector<render::Draw> draws;
+  for (std::uint32_t figure = 0; figure < drawn_->figureCount() && done; ++figure)
+    done = drawn_->addDraws(figure, places_[figure], draws);
+  view_.draws = draws;
+  const auto afterPass = [&] { counter->record(commandBuffer); };
+  if (done) done = renderer_->record(commandBuffer, *frame_, {&view_, 1}, afterPass);
+  view_.draws = {};
+  if (done) frame_->target().recordReadBack(*device_.device, commandBuffer);
+  functions.EndCommandBuffer(commandBuffer);
+  // Of a film the pictures are counted.
+  Progress progress("rendering", options_.frames ? 1 : passes);
+  if (done) done = counter->submitAndWait(commandBuffer, [&] { progress.step(); });
+  device_.device->freeCommandBuffer(commandBuffer);
+  return done;
+}
+
+Result<render::Picture> Film::draw(double time) {
+  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun.error();
+  for (std::uint32_t figure = 0; figure < roles_.size(); ++figure) {
+    const Role& role = roles_[figure];
+    if (Result<void> posed =
+            drawn_->setPose(figure, scenePose(scene_, role.clip, timeOf(role, time)));
+        !posed)
+      return posed.error();
+  }
+  if (Result<void> done = skinAndDraw(); !done) return done.error();
+  return render::Picture{options_.width, options_.height, frame_->target().pixels()};
+}
+
+ExitStatus writePictures(const RenderOptions& options, Film& film, PictureWriter& writer) {
+  const std::uint32_t count = options.frames.value_or(1);
+  Progress progress("rendering", count);
+  for (std::uint32_t frame = 0; frame < count; ++frame) {
+    const Result<render::Picture> picture =
+        film.draw(options.time + frame / options.framesPerSecond);
+    if (!picture) return reportDeviceError(picture.error());
+    if (Result<void> written = writer.write(*picture); !written)
+      return reportError(ExitStatus::stopped, written.error().message);
+    progress.step();
+  }
+  if (Result<void> finished = writer.finish(); !finished)
+    return reportError(ExitStatus::stopped, finished.error().message);
+  return ExitStatus::done;
+}
+
+Result<std::unique_ptr<PictureWriter>> openWriter(const RenderOptions& options) {
+  const PictureKind kind = *pictureKind(options.output);
+  if (kind == PictureKind::png) return writePngs(options.output);
+  return writeFilm(options.output, kind, options.width, options.height, options.framesPerSecond);
+}
+
+ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {
+  for (const std::string& warning : scene.warnings) reportWarning(warning);
+  for (const std::string& remark : scene.remarks) reportNote(remark);
+  for (const std::string& note : scene.notes) reportNote(note);
+  if (scene.parts.empty()) {
+    return reportError(ExitStatus::badInput,
+                       fmt::format("{} has no skinned mesh in its scene", options.model));
+  }
+  if (!allows(scene, *methodFromName(options.method))) {
+    return reportError(ExitStatus::badInput,
+                       fmt::format("{}: {} needs centres of rotation, which were too much work",
+                                   options.model, options.method));
+  }
+  return ExitStatus::done;
+}
+
+ExitStatus renderModel(const RenderOptions& options) {
+  if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  MeshPreparation preparation;
+  preparation.strict = options.strict;
+  preparation.images = true;
+  preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
+  preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
+  preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
+  const Result<Scene> scene = loadScene(options.model, preparation);
+  if (!scene) return reportModelError(scene.error());
+  if (const ExitStatus checked = checkScene(options, *scene); checked != ExitStatus::done)
+    return checked;
+  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
+  if (!clip) return wrong(clip.error().message);
+
+  samples::DeviceOptions deviceOptions;
+  deviceOptions.device = options.device;
+  deviceOptions.graphics = true;
+  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
+  if (!open) return reportDeviceError(open.error());
+  Film film(options, *scene, *clip, *open);
+  if (Result<void> prepared = film.prepare(); !prepared) {
+    if (prepared.error().code == ErrorCode::invalidData) return reportModelError(prepared.error());
+    return reportDeviceError(prepared.error());
+  }
+  Result<std::unique_ptr<PictureWriter>> writer = openWriter(options);
+  if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
+  return writePictures(options, film, **writer);
+}
+
+}  // namespace
+
+Run addRender(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("render", "Draw a model, a crowd of it, or a film");
+  const auto options = std::make_shared<RenderOptions>();
+  command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "The picture to write: .png; with --frames, a name with %04d in it, or a film: "
+                   ".mp4, .gif, .apng (with ffmpeg)")
+      ->required();
+  command->add_option(
+      "--animation", options->animation,
+      "A clip's number or name, or none for the rest pose [the first; a crowd plays "
+      "all of them]");
+  command->add_option("--time", options->time, "Seconds into the clip [0]");
+  CLI::Option* frames = command->add_option("--frames", options->frames,
+                                            "Draw this many pictures, from --time on; the clip is "
+                                            "played again and again");
+  command->add_option("--fps", options->framesPerSecond, "Pictures a second [30]")->needs(frames);
+  command->add_option("--instances", options->instances,
+                      "A crowd of so many, each ahead by some time of its own [1]");
+  command->add_option("--method", options->method, methodNames("or") + " [dual_quaternion]");
+  addShares(*command, options->shares);
+  command->add_option("--width", options->width, "Pixels [1280]");
+  command->add_option("--height", options->height, "Pixels [720]");
+  command->add_flag("--orthographic", options->isOrthographic, "Without perspective");
+  command->add_option(
+      "--azimuth", options->azimuth,
+      "Degrees that the camera has gone around the model, from its front [30; a crowd: 20]");
+  command->add_option("--elevation", options->elevation,
+                      "Degrees that the camera stands above the ground [12; a crowd: 18]");
+  command->add_option("--device", options->device,
+                      "auto, a number of 'dermis devices', or part of a name");
+  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  return [options] { return renderModel(*options); };
+}
+
+}  // namespace dermis::cli

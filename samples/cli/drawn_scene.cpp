@@ -1,0 +1,352 @@
+#include "drawn_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "bind_pose.h"
+#include "dermis/vulkan/scope.h"
+
+namespace dermis::cli {
+namespace {
+
+using samples::MappedBuffer;
+using samples::render::Draw;
+using samples::render::Geometry;
+using samples::render::GeometryData;
+using samples::render::Surface;
+using samples::render::Transparency;
+
+Transparency transparencyOf(gltf::AlphaMode mode) {
+  switch (mode) {
+    case gltf::AlphaMode::mask:
+      return Transparency::mask;
+    case gltf::AlphaMode::blend:
+      return Transparency::blend;
+    default:
+      return Transparency::opaque;
+  }
+}
+
+samples::render::Wrap wrapOf(gltf::Wrap wrap) {
+  switch (wrap) {
+    case gltf::Wrap::mirroredRepeat:
+      return samples::render::Wrap::mirror;
+    case gltf::Wrap::clampToEdge:
+      return samples::render::Wrap::clamp;
+    default:
+      return samples::render::Wrap::repeat;
+  }
+}
+
+Surface surfaceOf(const gltf::Model& model, const gltf::Primitive& primitive) {
+  // What the file says nothing of is of no metal: glTF's own default would be dark.
+  Surface surface;
+  if (primitive.material == gltf::none) return surface;
+  const gltf::Material& material = model.materials[primitive.material];
+  surface.baseColor = material.baseColor;
+  surface.metallic = std::clamp(material.metallic, 0.f, 1.f);
+  surface.roughness = std::clamp(material.roughness, 0.f, 1.f);
+  surface.transparency = transparencyOf(material.alphaMode);
+  surface.alphaCutoff = material.alphaCutoff;
+  surface.isDoubleSided = material.doubleSided;
+  return surface;
+}
+
+Result<Geometry> geometryOf(samples::Device& device, const gltf::Primitive& primitive,
+                            std::uint32_t texcoordSet) {
+  GeometryData data;
+  data.vertexCount = primitive.vertexCount;
+  data.triangles = primitive.triangles;
+  if (texcoordSet < primitive.texcoords.size()) data.texcoords = primitive.texcoords[texcoordSet];
+  data.colors = primitive.colors;
+  return Geometry::create(device, data);
+}
+
+float determinant(const JointMatrix& matrix) {
+  const auto& m = matrix.m;
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+/// Whether most joints mirror: then triangles are wound the other way.
+bool isMirrored(std::span<const JointMatrix> palette) {
+  const auto mirrored = std::ranges::count_if(
+      palette, [](const JointMatrix& joint) { return determinant(joint) < 0; });
+  return static_cast<std::size_t>(mirrored) * 2 > palette.size();
+}
+
+void include(std::optional<Box>& all, const Box& box) {
+  if (!all) all = box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    all->min[axis] = std::min(all->min[axis], box.min[axis]);
+    all->max[axis] = std::max(all->max[axis], box.max[axis]);
+  }
+}
+
+/// Around what is finite; its sides are reversed where nothing is.
+Box boxOf(std::span<const float> positions) {
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  Box box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (!std::isfinite(positions[i])) continue;
+    box.min[i % 3] = std::min(box.min[i % 3], positions[i]);
+    box.max[i % 3] = std::max(box.max[i % 3], positions[i]);
+  }
+  return box;
+}
+
+void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency) {
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
+  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
+                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
+                                        0, nullptr);
+}
+
+constexpr std::uint32_t bytesPerVector = 3 * sizeof(float);
+
+}  // namespace
+
+Result<DrawnScene> DrawnScene::create(samples::OpenDevice& device,
+                                      samples::render::Renderer& renderer, const Scene& scene,
+                                      std::uint32_t figures, Method method) {
+  DrawnScene drawn;
+  drawn.device_ = &device;
+  drawn.scene_ = &scene;
+  if (Result<void> made = drawn.makeSystem(figures); !made) return made.error();
+  if (Result<void> added = drawn.addSharedParts(renderer); !added) return added.error();
+  if (Result<void> done = drawn.prepare(method); !done) return done.error();
+  for (std::uint32_t figure = 0; figure < figures; ++figure) {
+    if (Result<void> added = drawn.addFigure(method); !added) return added.error();
+  }
+  return drawn;
+}
+
+Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
+  vulkan::SkinningSystemDescription description;
+  description.context = &device_->context;
+  description.framesInFlight = 1;
+  description.tuning = device_->context.tuning();
+  std::uint64_t joints = 0, outputs = 0, meshes = 0;
+  std::uint32_t instances = 0;
+  for (const gltf::Skin& skin : scene_->model->skins) joints += skin.joints.size();
+  for (const ScenePart& part : scene_->parts) {
+    if (part.mesh == nullptr) continue;
+    // Each begins at a multiple of its stride.
+    outputs += (std::uint64_t{part.primitive->vertexCount} + 2) * 2 * bytesPerVector;
+    meshes += part.mesh->packed().bytes().size() + packedMeshAlignment;
+    ++instances;
+  }
+  const std::uint64_t all = joints * figures;
+  if (!std::in_range<std::uint32_t>(all) ||
+      !std::in_range<std::uint32_t>(std::uint64_t{instances} * figures)) {
+    return Error{ErrorCode::limitExceeded, "so many figures have too many joints"};
+  }
+  description.meshBudget = std::max<std::uint64_t>(meshes, 4096);
+  description.jointBudget = std::max(static_cast<std::uint32_t>(all), 1u);
+  description.outputBudget = std::max<std::uint64_t>(outputs * figures, 4096);
+  description.instanceBudget = std::max(instances * figures, 1u);
+  description.boundsBudget = description.instanceBudget;
+  Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
+  if (!system) return system.error();
+  system_.emplace(std::move(*system));
+  return {};
+}
+
+Result<std::uint32_t> DrawnScene::textureOf(samples::render::Renderer& renderer,
+                                            const gltf::TextureUse& use) {
+  if (use.image == gltf::none) return 0u;
+  const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
+  if (!isNew) return place->second;
+  const gltf::Image& image = scene_->model->images[use.image];
+  const Result<samples::render::TexturePixels> pixels = samples::render::decodeImage(image.bytes);
+  if (!pixels) {
+    notes_.push_back(image.name + ": " + pixels.error().message + "; it is left out");
+    return 0u;
+  }
+  Result<std::uint32_t> texture =
+      renderer.addTexture(*pixels, {wrapOf(use.wrapU), wrapOf(use.wrapV)});
+  if (texture) place->second = *texture;
+  return texture;
+}
+
+Result<void> DrawnScene::addSharedParts(samples::render::Renderer& renderer) {
+  std::map<const PreparedMesh*, MeshHandle> meshes;
+  for (const ScenePart& part : scene_->parts) {
+    SharedPart& shared = shared_.emplace_back();
+    shared.surface = surfaceOf(*scene_->model, *part.primitive);
+    gltf::TextureUse use;
+    if (part.primitive->material != gltf::none)
+      use = scene_->model->materials[part.primitive->material].baseColorTexture;
+    if (use.texcoord < part.primitive->texcoords.size()) {
+      const Result<std::uint32_t> texture = textureOf(renderer, use);
+      if (!texture) return texture.error();
+      shared.surface.texture = *texture;
+    }
+    if (!geometries_.contains(part.primitive)) {
+      Result<Geometry> geometry = geometryOf(*device_->device, *part.primitive, use.texcoord);
+      if (!geometry) return geometry.error();
+      geometries_.emplace(part.primitive, std::move(*geometry));
+    }
+    shared.geometry = &geometries_.at(part.primitive);
+    if (part.mesh == nullptr) continue;
+    if (!meshes.contains(part.mesh.get())) {
+      Result<MeshHandle> mesh = system_->addMesh(part.mesh->packed());
+      if (!mesh) return mesh.error();
+      meshes.emplace(part.mesh.get(), *mesh);
+    }
+    shared.mesh = meshes.at(part.mesh.get());
+  }
+  return {};
+}
+
+InstanceDescription DrawnScene::instanceOf(std::size_t part, Method method) const {
+  InstanceDescription description;
+  if (shared_[part].mesh) description.mesh = *shared_[part].mesh;
+  description.method = method;
+  description.layout.normals =
+      scene_->parts[part].primitive->normals.empty() ? VertexFormat::none : VertexFormat::float32x3;
+  description.bounds = true;
+  return description;
+}
+
+Result<void> DrawnScene::prepare(Method method) {
+  for (std::size_t part = 0; part < shared_.size(); ++part) {
+    if (!shared_[part].mesh) continue;
+    if (Result<void> done = system_->prepare(instanceOf(part, method)); !done) return done;
+  }
+  return {};
+}
+
+Result<void> DrawnScene::addFigure(Method method) {
+  Figure figure;
+  figure.palettes.resize(scene_->model->skins.size());
+  std::vector<bool> isUsed(figure.palettes.size());
+  for (std::size_t index = 0; index < shared_.size(); ++index) {
+    FigurePart& part = figure.parts.emplace_back();
+    if (!shared_[index].mesh) continue;
+    const std::uint32_t skin = scene_->parts[index].source.skin;
+    if (!isUsed[skin]) {
+      const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
+      Result<PaletteHandle> palette = system_->addPalette(joints);
+      if (!palette) return palette.error();
+      figure.palettes[skin] = *palette;
+      isUsed[skin] = true;
+    }
+    InstanceDescription description = instanceOf(index, method);
+    description.palette = figure.palettes[skin];
+    Result<InstanceHandle> instance = system_->addInstance(description);
+    if (!instance) return instance.error();
+    part.instance = *instance;
+  }
+  figures_.push_back(std::move(figure));
+  return {};
+}
+
+Result<void> DrawnScene::beginFrame() {
+  ++frame_;
+  return system_->beginFrame(frame_, frame_ - 1);
+}
+
+Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
+  Figure& figure = figures_[index];
+  std::vector<bool> isWritten(figure.palettes.size());
+  for (std::size_t i = 0; i < scene_->parts.size(); ++i) {
+    const ScenePart& part = scene_->parts[i];
+    FigurePart& posed = figure.parts[i];
+    if (!posed.instance) {
+      if (Result<void> placed = placeFixed(part, pose.morphs[i], posed.fixed); !placed)
+        return placed;
+      continue;
+    }
+    const std::vector<JointMatrix>& palette = pose.palette(part);
+    posed.isMirrored = isMirrored(palette);
+    if (!isWritten[part.source.skin]) {
+      isWritten[part.source.skin] = true;
+      Result<std::span<JointMatrix>> place = system_->writePose(figure.palettes[part.source.skin]);
+      if (!place) return place.error();
+      std::ranges::copy(palette, place->begin());
+    }
+    if (part.primitive->morphTargets.empty()) continue;
+    if (Result<void> set = system_->setMorphWeights(*posed.instance, pose.morphs[i]); !set)
+      return set;
+  }
+  return {};
+}
+
+Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const MorphWeight> morphs,
+                                    FixedPart& fixed) const {
+  const SkinnedPart posed = bindPose(part, morphs);
+  const std::uint64_t positions = posed.positions.size() * sizeof(float);
+  const std::uint64_t normals = posed.normals.size() * sizeof(float);
+  if (fixed.vertices.handle() == VK_NULL_HANDLE) {
+    Result<MappedBuffer> made = MappedBuffer::create(*device_->device, positions + normals,
+                                                     VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
+    if (!made) return made.error();
+    fixed.vertices = std::move(*made);
+  }
+  std::memcpy(fixed.vertices.bytes().data(), posed.positions.data(), positions);
+  if (normals != 0)
+    std::memcpy(fixed.vertices.bytes().data() + positions, posed.normals.data(), normals);
+  fixed.box = boxOf(posed.positions);
+  return {};
+}
+
+Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
+  recordBarrier(*device_->device, commandBuffer,
+                vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+  if (Result<void> done = system_->record(commandBuffer); !done) return done;
+  recordBarrier(*device_->device, commandBuffer,
+                vulkan::outputScope(vulkan::Consumer::vertexInput));
+  return {};
+}
+
+Result<void> DrawnScene::addDraws(std::uint32_t figure, const JointMatrix& transform,
+                                  std::vector<Draw>& draws) const {
+  for (std::size_t index = 0; index < shared_.size(); ++index) {
+    const FigurePart& part = figures_[figure].parts[index];
+    Draw& draw = draws.emplace_back();
+    draw.geometry = shared_[index].geometry;
+    draw.surface = shared_[index].surface;
+    draw.transform = transform;
+    draw.isMirrored = part.isMirrored;
+    if (part.instance) {
+      const Result<InstanceOutput> output = system_->output(*part.instance);
+      if (!output) return output.error();
+      const auto stream = [&](const OutputAttribute& attribute) -> samples::render::VertexStream {
+        return {system_->outputBuffer(), attribute.offset, attribute.stride, attribute.format};
+      };
+      draw.positions = stream(output->positions);
+      if (output->normals.format != VertexFormat::none) draw.normals = stream(output->normals);
+      continue;
+    }
+    const gltf::Primitive& primitive = *scene_->parts[index].primitive;
+    const VkBuffer buffer = part.fixed.vertices.handle();
+    draw.positions = {buffer, 0, bytesPerVector, VertexFormat::float32x3};
+    if (!primitive.normals.empty()) {
+      draw.normals = {buffer, std::uint64_t{bytesPerVector} * primitive.vertexCount, bytesPerVector,
+                      VertexFormat::float32x3};
+    }
+  }
+  return {};
+}
+
+Result<std::optional<Box>> DrawnScene::bounds(std::uint32_t figure) const {
+  std::optional<Box> all;
+  for (const FigurePart& part : figures_[figure].parts) {
+    if (!part.instance) {
+      if (part.fixed.box.min[0] <= part.fixed.box.max[0]) include(all, part.fixed.box);
+      continue;
+    }
+    const Result<std::optional<Box>> box = system_->bounds(*part.instance);
+    if (!box) return box.error();
+    if (*box) include(all, **box);
+  }
+  return all;
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,89 @@
+// A scene, once or many times over, skinned by a SkinningSystem and ready to be drawn from its
+// output.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "dermis/vulkan/skinning_system.h"
+#include "open_device.h"
+#include "render/renderer.h"
+#include "skinned_scene.h"
+
+namespace dermis::cli {
+
+/// Every figure of a crowd is the whole scene, in a pose of its own.
+class DrawnScene {
+ public:
+  /// `device`, `renderer` and `scene` must outlive it. The scene's method must be allowed.
+  static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
+                                   const Scene& scene, std::uint32_t figures, Method method);
+
+  std::uint32_t figureCount() const { return static_cast<std::uint32_t>(figures_.size()); }
+
+  /// Begins the next frame; all recorded before must be complete.
+  Result<void> beginFrame();
+  Result<void> setPose(std::uint32_t figure, const ScenePose& pose);
+  /// Skins, and makes what was skinned ready to be drawn.
+  Result<void> recordSkinning(VkCommandBuffer commandBuffer);
+
+  /// What draws a figure as it was last posed, its bind space moved by `transform`.
+  Result<void> addDraws(std::uint32_t figure, const JointMatrix& transform,
+                        std::vector<samples::render::Draw>& draws) const;
+  /// Around a figure as it was skinned in the last complete frame; nothing where no vertex of it is
+  /// finite. Call `beginFrame` before.
+  Result<std::optional<Box>> bounds(std::uint32_t figure) const;
+
+  /// What of the materials could not be had.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  /// A part that no joint moves.
+  struct FixedPart {
+    samples::MappedBuffer vertices;  ///< positions, then normals where there are any
+    Box box;
+  };
+  struct FigurePart {
+    std::optional<InstanceHandle> instance;
+    FixedPart fixed;
+    bool isMirrored = false;
+  };
+  struct Figure {
+    std::vector<PaletteHandle> palettes;  ///< by skin; a null handle where no part uses it
+    std::vector<FigurePart> parts;
+  };
+  /// What all figures share.
+  struct SharedPart {
+    const samples::render::Geometry* geometry = nullptr;
+    samples::render::Surface surface;
+    std::optional<MeshHandle> mesh;
+  };
+
+  DrawnScene() = default;
+  Result<void> makeSystem(std::uint32_t figures);
+  Result<void> addSharedParts(samples::render::Renderer& renderer);
+  Result<std::uint32_t> textureOf(samples::render::Renderer& renderer, const gltf::TextureUse& use);
+  Result<void> addFigure(Method method);
+  Result<void> prepare(Method method);
+  InstanceDescription instanceOf(std::size_t part, Method method) const;
+  Result<void> placeFixed(const ScenePart& part, std::span<const MorphWeight> morphs,
+                          FixedPart& fixed) const;
+
+  samples::OpenDevice* device_ = nullptr;
+  const Scene* scene_ = nullptr;
+  std::optional<vulkan::SkinningSystem> system_;
+  std::uint64_t frame_ = 0;
+  std::map<const gltf::Primitive*, samples::render::Geometry> geometries_;
+  /// The renderer's, by image and how it is wrapped; 0 for one that cannot be decoded.
+  std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;
+  std::vector<SharedPart> shared_;
+  std::vector<Figure> figures_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace dermis::cli

@@ -1,0 +1,38 @@
+// What of a mesh does not change when it is skinned.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "buffer.h"
+
+namespace dermis::samples::render {
+
+struct GeometryData {
+  std::uint32_t vertexCount = 0;
+  std::span<const std::uint32_t> triangles;  ///< 3 indices each, all below `vertexCount`
+  std::span<const float> texcoords;          ///< 2 a vertex, or none
+  std::span<const float> colors;             ///< 4 a vertex, linear, or none: white
+};
+
+/// As it stands in the vertex buffer.
+struct StaticVertex {
+  float texcoord[2];
+  std::uint16_t color[4];
+};
+static_assert(sizeof(StaticVertex) == 16);
+
+class Geometry {
+ public:
+  static Result<Geometry> create(Device& device, const GeometryData& data);
+
+  VkBuffer vertices() const { return vertices_.handle(); }
+  VkBuffer indices() const { return indices_.handle(); }
+  std::uint32_t indexCount() const { return indexCount_; }
+
+ private:
+  MappedBuffer vertices_, indices_;
+  std::uint32_t indexCount_ = 0;
+};
+
+}  // namespace dermis::samples::render

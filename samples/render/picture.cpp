@@ -1,0 +1,132 @@
+#include "picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include <png.h>
+
+#include "stb_headers.h"
+
+namespace dermis::samples::render {
+namespace {
+
+constexpr std::array<const char*, 3> fontFiles{
+    "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
+    "/usr/share/fonts/TTF/DejaVuSans.ttf",
+    "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
+};
+
+/// The code points of a text; a byte that begins none counts as U+FFFD.
+std::vector<int> codePoints(std::string_view text) {
+  std::vector<int> points;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i++]);
+    const int following = byte < 0x80   ? 0
+                          : byte < 0xc0 ? -1
+                          : byte < 0xe0 ? 1
+                          : byte < 0xf0 ? 2
+                                        : 3;
+    int point = following < 0 ? 0xfffd : following == 0 ? byte : byte & (0x3f >> following);
+    for (int k = 0; k < following && i < text.size(); ++k)
+      point = point << 6 | (static_cast<unsigned char>(text[i++]) & 0x3f);
+    points.push_back(point);
+  }
+  return points;
+}
+
+/// Mixes a colour into a pixel by a share of 0 to 255.
+void mix(std::uint8_t* pixel, const std::uint8_t* color, unsigned share) {
+  for (int i = 0; i < 3; ++i)
+    pixel[i] = static_cast<std::uint8_t>((pixel[i] * (255 - share) + color[i] * share + 127) / 255);
+}
+
+stbtt_fontinfo infoOf(const std::vector<unsigned char>& file) {
+  stbtt_fontinfo info;
+  stbtt_InitFont(&info, file.data(), stbtt_GetFontOffsetForIndex(file.data(), 0));
+  return info;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> encodePng(const Picture& picture) {
+  std::vector<std::uint8_t> opaque;
+  opaque.reserve(picture.pixels.size() / 4 * 3);
+  for (std::size_t i = 0; i + 3 < picture.pixels.size(); i += 4)
+    opaque.insert(opaque.end(), &picture.pixels[i], &picture.pixels[i] + 3);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = picture.width;
+  image.height = picture.height;
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::vector<std::byte> bytes(size);
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, opaque.data(), 0, nullptr) == 0) {
+    return Error{ErrorCode::limitExceeded,
+                 std::string("the picture cannot be written as PNG: ") + image.message};
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+Result<Font> Font::load() {
+  std::vector<const char*> names(fontFiles.begin(), fontFiles.end());
+  if (const char* own = std::getenv("DERMIS_FONT"); own != nullptr)
+    names.insert(names.begin(), own);
+  for (const char* name : names) {
+    std::ifstream stream(name, std::ios::binary);
+    if (!stream) continue;
+    Font font;
+    font.file_.assign(std::istreambuf_iterator<char>(stream), {});
+    stbtt_fontinfo info;
+    const int offset =
+        font.file_.size() < 1024 ? -1 : stbtt_GetFontOffsetForIndex(font.file_.data(), 0);
+    if (offset >= 0 && stbtt_InitFont(&info, font.file_.data(), offset) != 0) return font;
+  }
+  return Error{ErrorCode::ioError,
+               "there is no DejaVuSans.ttf on this machine (Debian: fonts-dejavu-core)"};
+}
+
+float Font::width(std::string_view text, float height) const {
+  const stbtt_fontinfo info = infoOf(file_);
+  int sum = 0;
+  for (const int point : codePoints(text)) {
+    int advance = 0, bearing = 0;
+    stbtt_GetCodepointHMetrics(&info, point, &advance, &bearing);
+    sum += advance;
+  }
+  return static_cast<float>(sum) * stbtt_ScaleForPixelHeight(&info, height);
+}
+
+void Font::draw(Picture& picture, std::string_view text, const Label& label) const {
+  const stbtt_fontinfo info = infoOf(file_);
+  const float scale = stbtt_ScaleForPixelHeight(&info, label.height);
+  float x = label.x;
+  for (const int point : codePoints(text)) {
+    int advance = 0, bearing = 0, width = 0, height = 0, left = 0, top = 0;
+    stbtt_GetCodepointHMetrics(&info, point, &advance, &bearing);
+    unsigned char* shape = stbtt_GetCodepointBitmapSubpixel(&info, scale, scale, x - std::floor(x),
+                                                            0, point, &width, &height, &left, &top);
+    for (int row = 0; row < height; ++row) {
+      for (int column = 0; column < width; ++column) {
+        const int px = static_cast<int>(std::floor(x)) + left + column;
+        const int py = static_cast<int>(std::lround(label.y)) + top + row;
+        if (px < 0 || py < 0 || px >= static_cast<int>(picture.width) ||
+            py >= static_cast<int>(picture.height))
+          continue;
+        const std::size_t place =
+            static_cast<std::size_t>(py) * picture.width + static_cast<std::size_t>(px);
+        mix(&picture.pixels[place * 4], label.color, shape[row * width + column]);
+      }
+    }
+    stbtt_FreeBitmap(shape, nullptr);
+    x += static_cast<float>(advance) * scale;
+  }
+}
+
+}  // namespace dermis::samples::render

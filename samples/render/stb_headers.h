@@ -1,0 +1,10 @@
+// stb as the renderer uses it: declarations here, its code in stb_implementation.cpp.
+#pragma once
+
+// The switches change what is compiled: PNG and JPEG from memory are all that glTF needs.
+#define STBI_ONLY_PNG
+#define STBI_ONLY_JPEG
+#define STBI_NO_STDIO
+
+#include <stb/stb_image.h>
+#include <stb/stb_truetype.h>

@@ -1,0 +1,97 @@
+#include "pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "render/texture.h"
+
+namespace dermis::test {
+namespace {
+
+using samples::render::Picture;
+
+constexpr std::uint32_t window = 8;
+
+struct Window {
+  std::array<double, 3> color{};
+  std::array<double, window * window> luminance{};
+};
+
+Window windowAt(const Picture& picture, std::uint32_t left, std::uint32_t top) {
+  Window result;
+  for (std::uint32_t i = 0; i < window * window; ++i) {
+    const std::size_t place = std::size_t{top + i / window} * picture.width + left + i % window;
+    const std::uint8_t* pixel = &picture.pixels[place * 4];
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      result.color[channel] += pixel[channel] / static_cast<double>(window * window);
+    result.luminance[i] = 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
+  }
+  return result;
+}
+
+double meanOf(const Window& of) {
+  double sum = 0;
+  for (const double value : of.luminance) sum += value;
+  return sum / static_cast<double>(of.luminance.size());
+}
+
+double similarityOf(const Window& a, const Window& b) {
+  // The constants of the paper, for values from 0 to 255.
+  constexpr double c1 = 6.5025, c2 = 58.5225;
+  const double meanA = meanOf(a), meanB = meanOf(b);
+  double varianceA = 0, varianceB = 0, covariance = 0;
+  for (std::size_t i = 0; i < a.luminance.size(); ++i) {
+    const double da = a.luminance[i] - meanA, db = b.luminance[i] - meanB;
+    varianceA += da * da;
+    varianceB += db * db;
+    covariance += da * db;
+  }
+  const double count = static_cast<double>(a.luminance.size()) - 1;
+  return (2 * meanA * meanB + c1) * (2 * covariance / count + c2) /
+         ((meanA * meanA + meanB * meanB + c1) * ((varianceA + varianceB) / count + c2));
+}
+
+}  // namespace
+
+std::optional<Picture> readPng(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<char> bytes(std::istreambuf_iterator<char>(file), {});
+  Result<samples::render::TexturePixels> pixels =
+      samples::render::decodeImage(std::as_bytes(std::span(bytes)));
+  if (!pixels) return std::nullopt;
+  return Picture{pixels->width, pixels->height, std::move(pixels->pixels)};
+}
+
+PictureDifference comparePictures(const Picture& a, const Picture& b) {
+  PictureDifference difference;
+  if (a.width != b.width || a.height != b.height || a.width < window || a.height < window)
+    return difference;
+  difference.worstColor = 0;
+  difference.worstSimilarity = 1;
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::uint32_t top = 0; top + window <= a.height; top += window / 2) {
+    for (std::uint32_t left = 0; left + window <= a.width; left += window / 2) {
+      const Window ofA = windowAt(a, left, top), ofB = windowAt(b, left, top);
+      const double similarity = similarityOf(ofA, ofB);
+      sum += similarity;
+      ++count;
+      difference.worstSimilarity = std::min(difference.worstSimilarity, similarity);
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        difference.worstColor =
+            std::max(difference.worstColor, std::abs(ofA.color[channel] - ofB.color[channel]));
+      }
+    }
+  }
+  difference.similarity = sum / static_cast<double>(count);
+  return difference;
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,28 @@
+// Pictures compared as an eye does it: what two drivers round differently does not count, what is
+// in another place or of another colour does.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "render/picture.h"
+
+namespace dermis::test {
+
+/// A PNG file.
+std::optional<samples::render::Picture> readPng(const std::string& path);
+
+struct PictureDifference {
+  /// Mean structural similarity of the luminances, in windows of 8 x 8 pixels: 1 for the same
+  /// (Wang et al. 2004, "Image quality assessment").
+  double similarity = 0;
+  double worstSimilarity = 0;  ///< of a window
+  /// The largest difference of the mean colours of two such windows, 0 to 255.
+  double worstColor = 255;
+};
+
+/// Pictures of different sizes have nothing in common.
+PictureDifference comparePictures(const samples::render::Picture& a,
+                                  const samples::render::Picture& b);
+
+}  // namespace dermis::test
