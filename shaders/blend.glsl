@@ -14,36 +14,34 @@
 #include "center_of_rotation.glsl"
 #endif
 
-Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
-                    bool withTangent) {
+Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
   switch (METHOD) {
 #ifdef COMPARISON
     case METHOD_LOG_MATRIX:
-      return skinLogMatrix(vertex, influences, palette, jointCount, withNormal, withTangent);
+      return skinLogMatrix(vertex, influences, pose, withNormal, withTangent);
     case METHOD_SPHERICAL_BLEND:
-      return skinSpherical(vertex, influences, palette, jointCount, withNormal, withTangent);
+      return skinSpherical(vertex, influences, pose, withNormal, withTangent);
     case METHOD_QUATERNION_TRANSLATION:
-      return skinQuaternionTranslation(vertex, influences, palette, jointCount, withNormal, withTangent);
+      return skinQuaternionTranslation(vertex, influences, pose, withNormal, withTangent);
     default:
-      return skinIterative(vertex, influences, palette, jointCount, withNormal, withTangent);
+      return skinIterative(vertex, influences, pose, withNormal, withTangent);
 #else
     case METHOD_LINEAR:
-      return skinLinear(vertex, influences, palette, withNormal, withTangent);
+      return skinLinear(vertex, influences, pose, withNormal, withTangent);
     case METHOD_BLENDED:
-      return skinBlended(vertex, influences, palette, jointCount, inputs.share, withNormal, withTangent);
+      return skinBlended(vertex, influences, pose, inputs.share, withNormal, withTangent);
     case METHOD_CENTER_OF_ROTATION:
-      return skinCenterOfRotation(vertex, influences, palette, jointCount, inputs.center, withNormal, withTangent);
+      return skinCenterOfRotation(vertex, influences, pose, inputs.center, withNormal, withTangent);
     case METHOD_BULGE_CONTROLLED:
-      return skinBulgeControlled(vertex, influences, palette, jointCount, inputs.center, inputs.share, withNormal, withTangent);
+      return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.share, withNormal, withTangent);
     default:
-      return skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
+      return skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
 #endif
   }
 }
 
 // A vertex without influences stays in bind pose.
-Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uint palette, uint jointCount, bool withNormal,
-                  bool withTangent) {
+Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
   // Where up to four influences were read they are joint 0 for such a vertex. Most meshes have none: choosing afterwards costs
   // less than a branch around everything, unless the method goes on until it converges.
 #ifdef COMPARISON
@@ -52,10 +50,8 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, uin
   const bool branches = INFLUENCES == 0u;
 #endif
   bool still = influences.count == 0u;
-  Vertex rest = vertex;
-  if (!UNIT_BEFORE) makeDirectionsUnit(rest, withNormal, withTangent);
-  if (branches && still) return rest;
-  Vertex skinned = skinByMethod(vertex, influences, inputs, palette, jointCount, withNormal, withTangent);
-  if (still) skinned = rest;
+  if (branches && still) return vertex;
+  Vertex skinned = skinByMethod(vertex, influences, inputs, pose, withNormal, withTangent);
+  if (still) skinned = vertex;
   return skinned;
 }

@@ -2,40 +2,35 @@
 // palette serves both. Needs linear and dual_quaternion.
 
 // The rows of R S, one joint's 3×3.
-void jointRows(vec4 q, ScaleShear part, bool twoPhase, out vec3 r0, out vec3 r1, out vec3 r2) {
+void jointRows(vec4 q, Pose pose, uint joint, out vec3 r0, out vec3 r1, out vec3 r2) {
   rowsOfQuaternion(q, r0, r1, r2);
-  if (twoPhase) {  // S is symmetric: a row of R S is S times that row of R
+  if (pose.scales) {  // S is symmetric: a row of R S is S times that row of R
+    ScaleShear part = paletteScaleShear(pose, joint);
     r0 = scalePosition(part, r0);
     r1 = scalePosition(part, r1);
     r2 = scalePosition(part, r2);
   }
 }
 
-Vertex skinBlended(Vertex vertex, Influences influences, uint palette, uint jointCount, float share, bool withNormal,
-                   bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
+Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share, bool withNormal, bool withTangent) {
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
-    vec4 real = paletteRotation(palette, joint);
-    ScaleShear part = ScaleShear(vec3(1.0), vec3(0.0));
-    if (twoPhase) part = paletteScaleShear(palette, jointCount, joint);
+    vec4 real = paletteRotation(pose.palette, joint);
     vec3 row0;
     vec3 row1;
     vec3 row2;
-    jointRows(real, part, twoPhase, row0, row1, row2);
-    vec3 translation = translationOf(real, paletteDual(palette, joint), 1.0);
+    jointRows(real, pose, joint, row0, row1, row2);
+    vec3 translation = translationOf(real, paletteDual(pose.palette, joint), 1.0);
     r0 += weight * vec4(row0, translation.x);
     r1 += weight * vec4(row1, translation.y);
     r2 += weight * vec4(row2, translation.z);
   }
-  Vertex unscaled = vertex;
-  if (!UNIT_BEFORE) makeDirectionsUnit(unscaled, withNormal, withTangent);
-  Vertex straight = throughMatrix(unscaled, r0, r1, r2, withNormal, withTangent);
-  Vertex skinned = skinDualQuaternion(vertex, influences, palette, jointCount, withNormal, withTangent);
+  Vertex straight = throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
+  Vertex skinned = skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
   if (share >= 1.0) return skinned;
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;

@@ -17,18 +17,16 @@ DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
   return DirectionMap(n0, n1, n2, dot3(n0, cross3(n1, n2)) < 0.0 ? -1.0 : 1.0);
 }
 
-vec3 directionOr(vec3 direction, vec3 fallback) { return largestComponent(direction) == 0.0 ? fallback : direction; }
-
 // Normals go by the cofactors of the matrix, which have the direction of its inverse transpose and stay finite where it is
-// singular; a mirror turns them over once. Not of unit length; where nothing is left, as they were.
+// singular; a mirror turns them over once. Not of unit length, and zero where nothing is left.
 vec3 mapNormal(DirectionMap map, vec3 normal) {
   precise vec3 turned = map.side * vec3(dot3(cross3(map.r1, map.r2), normal), dot3(cross3(map.r2, map.r0), normal),
                                         dot3(cross3(map.r0, map.r1), normal));
-  return directionOr(turned, normal);
+  return turned;
 }
 
 // Tangents go by the matrix itself.
 vec3 mapTangent(DirectionMap map, vec3 tangent) {
   precise vec3 turned = vec3(dot3(map.r0, tangent), dot3(map.r1, tangent), dot3(map.r2, tangent));
-  return directionOr(turned, tangent);
+  return turned;
 }

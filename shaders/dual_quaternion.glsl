@@ -6,56 +6,48 @@
 struct Blend {
   vec4 real;
   vec4 dual;
-  ScaleShear part;
 };
 
 float signedWeight(vec4 pivot, vec4 rotation, float weight) { return dot4(pivot, rotation) < 0.0 ? -weight : weight; }
 
-// Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex comes
-// out to the bit as if the palette had no such joint. A loop of its own, over nothing where it is not wanted: some drivers execute
-// both sides of an `if`, but none goes through a loop that is over.
-ScaleShear blendScaleShear(Influences influences, uint palette, uint jointCount, bool twoPhase) {
-  precise vec3 diagonal = vec3(1.0);
-  precise vec3 mixed = vec3(0.0);
-  uint count = twoPhase ? influences.count : 0u;
-  vec3 pivotDiagonal = vec3(0.0);
-  vec3 pivotMixed = vec3(0.0);
-  for (uint slot = 0u; slot < count; ++slot) {
-    ScaleShear part = paletteScaleShear(palette, jointCount, influenceJoint(influences, slot));
-    if (slot == 0u) {
-      pivotDiagonal = part.diagonal;
-      pivotMixed = part.mixed;
-      diagonal = part.diagonal;
-      mixed = part.mixed;
-    }
-    float weight = influenceWeight(influences, slot);
-    diagonal += weight * (part.diagonal - pivotDiagonal);
-    mixed += weight * (part.mixed - pivotMixed);
-  }
-  return ScaleShear(diagonal, mixed);
-}
-
-Blend blendJoints(Influences influences, uint palette, uint jointCount, bool twoPhase) {
+Blend blendJoints(Influences influences, Pose pose) {
   uint pivotJoint = influenceJoint(influences, 0u);
-  vec4 pivot = paletteRotation(palette, pivotJoint);
+  vec4 pivot = paletteRotation(pose.palette, pivotJoint);
   float pivotWeight = influenceWeight(influences, 0u);
   precise vec4 real = pivotWeight * pivot;
-  precise vec4 dual = pivotWeight * paletteDual(palette, pivotJoint);
+  precise vec4 dual = pivotWeight * paletteDual(pose.palette, pivotJoint);
   for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
     if (slot >= influences.count) break;
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
-    vec4 rotation = paletteRotation(palette, joint);
+    vec4 rotation = paletteRotation(pose.palette, joint);
     float towardsPivot = signedWeight(pivot, rotation, weight);
     real += towardsPivot * rotation;
-    dual += towardsPivot * paletteDual(palette, joint);
+    dual += towardsPivot * paletteDual(pose.palette, joint);
   }
-  return Blend(real, dual, blendScaleShear(influences, palette, jointCount, twoPhase));
+  return Blend(real, dual);
+}
+
+// Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex comes
+// out to the bit as if the palette had no joint that does.
+ScaleShear blendScaleShear(Influences influences, Pose pose) {
+  ScaleShear pivot = paletteScaleShear(pose, influenceJoint(influences, 0u));
+  precise vec3 diagonal = pivot.diagonal;
+  precise vec3 mixed = pivot.mixed;
+  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
+    if (slot >= influences.count) break;
+    float weight = influenceWeight(influences, slot);
+    ScaleShear part = paletteScaleShear(pose, influenceJoint(influences, slot));
+    diagonal += weight * (part.diagonal - pivot.diagonal);
+    mixed += weight * (part.mixed - pivot.mixed);
+  }
+  return ScaleShear(diagonal, mixed);
 }
 
 // The first phase: a vertex scaled and sheared in bind space. Its directions are of unit length.
 struct Scaled {
   Vertex vertex;
+  ScaleShear part;
   float side;  // -1 where it was mirrored
 };
 
@@ -66,20 +58,21 @@ vec3 scalePosition(ScaleShear part, vec3 p) {
   return position;
 }
 
-Scaled scaleVertex(Vertex vertex, ScaleShear part, bool twoPhase, bool withNormal, bool withTangent) {
-  Scaled scaled = Scaled(vertex, 1.0);
-  if (twoPhase) {
+Scaled scaleVertex(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+  Scaled scaled = Scaled(vertex, ScaleShear(vec3(1.0), vec3(0.0)), 1.0);
+  if (pose.scales) {
+    ScaleShear part = blendScaleShear(influences, pose);
+    scaled.part = part;
     scaled.vertex.position = scalePosition(part, vertex.position);
     if (withNormal || withTangent) {
       DirectionMap map =
           directionMap(vec3(part.diagonal.x, part.mixed.x, part.mixed.y), vec3(part.mixed.x, part.diagonal.y, part.mixed.z),
                        vec3(part.mixed.y, part.mixed.z, part.diagonal.z));
       scaled.side = map.side;
-      if (withNormal) scaled.vertex.normal = mapNormal(map, vertex.normal);
-      if (withTangent) scaled.vertex.tangent.xyz = mapTangent(map, vertex.tangent.xyz);
+      if (withNormal) scaled.vertex.normal = unitOr(mapNormal(map, vertex.givenNormal), vertex.normal);
+      if (withTangent) scaled.vertex.tangent.xyz = unitOr(mapTangent(map, vertex.givenTangent), vertex.tangent.xyz);
     }
   }
-  if (!UNIT_BEFORE) makeDirectionsUnit(scaled.vertex, withNormal, withTangent);
   return scaled;
 }
 
@@ -101,11 +94,10 @@ vec3 translationOf(vec4 real, vec4 dual, float squaredLength) {
   return translation;
 }
 
-Vertex skinDualQuaternion(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal,
-                          bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
-  Blend blend = blendJoints(influences, palette, jointCount, twoPhase);
+Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+  Blend blend = blendJoints(influences, pose);
   float squaredLength = dot4(blend.real, blend.real);
-  return turnVertex(scaleVertex(vertex, blend.part, twoPhase, withNormal, withTangent), blend.real, squaredLength,
-                    translationOf(blend.real, blend.dual, squaredLength), withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, squaredLength, translationOf(blend.real, blend.dual, squaredLength), withNormal,
+                    withTangent);
 }

@@ -26,15 +26,10 @@ float powerScale(float largest) {
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);
 }
 
-// v with length 1, or `fallback` with length 1 where v vanished; zero where both did, at any scale of a joint.
+// v with length 1, at any scale of a joint, or `fallback` where v vanished.
 vec3 unitOr(vec3 v, vec3 fallback) {
-  float largest = largestComponent(v);
-  if (largest == 0.0) {
-    v = fallback;
-    largest = largestComponent(v);
-    if (largest == 0.0) return vec3(0.0);
-  }
-  precise vec3 scaled = v * powerScale(largest);
-  precise vec3 unit = scaled * inversesqrt(dot3(scaled, scaled));
-  return unit;
+  precise vec3 scaled = v * powerScale(largestComponent(v));
+  float squared = dot3(scaled, scaled);
+  precise vec3 unit = scaled * inversesqrt(squared);
+  return squared == 0.0 ? fallback : unit;
 }

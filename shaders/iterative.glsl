@@ -14,7 +14,7 @@ void makeUnit(inout vec4 real, inout vec4 dual) {
 }
 
 // The mean screw from a transform to the joints', and the square of how far their dual parts reach.
-Screw meanScrew(vec4 real, vec4 dual, Influences influences, uint palette, vec4 pivot, out float reach) {
+Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 pivot, out float reach) {
   precise vec3 turn = vec3(0.0);
   precise vec3 shift = vec3(0.0);
   vec4 backReal = conjugateOf(real);
@@ -23,8 +23,8 @@ Screw meanScrew(vec4 real, vec4 dual, Influences influences, uint palette, vec4 
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
-    vec4 jointReal = paletteRotation(palette, joint);
-    vec4 jointDual = paletteDual(palette, joint);
+    vec4 jointReal = paletteRotation(pose.palette, joint);
+    vec4 jointDual = paletteDual(pose.palette, joint);
     reach = max(reach, dot4(jointDual, jointDual));
     if (dot4(pivot, jointReal) < 0.0) {
       jointReal = -jointReal;
@@ -38,14 +38,13 @@ Screw meanScrew(vec4 real, vec4 dual, Influences influences, uint palette, vec4 
   return Screw(turn, shift);
 }
 
-Vertex skinIterative(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal, bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
-  Blend blend = blendJoints(influences, palette, jointCount, twoPhase);
-  vec4 pivot = paletteRotation(palette, influenceJoint(influences, 0u));
+Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+  Blend blend = blendJoints(influences, pose);
+  vec4 pivot = paletteRotation(pose.palette, influenceJoint(influences, 0u));
   makeUnit(blend.real, blend.dual);
   for (uint step = 0u; step < MOST_STEPS; ++step) {
     float reach;
-    Screw screw = meanScrew(blend.real, blend.dual, influences, palette, pivot, reach);
+    Screw screw = meanScrew(blend.real, blend.dual, influences, pose, pivot, reach);
     vec4 real;
     vec4 dual;
     exponentialOf(screw, real, dual);
@@ -57,6 +56,6 @@ Vertex skinIterative(Vertex vertex, Influences influences, uint palette, uint jo
     precise float near = 9e-14 * reach;
     if (dot3(screw.real, screw.real) <= 9e-14 && dot3(screw.dual, screw.dual) <= near) break;
   }
-  return turnVertex(scaleVertex(vertex, blend.part, twoPhase, withNormal, withTangent), blend.real, 1.0,
-                    translationOf(blend.real, blend.dual, 1.0), withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, 1.0, translationOf(blend.real, blend.dual, 1.0), withNormal, withTangent);
 }

@@ -8,28 +8,28 @@ Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, 
   skinned.position = position;
   if (withNormal || withTangent) {
     DirectionMap map = directionMap(r0.xyz, r1.xyz, r2.xyz);
-    if (withNormal) skinned.normal = unitOr(mapNormal(map, vertex.normal), vec3(0.0));
+    if (withNormal) skinned.normal = unitOr(mapNormal(map, vertex.normal), vertex.normal);
     if (withTangent) {
-      vec3 direction = unitOr(mapTangent(map, vertex.tangent.xyz), vec3(0.0));
+      vec3 direction = unitOr(mapTangent(map, vertex.tangent.xyz), vertex.tangent.xyz);
       skinned.tangent = tangentOf(direction, vertex.tangent.w, map.side);
     }
   }
   return skinned;
 }
 
-Vertex skinLinear(Vertex vertex, Influences influences, uint palette, bool withNormal, bool withTangent) {
+Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
   float pivotWeight = influenceWeight(influences, 0u);
   uint pivotJoint = influenceJoint(influences, 0u);
-  precise vec4 r0 = pivotWeight * paletteRow(palette, pivotJoint, 0u);
-  precise vec4 r1 = pivotWeight * paletteRow(palette, pivotJoint, 1u);
-  precise vec4 r2 = pivotWeight * paletteRow(palette, pivotJoint, 2u);
+  precise vec4 r0 = pivotWeight * paletteRow(pose.palette, pivotJoint, 0u);
+  precise vec4 r1 = pivotWeight * paletteRow(pose.palette, pivotJoint, 1u);
+  precise vec4 r2 = pivotWeight * paletteRow(pose.palette, pivotJoint, 2u);
   for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
     if (slot >= influences.count) break;
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
-    r0 += weight * paletteRow(palette, joint, 0u);
-    r1 += weight * paletteRow(palette, joint, 1u);
-    r2 += weight * paletteRow(palette, joint, 2u);
+    r0 += weight * paletteRow(pose.palette, joint, 0u);
+    r1 += weight * paletteRow(pose.palette, joint, 1u);
+    r2 += weight * paletteRow(pose.palette, joint, 2u);
   }
   return throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
 }

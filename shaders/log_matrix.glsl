@@ -50,21 +50,19 @@ Affine exponentialOf(Affine logarithm) {
 
 vec3 direct(Affine m, vec3 v) { return vec3(dot3(m.r0.xyz, v), dot3(m.r1.xyz, v), dot3(m.r2.xyz, v)); }
 
-Vertex skinLogMatrix(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal, bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
+Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     uint joint = influenceJoint(influences, slot);
-    r0 += weight * paletteLogarithmRow(palette, joint, 0u);
-    r1 += weight * paletteLogarithmRow(palette, joint, 1u);
-    r2 += weight * paletteLogarithmRow(palette, joint, 2u);
+    r0 += weight * paletteLogarithmRow(pose.palette, joint, 0u);
+    r1 += weight * paletteLogarithmRow(pose.palette, joint, 1u);
+    r2 += weight * paletteLogarithmRow(pose.palette, joint, 2u);
   }
   Affine blended = exponentialOf(Affine(r0, r1, r2));
-  ScaleShear part = blendScaleShear(influences, palette, jointCount, twoPhase);
-  Scaled scaled = scaleVertex(vertex, part, twoPhase, withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   Vertex skinned = scaled.vertex;
   precise vec3 position = direct(blended, scaled.vertex.position) + vec3(blended.r0.w, blended.r1.w, blended.r2.w);
   skinned.position = position;

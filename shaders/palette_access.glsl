@@ -13,15 +13,22 @@ uvec4 paletteBits(uint unit) { return palettes[unit]; }
 
 vec4 paletteUnit(uint unit) { return uintBitsToFloat(paletteBits(unit)); }
 
-// A branch that some drivers execute whatever its condition is left out where no palette may scale.
-bool paletteIsTwoPhase(uint palette) { return SCALES && paletteBits(palette)[STATUS_TWO_PHASE] != 0u; }
+// Where a palette stands, how many joints it has, and whether one of them scales or shears.
+struct Pose {
+  uint palette;
+  uint joints;
+  bool scales;
+};
+
+// False, and a constant, where no palette may scale: nothing of what scales is left in the code.
+bool paletteScales(uint palette) { return SCALES && paletteBits(palette)[STATUS_TWO_PHASE] != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }
 
-ScaleShear paletteScaleShear(uint palette, uint jointCount, uint joint) {
+ScaleShear paletteScaleShear(Pose pose, uint joint) {
   const uint unitsOfJoint = METHOD == METHOD_LOG_MATRIX ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
-  uint unit = palette + 1u + jointCount * unitsOfJoint + joint * 2u;
+  uint unit = pose.palette + 1u + pose.joints * unitsOfJoint + joint * 2u;
   vec4 first = paletteUnit(unit);
   vec4 second = paletteUnit(unit + 1u);
   return ScaleShear(first.xyz, vec3(first.w, second.xy));

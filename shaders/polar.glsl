@@ -1,59 +1,66 @@
 // Polar decomposition of a 3×3 matrix. Needs exact.glsl and quaternion.glsl.
 
+// One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are the other two indices, vp and vq
+// the eigenvectors so far. In scalars, since drivers keep an array that is indexed in memory.
+void turnJacobi(inout float app, inout float aqq, inout float apq, inout float ajp, inout float ajq, inout float akp,
+                inout float akq, inout vec4 vp, inout vec4 vq) {
+  precise float theta = (aqq - app) / (2.0 * apq);
+  precise float tangent = (theta < 0.0 ? -1.0 : 1.0) / (abs(theta) + sqrt(1.0 + theta * theta));
+  if (apq == 0.0 || abs(theta) > 1e18) tangent = 0.0;
+  precise float cosine = inversesqrt(1.0 + tangent * tangent);
+  precise float sine = tangent * cosine;
+  precise float p = app - tangent * apq;
+  precise float q = aqq + tangent * apq;
+  precise vec2 j = vec2(cosine * ajp - sine * ajq, sine * ajp + cosine * ajq);
+  precise vec2 k = vec2(cosine * akp - sine * akq, sine * akp + cosine * akq);
+  precise vec4 turnedP = cosine * vp - sine * vq;
+  precise vec4 turnedQ = sine * vp + cosine * vq;
+  app = p;
+  aqq = q;
+  apq = 0.0;
+  ajp = j.x;
+  ajq = j.y;
+  akp = k.x;
+  akq = k.y;
+  vp = turnedP;
+  vq = turnedQ;
+}
+
 // The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue of a symmetric 4×4
 // matrix (Horn 1987, "Closed-form solution of absolute orientation using unit quaternions"). It also is the right rotation
 // for a matrix of rank 2, and finite for any. Cyclic Jacobi, which is as exact as float32 allows.
 vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
-  precise float a[16];  // symmetric, in the order x y z w
-  a[0] = r0.x - r1.y - r2.z;
-  a[5] = -r0.x + r1.y - r2.z;
-  a[10] = -r0.x - r1.y + r2.z;
-  a[15] = r0.x + r1.y + r2.z;
-  a[1] = a[4] = r0.y + r1.x;
-  a[2] = a[8] = r0.z + r2.x;
-  a[6] = a[9] = r1.z + r2.y;
-  a[3] = a[12] = r2.y - r1.z;
-  a[7] = a[13] = r0.z - r2.x;
-  a[11] = a[14] = r1.x - r0.y;
-  precise float v[16];  // eigenvectors, one a column
-  for (uint i = 0u; i < 16u; ++i) v[i] = i % 5u == 0u ? 1.0 : 0.0;
+  precise float xx = r0.x - r1.y - r2.z;
+  precise float yy = -r0.x + r1.y - r2.z;
+  precise float zz = -r0.x - r1.y + r2.z;
+  precise float ww = r0.x + r1.y + r2.z;
+  precise float xy = r0.y + r1.x;
+  precise float xz = r0.z + r2.x;
+  precise float yz = r1.z + r2.y;
+  precise float xw = r2.y - r1.z;
+  precise float yw = r0.z - r2.x;
+  precise float zw = r1.x - r0.y;
+  vec4 vx = vec4(1.0, 0.0, 0.0, 0.0);
+  vec4 vy = vec4(0.0, 1.0, 0.0, 0.0);
+  vec4 vz = vec4(0.0, 0.0, 1.0, 0.0);
+  vec4 vw = vec4(0.0, 0.0, 0.0, 1.0);
 
+  // It converges quadratically: four or five sweeps, and few matrices take more.
   for (uint sweep = 0u; sweep < 8u; ++sweep) {
-    for (uint p = 0u; p < 3u; ++p) {
-      for (uint q = p + 1u; q < 4u; ++q) {
-        precise float offDiagonal = a[p * 4u + q];
-        if (offDiagonal == 0.0) continue;
-        precise float theta = (a[q * 5u] - a[p * 5u]) / (2.0 * offDiagonal);
-        precise float tangent = (theta < 0.0 ? -1.0 : 1.0) / (abs(theta) + sqrt(1.0 + theta * theta));
-        if (isinf(theta) || abs(theta) > 1e18) tangent = 0.0;
-        precise float cosine = inversesqrt(1.0 + tangent * tangent);
-        precise float sine = tangent * cosine;
-        for (uint k = 0u; k < 4u; ++k) {
-          precise float x = a[k * 4u + p];
-          precise float y = a[k * 4u + q];
-          a[k * 4u + p] = cosine * x - sine * y;
-          a[k * 4u + q] = sine * x + cosine * y;
-        }
-        for (uint k = 0u; k < 4u; ++k) {
-          precise float x = a[p * 4u + k];
-          precise float y = a[q * 4u + k];
-          a[p * 4u + k] = cosine * x - sine * y;
-          a[q * 4u + k] = sine * x + cosine * y;
-          x = v[k * 4u + p];
-          y = v[k * 4u + q];
-          v[k * 4u + p] = cosine * x - sine * y;
-          v[k * 4u + q] = sine * x + cosine * y;
-        }
-        a[p * 4u + q] = 0.0;
-        a[q * 4u + p] = 0.0;
-      }
-    }
+    precise float outside = abs(xy) + abs(xz) + abs(xw) + abs(yz) + abs(yw) + abs(zw);
+    precise float inside = abs(xx) + abs(yy) + abs(zz) + abs(ww);
+    precise float negligible = 1e-12 * inside;
+    if (outside <= negligible) break;
+    turnJacobi(xx, yy, xy, xz, yz, xw, yw, vx, vy);
+    turnJacobi(xx, zz, xz, xy, yz, xw, zw, vx, vz);
+    turnJacobi(xx, ww, xw, xy, yw, xz, zw, vx, vw);
+    turnJacobi(yy, zz, yz, xy, xz, yw, zw, vy, vz);
+    turnJacobi(yy, ww, yw, xy, xw, yz, zw, vy, vw);
+    turnJacobi(zz, ww, zw, xz, xw, yz, yw, vz, vw);
   }
-  uint largest = 0u;
-  for (uint i = 1u; i < 4u; ++i) {
-    if (a[i * 5u] > a[largest * 5u]) largest = i;
-  }
-  precise vec4 q = vec4(v[largest], v[4u + largest], v[8u + largest], v[12u + largest]);
+
+  float largest = max(max(xx, yy), max(zz, ww));
+  vec4 q = xx == largest ? vx : (yy == largest ? vy : (zz == largest ? vz : vw));
   precise vec4 unit = q * inversesqrt(dot4(q, q));
   return unit;
 }

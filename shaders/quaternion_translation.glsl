@@ -1,17 +1,15 @@
 // Quaternions and translations, each blended on its own (Hejl 2004). Needs dual_quaternion.
 
-vec3 jointTranslation(uint palette, uint joint) {
-  return translationOf(paletteRotation(palette, joint), paletteDual(palette, joint), 1.0);
+vec3 jointTranslation(Pose pose, uint joint) {
+  return translationOf(paletteRotation(pose.palette, joint), paletteDual(pose.palette, joint), 1.0);
 }
 
-Vertex skinQuaternionTranslation(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal,
-                                 bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
-  Blend blend = blendJoints(influences, palette, jointCount, twoPhase);
+Vertex skinQuaternionTranslation(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+  Blend blend = blendJoints(influences, pose);
   precise vec3 translation = vec3(0.0);
   for (uint slot = 0u; slot < influences.count; ++slot) {
-    translation += influenceWeight(influences, slot) * jointTranslation(palette, influenceJoint(influences, slot));
+    translation += influenceWeight(influences, slot) * jointTranslation(pose, influenceJoint(influences, slot));
   }
-  return turnVertex(scaleVertex(vertex, blend.part, twoPhase, withNormal, withTangent), blend.real, dot4(blend.real, blend.real),
-                    translation, withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, dot4(blend.real, blend.real), translation, withNormal, withTangent);
 }

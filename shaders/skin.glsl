@@ -74,7 +74,7 @@ uint findGroup(uint number) {
 }
 
 Vertex bindVertex(uint mesh, uint vertex) {
-  Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0));
+  Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
   bind.position = meshVector(meshSection(mesh, MESH_HEADER_POSITIONS) + vertex * 3u);
   if (NORMALS) bind.normal = meshVector(meshSection(mesh, MESH_HEADER_NORMALS) + vertex * 3u);
   if (TANGENTS) {
@@ -136,20 +136,77 @@ Instance readInstance(uint record, uvec4 offsets) {
                   second[INSTANCE_EXTENSION - 4u], uvec4(first.yzw, second.x) + offsets);
 }
 
+// What an invocation has read of its vertex, for all its instances.
+struct Work {
+  uint mesh;
+  uint vertex;
+  Vertex bind;
+  Influences influences;
+  MethodInputs inputs;
+};
+
 #ifdef HAS_MOTION
-uvec4 previousPosition(Instance instance, uvec4 current, Vertex bind, Influences influences, MethodInputs inputs, uint mesh,
-                       uint vertex) {
+uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
   if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-  Vertex before = bind;
+  Vertex before = work.bind;
   if (MORPHS) {
-    morphVertex(before, mesh, vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
+    morphVertex(before, work.mesh, work.vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
                 tables[instance.extension + EXTENSION_PREVIOUS_MORPH_COUNT], false, false);
   }
-  before = skinVertex(before, influences, inputs, tables[instance.extension + EXTENSION_PREVIOUS_PALETTE],
-                      tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], false, false);
+  uint palette = tables[instance.extension + EXTENSION_PREVIOUS_PALETTE];
+  Pose pose = Pose(palette, tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], paletteScales(palette));
+  before = skinVertex(before, work.influences, work.inputs, pose, false, false);
   return encodePosition(before.position, instance.extension, false);
 }
+#endif
+
+void skinInstance(Instance instance, Work work, bool scales) {
+#ifdef HAS_MOTION
+  if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
+    uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+    return;
+  }
+#endif
+
+  Vertex morphed = work.bind;
+  if (MORPHS) {
+    morphVertex(morphed, work.mesh, work.vertex, tables[instance.extension + EXTENSION_MORPHS],
+                tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
+    makeDirectionsUnit(morphed, NORMALS, TANGENTS);
+  }
+  Pose pose = Pose(instance.palette, instance.jointCount, scales);
+  Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
+  if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
+  uvec4 position = encodePosition(skinned.position, instance.extension, true);
+#ifdef HAS_MOTION
+  if (MOTION != MOTION_NONE) {
+    uvec4 words = previousPosition(instance, position, work);
+    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+  }
+#endif
+#ifdef STORE_PAIRS
+  storePositionAndNormal(instance.places.x, position.xyz, floatBitsToUint(skinned.normal));
+#else
+  storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  if (NORMALS)
+    storeNormals(instance.places.y, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+#endif
+  if (TANGENTS) {
+    storeTangents(instance.places.z, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+  }
+}
+
+// Whether instances whose joints scale go through a loop of their own: some drivers execute what is in an `if` whatever its
+// condition is, and the others would pay for them. It takes longer to compile, which is not worth it for methods that are there for
+// comparison, nor where an invocation has few instances: drivers that want it so branch.
+#ifdef COMPARISON
+const bool APART = false;
+#elif defined(HAS_MOTION)
+const bool APART = SCALES && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
+#else
+const bool APART = SCALES && INSTANCES >= 8u;
 #endif
 
 void main() {
@@ -165,53 +222,33 @@ void main() {
   uint vertex = group.firstVertex + run;
   if (vertex >= group.vertexEnd) return;
   uint firstInstance = (local / group.vertexGroups) * INSTANCES;
-  uint instanceEnd = min(firstInstance + INSTANCES, group.instanceCount);
+  if (firstInstance >= group.instanceCount) return;
+  uint count = min(INSTANCES, group.instanceCount - firstInstance);
 
-  Vertex bind = bindVertex(group.mesh, vertex);
-  if (UNIT_BEFORE && !MORPHS) makeDirectionsUnit(bind, NORMALS, TANGENTS);
-  MethodInputs inputs = methodInputsOf(group.mesh, vertex);
-  Influences influences = influencesOf(group.mesh, vertex);
+  Work work;
+  work.mesh = group.mesh;
+  work.vertex = vertex;
+  work.bind = bindVertex(group.mesh, vertex);
+  if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
+  work.inputs = methodInputsOf(group.mesh, vertex);
+  work.influences = influencesOf(group.mesh, vertex);
 
   // Outside the loop: some drivers read push constants, too, as often as they stand there.
-  uint records = push[PUSH_INSTANCE_RECORDS] + group.firstInstance * INSTANCE_WORDS;
+  uint records = push[PUSH_INSTANCE_RECORDS] + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
   uvec4 offsets = run * group.strides;
-  for (uint number = firstInstance; number < instanceEnd; ++number) {
-    Instance instance = readInstance(records + number * INSTANCE_WORDS, offsets);
-
-#ifdef HAS_MOTION
-    if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
-      uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-      storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
-      continue;
+  uint left = 0xffffffffu >> (32u - count);  // a bit an instance
+  if (APART) {
+    uint scaling = 0u;
+    for (uint i = 0u; i < count; ++i) {
+      if (paletteScales(readInstance(records + i * INSTANCE_WORDS, offsets).palette)) scaling |= 1u << i;
     }
-#endif
-
-    Vertex morphed = bind;
-    if (MORPHS) {
-      morphVertex(morphed, group.mesh, vertex, tables[instance.extension + EXTENSION_MORPHS],
-                  tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
-      if (UNIT_BEFORE) makeDirectionsUnit(morphed, NORMALS, TANGENTS);
+    for (uint rigid = left & ~scaling; rigid != 0u; rigid &= rigid - 1u) {
+      skinInstance(readInstance(records + uint(findLSB(rigid)) * INSTANCE_WORDS, offsets), work, false);
     }
-    Vertex skinned =
-        skinVertex(morphed, influences, inputs, instance.palette, instance.jointCount, NORMALS, TANGENTS);
-    if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
-    uvec4 position = encodePosition(skinned.position, instance.extension, true);
-#ifdef HAS_MOTION
-    if (MOTION != MOTION_NONE) {
-      uvec4 words = previousPosition(instance, position, bind, influences, inputs, group.mesh, vertex);
-      storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
-    }
-#endif
-#ifdef STORE_PAIRS
-    storePositionAndNormal(instance.places.x, position.xyz, floatBitsToUint(skinned.normal));
-#else
-    storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-    if (NORMALS)
-      storeNormals(instance.places.y, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
-#endif
-    if (TANGENTS) {
-      storeTangents(instance.places.z, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT),
-                    TANGENT_UNIT);
-    }
+    left = scaling;
+  }
+  for (; left != 0u; left &= left - 1u) {
+    Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
+    skinInstance(instance, work, APART || paletteScales(instance.palette));
   }
 }

@@ -81,19 +81,18 @@ vec3 leastSquares(System system) {
 }
 
 // The rigid part of a joint, [R | t].
-System jointSystem(uint palette, uint joint) {
-  vec4 real = paletteRotation(palette, joint);
+System jointSystem(Pose pose, uint joint) {
+  vec4 real = paletteRotation(pose.palette, joint);
   vec3 r0;
   vec3 r1;
   vec3 r2;
   rowsOfQuaternion(real, r0, r1, r2);
-  vec3 t = translationOf(real, paletteDual(palette, joint), 1.0);
+  vec3 t = translationOf(real, paletteDual(pose.palette, joint), 1.0);
   return System(vec4(r0, t.x), vec4(r1, t.y), vec4(r2, t.z));
 }
 
-Vertex skinSpherical(Vertex vertex, Influences influences, uint palette, uint jointCount, bool withNormal, bool withTangent) {
-  bool twoPhase = paletteIsTwoPhase(palette);
-  Blend blend = blendJoints(influences, palette, jointCount, twoPhase);
+Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+  Blend blend = blendJoints(influences, pose);
   // The mean, and the weighted mean.
   precise vec4 m0 = vec4(0.0);
   precise vec4 m1 = vec4(0.0);
@@ -104,7 +103,7 @@ Vertex skinSpherical(Vertex vertex, Influences influences, uint palette, uint jo
   float share = 1.0 / float(influences.count);
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
-    System joint = jointSystem(palette, influenceJoint(influences, slot));
+    System joint = jointSystem(pose, influenceJoint(influences, slot));
     m0 += share * joint.r0;
     m1 += share * joint.r1;
     m2 += share * joint.r2;
@@ -115,7 +114,7 @@ Vertex skinSpherical(Vertex vertex, Influences influences, uint palette, uint jo
   System system = System(vec4(0.0), vec4(0.0), vec4(0.0));
   const vec4 rightSide = vec4(1.0, 1.0, 1.0, -1.0);
   for (uint slot = 0u; slot < influences.count; ++slot) {
-    System joint = jointSystem(palette, influenceJoint(influences, slot));
+    System joint = jointSystem(pose, influenceJoint(influences, slot));
     precise vec4 d0 = rightSide * (joint.r0 - m0);
     precise vec4 d1 = rightSide * (joint.r1 - m1);
     precise vec4 d2 = rightSide * (joint.r2 - m2);
@@ -124,7 +123,7 @@ Vertex skinSpherical(Vertex vertex, Influences influences, uint palette, uint jo
     addRow(system, d2);
   }
   vec3 center = leastSquares(system);
-  Scaled scaled = scaleVertex(vertex, blend.part, twoPhase, withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   precise vec3 lever = scaled.vertex.position - center;
   scaled.vertex.position = lever;
   precise vec3 moved =

@@ -20,14 +20,15 @@ namespace {
 using samples::OwnedMesh;
 
 constexpr std::uint32_t vertexCount = 10'000;
+constexpr std::uint32_t fewVertices = 64;  ///< so that palettes are what takes time
 constexpr std::uint32_t jointCount = 50;
 constexpr std::uint32_t instanceCount = 100;
 
 /// Every vertex with exactly so many influences; joints are near each other, as in real meshes.
-OwnedMesh evenMesh(std::uint32_t influences) {
-  OwnedMesh mesh = samples::randomMesh(1, vertexCount, jointCount, influences);
-  for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
-    const std::uint32_t base = vertex * jointCount / vertexCount;
+OwnedMesh evenMesh(std::uint32_t influences, std::uint32_t vertices = vertexCount) {
+  OwnedMesh mesh = samples::randomMesh(1, vertices, jointCount, influences);
+  for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+    const std::uint32_t base = vertex * jointCount / vertices;
     for (std::uint32_t slot = 0; slot < influences; ++slot) {
       mesh.joints[vertex * influences + slot] = (base + slot) % jointCount;
       mesh.weights[vertex * influences + slot] = 1.0f / static_cast<float>(slot + 1);
@@ -144,6 +145,12 @@ void registerAll() {
     scene.mayScale = true;
     return scene;
   });
+  add("palettes/shear", [] {
+    return Scene(evenMesh(4, fewVertices), Method::dualQuaternion, samples::Rigidity::shear);
+  });
+  add("palettes/rigid", [] {
+    return Scene(evenMesh(4, fewVertices), Method::dualQuaternion, samples::Rigidity::rigid);
+  });
   add("influences/1", [] { return Scene(evenMesh(1)); });
   add("influences/2", [] { return Scene(evenMesh(2)); });
   add("influences/4", [] { return Scene(evenMesh(4)); });
@@ -177,6 +184,7 @@ const std::vector<Ratio> ratios{
     {"method/dual_quaternion", "method/linear", "dual quaternions / linear"},
     {"method/two_phase", "method/linear", "two-phase / linear"},
     {"method/two_phase", "method/dual_quaternion", "two-phase / dual quaternions"},
+    {"palettes/shear", "palettes/rigid", "palettes with joints that shear / rigid, few vertices"},
     {"method/may_scale", "method/dual_quaternion",
      "joints that may scale, but do not / joints that may not"},
     {"method/dual_quaternion_iterative", "method/dual_quaternion",
