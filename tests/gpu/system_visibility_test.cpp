@@ -137,6 +137,38 @@ TEST_F(SystemVisibilityTest, WhatRestsInViewOfTheGpuSettlesAndIsNotSkinnedAgain)
   for (std::uint32_t i = 0; i < instanceCount; ++i) expectPoisoned(bytes, i);
 }
 
+// Of what is visible, only what is due is skinned; of what is not visible, nothing.
+TEST_F(SystemVisibilityTest, UpdateIntervalsHoldForWhatTheGpuSees) {
+  constexpr std::uint32_t visible = 20, interval = 4;
+  instance_.updateInterval = interval;
+  open(true, plainLayout());
+  submit();
+  show(0, visible);
+  engine_->begin();
+  std::vector<std::uint32_t> shown(instanceCount, 0), updates(instanceCount, 0);
+  for (std::uint32_t frame = 1; frame <= 2 * interval; ++frame) {
+    moveAll(frame * 100);
+    submit();
+    const std::vector<std::byte> bytes = engine_->readOutput();
+    std::uint32_t skinned = 0;
+    for (std::uint32_t i = 0; i < instanceCount; ++i) {
+      const std::vector<std::byte> positions = engine_->read(bytes, instances_[i])[positionStream];
+      if (positions == positionsIn(i + frame * 100)) {
+        shown[i] = frame * 100;
+        ++updates[i];
+        ++skinned;
+      }
+      ASSERT_TRUE(positions == positionsIn(i + shown[i])) << i << ", frame " << frame;
+    }
+    const vulkan::GpuStatistics gpu = completed();
+    EXPECT_EQ(gpu.skinnedInstances, skinned);
+    EXPECT_LT(skinned, visible / 2) << "they take turns";
+  }
+  submit();
+  for (std::uint32_t i = 0; i < instanceCount; ++i)
+    EXPECT_EQ(updates[i], i < visible ? 2u : 0u) << i;
+}
+
 TEST_F(SystemVisibilityTest, SomeAreCulledOnTheGpuAndSomeAreNot) {
   open(true, motionLayout());
   InstanceDescription other = instance_;
