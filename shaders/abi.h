@@ -32,9 +32,10 @@ DERMIS_CONSTANT BINDING_COUNT = 8u;
 
 // Uniform texel buffers, for variants that read through them: the same buffers again.
 DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;     // 16 bytes a texel
-DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;      // 4 bytes a texel
-DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 10u;  // 16 bytes a texel
-DERMIS_CONSTANT TEXEL_BINDING_COUNT = 3u;
+DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;      // likewise
+DERMIS_CONSTANT BINDING_MESH_WORDS = 10u;      // 4 bytes a texel
+DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 11u;  // 16 bytes a texel
+DERMIS_CONSTANT TEXEL_BINDING_COUNT = 4u;
 
 // Specialisation constants.
 DERMIS_CONSTANT CONSTANT_WORKGROUP_SIZE = 0u;
@@ -85,7 +86,7 @@ DERMIS_CONSTANT MOTION_RESKINNED = 2u;
 
 // Packed mesh: a header, then sections at word offsets from the blob's start.
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
-DERMIS_CONSTANT MESH_VERSION = 3u;
+DERMIS_CONSTANT MESH_VERSION = 4u;
 DERMIS_CONSTANT MESH_HEADER_MAGIC = 0u;
 DERMIS_CONSTANT MESH_HEADER_VERSION = 1u;
 DERMIS_CONSTANT MESH_HEADER_CHECKSUM =
@@ -94,24 +95,32 @@ DERMIS_CONSTANT MESH_HEADER_WORDS_TOTAL = 3u;
 DERMIS_CONSTANT MESH_HEADER_VERTEX_COUNT = 4u;
 DERMIS_CONSTANT MESH_HEADER_REQUIRED_JOINTS = 5u;
 DERMIS_CONSTANT MESH_HEADER_MAX_INFLUENCES = 6u;
-DERMIS_CONSTANT MESH_HEADER_POSITIONS = 7u;    // 3 floats a vertex
-DERMIS_CONSTANT MESH_HEADER_NORMALS = 8u;      // likewise, 0 where there are none
-DERMIS_CONSTANT MESH_HEADER_TANGENTS = 9u;     // 4 floats a vertex, 0 where there are none
-DERMIS_CONSTANT MESH_HEADER_FIRSTS = 10u;      // vertices + 1 words: each vertex' first influence
-DERMIS_CONSTANT MESH_HEADER_INFLUENCES = 11u;  // INFLUENCE_WORDS each; an even offset
-DERMIS_CONSTANT MESH_HEADER_MORPHS = 12u;      // MORPH_WORDS a morph target
-DERMIS_CONSTANT MESH_HEADER_MORPH_COUNT = 13u;
-DERMIS_CONSTANT MESH_HEADER_CENTERS =
-    14u;  // of rotation: 3 floats a vertex, 0 where there are none
-DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHTS = 15u;  // a float a vertex, 0 where all have …
-DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHT = 16u;   // … this one
-DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTHS = 17u;          // likewise
-DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTH = 18u;
+DERMIS_CONSTANT MESH_HEADER_MORPH_COUNT = 7u;
+// What every vertex is read from, at multiples of 4 words, a unit of 4 words at a time: these four
+// offsets are one unit themselves.
+DERMIS_CONSTANT MESH_HEADER_POSITIONS = 8u;    // VERTEX_WORDS each, and one more record
+DERMIS_CONSTANT MESH_HEADER_NORMALS = 9u;      // likewise, 0 where there are none
+DERMIS_CONSTANT MESH_HEADER_TANGENTS = 10u;    // likewise
+DERMIS_CONSTANT MESH_HEADER_INFLUENCES = 11u;  // INFLUENCE_WORDS each
+DERMIS_CONSTANT MESH_HEADER_CENTERS = 12u;     // of rotation: VERTEX_WORDS each, 0 for none
+DERMIS_CONSTANT MESH_HEADER_MORPHS = 13u;      // MORPH_WORDS a morph target
+DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHTS = 14u;  // a float a vertex, 0 where all have …
+DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHT = 15u;   // … this one
+DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTHS = 16u;          // likewise
+DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTH = 17u;
 DERMIS_CONSTANT MESH_HEADER_WORDS = 20u;
 
-// Influences stand vertex by vertex, as many as each has. The first of a vertex is its pivot; a
-// vertex without influences stays in bind pose.
-DERMIS_CONSTANT INFLUENCE_WEIGHT = 0u;  // float; those of a vertex sum to exactly 1
+// A position, a normal, a tangent or a centre of rotation of a vertex: three floats, and a word
+// that is the handedness of a tangent, 0 of a normal and a centre, and of a position where the
+// influences of the vertex begin: the number of their first unit, times 2, plus 1 where the last of
+// them is padding. Those of the next vertex follow; the record behind the last vertex says where
+// they end.
+DERMIS_CONSTANT VERTEX_WORDS = 4u;
+DERMIS_CONSTANT VERTEX_INFLUENCES = 3u;
+
+// Influences stand vertex by vertex, as many as each has, two in a unit. The first of a vertex is
+// its pivot; a vertex without influences stays in bind pose.
+DERMIS_CONSTANT INFLUENCE_WEIGHT = 0u;  // float; those of a vertex sum to exactly 1; padding: 0
 DERMIS_CONSTANT INFLUENCE_JOINT = 1u;
 DERMIS_CONSTANT INFLUENCE_WORDS = 2u;
 

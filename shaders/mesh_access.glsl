@@ -1,12 +1,16 @@
-// How a packed mesh is read. Needs abi.h.
+// How a packed mesh is read: what every vertex has by units of four words, the rest by words. Needs abi.h.
 
 #ifdef TEXELS
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
+layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
 
-uint meshWord(uint word) { return texelFetch(meshTexels, int(word)).x; }
+uvec4 meshUnit(uint unit) { return texelFetch(meshTexels, int(unit)); }
+uint meshWord(uint word) { return texelFetch(meshWordTexels, int(word)).x; }
 #else
-layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Meshes { uint meshes[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Meshes { uint meshes[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer MeshUnits { uvec4 meshUnits[]; };
 
+uvec4 meshUnit(uint unit) { return meshUnits[unit]; }
 uint meshWord(uint word) { return meshes[word]; }
 #endif
 
@@ -17,45 +21,63 @@ vec3 meshVector(uint word) {
 // The word at which a section begins.
 uint meshSection(uint mesh, uint header) { return mesh + meshWord(mesh + header); }
 
+// The units at which stand the vertices of a mesh.
+struct Sections {
+  uint positions;
+  uint normals;
+  uint tangents;
+  uint influences;
+};
+
+Sections sectionsOf(uint mesh) {
+  uvec4 units = (mesh + meshUnit((mesh + MESH_HEADER_POSITIONS) / 4u)) / 4u;
+  return Sections(units.x, units.y, units.z, units.w);
+}
+
 // The influences of one vertex. Up to four are read once, for all instances.
 struct Influences {
-  uint word;
+  uint unit;
   uint count;
   vec4 weights;
   uvec4 joints;
 };
 
-float readWeight(uint word, uint slot) {
-  return uintBitsToFloat(meshWord(word + slot * INFLUENCE_WORDS + INFLUENCE_WEIGHT));
-}
-
-uint readJoint(uint word, uint slot) { return meshWord(word + slot * INFLUENCE_WORDS + INFLUENCE_JOINT); }
-
-Influences influencesOf(uint mesh, uint vertex) {
-  uint firsts = meshSection(mesh, MESH_HEADER_FIRSTS) + vertex;
-  uint first = meshWord(firsts);
+// `first` is the last word of the vertex' position.
+Influences influencesOf(Sections sections, uint vertex, uint first) {
+  uint end = meshUnit(sections.positions + vertex + 1u)[VERTEX_INFLUENCES];
   Influences influences;
-  influences.word = meshSection(mesh, MESH_HEADER_INFLUENCES) + first * INFLUENCE_WORDS;
-  influences.count = meshWord(firsts + 1u) - first;
+  influences.unit = sections.influences + first / 2u;
+  influences.count = (end / 2u - first / 2u) * 2u - first % 2u;
   influences.weights = vec4(0.0);
   influences.joints = uvec4(0u);
   if (INFLUENCES != 0u) {
     influences.count = min(influences.count, INFLUENCES);
-    for (uint slot = 0u; slot < INFLUENCES; ++slot) {
-      if (slot >= influences.count) break;
-      influences.weights[slot] = readWeight(influences.word, slot);
-      influences.joints[slot] = readJoint(influences.word, slot);
+    uvec4 two = uvec4(0u);
+    if (influences.count > 0u) two = meshUnit(influences.unit);
+    influences.weights.xy = uintBitsToFloat(two.xz);
+    influences.joints.xy = two.yw;
+    if (INFLUENCES > 2u) {
+      two = uvec4(0u);
+      if (influences.count > 2u) two = meshUnit(influences.unit + 1u);
+      influences.weights.zw = uintBitsToFloat(two.xz);
+      influences.joints.zw = two.yw;
     }
   }
   return influences;
 }
 
+uvec2 readInfluence(uint unit, uint slot) {
+  uvec4 two = meshUnit(unit + slot / 2u);
+  return slot % 2u == 0u ? two.xy : two.zw;
+}
+
 float influenceWeight(Influences influences, uint slot) {
-  return INFLUENCES != 0u ? influences.weights[slot] : readWeight(influences.word, slot);
+  return INFLUENCES != 0u ? influences.weights[slot]
+                          : uintBitsToFloat(readInfluence(influences.unit, slot)[INFLUENCE_WEIGHT]);
 }
 
 uint influenceJoint(Influences influences, uint slot) {
-  return INFLUENCES != 0u ? influences.joints[slot] : readJoint(influences.word, slot);
+  return INFLUENCES != 0u ? influences.joints[slot] : readInfluence(influences.unit, slot)[INFLUENCE_JOINT];
 }
 
 // What some methods want to know of a vertex besides.
@@ -72,7 +94,7 @@ float meshShare(uint mesh, uint vertex, uint values, uint value) {
 MethodInputs methodInputsOf(uint mesh, uint vertex) {
   MethodInputs inputs = MethodInputs(vec3(0.0), 0.0);
   if (METHOD == METHOD_CENTER_OF_ROTATION || METHOD == METHOD_BULGE_CONTROLLED) {
-    inputs.center = meshVector(meshSection(mesh, MESH_HEADER_CENTERS) + vertex * 3u);
+    inputs.center = uintBitsToFloat(meshUnit(meshSection(mesh, MESH_HEADER_CENTERS) / 4u + vertex).xyz);
   }
   if (METHOD == METHOD_BULGE_CONTROLLED) {
     inputs.share = meshShare(mesh, vertex, MESH_HEADER_BULGE_STRENGTHS, MESH_HEADER_BULGE_STRENGTH);

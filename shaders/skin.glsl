@@ -73,14 +73,14 @@ uint findGroup(uint number) {
   return low;
 }
 
-Vertex bindVertex(uint mesh, uint vertex) {
+// `first` says where the influences begin.
+Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
-  bind.position = meshVector(meshSection(mesh, MESH_HEADER_POSITIONS) + vertex * 3u);
-  if (NORMALS) bind.normal = meshVector(meshSection(mesh, MESH_HEADER_NORMALS) + vertex * 3u);
-  if (TANGENTS) {
-    uint word = meshSection(mesh, MESH_HEADER_TANGENTS) + vertex * 4u;
-    bind.tangent = vec4(meshVector(word), uintBitsToFloat(meshWord(word + 3u)));
-  }
+  uvec4 position = meshUnit(sections.positions + vertex);
+  first = position[VERTEX_INFLUENCES];
+  bind.position = uintBitsToFloat(position.xyz);
+  if (NORMALS) bind.normal = uintBitsToFloat(meshUnit(sections.normals + vertex).xyz);
+  if (TANGENTS) bind.tangent = uintBitsToFloat(meshUnit(sections.tangents + vertex));
   return bind;
 }
 
@@ -228,10 +228,12 @@ void main() {
   Work work;
   work.mesh = group.mesh;
   work.vertex = vertex;
-  work.bind = bindVertex(group.mesh, vertex);
+  Sections sections = sectionsOf(group.mesh);
+  uint firstInfluence;
+  work.bind = bindVertex(sections, vertex, firstInfluence);
   if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
   work.inputs = methodInputsOf(group.mesh, vertex);
-  work.influences = influencesOf(group.mesh, vertex);
+  work.influences = influencesOf(sections, vertex, firstInfluence);
 
   // Outside the loop: some drivers read push constants, too, as often as they stand there.
   uint records = push[PUSH_INSTANCE_RECORDS] + (group.firstInstance + firstInstance) * INSTANCE_WORDS;

@@ -31,10 +31,10 @@ class KernelReads {
 
   void readAll() {
     for (std::uint32_t vertex = 0; vertex < info_.vertexCount; ++vertex) {
-      read(words_[abi::MESH_HEADER_POSITIONS] + vertex * 3, 3);
-      if (info_.hasNormals) read(words_[abi::MESH_HEADER_NORMALS] + vertex * 3, 3);
+      read(words_[abi::MESH_HEADER_POSITIONS] + vertex * 4, 8);  // the next one says the end
+      if (info_.hasNormals) read(words_[abi::MESH_HEADER_NORMALS] + vertex * 4, 4);
       if (info_.hasTangents) read(words_[abi::MESH_HEADER_TANGENTS] + vertex * 4, 4);
-      if (info_.hasCentersOfRotation) read(words_[abi::MESH_HEADER_CENTERS] + vertex * 3, 3);
+      if (info_.hasCentersOfRotation) read(words_[abi::MESH_HEADER_CENTERS] + vertex * 4, 4);
       for (const std::uint32_t shares :
            {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, abi::MESH_HEADER_BULGE_STRENGTHS}) {
         if (words_[shares] != 0) read(words_[shares] + vertex, 1);
@@ -72,9 +72,13 @@ class KernelReads {
     for (std::uint32_t i = 0; i < count; ++i) sink_ = words_[word + i];
   }
   void readInfluences(std::uint32_t vertex) {
-    const std::uint32_t* firsts = words_ + words_[abi::MESH_HEADER_FIRSTS];
-    require(firsts[vertex + 1] - firsts[vertex] <= info_.maxInfluences);
-    for (std::uint32_t influence = firsts[vertex]; influence < firsts[vertex + 1]; ++influence) {
+    const std::uint32_t* record = words_ + words_[abi::MESH_HEADER_POSITIONS] + vertex * 4;
+    const std::uint32_t first = record[3], end = record[7], padding = first % 2;
+    const std::uint32_t count = (end / 2 - first / 2) * 2 - padding;
+    require(count <= info_.maxInfluences);
+    // Two are read at a time.
+    for (std::uint32_t influence = first / 2 * 2; influence < first / 2 * 2 + count + padding;
+         ++influence) {
       const std::uint32_t word =
           words_[abi::MESH_HEADER_INFLUENCES] + influence * abi::INFLUENCE_WORDS;
       read(word, abi::INFLUENCE_WORDS);

@@ -65,7 +65,8 @@ TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
         EXPECT_EQ(bound.at(binding).range, range.size / texel * texel);
       };
       expectBound(abi::BINDING_TABLE_TEXELS, buffers.tables, 16);
-      expectBound(abi::BINDING_MESH_TEXELS, buffers.meshes, 4);
+      expectBound(abi::BINDING_MESH_TEXELS, buffers.meshes, 16);
+      expectBound(abi::BINDING_MESH_WORDS, buffers.meshes, 4);
       expectBound(abi::BINDING_PALETTE_TEXELS, palettes, 16);
     }
     EXPECT_EQ(mock.alive["BufferView"], 0) << "views go with their bindings";
@@ -208,14 +209,14 @@ TEST_F(TexelTest, AFailedViewIsAnErrorAndLeaksNothing) {
   const VkAllocationCallbacks callbacks{};
   mock.allocator = &callbacks;
   for (const bool push : {false, true}) {
-    for (int failAfter = 0; failAfter <= 4; ++failAfter) {
+    for (int failAfter = 0; failAfter <= 5; ++failAfter) {
       ASSERT_NO_FATAL_FAILURE(create(push));
       const MockBatch batch = MockBatch::withAllMethods(context->limits());
       mock.failing = "vkCreateBufferView";
       mock.failAfter = failAfter;
       const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
       mock.failing.clear();
-      ASSERT_EQ(bindings.ok(), failAfter == 4);
+      ASSERT_EQ(bindings.ok(), failAfter == 5);
       if (bindings) continue;
       EXPECT_EQ(bindings.error().code, ErrorCode::vulkanError);
       EXPECT_NE(bindings.error().message.find("vkCreateBufferView"), std::string::npos);

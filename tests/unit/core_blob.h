@@ -41,17 +41,17 @@ class Blob {
 
   std::uint32_t vertexCount() const { return word(abi::MESH_HEADER_VERTEX_COUNT); }
   float position(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_POSITIONS)} + vertex * 3 + component);
+    return number(std::size_t{word(abi::MESH_HEADER_POSITIONS)} + vertex * 4 + component);
   }
   float normal(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_NORMALS)} + vertex * 3 + component);
+    return number(std::size_t{word(abi::MESH_HEADER_NORMALS)} + vertex * 4 + component);
   }
   float tangent(std::uint32_t vertex, std::uint32_t component) const {
     return number(std::size_t{word(abi::MESH_HEADER_TANGENTS)} + vertex * 4 + component);
   }
 
   float center(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_CENTERS)} + vertex * 3 + component);
+    return number(std::size_t{word(abi::MESH_HEADER_CENTERS)} + vertex * 4 + component);
   }
   /// The vertex' own, or the mesh's.
   float dualQuaternionWeight(std::uint32_t vertex) const {
@@ -63,16 +63,20 @@ class Blob {
     return number(section != 0 ? section + vertex : abi::MESH_HEADER_BULGE_STRENGTH);
   }
 
-  /// The word at which a vertex' influences are counted from; that of the next ends them.
+  /// The word that says where a vertex' influences begin; that of the next ends them.
   std::size_t firstOf(std::uint32_t vertex) const {
-    return std::size_t{word(abi::MESH_HEADER_FIRSTS)} + vertex;
+    return std::size_t{word(abi::MESH_HEADER_POSITIONS)} + vertex * 4 + 3;
   }
+  /// Padding counts, too.
   std::size_t influenceWord(std::uint32_t influence) const {
     return word(abi::MESH_HEADER_INFLUENCES) + std::size_t{influence} * abi::INFLUENCE_WORDS;
   }
   std::vector<BlobInfluence> influences(std::uint32_t vertex) const {
     std::vector<BlobInfluence> result;
-    for (std::uint32_t i = word(firstOf(vertex)); i < word(firstOf(vertex + 1)); ++i) {
+    const std::uint32_t begin = word(firstOf(vertex)) / 2 * 2;
+    const std::uint32_t padding = word(firstOf(vertex)) % 2;
+    const std::uint32_t end = word(firstOf(vertex + 1)) / 2 * 2 - padding;
+    for (std::uint32_t i = begin; i < end; ++i) {
       result.push_back({word(influenceWord(i) + abi::INFLUENCE_JOINT),
                         number(influenceWord(i) + abi::INFLUENCE_WEIGHT)});
     }

@@ -156,8 +156,8 @@ TEST_F(DamagedBlob, SwappedWordsAreRefused) {
 }
 
 TEST_F(DamagedBlob, AnotherVersionIsNamed) {
-  ASSERT_EQ(abi::MESH_VERSION, 3u);
-  for (const std::uint32_t version : {0u, 1u, 2u, 4u, 0xffffffffu}) {
+  ASSERT_EQ(abi::MESH_VERSION, 4u);
+  for (const std::uint32_t version : {0u, 1u, 2u, 3u, 5u, 0xffffffffu}) {
     Blob changed = blob;
     changed.words()[abi::MESH_HEADER_VERSION] = version;
     changed.seal();
@@ -181,28 +181,35 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
     expectRefusedWith(abi::MESH_HEADER_MAX_INFLUENCES, influences);
   // Each section's offset: in the header, too late for what it holds, behind the end.
   const std::pair<std::uint32_t, std::uint32_t> sections[] = {
-      {abi::MESH_HEADER_POSITIONS, 66 * 3},
-      {abi::MESH_HEADER_NORMALS, 66 * 3},
+      {abi::MESH_HEADER_POSITIONS, 67 * 4},
+      {abi::MESH_HEADER_NORMALS, 66 * 4},
       {abi::MESH_HEADER_TANGENTS, 66 * 4},
-      {abi::MESH_HEADER_CENTERS, 66 * 3},
+      {abi::MESH_HEADER_CENTERS, 66 * 4},
       {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, 66},
       {abi::MESH_HEADER_BULGE_STRENGTHS, 66},
-      {abi::MESH_HEADER_FIRSTS, 67},
       {abi::MESH_HEADER_INFLUENCES, 2 * blob.word(blob.firstOf(66))},
       {abi::MESH_HEADER_MORPHS, 3 * abi::MORPH_WORDS}};
   for (const auto& [header, words] : sections) {
-    const std::uint32_t even = (size() - words + 2) / 2 * 2;  // influences stand at even offsets
-    for (const std::uint32_t offset : {1u, abi::MESH_HEADER_WORDS - 2, even, size(), size() + 2,
-                                       0x7ffffffeu, 0xfffffffeu, 0xffffffffu}) {
+    const std::uint32_t late = (size() - words + 4) / 4 * 4;  // many stand at multiples of 4
+    for (const std::uint32_t offset : {1u, abi::MESH_HEADER_WORDS - 4, late, size(), size() + 4,
+                                       0x7ffffffcu, 0xfffffffcu, 0xffffffffu}) {
       expectRefusedWith(header, offset);
     }
     ASSERT_NE(blob.word(header), 0u) << "this blob has everything";
-    const bool mayBeAbsent =
-        header != abi::MESH_HEADER_POSITIONS && header != abi::MESH_HEADER_FIRSTS &&
-        header != abi::MESH_HEADER_INFLUENCES && header != abi::MESH_HEADER_MORPHS;
+    const bool mayBeAbsent = header != abi::MESH_HEADER_POSITIONS &&
+                             header != abi::MESH_HEADER_INFLUENCES &&
+                             header != abi::MESH_HEADER_MORPHS;
     if (!mayBeAbsent) expectRefusedWith(header, 0);
   }
-  expectRefusedWith(abi::MESH_HEADER_INFLUENCES, blob.word(abi::MESH_HEADER_INFLUENCES) - 1);
+  // Inside the blob, but not at a multiple of four words.
+  for (const std::uint32_t header :
+       {abi::MESH_HEADER_POSITIONS, abi::MESH_HEADER_NORMALS, abi::MESH_HEADER_TANGENTS,
+        abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_INFLUENCES}) {
+    for (const std::uint32_t by : {1u, 2u, 3u}) {
+      expectRefusedWith(header, blob.word(header) + by);
+      expectRefusedWith(header, blob.word(header) - by);
+    }
+  }
   for (const std::uint32_t targets : {size(), size() / 4, 0x40000000u, 0x40000003u, 0xffffffffu})
     expectRefusedWith(abi::MESH_HEADER_MORPH_COUNT, targets);
 }
@@ -230,8 +237,9 @@ TEST_F(DamagedBlob, InfluencesOutOfOrderAreRefused) {
     if (vertex > 1 && blob.word(blob.firstOf(vertex - 1)) != 0)
       expectRefusedWith(blob.firstOf(vertex), blob.word(blob.firstOf(vertex - 1)) - 1);
   }
-  const std::uint32_t last = blob.word(blob.firstOf(65));
-  expectRefusedWith(blob.firstOf(66), last + good.info().maxInfluences + 1);
+  const std::uint32_t last = blob.word(blob.firstOf(65)) / 2 * 2;
+  expectRefusedWith(blob.firstOf(66), last + (good.info().maxInfluences + 3) / 2 * 2);
+  expectRefusedWith(blob.firstOf(66), total + 1);  // the end is that of a whole unit
 }
 
 // All of them follow each other, and the last lie behind the blob's end.
@@ -316,15 +324,15 @@ TEST(PackedBlob, APaletteOfNoJointsIsRefused) {
 }
 
 // Nothing else tells that they would stand askew.
-TEST(PackedBlob, InfluencesAtAnOddOffsetAreRefused) {
+TEST(PackedBlob, InfluencesBetweenUnitsAreRefused) {
   OwnedMesh mesh = slottedMesh(1, 10, 4, 10);
   std::fill(mesh.weights.begin(), mesh.weights.end(), 0.0f);
   Blob blob(packed(mesh.view(), 10).bytes());
-  for (const int off : {-2, -1, 0}) {
+  for (const int off : {-4, -2, -1, 0}) {
     Blob changed = blob;
     changed.words()[abi::MESH_HEADER_INFLUENCES] += static_cast<std::uint32_t>(off);
     changed.seal();
-    EXPECT_EQ(PackedMesh::fromBytes(changed.bytes()).ok(), off % 2 == 0) << off;
+    EXPECT_EQ(PackedMesh::fromBytes(changed.bytes()).ok(), off % 4 == 0) << off;
   }
 }
 

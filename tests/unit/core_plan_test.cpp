@@ -303,7 +303,7 @@ bool samePlan(const Plan& a, const Plan& b) {
 TEST(Plan, AReusedObjectIsAsGoodAsANewOne) {
   Plan reused;
   DeviceLimits narrow = richLimits();
-  narrow.maxStorageBufferRange = 102400;
+  narrow.maxStorageBufferRange = 163840;
   narrow.minStorageBufferOffsetAlignment = 64;
   narrow.maxWorkgroupCountX = 50;
   for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {

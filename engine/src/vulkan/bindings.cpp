@@ -49,7 +49,7 @@ VkDescriptorBufferInfo infoOf(const BufferRange& range) {
 
 Bindings::State::~State() {
   if (context == nullptr) return;
-  for (const VkBufferView view : {tableTexels, meshTexels, matrixTexels, paletteTexels})
+  for (const VkBufferView view : {tableTexels, meshTexels, meshWords, matrixTexels, paletteTexels})
     context->table.destroyBufferView(context->device, view, context->allocator);
   context->table.destroyDescriptorPool(context->device, pool, context->allocator);
 }
@@ -102,6 +102,7 @@ BoundBuffers Bindings::State::skinKernel(Method method, const Windows& windows) 
   }
   bound.texels[abi::BINDING_TABLE_TEXELS - abi::BINDING_COUNT] = tableTexels;
   bound.texels[abi::BINDING_MESH_TEXELS - abi::BINDING_COUNT] = meshTexels;
+  bound.texels[abi::BINDING_MESH_WORDS - abi::BINDING_COUNT] = meshWords;
   bound.texels[abi::BINDING_PALETTE_TEXELS - abi::BINDING_COUNT] =
       method == Method::linear ? matrixTexels : paletteTexels;
   // Not to an output: a layer would see results read there that another dispatch wrote.
@@ -138,7 +139,8 @@ Result<void> Bindings::State::createTexelViews() {
   // buffers.
   constexpr VkFormat unit = VK_FORMAT_R32G32B32A32_UINT;
   if (Result<void> good = create(buffers.tables, unit, 16, tableTexels); !good) return good;
-  if (Result<void> good = create(buffers.meshes, VK_FORMAT_R32_UINT, 4, meshTexels); !good)
+  if (Result<void> good = create(buffers.meshes, unit, 16, meshTexels); !good) return good;
+  if (Result<void> good = create(buffers.meshes, VK_FORMAT_R32_UINT, 4, meshWords); !good)
     return good;
   if (Result<void> good = create(buffers.matrices, unit, 16, matrixTexels); !good) return good;
   return create(buffers.palettes, unit, 16, paletteTexels);

@@ -66,6 +66,7 @@ struct Bindings::State {
   /// Of buffers that kernels read through texels, where there are such buffers.
   VkBufferView tableTexels = VK_NULL_HANDLE;
   VkBufferView meshTexels = VK_NULL_HANDLE;
+  VkBufferView meshWords = VK_NULL_HANDLE;
   VkBufferView matrixTexels = VK_NULL_HANDLE;
   VkBufferView paletteTexels = VK_NULL_HANDLE;
 

@@ -13,23 +13,30 @@ bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t total) {
   return offset >= abi::MESH_HEADER_WORDS && offset <= total && count <= total - offset;
 }
 
+/// The same for what is read by units: `count` records of vertices.
+bool isUnitSection(std::uint64_t offset, std::uint64_t count, std::uint64_t total) {
+  return offset % 4 == 0 && isSection(offset, count * abi::VERTEX_WORDS, total);
+}
+
+/// Positions are known to lie in the blob.
 Result<void> checkInfluences(std::span<const std::uint32_t> words) {
-  const std::uint64_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
+  const std::size_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
   const std::uint32_t offset = words[abi::MESH_HEADER_INFLUENCES];
-  if (!isSection(words[abi::MESH_HEADER_FIRSTS], vertices + 1, words.size()) || offset % 2 != 0) {
-    return damagedBlob("its header does not fit its sections");
-  }
-  const std::span<const std::uint32_t> firsts =
-      words.subspan(words[abi::MESH_HEADER_FIRSTS], static_cast<std::size_t>(vertices) + 1);
+  const auto begin = [&](std::size_t vertex) {
+    return words[words[abi::MESH_HEADER_POSITIONS] + vertex * abi::VERTEX_WORDS +
+                 abi::VERTEX_INFLUENCES];
+  };
   for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
-    if (firsts[vertex] > firsts[vertex + 1] ||
-        firsts[vertex + 1] - firsts[vertex] > words[abi::MESH_HEADER_MAX_INFLUENCES]) {
+    const std::uint32_t first = begin(vertex), next = begin(vertex + 1), isOdd = first % 2;
+    if (next / 2 < first / 2 + isOdd ||
+        std::uint64_t{next / 2 - first / 2} * 2 - isOdd > words[abi::MESH_HEADER_MAX_INFLUENCES]) {
       return damagedBlob("the influences of vertex " + std::to_string(vertex) +
                          " do not follow those before");
     }
   }
-  const std::uint64_t count = firsts[static_cast<std::size_t>(vertices)];
-  if (!isSection(offset, count * abi::INFLUENCE_WORDS, words.size())) {
+  const std::uint64_t count = begin(vertices);
+  if (count % 2 != 0) return damagedBlob("its influences do not end with a whole unit");
+  if (offset % 4 != 0 || !isSection(offset, count * abi::INFLUENCE_WORDS, words.size())) {
     return damagedBlob("its influences lie outside the blob");
   }
   for (std::uint64_t influence = 0; influence < count; ++influence) {
@@ -109,15 +116,19 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
     return damagedBlob("the checksum does not match");
 
   const std::uint64_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
-  const auto isAttribute = [&](std::uint32_t header, std::uint64_t components) {
-    return words[header] == 0 || isSection(words[header], vertices * components, words.size());
+  const auto areVectors = [&](std::uint32_t header) {
+    return words[header] == 0 || isUnitSection(words[header], vertices, words.size());
+  };
+  const auto areFloats = [&](std::uint32_t header) {
+    return words[header] == 0 || isSection(words[header], vertices, words.size());
   };
   if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPaletteJoints ||
-      words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 || words[abi::MESH_HEADER_POSITIONS] == 0 ||
-      !isAttribute(abi::MESH_HEADER_POSITIONS, 3) || !isAttribute(abi::MESH_HEADER_NORMALS, 3) ||
-      !isAttribute(abi::MESH_HEADER_TANGENTS, 4) || !isAttribute(abi::MESH_HEADER_CENTERS, 3) ||
-      !isAttribute(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, 1) ||
-      !isAttribute(abi::MESH_HEADER_BULGE_STRENGTHS, 1) ||
+      words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 ||
+      !isUnitSection(words[abi::MESH_HEADER_POSITIONS], vertices + 1, words.size()) ||
+      !areVectors(abi::MESH_HEADER_NORMALS) || !areVectors(abi::MESH_HEADER_TANGENTS) ||
+      !areVectors(abi::MESH_HEADER_CENTERS) ||
+      !areFloats(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS) ||
+      !areFloats(abi::MESH_HEADER_BULGE_STRENGTHS) ||
       !isSection(words[abi::MESH_HEADER_MORPHS],
                  std::uint64_t{words[abi::MESH_HEADER_MORPH_COUNT]} * abi::MORPH_WORDS,
                  words.size())) {

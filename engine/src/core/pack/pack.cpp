@@ -24,61 +24,84 @@ std::uint32_t offsetOf(const std::vector<std::uint32_t>& words) {
   return static_cast<std::uint32_t>(words.size());
 }
 
+void alignToUnit(std::vector<std::uint32_t>& words) {
+  words.resize((words.size() + 3) / 4 * 4, 0u);
+}
+
+/// With one record more than there are vertices; where influences begin is not known yet.
 std::uint32_t appendPositions(const MeshView& mesh, std::vector<std::uint32_t>& words) {
   const std::uint32_t offset = offsetOf(words);
-  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
+  words.resize(words.size() + (std::size_t{mesh.vertexCount} + 1) * abi::VERTEX_WORDS);
+  std::uint32_t* record = words.data() + offset;
+  for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex, record += abi::VERTEX_WORDS) {
     for (std::uint32_t component = 0; component < 3; ++component)
-      words.push_back(std::bit_cast<std::uint32_t>(loadPosition(mesh, vertex, component)));
+      record[component] = std::bit_cast<std::uint32_t>(loadPosition(mesh, vertex, component));
   }
   return offset;
 }
 
-/// 0 where the mesh has none.
-std::uint32_t appendFloats(const AttributeView& view, std::uint32_t components,
-                           std::vector<std::uint32_t>& words) {
+/// Three or four components to a record; 0 where the mesh has none.
+std::uint32_t appendVectors(const AttributeView& view, std::uint32_t components,
+                            std::vector<std::uint32_t>& words) {
   if (!view) return 0;
   const std::uint32_t offset = offsetOf(words);
-  for (std::uint32_t vertex = 0; vertex < view.count; ++vertex) {
+  words.resize(words.size() + std::size_t{view.count} * abi::VERTEX_WORDS);
+  std::uint32_t* record = words.data() + offset;
+  for (std::uint32_t vertex = 0; vertex < view.count; ++vertex, record += abi::VERTEX_WORDS) {
     for (std::uint32_t component = 0; component < components; ++component)
-      words.push_back(std::bit_cast<std::uint32_t>(loadFloat(view, vertex, component)));
+      record[component] = std::bit_cast<std::uint32_t>(loadFloat(view, vertex, component));
   }
   return offset;
 }
 
+/// One a vertex; 0 where the mesh has none.
+std::uint32_t appendFloats(const AttributeView& view, std::vector<std::uint32_t>& words) {
+  if (!view) return 0;
+  const std::uint32_t offset = offsetOf(words);
+  for (std::uint32_t vertex = 0; vertex < view.count; ++vertex)
+    words.push_back(std::bit_cast<std::uint32_t>(loadFloat(view, vertex, 0)));
+  return offset;
+}
+
+/// Behind the positions, whose records are told where the influences of their vertices begin.
 void appendInfluences(const MeshView& mesh, std::vector<std::uint32_t>& words) {
-  const std::size_t firsts = words.size();
-  words[abi::MESH_HEADER_FIRSTS] = offsetOf(words);
-  words.resize(firsts + std::size_t{mesh.vertexCount} + 1);
-  words.resize(words.size() + words.size() % 2, 0u);
   const std::size_t offset = words.size();
   words[abi::MESH_HEADER_INFLUENCES] = offsetOf(words);
+  const auto begin = [&](std::uint32_t vertex) -> std::uint32_t& {
+    return words[words[abi::MESH_HEADER_POSITIONS] + std::size_t{vertex} * abi::VERTEX_WORDS +
+                 abi::VERTEX_INFLUENCES];
+  };
   std::vector<PackedInfluence> influences;
   std::uint32_t requiredJoints = 1, maxInfluences = 0;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
-    words[firsts + vertex] =
-        static_cast<std::uint32_t>((words.size() - offset) / abi::INFLUENCE_WORDS);
+    const auto unit = static_cast<std::uint32_t>((words.size() - offset) / 4);
     packInfluences(mesh, vertex, influences);
+    const auto count = static_cast<std::uint32_t>(influences.size());
+    begin(vertex) = unit * 2 + count % 2;
     for (const PackedInfluence& influence : influences) {
       words.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(influence.weight)));
       words.push_back(influence.joint);
       requiredJoints = std::max(requiredJoints, influence.joint + 1);
     }
-    maxInfluences = std::max(maxInfluences, static_cast<std::uint32_t>(influences.size()));
+    alignToUnit(words);
+    maxInfluences = std::max(maxInfluences, count);
   }
-  words[firsts + mesh.vertexCount] =
-      static_cast<std::uint32_t>((words.size() - offset) / abi::INFLUENCE_WORDS);
+  begin(mesh.vertexCount) = static_cast<std::uint32_t>((words.size() - offset) / 4 * 2);
   words[abi::MESH_HEADER_REQUIRED_JOINTS] = requiredJoints;
   words[abi::MESH_HEADER_MAX_INFLUENCES] = maxInfluences;
 }
 
 /// An upper limit of the words that a mesh takes, before any is written.
 std::uint64_t wordsNeeded(const MeshView& mesh) {
-  std::uint64_t perVertex = 3 + (mesh.normals ? 3u : 0u) + (mesh.tangents ? 4u : 0u) + 1;
-  perVertex += (mesh.centersOfRotation ? 3u : 0u) + (mesh.dualQuaternionWeights ? 1u : 0u) +
-               (mesh.bulgeStrengths ? 1u : 0u);
+  std::uint64_t perVertex = abi::INFLUENCE_WORDS;  // of padding
+  for (const AttributeView* view :
+       {&mesh.positions, &mesh.normals, &mesh.tangents, &mesh.centersOfRotation})
+    perVertex += *view ? abi::VERTEX_WORDS : 0u;
+  perVertex += (mesh.dualQuaternionWeights ? 1u : 0u) + (mesh.bulgeStrengths ? 1u : 0u);
   for (const InfluenceSet& set : mesh.influenceSets)
     perVertex += std::uint64_t{set.weights.components} * abi::INFLUENCE_WORDS;
-  std::uint64_t words = abi::MESH_HEADER_WORDS + mesh.vertexCount * perVertex;
+  std::uint64_t words =
+      abi::MESH_HEADER_WORDS + 2 * abi::VERTEX_WORDS + mesh.vertexCount * perVertex;
   for (const MorphTargetView& target : mesh.morphTargets) {
     const std::uint64_t displaced =
         target.vertices.empty() ? mesh.vertexCount : target.vertices.size();
@@ -113,16 +136,15 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
   words[abi::MESH_HEADER_VERTEX_COUNT] = mesh.vertexCount;
   words[abi::MESH_HEADER_POSITIONS] = appendPositions(mesh, words);
-  words[abi::MESH_HEADER_NORMALS] = appendFloats(mesh.normals, 3, words);
-  words[abi::MESH_HEADER_TANGENTS] = appendFloats(mesh.tangents, 4, words);
-  words[abi::MESH_HEADER_CENTERS] = appendFloats(mesh.centersOfRotation, 3, words);
-  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS] =
-      appendFloats(mesh.dualQuaternionWeights, 1, words);
+  words[abi::MESH_HEADER_NORMALS] = appendVectors(mesh.normals, 3, words);
+  words[abi::MESH_HEADER_TANGENTS] = appendVectors(mesh.tangents, 4, words);
+  words[abi::MESH_HEADER_CENTERS] = appendVectors(mesh.centersOfRotation, 3, words);
+  appendInfluences(mesh, words);
+  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS] = appendFloats(mesh.dualQuaternionWeights, words);
   words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHT] =
       std::bit_cast<std::uint32_t>(mesh.dualQuaternionWeight);
-  words[abi::MESH_HEADER_BULGE_STRENGTHS] = appendFloats(mesh.bulgeStrengths, 1, words);
+  words[abi::MESH_HEADER_BULGE_STRENGTHS] = appendFloats(mesh.bulgeStrengths, words);
   words[abi::MESH_HEADER_BULGE_STRENGTH] = std::bit_cast<std::uint32_t>(mesh.bulgeStrength);
-  appendInfluences(mesh, words);
   words[abi::MESH_HEADER_MORPHS] = appendMorphs(mesh, words);
   words[abi::MESH_HEADER_MORPH_COUNT] = static_cast<std::uint32_t>(mesh.morphTargets.size());
   while (words.size() % (packedMeshAlignment / 4) != 0) words.push_back(0);
