@@ -82,7 +82,9 @@ void main() {
   }
   barrier();
 
-  for (uint joint = gl_LocalInvocationID.x; joint < jointCount; joint += gl_WorkGroupSize.x) {
+  // Asked at its end, as some drivers execute the rest of a loop once more after the question.
+  uint joint = gl_LocalInvocationID.x;
+  if (joint < jointCount) do {
     vec4 r0 = matrices[firstMatrix + joint * 3u];
     vec4 r1 = matrices[firstMatrix + joint * 3u + 1u];
     vec4 r2 = matrices[firstMatrix + joint * 3u + 2u];
@@ -106,7 +108,8 @@ void main() {
       palettes[unit + 1u] = floatBitsToUint(dual);
     }
     if (mayScale) writeScaleShear(status + 1u + jointCount * unitsOfJoint + joint * 2u, scaleShear);
-  }
+    joint += gl_WorkGroupSize.x;
+  } while (joint < jointCount);
   barrier();
 
   if (gl_LocalInvocationID.x == 0u) {

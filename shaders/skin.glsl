@@ -238,19 +238,28 @@ void main() {
   // Outside the loop: some drivers read push constants, too, as often as they stand there.
   uint records = push[PUSH_INSTANCE_RECORDS] + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
   uvec4 offsets = run * group.strides;
+  // Loops ask at their end whether they go on: some drivers execute the rest of a loop's body once more, to no effect, after the
+  // question, and where there is one instance that would be half of it all.
   uint left = 0xffffffffu >> (32u - count);  // a bit an instance
   if (APART) {
     uint scaling = 0u;
-    for (uint i = 0u; i < count; ++i) {
+    uint i = 0u;
+    do {
       if (paletteScales(readInstance(records + i * INSTANCE_WORDS, offsets).palette)) scaling |= 1u << i;
-    }
-    for (uint rigid = left & ~scaling; rigid != 0u; rigid &= rigid - 1u) {
-      skinInstance(readInstance(records + uint(findLSB(rigid)) * INSTANCE_WORDS, offsets), work, false);
+    } while (++i < count);
+    uint rigid = left & ~scaling;
+    if (rigid != 0u) {
+      do {
+        skinInstance(readInstance(records + uint(findLSB(rigid)) * INSTANCE_WORDS, offsets), work, false);
+        rigid &= rigid - 1u;
+      } while (rigid != 0u);
     }
     left = scaling;
+    if (left == 0u) return;
   }
-  for (; left != 0u; left &= left - 1u) {
+  do {
     Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
     skinInstance(instance, work, APART || paletteScales(instance.palette));
-  }
+    left &= left - 1u;
+  } while (left != 0u);
 }
