@@ -31,7 +31,7 @@ std::vector<ComparisonStrip> builtInStrips(const BuiltInScenes& scenes) {
   bar.scene = &scenes.bar;
   bar.pose = scenePose(scenes.bar, 0, middleOfClip(scenes.bar));
   bar.title = "A bar, one end of it turned by 175°";
-  bar.remark = "and what is left of its smallest cross-section";
+  bar.remark = "what is left of its smallest cross-section";
   bar.camera.azimuth = 18;
   bar.camera.elevation = 16;
   bar.sections = SectionRange{0.3, 0.7};
@@ -39,7 +39,7 @@ std::vector<ComparisonStrip> builtInStrips(const BuiltInScenes& scenes) {
   arm.scene = &scenes.arm;
   arm.pose = scenePose(scenes.arm, 0, middleOfClip(scenes.arm));
   arm.title = "An arm, its elbow bent by 140°";
-  arm.remark = "and what is left of the elbow's smallest cross-section";
+  arm.remark = "what is left of its smallest cross-section";
   arm.camera.azimuth = 18;
   arm.camera.elevation = 12;
   arm.sections = SectionRange{0.2, 0.45};

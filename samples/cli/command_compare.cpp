@@ -1,40 +1,27 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <filesystem>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "built_in_scenes.h"
 #include "commands.h"
-#include "comparison_picture.h"
-#include "comparison_report.h"
+#include "comparison_subject.h"
 #include "driver_version.h"
 #include "frame_name.h"
 #include "open_device.h"
 #include "output_file.h"
 #include "picture_writer.h"
-#include "plain_text.h"
 #include "progress.h"
 
 namespace dermis::cli {
 namespace {
 
 constexpr std::uint32_t mostRepetitions = 10'000;
-
-constexpr std::uint32_t leastWidth = 480, largestWidth = 8192;
-
-/// The paper's own comparison, with what everyone uses and what is newer. All nine are too many to
-/// be large.
-constexpr std::array usualColumns{Method::linear,         Method::quaternionTranslation,
-                                  Method::logMatrix,      Method::sphericalBlend,
-                                  Method::dualQuaternion, Method::centerOfRotation};
+constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
 
 struct CompareOptions {
   std::string model;  ///< empty: the built-in arm
@@ -70,9 +57,8 @@ ExitStatus checkPicture(const CompareOptions& options) {
   if (options.width < leastWidth || options.width > largestWidth)
     return wrong(fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
   for (auto name = options.methods.begin(); name != options.methods.end(); ++name) {
-    if (!methodFromName(*name)) {
+    if (!methodFromName(*name))
       return wrong(fmt::format("there is no method '{}'; there are {}", *name, methodNames("and")));
-    }
     if (std::find(options.methods.begin(), name, *name) != name)
       return wrong(fmt::format("--methods names {} twice", *name));
   }
@@ -104,18 +90,8 @@ MeshPreparation preparationFor(const CompareOptions& options) {
   return preparation;
 }
 
-/// What is compared, in its pose.
-struct Subject {
-  std::optional<BuiltInScenes> builtIn;  ///< where there is a picture
-  std::optional<Scene> model;            ///< nothing: it is the built-in arm
-  std::string name, poseTitle;
-  ScenePose pose;
-
-  const Scene& scene() const { return model ? *model : builtIn->arm; }
-};
-
 /// The model, with something to skin.
-ExitStatus loadModel(const CompareOptions& options, Subject& subject) {
+ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) {
   Result<Scene> scene = loadScene(options.model, preparationFor(options));
   if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
@@ -128,13 +104,13 @@ ExitStatus loadModel(const CompareOptions& options, Subject& subject) {
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return wrong(clip.error().message);
   subject.name = options.model;
-  subject.poseTitle = poseName(*scene->model, *clip, options.time);
+  subject.poseName = poseName(*scene->model, *clip, options.time);
   subject.pose = scenePose(*scene, *clip, options.time);
   subject.model.emplace(std::move(*scene));
   return ExitStatus::done;
 }
 
-ExitStatus loadSubject(const CompareOptions& options, Subject& subject) {
+ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject) {
   if (!options.model.empty()) {
     if (const ExitStatus loaded = loadModel(options, subject); loaded != ExitStatus::done)
       return loaded;
@@ -146,7 +122,7 @@ ExitStatus loadSubject(const CompareOptions& options, Subject& subject) {
   if (subject.model) return ExitStatus::done;
   const Scene& arm = subject.builtIn->arm;
   subject.name = "the built-in arm";
-  subject.poseTitle = poseName(*arm.model, 0, builtInArmTime(arm));
+  subject.poseName = poseName(*arm.model, 0, builtInArmTime(arm));
   subject.pose = scenePose(arm, 0, builtInArmTime(arm));
   return ExitStatus::done;
 }
@@ -161,49 +137,14 @@ Result<std::vector<Method>> chooseColumns(const CompareOptions& options, const S
                  fmt::format("{}: {} needs centres of rotation, which were too much work",
                              options.model, name)};
   }
-  if (!columns.empty()) return columns;
-  std::ranges::copy_if(usualColumns, std::back_inserter(columns),
-                       [&scene](Method method) { return allows(scene, method); });
-  return columns;
+  return columns.empty() ? usualColumns(scene) : columns;
 }
 
-std::vector<std::string> costOf(const MethodComparison& comparison, Method method) {
-  const auto compared = std::ranges::find(comparison.methods, method, &ComparedMethod::method);
-  if (compared == comparison.methods.end() || !compared->time) return {};
-  const double vertices =
-      static_cast<double>(comparison.vertices) * static_cast<double>(comparison.instances);
-  return {fmt::format("{:.2f} × linear's time", *compared->time),
-          fmt::format("{:.3g} ns a vertex", *compared->seconds / vertices * 1e9)};
-}
-
-ComparisonSheet describeSheet(const CompareOptions& options, const Subject& subject,
-                              const std::vector<Method>& columns, const ComparisonTitle& title,
-                              const MethodComparison& comparison) {
-  ComparisonSheet sheet;
-  sheet.width = options.width;
-  for (const Method method : columns) sheet.columns.push_back({method, costOf(comparison, method)});
-  sheet.strips = builtInStrips(*subject.builtIn);
-  if (subject.model) {
-    ComparisonStrip& strip = sheet.strips.emplace_back();
-    strip.scene = &*subject.model;
-    strip.pose = subject.pose;
-    strip.title = plainLine(std::filesystem::path(options.model).filename().string());
-    strip.remark = plainLine(subject.poseTitle) + ", and the time that skinning takes";
-  } else {
-    sheet.strips.back().remark += ", and the time that skinning takes";
-  }
-  sheet.strips.back().showsCost = true;
-  sheet.strips.back().hasHeatMap = true;
-  sheet.footer = plainLine(fmt::format("Time: medians of {} runs, {} instances of {} vertices, {}",
-                                       comparison.repetitions, comparison.instances,
-                                       comparison.vertices, title.device));
-  return sheet;
-}
-
-ExitStatus writePicture(const CompareOptions& options, const Subject& subject,
+ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& subject,
                         const std::vector<Method>& columns, const ComparisonTitle& title,
                         const MethodComparison& comparison, samples::OpenDevice& open) {
-  const ComparisonSheet sheet = describeSheet(options, subject, columns, title, comparison);
+  ComparisonSheet sheet = describeSheet(subject, columns, title, comparison);
+  sheet.width = options.width;
   Result<samples::render::Font> font = samples::render::Font::load();
   if (!font) reportNote(font.error().message + ": the picture has no words");
   std::vector<std::string> notes;
@@ -226,13 +167,13 @@ ExitStatus writePicture(const CompareOptions& options, const Subject& subject,
 
 ExitStatus compare(const CompareOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
-  Subject subject;
+  ComparisonSubject subject;
   if (const ExitStatus loaded = loadSubject(options, subject); loaded != ExitStatus::done)
     return loaded;
   const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
   if (!columns) return wrong(columns.error().message);
 
-  ComparisonTitle title{options.device, {}, subject.name, subject.poseTitle};
+  ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
   std::optional<samples::OpenDevice> open;
   if (options.device != "cpu") {
     samples::DeviceOptions deviceOptions;

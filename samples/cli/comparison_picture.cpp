@@ -27,7 +27,7 @@ constexpr Sheet::Style nameStyle{26, sheetInk};
 constexpr Sheet::Style numberStyle{23, sheetPaleInk};
 constexpr float lineGap = 1.22f;
 /// Free at each border of a picture, as a part of it.
-constexpr double cameraMargin = 0.06;
+constexpr double cameraMargin = 0.07;
 
 Sheet::Style scaled(Sheet::Style style, float scale) {
   style.height = std::round(style.height * scale);
@@ -39,11 +39,11 @@ float linearOf(std::uint8_t encoded) {
   return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
 }
 
-/// The paper goes on behind the figures.
-render::LightingStyle styleOnPaper() {
+/// In front of one colour, neither white nor black: figures may be either.
+render::LightingStyle styleOfPictures() {
   render::LightingStyle style;
-  style.horizonColor = style.zenithColor = {linearOf(sheetPaper[0]), linearOf(sheetPaper[1]),
-                                            linearOf(sheetPaper[2])};
+  style.horizonColor = style.zenithColor = {linearOf(sheetPanel[0]), linearOf(sheetPanel[1]),
+                                            linearOf(sheetPanel[2])};
   style.keyElevation = 62;  // Shadows are short: there is little room beside a figure.
   return style;
 }
@@ -51,7 +51,7 @@ render::LightingStyle styleOnPaper() {
 /// Light from everywhere, so that a colour is what the scale says, and just enough from one side to
 /// see a shape.
 render::LightingStyle styleOfHeatMaps() {
-  render::LightingStyle style = styleOnPaper();
+  render::LightingStyle style = styleOfPictures();
   style.keyColor = glm::vec3(0.45f);
   style.skyColor = glm::vec3(0.62f);
   style.bounceColor = glm::vec3(0.42f);
@@ -66,25 +66,6 @@ double roundedUp(double value) {
     if (factor * power >= value * (1 - 1e-9)) return factor * power;
   }
   return 10 * power;
-}
-
-/// A figure stands in the middle of its picture, but its shadow may reach the border: there it
-/// becomes paper.
-void fadeBorder(render::Picture& picture) {
-  const auto reach = static_cast<float>(cameraMargin * std::min(picture.width, picture.height));
-  for (std::uint32_t y = 0; y < picture.height; ++y) {
-    for (std::uint32_t x = 0; x < picture.width; ++x) {
-      const std::uint32_t away = std::min({x, y, picture.width - 1 - x, picture.height - 1 - y});
-      const float share = std::min(static_cast<float>(away) / reach, 1.f);
-      if (share == 1) continue;
-      std::uint8_t* pixel = &picture.pixels[(std::size_t{y} * picture.width + x) * 4];
-      for (std::size_t i = 0; i < 3; ++i) {
-        pixel[i] = static_cast<std::uint8_t>(
-            std::lround(std::lerp(static_cast<float>(sheetPaper[i]), static_cast<float>(pixel[i]),
-                                  share * share * (3 - 2 * share))));
-      }
-    }
-  }
 }
 
 /// How high a picture must be for its width, so that a box fills it.
@@ -118,7 +99,7 @@ class ComparisonDrawer {
   }
 
   Result<render::Picture> draw() {
-    Result<render::Renderer> renderer = render::Renderer::create(*device_.device);
+    Result<render::Renderer> renderer = render::Renderer::create(*device_.device, {12, 24, 4});
     if (!renderer) return renderer.error();
     renderer_.emplace(std::move(*renderer));
     space(14);
@@ -165,7 +146,7 @@ class ComparisonDrawer {
   void writeCaptions(const std::vector<std::vector<std::string>>& numbers) {
     const Sheet::Style name = scaled(nameStyle, sheet_.scale());
     const Sheet::Style number = scaled(numberStyle, sheet_.scale());
-    space(4);
+    space(10);
     std::vector<std::vector<std::string>> names;
     std::size_t nameLines = 1, numberLines = 0;
     for (std::size_t column = 0; column < methods_.size(); ++column) {
@@ -253,9 +234,9 @@ class ComparisonDrawer {
     sheet_.left("0", style);
     const float from = sheet_.width("0", style) + gap;
     sheet_.gradient(colors, from, length, style.height);
-    sheet_.left(fmt::format("{:g} ‰ of the model's size, or more ({:.3g} in its units)",
-                            most / size * 1e3, most),
-                style, from + length + gap);
+    sheet_.left(
+        fmt::format("{:g} ‰ of the model's size or more ({:.3g} units)", most / size * 1e3, most),
+        style, from + length + gap);
     sheet_.advance(std::round(style.height * lineGap));
     space(6);
   }
@@ -267,11 +248,11 @@ class ComparisonDrawer {
     description.width = sheet_.columnWidth();
     description.height = static_cast<std::uint32_t>(static_cast<float>(description.width) *
                                                     heightForWidth(figures.box(), strip.camera));
-    description.shadows = {1024, 256, 20};
+    description.shadows = {1024, 256, 16};
     Result<render::RenderFrame> frame = renderer_->createFrame(description);
     if (!frame) return frame.error();
     render::View view = viewOf(figures.box(), strip.camera, description);
-    view.style = asHeatMap ? styleOfHeatMaps() : styleOnPaper();
+    view.style = asHeatMap ? styleOfHeatMaps() : styleOfPictures();
     for (std::size_t column = 0; column < methods_.size(); ++column) {
       std::vector<render::Draw> draws;
       if (Result<void> added =
@@ -280,9 +261,7 @@ class ComparisonDrawer {
         return added;
       view.draws = draws;
       if (Result<void> drawn = drawView(*frame, view); !drawn) return drawn;
-      render::Picture picture{description.width, description.height, frame->target().pixels()};
-      fadeBorder(picture);
-      sheet_.paste(column, picture);
+      sheet_.paste(column, {description.width, description.height, frame->target().pixels()});
       step_();
     }
     sheet_.advance(static_cast<float>(description.height));

@@ -10,8 +10,8 @@ namespace {
 using samples::render::Font;
 using samples::render::Picture;
 
-/// Lengths are given for columns of this width.
-constexpr float usualColumnWidth = 280;
+/// Lengths are given for such columns, on a sheet that is at least so wide.
+constexpr float usualColumnWidth = 280, usualWidth = 1000;
 
 /// Bytes that follow the first of a UTF-8 character.
 bool isContinuation(char byte) {
@@ -25,7 +25,9 @@ Sheet::Sheet(std::uint32_t width, std::size_t columns, const Font* font) : font_
   margin_ = width / 50;
   gutter_ = width / 150;
   columnWidth_ = (width - 2 * margin_ - (count - 1) * gutter_) / count;
-  scale_ = std::clamp(static_cast<float>(columnWidth_) / usualColumnWidth, 0.5f, 1.6f);
+  scale_ = std::clamp(std::min(static_cast<float>(columnWidth_) / usualColumnWidth,
+                               static_cast<float>(width) / usualWidth),
+                      0.5f, 1.6f);
   picture_.width = width;
 }
 

@@ -16,6 +16,7 @@ namespace dermis::cli {
 using SheetColor = std::array<std::uint8_t, 3>;  ///< sRGB
 
 inline constexpr SheetColor sheetPaper{243, 244, 246};
+inline constexpr SheetColor sheetPanel{203, 209, 216};  ///< behind pictures
 inline constexpr SheetColor sheetInk{30, 35, 43};
 inline constexpr SheetColor sheetPaleInk{94, 103, 115};
 inline constexpr SheetColor sheetLine{208, 212, 218};
