@@ -59,10 +59,10 @@ render::LightingStyle styleOfHeatMaps() {
   return style;
 }
 
-/// The number of 1, 2 and 5 times a power of ten that is not below a value.
+/// The next of such numbers, times a power of ten, that people read at a glance.
 double roundedUp(double value) {
   const double power = std::pow(10, std::floor(std::log10(value)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
+  for (const double factor : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0}) {
     if (factor * power >= value * (1 - 1e-9)) return factor * power;
   }
   return 10 * power;

@@ -25,14 +25,12 @@ Sheet::Sheet(std::uint32_t width, std::size_t columns, const Font* font) : font_
   margin_ = width / 50;
   gutter_ = width / 150;
   columnWidth_ = (width - 2 * margin_ - (count - 1) * gutter_) / count;
+  innerWidth_ = count * (columnWidth_ + gutter_) - gutter_;
+  margin_ = (width - innerWidth_) / 2;
   scale_ = std::clamp(std::min(static_cast<float>(columnWidth_) / usualColumnWidth,
                                static_cast<float>(width) / usualWidth),
                       0.5f, 1.6f);
   picture_.width = width;
-}
-
-float Sheet::innerWidth() const {
-  return static_cast<float>(picture_.width - 2 * margin_);
 }
 
 std::uint32_t Sheet::columnLeft(std::size_t column) const {
@@ -58,7 +56,7 @@ void Sheet::advance(float pixels) {
 void Sheet::rule() {
   const auto row = static_cast<std::uint32_t>(y_);
   need(row + 1);
-  for (std::uint32_t x = margin_; x < picture_.width - margin_; ++x)
+  for (std::uint32_t x = margin_; x < margin_ + innerWidth_; ++x)
     std::ranges::copy(sheetLine, &picture_.pixels[(std::size_t{row} * picture_.width + x) * 4]);
 }
 

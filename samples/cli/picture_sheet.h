@@ -50,7 +50,7 @@ class Sheet {
   /// A box of colours from left to right, in a line of text; `from` as in `left`.
   void gradient(const std::vector<SheetColor>& colors, float from, float length, float height);
   /// Of what is inside the margins.
-  float innerWidth() const;
+  float innerWidth() const { return static_cast<float>(innerWidth_); }
 
   samples::render::Picture take();
 
@@ -61,7 +61,7 @@ class Sheet {
 
   const samples::render::Font* font_;
   samples::render::Picture picture_;
-  std::uint32_t margin_, gutter_, columnWidth_;
+  std::uint32_t margin_, gutter_, columnWidth_, innerWidth_;
   float scale_, y_ = 0;
 };
 
