@@ -224,6 +224,7 @@ Run addCompare(CLI::App& app) {
       ->add_option("--methods", options->methods,
                    "The columns of the picture, with commas [those of the paper, and newer ones]")
       ->delimiter(',')
+      ->allow_extra_args(false)  // A model may follow.
       ->needs(output);
   command->add_option("--width", options->width, fmt::format("Pixels [{}]", options->width))
       ->needs(output);

@@ -132,17 +132,20 @@ Result<void> ComparedFigures::findBox() {
   if (!*base) return Error{ErrorCode::invalidData, "there is nothing to draw: no vertex is finite"};
   size_ = std::max(diagonalOf(**base), 1e-30);
   box_ = **base;
+  floor_ = box_.min[1];
   const auto beyond = static_cast<float>(0.15 * size_);
   for (std::uint32_t figure = 0; figure + 1 < count; ++figure) {
     const Result<std::optional<Box>> box = drawn_.bounds(figure);
     if (!box) return box.error();
     if (!*box) continue;
+    if ((*box)->min[1] > (*base)->min[1] - beyond / 10) floor_ = std::min(floor_, (*box)->min[1]);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float low = (*base)->min[axis], high = (*base)->max[axis];
       box_.min[axis] = std::min(box_.min[axis], std::max((*box)->min[axis], low - beyond));
       box_.max[axis] = std::max(box_.max[axis], std::min((*box)->max[axis], high + beyond));
     }
   }
+  box_.min[1] = floor_;  // What is below is not seen.
   return {};
 }
 

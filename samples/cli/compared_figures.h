@@ -27,8 +27,11 @@ class ComparedFigures {
                                         const ScenePose& pose, std::span<const Method> methods);
 
   /// Around all figures, but for vertices that a method throws far away from where dual quaternions
-  /// have theirs.
+  /// have theirs, or below the floor.
   const Box& box() const { return box_; }
+  /// The height on which they stand: so low that no foot goes through it, but not so low as what a
+  /// method has torn off.
+  float floor() const { return floor_; }
   /// The diagonal of the figure's box by dual quaternions; above 0.
   double size() const { return size_; }
   /// A part's vertices as the device wrote them, 3 floats each; empty where no joint moves it.
@@ -64,6 +67,7 @@ class ComparedFigures {
   std::vector<FigureDifference> differences_;
   std::vector<std::vector<samples::MappedBuffer>> heat_;  ///< by method, by part
   Box box_;
+  float floor_ = 0;
   double size_ = 0;
 };
 

@@ -251,7 +251,7 @@ class ComparisonDrawer {
     description.shadows = {1024, 256, 16};
     Result<render::RenderFrame> frame = renderer_->createFrame(description);
     if (!frame) return frame.error();
-    render::View view = viewOf(figures.box(), strip.camera, description);
+    render::View view = viewOf(figures, strip.camera, description);
     view.style = asHeatMap ? styleOfHeatMaps() : styleOfPictures();
     for (std::size_t column = 0; column < methods_.size(); ++column) {
       std::vector<render::Draw> draws;
@@ -268,21 +268,22 @@ class ComparisonDrawer {
     return {};
   }
 
-  static render::View viewOf(const Box& box, render::CameraOptions camera,
+  static render::View viewOf(const ComparedFigures& figures, render::CameraOptions camera,
                              const render::FrameDescription& description) {
+    const Box& box = figures.box();
     const float radius = render::radiusOf(box);
     render::View view;
     view.area.extent = {description.width, description.height};
     view.casters = box;
     // A hair lower, for soles that are as flat as the ground.
-    view.groundHeight = box.min[1] - 1e-3f * radius;
+    view.groundHeight = figures.floor() - 1e-3f * radius;
     view.groundRadius = 2.5f * radius;
     Box ground = box;
     for (const std::size_t axis : {0u, 2u}) {
       ground.min[axis] -= 4 * radius;
       ground.max[axis] += 4 * radius;
     }
-    ground.min[1] = *view.groundHeight;
+    ground.min[1] = std::min(ground.min[1], *view.groundHeight);
     camera.margin = cameraMargin;
     view.camera = render::frameBoxes(
         {&box, 1}, ground, camera,

@@ -23,8 +23,8 @@ CommandResult compare(std::vector<std::string> arguments) {
 TEST(ComparisonCommandTest, WritesAPictureBesidesTheTable) {
   REQUIRE_DEVICE();
   const std::string out = outFile("bar.png");
-  const CommandResult result = compare({bar, "--time", "1", "-o", out, "--methods",
-                                        "linear,dual_quaternion_iterative", "--width", "500"});
+  const CommandResult result = compare({"--time", "1", "-o", out, "--width", "500", "--methods",
+                                        "linear,dual_quaternion_iterative", bar});
   ASSERT_EQ(result.status, 0) << result.errors;
   EXPECT_TRUE(result.errors.empty()) << result.errors;
   // All methods, whatever the columns are.
