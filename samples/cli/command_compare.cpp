@@ -22,6 +22,8 @@ namespace {
 
 constexpr std::uint32_t mostRepetitions = 10'000;
 constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
+/// Narrower ones have no room for the names of methods.
+constexpr std::uint32_t leastColumnWidth = 110;
 
 struct CompareOptions {
   std::string model;  ///< empty: the built-in arm
@@ -172,6 +174,10 @@ ExitStatus compare(const CompareOptions& options) {
     return loaded;
   const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
   if (!columns) return wrong(columns.error().message);
+  if (options.width < columns->size() * leastColumnWidth) {
+    return wrong(fmt::format("{} methods side by side need a --width of {} pixels", columns->size(),
+                             columns->size() * leastColumnWidth));
+  }
 
   ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
   std::optional<samples::OpenDevice> open;

@@ -53,6 +53,7 @@ TEST(ComparisonCommandTest, WhatIsWrongHasItsStatus) {
       {bar, "-o", "a.png", "--device", "cpu"},
       {bar, "-o", "a.png", "--width", "100"},
       {bar, "-o", "a.png", "--width", "100000"},
+      {bar, "-o", "a.png", "--width", "500"},  // too many columns for it
       {bar, "-o", "a.png", "--methods", "magic"},
       {bar, "-o", "a.png", "--methods", "linear,linear"},
       {bar, "--methods", "linear"},
