@@ -78,7 +78,8 @@ ExitStatus checkUsage(const CompareOptions& options) {
 
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
   if (clip == gltf::none) return "rest pose";
-  return fmt::format("clip {} '{}' at {:.3f} s", clip, model.clips[clip].name,
+  const std::string& name = model.clips[clip].name;
+  return fmt::format("clip {}{} at {:.3f} s", clip, name.empty() ? "" : fmt::format(" '{}'", name),
                      std::clamp(time, 0.0, model.clips[clip].duration));
 }
 
