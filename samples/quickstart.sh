@@ -1,6 +1,6 @@
 #!/bin/sh
 # From a fresh clone to a skinned figure and a crowd, proven right: installs what is missing, builds, skins the figure on a Vulkan
-# device (on a machine without a GPU: Mesa's lavapipe) and compares every vertex with the reference.
+# device (on a machine without a GPU: Mesa's lavapipe), compares every vertex with the reference, and draws two pictures.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -27,15 +27,20 @@ echo "The Vulkan devices of this machine:"
 echo
 echo "Skinning the figure's walk, 8 poses with dual quaternions, on the best of them ..."
 "$dermis" skin "$models/figure.glb" --animation walk --frames 8 --fps 8 -o "$out/figure-%02d.ply"
-echo "The methods side by side ..."
-"$dermis" compare "$models/figure.glb" --json "$out/compare.json"
+echo "The methods side by side, as numbers and as a picture ..."
+"$dermis" compare "$models/figure.glb" --animation wave --time 1.2 --json "$out/compare.json" \
+  -o "$out/compare.png" --width 1400
 echo
 echo "Comparing every vertex, in every clip, by every method, with the double-precision reference ..."
 "$dermis" verify "$models/figure.glb" "$models/bar.glb" "$models/arm.glb" --json "$out/verify.json" --junit "$out/verify.xml"
 echo
 echo "A crowd of 200 such figures that come and go, each in a clip and phase of its own, with every tenth frame compared ..."
 "$crowd" --json "$out/crowd.json"
+echo "Drawing a crowd of 25, straight from the buffers that it is skinned into ..."
+"$dermis" render "$models/figure.glb" --instances 25 --width 960 --height 540 -o "$out/crowd.png"
 echo
+echo "The methods side by side, a picture:             $out/compare.png"
+echo "A crowd, a picture:                              $out/crowd.png"
 echo "The skinned figure (open it in any mesh viewer): $out/figure-00.ply ... figure-07.ply"
 echo "What was compared, and how near it came:         $out/verify.json"
 echo "What the crowd cost:                             $out/crowd.json"

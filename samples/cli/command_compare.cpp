@@ -6,20 +6,30 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "commands.h"
-#include "comparison_report.h"
+#include "comparison_subject.h"
 #include "driver_version.h"
+#include "frame_name.h"
 #include "open_device.h"
+#include "output_file.h"
+#include "picture_writer.h"
 #include "progress.h"
 
 namespace dermis::cli {
 namespace {
 
 constexpr std::uint32_t mostRepetitions = 10'000;
+constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
+/// Narrower ones have no room for the names of methods.
+constexpr std::uint32_t leastColumnWidth = 110;
 
 struct CompareOptions {
-  std::string model;
+  std::string model;  ///< empty: the built-in arm
+  std::string output;
+  std::vector<std::string> methods;
+  std::uint32_t width = 1800;
   std::optional<std::string> animation;
   double time = 0;
   std::string device = "auto";
@@ -30,60 +40,152 @@ struct CompareOptions {
   bool strict = false;
 };
 
-ExitStatus checkUsage(const CompareOptions& options) {
-  if (!std::isfinite(options.time))
-    return reportError(ExitStatus::wrongUsage, "--time must be a number of seconds");
-  if (options.repetitions == 0 || options.repetitions > mostRepetitions) {
-    return reportError(ExitStatus::wrongUsage,
-                       fmt::format("--repetitions must be from 1 to {}", mostRepetitions));
+ExitStatus wrong(const std::string& message) {
+  return reportError(ExitStatus::wrongUsage, message);
+}
+
+ExitStatus checkPicture(const CompareOptions& options) {
+  if (options.model.empty() && options.output.empty())
+    return wrong("compare needs MODEL, or -o OUT.png for a picture of the built-in models");
+  if (options.model.empty() && (options.animation || options.time != 0))
+    return wrong("--animation and --time are those of MODEL, and there is none");
+  if (options.output.empty()) return ExitStatus::done;
+  if (pictureKind(options.output) != PictureKind::png)
+    return wrong(fmt::format("OUT must end in .png, not be '{}'", options.output));
+  if (hasWrongPattern(options.output) || frameName(options.output, 0))
+    return wrong("OUT has a place for a number; there is one picture only");
+  if (options.device == "cpu")
+    return wrong("--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+  if (options.width < leastWidth || options.width > largestWidth)
+    return wrong(fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
+  for (auto name = options.methods.begin(); name != options.methods.end(); ++name) {
+    if (!methodFromName(*name))
+      return wrong(fmt::format("there is no method '{}'; there are {}", *name, methodNames("and")));
+    if (std::find(options.methods.begin(), name, *name) != name)
+      return wrong(fmt::format("--methods names {} twice", *name));
   }
-  if (options.instances && *options.instances == 0)
-    return reportError(ExitStatus::wrongUsage, "--instances must be at least 1");
+  return ExitStatus::done;
+}
+
+ExitStatus checkUsage(const CompareOptions& options) {
+  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (options.repetitions == 0 || options.repetitions > mostRepetitions)
+    return wrong(fmt::format("--repetitions must be from 1 to {}", mostRepetitions));
+  if (options.instances && *options.instances == 0) return wrong("--instances must be at least 1");
+  if (const ExitStatus picture = checkPicture(options); picture != ExitStatus::done) return picture;
   return checkShares(options.shares);
 }
 
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
   if (clip == gltf::none) return "rest pose";
-  return fmt::format("clip {} '{}' at {:.3f} s", clip, model.clips[clip].name,
+  const std::string& name = model.clips[clip].name;
+  return fmt::format("clip {}{} at {:.3f} s", clip, name.empty() ? "" : fmt::format(" '{}'", name),
                      std::clamp(time, 0.0, model.clips[clip].duration));
 }
 
-/// A scene with something to skin. What is wrong with it has been reported where there is none.
-std::optional<Scene> loadSkinnedScene(const CompareOptions& options, ExitStatus& status) {
+MeshPreparation preparationFor(const CompareOptions& options) {
   MeshPreparation preparation;
   preparation.strict = options.strict;
+  preparation.images = !options.output.empty();
   preparation.centersOfRotation = true;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
-  Result<Scene> scene = loadScene(options.model, preparation);
-  if (!scene) {
-    status = reportModelError(scene.error());
-    return std::nullopt;
-  }
+  return preparation;
+}
+
+/// The model, with something to skin.
+ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) {
+  Result<Scene> scene = loadScene(options.model, preparationFor(options));
+  if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
-  for (const ScenePart& part : scene->parts) {
-    if (part.mesh != nullptr) return std::move(*scene);
+  if (std::ranges::none_of(scene->parts,
+                           [](const ScenePart& part) { return part.mesh != nullptr; })) {
+    return reportError(
+        ExitStatus::badInput,
+        fmt::format("{} has no skinned mesh with joints and weights in its scene", options.model));
   }
-  status = reportError(
-      ExitStatus::badInput,
-      fmt::format("{} has no skinned mesh with joints and weights in its scene", options.model));
-  return std::nullopt;
+  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
+  if (!clip) return wrong(clip.error().message);
+  subject.name = options.model;
+  subject.poseName = poseName(*scene->model, *clip, options.time);
+  subject.pose = scenePose(*scene, *clip, options.time);
+  subject.model.emplace(std::move(*scene));
+  return ExitStatus::done;
+}
+
+ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject) {
+  if (!options.model.empty()) {
+    if (const ExitStatus loaded = loadModel(options, subject); loaded != ExitStatus::done)
+      return loaded;
+  }
+  if (options.output.empty()) return ExitStatus::done;
+  Result<BuiltInScenes> builtIn = loadBuiltInScenes(preparationFor(options));
+  if (!builtIn) return reportModelError(builtIn.error());
+  subject.builtIn.emplace(std::move(*builtIn));
+  if (subject.model) return ExitStatus::done;
+  const Scene& arm = subject.builtIn->arm;
+  subject.name = "the built-in arm";
+  subject.poseName = poseName(*arm.model, 0, builtInArmTime(arm));
+  subject.pose = scenePose(arm, 0, builtInArmTime(arm));
+  return ExitStatus::done;
+}
+
+/// Of the picture, in their order.
+Result<std::vector<Method>> chooseColumns(const CompareOptions& options, const Scene& scene) {
+  std::vector<Method> columns;
+  for (const std::string& name : options.methods) {
+    columns.push_back(*methodFromName(name));
+    if (allows(scene, columns.back())) continue;
+    return Error{ErrorCode::invalidArgument,
+                 fmt::format("{}: {} needs centres of rotation, which were too much work",
+                             options.model, name)};
+  }
+  return columns.empty() ? usualColumns(scene) : columns;
+}
+
+ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& subject,
+                        const std::vector<Method>& columns, const ComparisonTitle& title,
+                        const MethodComparison& comparison, samples::OpenDevice& open) {
+  ComparisonSheet sheet = describeSheet(subject, columns, title, comparison);
+  sheet.width = options.width;
+  Result<samples::render::Font> font = samples::render::Font::load();
+  if (!font) reportNote(font.error().message + ": the picture has no words");
+  std::vector<std::string> notes;
+  const Result<samples::render::Picture> picture = [&] {
+    Progress progress("drawing", comparisonPictures(sheet));
+    return drawComparison(open, sheet, font ? &*font : nullptr, notes,
+                          [&progress] { progress.step(); });
+  }();
+  if (!picture) {
+    return picture.error().code == ErrorCode::invalidData ? reportModelError(picture.error())
+                                                          : reportDeviceError(picture.error());
+  }
+  for (const std::string& note : notes) reportNote(note);
+  const Result<std::vector<std::byte>> file = samples::render::encodePng(*picture);
+  if (!file) return reportError(ExitStatus::stopped, file.error().message);
+  if (Result<void> written = writeFile(options.output, *file); !written)
+    return reportError(ExitStatus::stopped, written.error().message);
+  return ExitStatus::done;
 }
 
 ExitStatus compare(const CompareOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
-  ExitStatus status = ExitStatus::done;
-  const std::optional<Scene> scene = loadSkinnedScene(options, status);
-  if (!scene) return status;
-  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
-  if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
+  ComparisonSubject subject;
+  if (const ExitStatus loaded = loadSubject(options, subject); loaded != ExitStatus::done)
+    return loaded;
+  const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
+  if (!columns) return wrong(columns.error().message);
+  if (options.width < columns->size() * leastColumnWidth) {
+    return wrong(fmt::format("{} methods side by side need a --width of {} pixels", columns->size(),
+                             columns->size() * leastColumnWidth));
+  }
 
-  ComparisonTitle title{
-      options.device, {}, options.model, poseName(*scene->model, *clip, options.time)};
+  ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
   std::optional<samples::OpenDevice> open;
   if (options.device != "cpu") {
     samples::DeviceOptions deviceOptions;
     deviceOptions.device = options.device;
+    deviceOptions.graphics = !options.output.empty();
     Result<samples::OpenDevice> opened = samples::openDevice(deviceOptions);
     if (!opened) return reportDeviceError(opened.error());
     open.emplace(std::move(*opened));
@@ -92,14 +194,14 @@ ExitStatus compare(const CompareOptions& options) {
   }
 
   const ComparisonOptions comparisonOptions{options.instances, options.repetitions, options.shares};
-  Result<MethodComparison> comparison = [&] {
+  const Result<MethodComparison> comparison = [&] {
     Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
-    return compareMethods(*scene, scenePose(*scene, *clip, options.time), open ? &*open : nullptr,
-                          comparisonOptions, [&progress] { progress.step(); });
+    return compareMethods(subject.scene(), subject.pose, open ? &*open : nullptr, comparisonOptions,
+                          [&progress] { progress.step(); });
   }();
   if (!comparison) {
     return comparison.error().code == ErrorCode::invalidArgument
-               ? reportError(ExitStatus::wrongUsage, comparison.error().message)
+               ? wrong(comparison.error().message)
                : reportDeviceError(comparison.error());
   }
   printComparison(title, *comparison);
@@ -107,7 +209,8 @@ ExitStatus compare(const CompareOptions& options) {
     if (Result<void> written = writeJsonComparison(options.json, title, *comparison); !written)
       return reportError(ExitStatus::stopped, written.error().message);
   }
-  return ExitStatus::done;
+  if (options.output.empty()) return ExitStatus::done;
+  return writePicture(options, subject, *columns, title, *comparison, *open);
 }
 
 }  // namespace
@@ -118,7 +221,20 @@ Run addCompare(CLI::App& app) {
       "What each method costs on the device, and what it does to a twist, a bend and a "
       "model");
   const auto options = std::make_shared<CompareOptions>();
-  command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
+  command->add_option("MODEL", options->model,
+                      "A .gltf or .glb file [with -o: an arm that is built in]");
+  CLI::Option* output = command->add_option(
+      "-o,--output", options->output,
+      "Draw them side by side, with a twisted bar, a bent arm and a heat map of the difference: "
+      "OUT.png");
+  command
+      ->add_option("--methods", options->methods,
+                   "The columns of the picture, with commas [those of the paper, and newer ones]")
+      ->delimiter(',')
+      ->allow_extra_args(false)  // A model may follow.
+      ->needs(output);
+  command->add_option("--width", options->width, fmt::format("Pixels [{}]", options->width))
+      ->needs(output);
   command->add_option("--animation", options->animation,
                       "A clip's number or name, or none for the rest pose [the first]");
   command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "bind_pose.h"
@@ -114,13 +115,23 @@ constexpr std::uint32_t bytesPerVector = 3 * sizeof(float);
 Result<DrawnScene> DrawnScene::create(samples::OpenDevice& device,
                                       samples::render::Renderer& renderer, const Scene& scene,
                                       std::uint32_t figures, Method method) {
+  const std::vector<Method> methods(figures, method);
+  return create(device, renderer, scene, methods);
+}
+
+Result<DrawnScene> DrawnScene::create(samples::OpenDevice& device,
+                                      samples::render::Renderer& renderer, const Scene& scene,
+                                      std::span<const Method> methods) {
   DrawnScene drawn;
   drawn.device_ = &device;
   drawn.scene_ = &scene;
-  if (Result<void> made = drawn.makeSystem(figures); !made) return made.error();
+  if (Result<void> made = drawn.makeSystem(static_cast<std::uint32_t>(methods.size())); !made)
+    return made.error();
   if (Result<void> added = drawn.addSharedParts(renderer); !added) return added.error();
-  if (Result<void> done = drawn.prepare(method); !done) return done.error();
-  for (std::uint32_t figure = 0; figure < figures; ++figure) {
+  for (const Method method : std::set<Method>(methods.begin(), methods.end())) {
+    if (Result<void> done = drawn.prepare(method); !done) return done.error();
+  }
+  for (const Method method : methods) {
     if (Result<void> added = drawn.addFigure(method); !added) return added.error();
   }
   return drawn;

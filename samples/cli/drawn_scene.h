@@ -23,6 +23,9 @@ class DrawnScene {
   /// `device`, `renderer` and `scene` must outlive it. The scene's method must be allowed.
   static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
                                    const Scene& scene, std::uint32_t figures, Method method);
+  /// A figure for each method, in this order.
+  static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
+                                   const Scene& scene, std::span<const Method> methods);
 
   std::uint32_t figureCount() const { return static_cast<std::uint32_t>(figures_.size()); }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "mesh_centers.h"
@@ -40,14 +41,11 @@ void addFindings(Scene& scene, const MeshReport& report) {
   }
 }
 
-}  // namespace
-
-Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
-  Result<gltf::Model> loaded = gltf::load(path, {.images = preparation.images});
-  if (!loaded) return loaded.error();
-
+/// `file` is the file's name, for messages.
+Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
+                           const MeshPreparation& preparation) {
   Scene scene;
-  scene.model = std::make_unique<gltf::Model>(std::move(*loaded));
+  scene.model = std::make_unique<gltf::Model>(std::move(loaded));
   const gltf::Model& model = *scene.model;
   scene.notes = model.notes;
   std::uint64_t vertices = 0;
@@ -57,14 +55,14 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
     return Error{ErrorCode::limitExceeded,
                  fmt::format("'{}': its scene has {} skinned vertices, more than the {} that this "
                              "command takes",
-                             path.filename().string(), vertices, mostVertices)};
+                             file, vertices, mostVertices)};
   }
   std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>,
            std::shared_ptr<const PreparedMesh>>
       prepared;
   MeshCenters centers;
-  const auto inFile = [&path](const Error& error) {
-    return Error{error.code, fmt::format("'{}': {}", path.filename().string(), error.message)};
+  const auto inFile = [&file](const Error& error) {
+    return Error{error.code, fmt::format("'{}': {}", file, error.message)};
   };
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     ScenePart part;
@@ -98,6 +96,21 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
     scene.parts.push_back(std::move(part));
   }
   return scene;
+}
+
+}  // namespace
+
+Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
+  Result<gltf::Model> loaded = gltf::load(path, {.images = preparation.images});
+  if (!loaded) return loaded.error();
+  return prepareScene(std::move(*loaded), path.filename().string(), preparation);
+}
+
+Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
+                        const MeshPreparation& preparation) {
+  Result<gltf::Model> loaded = gltf::loadFromMemory(file, {}, {.images = preparation.images});
+  if (!loaded) return loaded.error();
+  return prepareScene(std::move(*loaded), name, preparation);
 }
 
 bool allows(const Scene& scene, Method method) {

@@ -1,9 +1,11 @@
 // A glTF file made ready for skinning: what `skin`, `verify` and `info` have in common.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,9 @@ bool allows(const Scene& scene, Method method);
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or
 /// refused where the preparation is strict.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
+/// The same for a binary glTF file in memory; `name` is what messages call it.
+Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
+                        const MeshPreparation& preparation);
 
 /// The clip that `--animation` means: a number, a name, "none" for the rest pose, nothing for clip
 /// 0 or the rest pose. Fails with `invalidArgument` where there is no such clip.

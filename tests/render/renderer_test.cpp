@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "drawing_device.h"
 #include "drawn_scene.h"
 #include "pictures.h"
 #include "render/renderer.h"
 #include "test_data.h"
-#include "test_device.h"
 
 namespace dermis::test {
 namespace {
@@ -26,32 +26,11 @@ namespace render = samples::render;
 
 constexpr std::uint32_t width = 320, height = 180;
 
-/// A device that draws, of the test program.
-std::optional<samples::OpenDevice>& drawingDevice() {
-  static std::optional<samples::OpenDevice> device;
-  return device;
-}
-
-class DestroyDrawingDevice : public ::testing::Environment {
- public:
-  void TearDown() override { drawingDevice().reset(); }
-};
-[[maybe_unused]] const ::testing::Environment* const destroyDrawingDevice =
-    ::testing::AddGlobalTestEnvironment(new DestroyDrawingDevice);
-
-class RendererTest : public ::testing::Test {
+class RendererTest : public DrawingTest {
  protected:
   void SetUp() override {
-    if (!drawingDevice()) {
-      samples::DeviceOptions options = testDeviceOptions();
-      options.graphics = true;
-      Result<samples::OpenDevice> open = samples::openDevice(options);
-      if (!open) {
-        ASSERT_FALSE(isContinuousIntegration()) << open.error().message;
-        GTEST_SKIP() << open.error().message;
-      }
-      drawingDevice().emplace(std::move(*open));
-    }
+    DrawingTest::SetUp();
+    if (!drawingDevice()) return;
     Result<render::Renderer> renderer = render::Renderer::create(device());
     ASSERT_TRUE(renderer) << renderer.error().message;
     renderer_.emplace(std::move(*renderer));
@@ -64,13 +43,6 @@ class RendererTest : public ::testing::Test {
     ASSERT_TRUE(frame) << frame.error().message;
     frame_.emplace(std::move(*frame));
   }
-
-  void TearDown() override {
-    if (!drawingDevice()) return;
-    for (const std::string& message : device().takeValidationMessages()) ADD_FAILURE() << message;
-  }
-
-  samples::Device& device() { return *drawingDevice()->device; }
 
   /// Skins where there is a scene, and draws in the same command buffer.
   render::Picture draw(cli::DrawnScene* scene, std::vector<render::View> views) {

@@ -74,9 +74,14 @@ void main() {
   vec3 diffuse = base.rgb * (1.0 - 0.5 * metallic);
   vec3 reflectance = mix(vec3(0.04), base.rgb, metallic);
 
+  // At an edge the middle of a pixel may be beyond the triangle, where in a crease it is below the
+  // next one: half of what a pixel sees of the surface farther out it is in the light again.
+  float seen = max(length(dFdx(worldPosition)), length(dFdy(worldPosition)));
+  vec3 litPosition = worldPosition + normal * min(0.5 * seen, view.shadow.z);
+
   float cosine = max(dot(normal, view.keyDirection.xyz), 0.0);
-  float visible = cosine > 0.0 ? keyVisibility(worldPosition, normal) : 0.0;
-  vec2 sky = skyLight(worldPosition, normal, view.sky.y);
+  float visible = cosine > 0.0 ? keyVisibility(litPosition, normal) : 0.0;
+  vec2 sky = skyLight(litPosition, normal, view.sky.y);
   float open = sky.y > 0.0 ? sky.x / sky.y : 1.0;
   float down = 0.5 - 0.5 * normal.y;
 

@@ -1,0 +1,220 @@
+#include "compared_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "dermis/vulkan/scope.h"
+
+namespace dermis::cli {
+namespace {
+
+using samples::MappedBuffer;
+using samples::render::Draw;
+
+/// Records, submits and waits.
+template <typename Record>
+Result<void> runOn(samples::Device& device, const Record& record) {
+  const samples::VulkanFunctions& functions = device.functions();
+  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  functions.BeginCommandBuffer(commandBuffer, &begin);
+  Result<void> done = record(commandBuffer);
+  functions.EndCommandBuffer(commandBuffer);
+  if (done) done = device.submitAndWait(commandBuffer);
+  device.freeCommandBuffer(commandBuffer);
+  return done;
+}
+
+void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency) {
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
+  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
+                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
+                                        0, nullptr);
+}
+
+double diagonalOf(const Box& box) {
+  double squares = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double side = static_cast<double>(box.max[axis]) - static_cast<double>(box.min[axis]);
+    squares += side * side;
+  }
+  return std::sqrt(squares);
+}
+
+}  // namespace
+
+Result<ComparedFigures> ComparedFigures::create(samples::OpenDevice& device,
+                                                samples::render::Renderer& renderer,
+                                                const Scene& scene, const ScenePose& pose,
+                                                std::span<const Method> methods) {
+  std::vector<Method> all(methods.begin(), methods.end());
+  all.push_back(Method::dualQuaternion);
+  Result<DrawnScene> drawn = DrawnScene::create(device, renderer, scene, all);
+  if (!drawn) return drawn.error();
+  ComparedFigures figures(device, scene, std::move(*drawn));
+  if (Result<void> done = figures.skin(pose); !done) return done.error();
+  if (Result<void> done = figures.readBack(); !done) return done.error();
+  if (Result<void> done = figures.findBox(); !done) return done.error();
+  figures.compareAll();
+  return figures;
+}
+
+Result<void> ComparedFigures::skin(const ScenePose& pose) {
+  if (Result<void> begun = drawn_.beginFrame(); !begun) return begun;
+  for (std::uint32_t figure = 0; figure < drawn_.figureCount(); ++figure) {
+    if (Result<void> posed = drawn_.setPose(figure, pose); !posed) return posed;
+  }
+  return runOn(*device_->device, [this](VkCommandBuffer commandBuffer) {
+    return drawn_.recordSkinning(commandBuffer);
+  });
+}
+
+Result<void> ComparedFigures::readBack() {
+  std::vector<std::vector<Draw>> draws(drawn_.figureCount());
+  std::vector<VkBufferCopy> copies;
+  VkBuffer output = VK_NULL_HANDLE;
+  std::uint64_t size = 0;
+  for (std::uint32_t figure = 0; figure < drawn_.figureCount(); ++figure) {
+    if (Result<void> added = drawn_.addDraws(figure, {}, draws[figure]); !added) return added;
+    for (std::size_t part = 0; part < scene_->parts.size(); ++part) {
+      const samples::render::VertexStream& stream = draws[figure][part].positions;
+      if (scene_->parts[part].mesh == nullptr) continue;
+      const std::uint64_t bytes =
+          (scene_->parts[part].primitive->vertexCount - std::uint64_t{1}) * stream.stride +
+          3 * sizeof(float);
+      output = stream.buffer;
+      copies.push_back({stream.offset, size, bytes});
+      size += bytes;
+    }
+  }
+  Result<MappedBuffer> buffer =
+      MappedBuffer::create(*device_->device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
+  if (!buffer) return buffer.error();
+  const Result<void> copied = runOn(*device_->device, [&](VkCommandBuffer commandBuffer) {
+    if (copies.empty()) return Result<void>();
+    const samples::Device& device = *device_->device;
+    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+    device.functions().CmdCopyBuffer(commandBuffer, output, buffer->handle(),
+                                     static_cast<std::uint32_t>(copies.size()), copies.data());
+    recordBarrier(device, commandBuffer,
+                  {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
+                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+    return Result<void>();
+  });
+  if (!copied) return copied;
+  auto copy = copies.begin();
+  for (std::uint32_t figure = 0; figure < drawn_.figureCount(); ++figure) {
+    Positions& positions = positions_.emplace_back(scene_->parts.size());
+    for (std::size_t part = 0; part < scene_->parts.size(); ++part) {
+      if (scene_->parts[part].mesh == nullptr) continue;
+      const std::uint32_t vertexCount = scene_->parts[part].primitive->vertexCount;
+      positions[part].resize(std::size_t{vertexCount} * 3);
+      const std::byte* source = buffer->bytes().data() + (copy++)->dstOffset;
+      for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex) {
+        std::memcpy(&positions[part][std::size_t{vertex} * 3],
+                    source + std::size_t{vertex} * draws[figure][part].positions.stride,
+                    3 * sizeof(float));
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> ComparedFigures::findBox() {
+  if (Result<void> begun = drawn_.beginFrame(); !begun) return begun;
+  const std::uint32_t count = drawn_.figureCount();
+  const Result<std::optional<Box>> base = drawn_.bounds(count - 1);
+  if (!base) return base.error();
+  if (!*base) return Error{ErrorCode::invalidData, "there is nothing to draw: no vertex is finite"};
+  size_ = std::max(diagonalOf(**base), 1e-30);
+  box_ = **base;
+  floor_ = box_.min[1];
+  const auto beyond = static_cast<float>(0.15 * size_);
+  for (std::uint32_t figure = 0; figure + 1 < count; ++figure) {
+    const Result<std::optional<Box>> box = drawn_.bounds(figure);
+    if (!box) return box.error();
+    if (!*box) continue;
+    if ((*box)->min[1] > (*base)->min[1] - beyond / 10) floor_ = std::min(floor_, (*box)->min[1]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float low = (*base)->min[axis], high = (*base)->max[axis];
+      box_.min[axis] = std::min(box_.min[axis], std::max((*box)->min[axis], low - beyond));
+      box_.max[axis] = std::max(box_.max[axis], std::min((*box)->max[axis], high + beyond));
+    }
+  }
+  box_.min[1] = floor_;  // What is below is not seen.
+  return {};
+}
+
+/// Of each vertex; 0 where one is not finite.
+std::vector<double> ComparedFigures::distances(std::size_t method, std::size_t part) const {
+  const std::vector<float>&a = positions_[method][part], &b = positions_.back()[part];
+  std::vector<double> found(a.size() / 3);
+  for (std::size_t vertex = 0; vertex < found.size(); ++vertex) {
+    double squares = 0;
+    for (std::size_t i = vertex * 3; i < vertex * 3 + 3; ++i) {
+      const double along = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+      squares += along * along;
+    }
+    if (std::isfinite(squares)) found[vertex] = std::sqrt(squares);
+  }
+  return found;
+}
+
+void ComparedFigures::compareAll() {
+  for (std::size_t method = 0; method + 1 < positions_.size(); ++method) {
+    FigureDifference& difference = differences_.emplace_back();
+    double squares = 0;
+    std::size_t count = 0;
+    for (std::size_t part = 0; part < scene_->parts.size(); ++part) {
+      for (const double distance : distances(method, part)) {
+        difference.largest = std::max(difference.largest, distance);
+        squares += distance * distance;
+        ++count;
+      }
+    }
+    if (count != 0) difference.rootMeanSquare = std::sqrt(squares / static_cast<double>(count));
+  }
+}
+
+Result<void> ComparedFigures::makeHeatMaps(double hottest) {
+  heat_.clear();
+  for (std::size_t method = 0; method < differences_.size(); ++method) {
+    std::vector<MappedBuffer>& parts = heat_.emplace_back();
+    for (std::size_t part = 0; part < scene_->parts.size(); ++part) {
+      std::vector<float> values(scene_->parts[part].primitive->vertexCount);
+      const std::vector<double> found = distances(method, part);
+      std::ranges::transform(found, values.begin(), [hottest](double distance) {
+        return static_cast<float>(std::min(distance / hottest, 1.0));
+      });
+      Result<MappedBuffer> buffer = MappedBuffer::create(
+          *device_->device, values.size() * sizeof(float), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
+      if (!buffer) return buffer.error();
+      if (!values.empty())
+        std::memcpy(buffer->bytes().data(), values.data(), values.size() * sizeof(float));
+      parts.push_back(std::move(*buffer));
+    }
+  }
+  return {};
+}
+
+Result<void> ComparedFigures::addDraws(std::size_t method, std::vector<Draw>& draws) const {
+  return drawn_.addDraws(static_cast<std::uint32_t>(method), {}, draws);
+}
+
+Result<void> ComparedFigures::addHeatMap(std::size_t method, std::vector<Draw>& draws) const {
+  const std::size_t first = draws.size();
+  if (Result<void> added = addDraws(method, draws); !added) return added;
+  for (std::size_t part = 0; part < heat_[method].size(); ++part) {
+    Draw& draw = draws[first + part];
+    draw.values = {heat_[method][part].handle(), 0, sizeof(float)};
+    draw.surface.metallic = 0;
+    draw.surface.roughness = 1;
+  }
+  return {};
+}
+
+}  // namespace dermis::cli

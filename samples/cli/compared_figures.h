@@ -1,0 +1,74 @@
+// A scene in one pose, once for each of several methods: to be drawn side by side, with the
+// distances from dual quaternions as a heat map.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dermis/method.h"
+#include "drawn_scene.h"
+
+namespace dermis::cli {
+
+/// Of the vertices that are finite by both methods, in units of the model.
+struct FigureDifference {
+  double largest = 0;
+  double rootMeanSquare = 0;
+};
+
+class ComparedFigures {
+ public:
+  /// Skins on the device, and waits for it. All must outlive it; the scene allows all methods.
+  /// Fails where the device does, and with `invalidData` where no vertex is finite.
+  static Result<ComparedFigures> create(samples::OpenDevice& device,
+                                        samples::render::Renderer& renderer, const Scene& scene,
+                                        const ScenePose& pose, std::span<const Method> methods);
+
+  /// Around all figures, but for vertices that a method throws far away from where dual quaternions
+  /// have theirs, or below the floor.
+  const Box& box() const { return box_; }
+  /// The height on which they stand: so low that no foot goes through it, but not so low as what a
+  /// method has torn off.
+  float floor() const { return floor_; }
+  /// The diagonal of the figure's box by dual quaternions; above 0.
+  double size() const { return size_; }
+  /// A part's vertices as the device wrote them, 3 floats each; empty where no joint moves it.
+  std::span<const float> positions(std::size_t method, std::size_t part) const {
+    return positions_[method][part];
+  }
+  const FigureDifference& difference(std::size_t method) const { return differences_[method]; }
+
+  /// The distance that has the last colour of a heat map: none until this is called.
+  Result<void> makeHeatMaps(double hottest);
+
+  Result<void> addDraws(std::size_t method, std::vector<samples::render::Draw>& draws) const;
+  Result<void> addHeatMap(std::size_t method, std::vector<samples::render::Draw>& draws) const;
+
+  /// What of the materials could not be had.
+  const std::vector<std::string>& notes() const { return drawn_.notes(); }
+
+ private:
+  using Positions = std::vector<std::vector<float>>;  ///< by part
+
+  ComparedFigures(samples::OpenDevice& device, const Scene& scene, DrawnScene drawn)
+      : device_(&device), scene_(&scene), drawn_(std::move(drawn)) {}
+  Result<void> skin(const ScenePose& pose);
+  Result<void> readBack();
+  Result<void> findBox();
+  void compareAll();
+  std::vector<double> distances(std::size_t method, std::size_t part) const;
+
+  samples::OpenDevice* device_;
+  const Scene* scene_;
+  DrawnScene drawn_;  ///< The last figure is that by dual quaternions.
+  std::vector<Positions> positions_;
+  std::vector<FigureDifference> differences_;
+  std::vector<std::vector<samples::MappedBuffer>> heat_;  ///< by method, by part
+  Box box_;
+  float floor_ = 0;
+  double size_ = 0;
+};
+
+}  // namespace dermis::cli

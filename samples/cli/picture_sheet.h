@@ -1,0 +1,72 @@
+// A sheet of paper that grows downwards: columns of pictures, and words above and below them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/picture.h"
+
+namespace dermis::cli {
+
+using SheetColor = std::array<std::uint8_t, 3>;  ///< sRGB
+
+inline constexpr SheetColor sheetPaper{243, 244, 246};
+inline constexpr SheetColor sheetPanel{203, 209, 216};  ///< behind pictures
+inline constexpr SheetColor sheetInk{30, 35, 43};
+inline constexpr SheetColor sheetPaleInk{94, 103, 115};
+inline constexpr SheetColor sheetLine{208, 212, 218};
+
+class Sheet {
+ public:
+  struct Style {
+    float height = 20;  ///< pixels, as `samples::render::Font` counts them
+    SheetColor color = sheetInk;
+  };
+
+  /// Without a typeface there are no words, but the room for them. It must outlive the sheet.
+  Sheet(std::uint32_t width, std::size_t columns, const samples::render::Font* font);
+
+  std::uint32_t columnWidth() const { return columnWidth_; }
+  /// What lengths are multiplied by where columns are narrower or wider than usual.
+  float scale() const { return scale_; }
+
+  /// Goes on so many pixels farther down.
+  void advance(float pixels);
+  /// A thin line across.
+  void rule();
+  /// At the left of a line; cut short where there is no room.
+  void left(std::string_view text, const Style& style, float from = 0, float room = 0);
+  /// What a text takes; 0 without a typeface.
+  float width(std::string_view text, const Style& style) const;
+  /// In the middle of a column, smaller where it has no room.
+  void centred(std::size_t column, std::string_view text, Style style);
+  /// A picture of the width of a column or less, in its middle.
+  void paste(std::size_t column, const samples::render::Picture& picture);
+  /// A box of colours from left to right, in a line of text; `from` as in `left`.
+  void gradient(const std::vector<SheetColor>& colors, float from, float length, float height);
+  /// Of what is inside the margins.
+  float innerWidth() const { return static_cast<float>(innerWidth_); }
+
+  samples::render::Picture take();
+
+ private:
+  std::uint32_t columnLeft(std::size_t column) const;
+  void need(std::uint32_t bottom);
+  std::string fitted(std::string_view text, const Style& style, float room) const;
+
+  const samples::render::Font* font_;
+  samples::render::Picture picture_;
+  std::uint32_t margin_, gutter_, columnWidth_, innerWidth_;
+  float scale_, y_ = 0;
+};
+
+/// A name in as few lines as fit, broken behind underscores.
+std::vector<std::string> brokenName(const Sheet& sheet, std::string_view name,
+                                    const Sheet::Style& style);
+
+}  // namespace dermis::cli
