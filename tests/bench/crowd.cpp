@@ -48,6 +48,24 @@ PlainVertex plainVertex(const gltf::Primitive& primitive, std::size_t vertex) {
   return plain;
 }
 
+Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
+                                std::uint32_t jointCount) {
+  const auto view = [&](const void* first, ComponentType type, std::uint32_t components) {
+    return AttributeView{first, static_cast<std::uint32_t>(vertices.size()), sizeof(PlainVertex),
+                         type, components};
+  };
+  const PlainVertex& first = vertices.front();
+  const InfluenceSet influences{view(&first.joints, ComponentType::uint16, 4),
+                                view(&first.weights, ComponentType::float32, 4)};
+  MeshView mesh;
+  mesh.name = "crowd";
+  mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
+  mesh.positions = view(&first.position, ComponentType::float32, 3);
+  mesh.normals = view(&first.normal, ComponentType::float32, 3);
+  mesh.influenceSets = std::span(&influences, 1);
+  return pack(mesh, jointCount);
+}
+
 }  // namespace
 
 std::vector<samples::SkinRequest> Crowd::requests(Method method) const {
@@ -71,18 +89,19 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
     return Error{ErrorCode::invalidData, "'" + crowd.name + "' " + reason};
   };
   if (model->skinnedPrimitives.empty()) return refuse("has no skinned primitive");
-  const gltf::SkinnedPrimitive& source = model->skinnedPrimitives.front();
-  const gltf::Primitive& primitive = model->meshes[source.mesh].primitives[source.primitive];
-  if (primitive.normals.empty()) return refuse("has no normals");
-  if (primitive.influences.size() != 1) return refuse("has not four influences a vertex");
-
-  const auto jointCount = static_cast<std::uint32_t>(model->skins[source.skin].joints.size());
-  const gltf::PrimitiveView view(primitive);
-  Result<PackedMesh> packed = pack(view.mesh(), jointCount);
+  const std::uint32_t skin = model->skinnedPrimitives.front().skin;
+  for (const gltf::SkinnedPrimitive& source : model->skinnedPrimitives) {
+    if (source.skin != skin) continue;
+    const gltf::Primitive& primitive = model->meshes[source.mesh].primitives[source.primitive];
+    if (primitive.normals.empty()) return refuse("has no normals");
+    if (primitive.influences.size() != 1) return refuse("has not four influences a vertex");
+    for (std::size_t vertex = 0; vertex < primitive.vertexCount; ++vertex)
+      crowd.vertices.push_back(plainVertex(primitive, vertex));
+  }
+  Result<PackedMesh> packed =
+      packVertices(crowd.vertices, static_cast<std::uint32_t>(model->skins[skin].joints.size()));
   if (!packed) return packed.error();
   crowd.mesh.emplace(std::move(*packed));
-  for (std::size_t vertex = 0; vertex < primitive.vertexCount; ++vertex)
-    crowd.vertices.push_back(plainVertex(primitive, vertex));
 
   const std::uint32_t clip = model->clips.empty() ? gltf::none : 0;
   const double duration = clip == gltf::none ? 0 : model->clips[clip].duration;
@@ -90,7 +109,7 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
   const double step = (std::sqrt(5.0) - 1) / 2;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
     const double phase = std::fmod(instance * step, 1.0);
-    crowd.poses.push_back(gltf::palette(*model, source.skin, clip, phase * duration));
+    crowd.poses.push_back(gltf::palette(*model, skin, clip, phase * duration));
   }
   return crowd;
 }
