@@ -93,7 +93,7 @@ ExitStatus compare(const CompareOptions& options) {
 
   const ComparisonOptions comparisonOptions{options.instances, options.repetitions, options.shares};
   Result<MethodComparison> comparison = [&] {
-    Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
+    samples::Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
     return compareMethods(*scene, scenePose(*scene, *clip, options.time), open ? &*open : nullptr,
                           comparisonOptions, [&progress] { progress.step(); });
   }();
