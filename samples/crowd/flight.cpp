@@ -25,13 +25,13 @@ struct Key {
 
 /// Evenly over the flight's time. Angles go round once.
 constexpr std::array keys{
-    Key{20, 2.00, 4.2, 20, 0.4, 0.6},      // over the last rows, all of the crowd ahead
-    Key{48, 1.62, 3.1, 62, 0.6, 0.7},      // low over heads
-    Key{80, 1.12, 2.1, 122, 1.05, 1.0},    // down into the aisle
-    Key{112, 1.00, 1.5, 158, 1.12, 1.15},  // those who walk come by
-    Key{144, 1.00, 1.5, 186, 0.95, 1.1},  Key{180, 1.10, 2.3, 222, 1.10, 0.8},
-    Key{224, 1.70, 6.5, 262, 0.9, 0.3},  // up, looking back over the rings
-    Key{280, 2.12, 13.0, 290, 0.25, 0.0}, Key{336, 2.18, 9.0, 340, 0.3, 0.0},
+    Key{20, 2.00, 4.2, 20, 0.85, 0.4},     // over the last rows, all of the crowd ahead
+    Key{48, 1.62, 3.1, 60, 0.75, 0.2},     // low over heads
+    Key{80, 1.12, 2.1, 120, 1.05, 0.85},   // down into the aisle
+    Key{112, 1.00, 1.5, 156, 1.12, 1.05},  // those who walk come by
+    Key{144, 1.00, 1.5, 186, 0.95, 1.05}, Key{180, 1.10, 2.3, 220, 1.10, 0.6},
+    Key{224, 1.70, 6.5, 260, 0.95, 0.0},  // up, looking back over the rings
+    Key{280, 2.12, 13.0, 288, 0.45, 0.0}, Key{336, 2.18, 9.0, 340, 0.65, 0.0},
 };
 
 Vector plus(const Vector& a, const Vector& b, double share) {

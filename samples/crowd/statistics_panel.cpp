@@ -151,8 +151,8 @@ void StatisticsPanel::draw(Picture& picture, const PanelNumbers& numbers) const 
   const int left = panel.left + padding, right = panel.right - padding;
   Column column(picture, font_, left, right, panel.top + padding);
   column.line(grouped(numbers.figures) + " figures", 1.4 * size, white);
-  column.line(fmt::format("{} instances, {} vertices each figure", grouped(numbers.instances),
-                          grouped(numbers.verticesOfFigure)),
+  column.line(fmt::format("{} instances, {} vertices", grouped(numbers.instances),
+                          grouped(numbers.figures * numbers.verticesOfFigure)),
               0.8 * size, grey);
   column.skip(0.55 * size);
   const int barTop = static_cast<int>(std::lround(column.top()));
