@@ -259,12 +259,13 @@ Result<void> Film::writeUpTo(std::uint64_t completedFrame, const CrowdReport& re
                             frames_[written_ % frames_.size()].target().pixels()};
     if (panel_) panel_->draw(picture, numbersOf(report, written_));
     if (Result<void> done = writer_->write(picture); !done) return done;
-    progress_.step();
+    progress_->step();
   }
   return {};
 }
 
 Result<void> Film::finish() {
+  progress_.reset();
   return writer_->finish();
 }
 

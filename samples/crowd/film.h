@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "appearance/appearances.h"
@@ -56,7 +56,7 @@ class Film {
         wardrobe_(character),
         renderer_(std::move(renderer)),
         appearances_(*device.device, renderer_, character.model()),
-        progress_("rendering", options.frames) {}
+        progress_(std::in_place, "rendering", options.frames) {}
 
   struct DrawnPart {
     const dermis::samples::render::Geometry* geometry = nullptr;
@@ -97,7 +97,7 @@ class Film {
   std::uint64_t written_ = 0;                                 ///< the last frame that was
   std::uint64_t recorded_ = 0;
   std::optional<StatisticsPanel> panel_;
-  dermis::samples::Progress progress_;
+  std::optional<dermis::samples::Progress> progress_;  ///< until the film is finished
 };
 
 }  // namespace crowd
