@@ -118,6 +118,7 @@ Result<Gait> measureGait(const Character& character) {
   const Extent& extent = stand->extent;
   Gait gait;
   gait.height = std::max(extent.max[1] - extent.min[1], 1e-6);
+  gait.length = std::max(extent.max[0] - extent.min[0], extent.max[2] - extent.min[2]);
   gait.middleX = (extent.min[0] + extent.max[0]) / 2;
   gait.middleZ = (extent.min[2] + extent.max[2]) / 2;
   for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip) {

@@ -18,6 +18,7 @@ struct ClipGait {
 
 struct Gait {
   double height = 0;                ///< of the character
+  double length = 0;                ///< of its longer side, seen from above
   double middleX = 0, middleZ = 0;  ///< what it stands above
   std::vector<ClipGait> clips;
 };

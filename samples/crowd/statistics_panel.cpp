@@ -150,7 +150,8 @@ void StatisticsPanel::draw(Picture& picture, const PanelNumbers& numbers) const 
 
   const int left = panel.left + padding, right = panel.right - padding;
   Column column(picture, font_, left, right, panel.top + padding);
-  column.line(grouped(numbers.figures) + " figures", 1.4 * size, white);
+  column.line(grouped(numbers.figures) + (numbers.figures == 1 ? " figure" : " figures"),
+              1.4 * size, white);
   column.line(fmt::format("{} instances, {} vertices", grouped(numbers.instances),
                           grouped(numbers.figures * numbers.verticesOfFigure)),
               0.8 * size, grey);

@@ -15,6 +15,7 @@ namespace {
 enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
 
 // Metres of someone of 1.75 m.
+// An animal that is longer than high counts by its length.
 constexpr double standingSpacing = 0.95;
 constexpr double aisleInside = 1.6, aisleWidth = 3.0;
 constexpr double ringSpacing = 1.3, walkingSpacing = 1.75;
@@ -34,7 +35,7 @@ Stroll::Stroll(const Character& character, const Gait& gait, const StrollOptions
       gait_(&gait),
       framesPerSecond_(options.framesPerSecond),
       startFrame_(static_cast<std::uint64_t>(std::llround(options.start * framesPerSecond_))),
-      unit_(gait.height / 1.75) {
+      unit_(std::max(gait.height / 1.75, gait.length / 1.3)) {
   for (std::uint32_t clip = 0; clip < gait.clips.size(); ++clip)
     (gait.clips[clip].walks() ? walkingClips_ : standingClips_).push_back(clip);
   FlightPlan plan;
