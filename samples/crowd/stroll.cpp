@@ -14,8 +14,7 @@ namespace {
 /// What chance is for.
 enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
 
-// Metres of someone of 1.75 m.
-// An animal that is longer than high counts by its length.
+// Metres of someone of 1.75 m; an animal that is longer than high counts by its length.
 constexpr double standingSpacing = 0.95;
 constexpr double aisleInside = 1.6, aisleWidth = 3.0;
 constexpr double ringSpacing = 1.3, walkingSpacing = 1.75;

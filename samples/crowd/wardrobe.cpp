@@ -53,21 +53,25 @@ const std::vector<Colors>& allColors() {
         {0.290, 0.215, 0.130},
         {0.160, 0.155, 0.150},
         {0.120, 0.105, 0.060}}},
-      {"shoes", {{0.185, 0.075, 0.035}, {0.040, 0.036, 0.034}, {0.500, 0.480, 0.450}}},
+      {"shoes", {{0.185, 0.075, 0.035}, {0.040, 0.036, 0.034}, {0.120, 0.125, 0.135}}},
   };
   return all;
 }
 
-/// The mean of the vertices' colours.
+/// The colour of most of it: eyes and soles do not count.
 Color ownColor(const gltf::Primitive& primitive) {
-  Color sum{};
   const std::size_t count = primitive.colors.size() / 4;
   if (count == 0) return {1, 1, 1};
-  for (std::size_t i = 0; i < primitive.colors.size(); ++i) {
-    if (i % 4 < 3)
-      sum[i % 4] += static_cast<double>(primitive.colors[i]) / static_cast<double>(count);
+  Color own{};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    std::vector<float> values;
+    for (std::size_t vertex = 0; vertex < count; ++vertex)
+      values.push_back(primitive.colors[vertex * 4 + channel]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::ranges::nth_element(values, middle);
+    own[channel] = static_cast<double>(*middle);
   }
-  return sum;
+  return own;
 }
 
 }  // namespace
