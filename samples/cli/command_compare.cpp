@@ -50,9 +50,9 @@ ExitStatus checkPicture(const CompareOptions& options) {
   if (options.model.empty() && (options.animation || options.time != 0))
     return wrong("--animation and --time are those of MODEL, and there is none");
   if (options.output.empty()) return ExitStatus::done;
-  if (pictureKind(options.output) != PictureKind::png)
+  if (samples::pictureKind(options.output) != samples::PictureKind::png)
     return wrong(fmt::format("OUT must end in .png, not be '{}'", options.output));
-  if (hasWrongPattern(options.output) || frameName(options.output, 0))
+  if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return wrong("OUT has a place for a number; there is one picture only");
   if (options.device == "cpu")
     return wrong("--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
@@ -152,7 +152,7 @@ ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& 
   if (!font) reportNote(font.error().message + ": the picture has no words");
   std::vector<std::string> notes;
   const Result<samples::render::Picture> picture = [&] {
-    Progress progress("drawing", comparisonPictures(sheet));
+    samples::Progress progress("drawing", comparisonPictures(sheet));
     return drawComparison(open, sheet, font ? &*font : nullptr, notes,
                           [&progress] { progress.step(); });
   }();
@@ -163,7 +163,7 @@ ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& 
   for (const std::string& note : notes) reportNote(note);
   const Result<std::vector<std::byte>> file = samples::render::encodePng(*picture);
   if (!file) return reportError(ExitStatus::stopped, file.error().message);
-  if (Result<void> written = writeFile(options.output, *file); !written)
+  if (Result<void> written = samples::writeFile(options.output, *file); !written)
     return reportError(ExitStatus::stopped, written.error().message);
   return ExitStatus::done;
 }
@@ -195,7 +195,7 @@ ExitStatus compare(const CompareOptions& options) {
 
   const ComparisonOptions comparisonOptions{options.instances, options.repetitions, options.shares};
   const Result<MethodComparison> comparison = [&] {
-    Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
+    samples::Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
     return compareMethods(subject.scene(), subject.pose, open ? &*open : nullptr, comparisonOptions,
                           [&progress] { progress.step(); });
   }();

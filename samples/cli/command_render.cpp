@@ -23,6 +23,9 @@ namespace dermis::cli {
 namespace {
 
 namespace render = samples::render;
+using samples::PictureKind;
+using samples::PictureWriter;
+using samples::Progress;
 
 struct RenderOptions {
   std::string model;
@@ -67,7 +70,7 @@ ExitStatus checkNumbers(const RenderOptions& options) {
 }
 
 ExitStatus checkUsage(const RenderOptions& options) {
-  const std::optional<PictureKind> kind = pictureKind(options.output);
+  const std::optional<PictureKind> kind = samples::pictureKind(options.output);
   if (!kind) {
     return wrong(
         fmt::format("OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
@@ -81,9 +84,9 @@ ExitStatus checkUsage(const RenderOptions& options) {
   if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
   if (*kind != PictureKind::png)
     return options.frames ? ExitStatus::done : wrong("a film needs --frames, how many it has");
-  if (hasWrongPattern(options.output))
+  if (samples::hasWrongPattern(options.output))
     return wrong("the place for a number in OUT is %01d to %09d, and there is one at most");
-  const bool pattern = frameName(options.output, 0).has_value();
+  const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && !pattern) {
     return wrong(
         "--frames needs a place for the number in OUT, such as frame%04d.png, or a film: .mp4, "
@@ -334,9 +337,10 @@ ExitStatus writePictures(const RenderOptions& options, Film& film, PictureWriter
 }
 
 Result<std::unique_ptr<PictureWriter>> openWriter(const RenderOptions& options) {
-  const PictureKind kind = *pictureKind(options.output);
-  if (kind == PictureKind::png) return writePngs(options.output);
-  return writeFilm(options.output, kind, options.width, options.height, options.framesPerSecond);
+  const PictureKind kind = *samples::pictureKind(options.output);
+  if (kind == PictureKind::png) return samples::writePngs(options.output);
+  return samples::writeFilm(options.output, kind, options.width, options.height,
+                            options.framesPerSecond);
 }
 
 ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {

@@ -148,11 +148,11 @@ ExitStatus checkUsage(const SkinOptions& options) {
   if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond)) {
     return reportError(ExitStatus::wrongUsage, "--fps must be a number above 0");
   }
-  if (hasWrongPattern(options.output)) {
+  if (samples::hasWrongPattern(options.output)) {
     return reportError(ExitStatus::wrongUsage,
                        "the place for a number in OUT is %01d to %09d, and there is one at most");
   }
-  const bool pattern = frameName(options.output, 0).has_value();
+  const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && *options.frames == 0)
     return reportError(ExitStatus::wrongUsage, "--frames must be at least 1");
   if (options.frames && !pattern) {
@@ -170,7 +170,7 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
                       const SkinParts& skinParts) {
   const OutputFormat format = *outputFormat(options.output);
   const std::uint32_t count = options.frames.value_or(1);
-  Progress progress("skinning", count);
+  samples::Progress progress("skinning", count);
   for (std::uint32_t frame = 0; frame < count; ++frame) {
     const double time = options.time + frame / options.framesPerSecond;
     Result<std::vector<SkinnedPart>> skinned = skinParts(scenePose(scene, clip, time));
@@ -185,7 +185,7 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
         return reportError(ExitStatus::badInput, message + "; only a .ply can hold them");
       reportWarning(message);
     }
-    const std::string name = frameName(options.output, frame).value_or(options.output);
+    const std::string name = samples::frameName(options.output, frame).value_or(options.output);
     if (Result<void> written = writeMesh(name, format, mesh); !written) {
       return reportError(ExitStatus::stopped, written.error().message);
     }

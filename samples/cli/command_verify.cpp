@@ -24,7 +24,7 @@ struct VerifyOptions {
 Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
                          std::span<const OutputToVerify> outputs, ModelVerification& verification) {
   const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
-  Progress progress(verification.model, poses.size());
+  samples::Progress progress(verification.model, poses.size());
   for (std::size_t index = 0; index < poses.size(); ++index) {
     const std::size_t first = outputs.size() * index / poses.size();
     const std::size_t end = outputs.size() * (index + 1) / poses.size();
@@ -42,7 +42,7 @@ Result<void> verifyModel(samples::Device& device, vulkan::Context& context, cons
 Result<ModelVerification> verifyRandom(samples::Device& device, vulkan::Context& context) {
   ModelVerification verification{"random meshes", {}, {}};
   const std::vector<samples::RandomCase> cases = samples::randomCases(context.limits());
-  Progress progress(verification.model, cases.size());
+  samples::Progress progress(verification.model, cases.size());
   Result<std::vector<VerifiedCase>> verified =
       verifyRandomMeshes(device, context, cases, [&progress] { progress.step(); });
   if (!verified) return verified.error();

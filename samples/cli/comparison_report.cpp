@@ -147,7 +147,7 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
     json["methods"].push_back(describe(compared));
   // Names come from a file: what is not UTF-8 in them is replaced.
   const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  return writeFile(path, std::as_bytes(std::span(text)));
+  return samples::writeFile(path, std::as_bytes(std::span(text)));
 }
 
 }  // namespace dermis::cli

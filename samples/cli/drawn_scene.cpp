@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -15,56 +16,6 @@ namespace {
 
 using samples::MappedBuffer;
 using samples::render::Draw;
-using samples::render::Geometry;
-using samples::render::GeometryData;
-using samples::render::Surface;
-using samples::render::Transparency;
-
-Transparency transparencyOf(gltf::AlphaMode mode) {
-  switch (mode) {
-    case gltf::AlphaMode::mask:
-      return Transparency::mask;
-    case gltf::AlphaMode::blend:
-      return Transparency::blend;
-    default:
-      return Transparency::opaque;
-  }
-}
-
-samples::render::Wrap wrapOf(gltf::Wrap wrap) {
-  switch (wrap) {
-    case gltf::Wrap::mirroredRepeat:
-      return samples::render::Wrap::mirror;
-    case gltf::Wrap::clampToEdge:
-      return samples::render::Wrap::clamp;
-    default:
-      return samples::render::Wrap::repeat;
-  }
-}
-
-Surface surfaceOf(const gltf::Model& model, const gltf::Primitive& primitive) {
-  // What the file says nothing of is of no metal: glTF's own default would be dark.
-  Surface surface;
-  if (primitive.material == gltf::none) return surface;
-  const gltf::Material& material = model.materials[primitive.material];
-  surface.baseColor = material.baseColor;
-  surface.metallic = std::clamp(material.metallic, 0.f, 1.f);
-  surface.roughness = std::clamp(material.roughness, 0.f, 1.f);
-  surface.transparency = transparencyOf(material.alphaMode);
-  surface.alphaCutoff = material.alphaCutoff;
-  surface.isDoubleSided = material.doubleSided;
-  return surface;
-}
-
-Result<Geometry> geometryOf(samples::Device& device, const gltf::Primitive& primitive,
-                            std::uint32_t texcoordSet) {
-  GeometryData data;
-  data.vertexCount = primitive.vertexCount;
-  data.triangles = primitive.triangles;
-  if (texcoordSet < primitive.texcoords.size()) data.texcoords = primitive.texcoords[texcoordSet];
-  data.colors = primitive.colors;
-  return Geometry::create(device, data);
-}
 
 float determinant(const JointMatrix& matrix) {
   const auto& m = matrix.m;
@@ -168,42 +119,18 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
   return {};
 }
 
-Result<std::uint32_t> DrawnScene::textureOf(samples::render::Renderer& renderer,
-                                            const gltf::TextureUse& use) {
-  if (use.image == gltf::none) return 0u;
-  const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
-  if (!isNew) return place->second;
-  const gltf::Image& image = scene_->model->images[use.image];
-  const Result<samples::render::TexturePixels> pixels = samples::render::decodeImage(image.bytes);
-  if (!pixels) {
-    notes_.push_back(image.name + ": " + pixels.error().message + "; it is left out");
-    return 0u;
-  }
-  Result<std::uint32_t> texture =
-      renderer.addTexture(*pixels, {wrapOf(use.wrapU), wrapOf(use.wrapV)});
-  if (texture) place->second = *texture;
-  return texture;
-}
-
 Result<void> DrawnScene::addSharedParts(samples::render::Renderer& renderer) {
+  appearances_.emplace(*device_->device, renderer, *scene_->model);
   std::map<const PreparedMesh*, MeshHandle> meshes;
   for (const ScenePart& part : scene_->parts) {
     SharedPart& shared = shared_.emplace_back();
-    shared.surface = surfaceOf(*scene_->model, *part.primitive);
-    gltf::TextureUse use;
-    if (part.primitive->material != gltf::none)
-      use = scene_->model->materials[part.primitive->material].baseColorTexture;
-    if (use.texcoord < part.primitive->texcoords.size()) {
-      const Result<std::uint32_t> texture = textureOf(renderer, use);
-      if (!texture) return texture.error();
-      shared.surface.texture = *texture;
-    }
-    if (!geometries_.contains(part.primitive)) {
-      Result<Geometry> geometry = geometryOf(*device_->device, *part.primitive, use.texcoord);
-      if (!geometry) return geometry.error();
-      geometries_.emplace(part.primitive, std::move(*geometry));
-    }
-    shared.geometry = &geometries_.at(part.primitive);
+    const Result<samples::render::Surface> surface = appearances_->surface(*part.primitive);
+    if (!surface) return surface.error();
+    shared.surface = *surface;
+    const Result<const samples::render::Geometry*> geometry =
+        appearances_->geometry(*part.primitive);
+    if (!geometry) return geometry.error();
+    shared.geometry = *geometry;
     if (part.mesh == nullptr) continue;
     if (!meshes.contains(part.mesh.get())) {
       Result<MeshHandle> mesh = system_->addMesh(part.mesh->packed());

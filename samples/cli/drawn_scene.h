@@ -3,13 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
+#include "appearance/appearances.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "open_device.h"
 #include "render/renderer.h"
@@ -43,7 +42,7 @@ class DrawnScene {
   Result<std::optional<Box>> bounds(std::uint32_t figure) const;
 
   /// What of the materials could not be had.
-  const std::vector<std::string>& notes() const { return notes_; }
+  const std::vector<std::string>& notes() const { return appearances_->notes(); }
 
  private:
   /// A part that no joint moves.
@@ -70,7 +69,6 @@ class DrawnScene {
   DrawnScene() = default;
   Result<void> makeSystem(std::uint32_t figures);
   Result<void> addSharedParts(samples::render::Renderer& renderer);
-  Result<std::uint32_t> textureOf(samples::render::Renderer& renderer, const gltf::TextureUse& use);
   Result<void> addFigure(Method method);
   Result<void> prepare(Method method);
   InstanceDescription instanceOf(std::size_t part, Method method) const;
@@ -81,12 +79,9 @@ class DrawnScene {
   const Scene* scene_ = nullptr;
   std::optional<vulkan::SkinningSystem> system_;
   std::uint64_t frame_ = 0;
-  std::map<const gltf::Primitive*, samples::render::Geometry> geometries_;
-  /// The renderer's, by image and how it is wrapped; 0 for one that cannot be decoded.
-  std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;
+  std::optional<samples::Appearances> appearances_;
   std::vector<SharedPart> shared_;
   std::vector<Figure> figures_;
-  std::vector<std::string> notes_;
 };
 
 }  // namespace dermis::cli

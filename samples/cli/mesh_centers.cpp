@@ -89,7 +89,7 @@ Result<std::vector<float>> solve(const MeshView& mesh, std::uint32_t jointCount,
                                  std::span<const std::uint32_t> triangles) {
   constexpr std::uint32_t steps = 100;
   struct Shown {
-    Progress bar{"centres of rotation", steps};
+    samples::Progress bar{"centres of rotation", steps};
     std::uint32_t done = 0;
   } shown;
   CentersOfRotationOptions options;

@@ -50,12 +50,12 @@ Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh) {
   if (format == OutputFormat::glb) {
     const std::vector<std::byte> bytes = glbFile(mesh);
-    if (!bytes.empty()) return writeFile(path, bytes);
+    if (!bytes.empty()) return samples::writeFile(path, bytes);
     return Error{ErrorCode::limitExceeded,
                  fmt::format("{} would be larger than the 4 GiB of a GLB", path.string())};
   }
   const std::string bytes = format == OutputFormat::ply ? plyFile(mesh) : objFile(mesh);
-  return writeFile(path, std::as_bytes(std::span(bytes)));
+  return samples::writeFile(path, std::as_bytes(std::span(bytes)));
 }
 
 }  // namespace dermis::cli

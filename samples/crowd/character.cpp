@@ -9,14 +9,12 @@
 using namespace dermis;
 
 namespace crowd {
-namespace {
 
-constexpr std::uint32_t mostTicks = 120;
-
-}  // namespace
-
-Result<Character> Character::load(const std::filesystem::path& path) {
-  Result<gltf::Model> loaded = gltf::load(path);
+Result<Character> Character::load(const std::filesystem::path& path,
+                                  const CharacterOptions& options) {
+  gltf::LoadOptions loadOptions;
+  loadOptions.images = options.images;
+  Result<gltf::Model> loaded = gltf::load(path, loadOptions);
   if (!loaded) return loaded.error();
   Character character;
   character.model_ = std::make_unique<gltf::Model>(std::move(*loaded));
@@ -36,7 +34,7 @@ Result<Character> Character::load(const std::filesystem::path& path) {
     gltf::PrimitiveView view(primitive);
     Result<PackedMesh> packed = pack(view.mesh(), jointCount);
     if (!packed) return packed.error();
-    character.parts_.push_back({std::move(view), std::move(*packed), skin});
+    character.parts_.push_back({&primitive, std::move(view), std::move(*packed), skin});
   }
   if (character.parts_.empty()) {
     return Error{ErrorCode::invalidData,
@@ -45,16 +43,17 @@ Result<Character> Character::load(const std::filesystem::path& path) {
   }
   character.clips_.resize(std::max<std::size_t>(model.clips.size(), 1));
   for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip)
-    character.sampleClip(clip, skins);
+    character.sampleClip(clip, skins, options);
   return character;
 }
 
-void Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins) {
+void Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
+                           const CharacterOptions& options) {
   const bool isRest = model_->clips.empty();
   const double duration = isRest ? 0 : model_->clips[clip].duration;
   Clip& sampled = clips_[clip];
-  sampled.tickCount = static_cast<std::uint32_t>(
-      std::clamp(std::round(duration * ticksPerSecond), 1.0, double{mostTicks}));
+  sampled.tickCount = static_cast<std::uint32_t>(std::clamp(
+      std::round(duration * options.ticksPerSecond), 1.0, static_cast<double>(options.mostTicks)));
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
     const std::vector<gltf::GlobalTransform> globals =
         gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);

@@ -20,6 +20,7 @@ namespace crowd {
 
 /// A skinned primitive of the file: body, hair, shirt, …
 struct Part {
+  const dermis::gltf::Primitive* source = nullptr;
   dermis::gltf::PrimitiveView primitive;
   dermis::PackedMesh packed;
   std::uint32_t skin = 0;  ///< index into `Character::jointCounts`
@@ -33,13 +34,19 @@ struct PoseKey {
   friend auto operator<=>(const PoseKey&, const PoseKey&) = default;
 };
 
+struct CharacterOptions {
+  double ticksPerSecond = 30;
+  std::uint32_t mostTicks = 120;  ///< of a clip; a longer one goes faster
+  bool images = false;            ///< read those of its materials
+};
+
 class Character {
  public:
-  static constexpr double ticksPerSecond = 30;
-
   /// Fails as `gltf::load` and `pack` do, and with `invalidData` where nothing is skinned.
-  static dermis::Result<Character> load(const std::filesystem::path& path);
+  static dermis::Result<Character> load(const std::filesystem::path& path,
+                                        const CharacterOptions& options = {});
 
+  const dermis::gltf::Model& model() const { return *model_; }
   const std::vector<Part>& parts() const { return parts_; }
   /// By skin: of those that parts hang on. Parts of one skin share its palette.
   const std::vector<std::uint32_t>& jointCounts() const { return jointCounts_; }
@@ -57,7 +64,8 @@ class Character {
   };
 
   Character() = default;
-  void sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins);
+  void sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
+                  const CharacterOptions& options);
 
   std::unique_ptr<dermis::gltf::Model> model_;  ///< parts point into it
   std::vector<Part> parts_;

@@ -49,6 +49,11 @@ class Crowd {
   dermis::Result<void> skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
                                  VkCommandBuffer commandBuffer);
 
+  /// After the last frame, for each that the GPU is then done with: its statistics are complete.
+  dermis::Result<void> complete(std::uint64_t frame, std::uint64_t completedFrame) {
+    return system_.beginFrame(frame, completedFrame);
+  }
+
   const dermis::vulkan::SkinningSystem& system() const { return system_; }
   std::span<const CrowdFigure> figures() const { return figures_; }
   bool isCulledOnGpu() const { return options_.culledOnGpu; }

@@ -115,10 +115,14 @@ void CrowdReport::add(const Crowd& crowd, const ShownCounts& counts) {
   frame.displayed = since(counts.displayed, before_.displayed);
   before_ = counts;
   frames_.push_back(frame);
-  // Frames count from 1.
-  if (const std::uint64_t completed = statistics.lastCompletedFrame.frame; completed != 0)
-    frames_[completed - 1].gpu = statistics.lastCompletedFrame;
+  addCompleted(crowd);
   if (frames_.size() - rowBegin_ == rowFrames) addRow();
+}
+
+void CrowdReport::addCompleted(const Crowd& crowd) {
+  const vulkan::GpuStatistics statistics = crowd.system().statistics().lastCompletedFrame;
+  // Frames count from 1.
+  if (statistics.frame != 0) frames_[statistics.frame - 1].gpu = statistics;
 }
 
 CrowdReport::Row CrowdReport::rowOf(std::size_t first, std::size_t end) const {
@@ -152,7 +156,7 @@ CrowdReport::Row CrowdReport::rowOf(std::size_t first, std::size_t end) const {
 void CrowdReport::addRow() {
   rows_.push_back(rowOf(rowBegin_, frames_.size()));
   rowBegin_ = frames_.size();
-  printRow(rows_.back());
+  if (!printsLater_) printRow(rows_.back());
 }
 
 void CrowdReport::printRow(const Row& row) const {
@@ -167,6 +171,10 @@ void CrowdReport::printRow(const Row& row) const {
 
 void CrowdReport::finish(const Crowd& crowd) {
   if (rowBegin_ != frames_.size()) addRow();
+  if (printsLater_) {
+    printTitle();
+    for (const Row& row : rows_) printRow(row);
+  }
   memory_ = crowd.system().statistics();
   totals_.refusals = crowd.refusals();
   sumUp();

@@ -27,12 +27,28 @@ class CrowdReport {
  public:
   static constexpr std::uint64_t rowFrames = 20;
 
+  struct Frame {
+    std::uint32_t figures = 0;
+    std::uint32_t instances = 0, outOfView = 0, waiting = 0, displayed = 0;
+    dermis::vulkan::FrameStatistics cpu;
+    std::optional<dermis::vulkan::GpuStatistics> gpu;  ///< once it is complete
+  };
+
   explicit CrowdReport(ReportTitle title) : title_(std::move(title)) {}
 
+  const ReportTitle& title() const { return title_; }
   void printTitle() const;
+  /// From now on nothing is printed before `finish`: standard error shows how far a film is.
+  void printLater() { printsLater_ = true; }
   /// After each record; prints a row when there are frames enough for one. `counts` is what
   /// `ShownPoses` has counted so far.
   void add(const Crowd& crowd, const ShownCounts& counts);
+  /// What of complete frames is known since `Crowd::skinFrame` or `Crowd::complete`.
+  void addCompleted(const Crowd& crowd);
+  /// Frames count from 1.
+  const Frame& frame(std::uint64_t number) const { return frames_[number - 1]; }
+  /// Of its instances; nothing where the GPU chose, and has not yet said.
+  std::optional<std::uint32_t> skinnedBy(const Frame& frame) const;
   /// The rest of the table, and the totals.
   void finish(const Crowd& crowd);
   void printCheck(const CheckTotals& check) const;
@@ -40,12 +56,6 @@ class CrowdReport {
   dermis::Result<void> writeJson(const std::filesystem::path& path, const CheckTotals* check) const;
 
  private:
-  struct Frame {
-    std::uint32_t figures = 0;
-    std::uint32_t instances = 0, outOfView = 0, waiting = 0, displayed = 0;
-    dermis::vulkan::FrameStatistics cpu;
-    std::optional<dermis::vulkan::GpuStatistics> gpu;  ///< once it is complete
-  };
   /// Means of the frames that know the number; nothing where none does.
   struct Row {
     std::uint64_t lastFrame = 0;
@@ -66,10 +76,10 @@ class CrowdReport {
   void sumUp();
   void printTotals() const;
   std::string json(const CheckTotals* check) const;
-  std::optional<std::uint32_t> skinnedBy(const Frame& frame) const;
   std::optional<std::uint32_t> settledBy(const Frame& frame) const;
 
   ReportTitle title_;
+  bool printsLater_ = false;
   std::vector<Frame> frames_;
   ShownCounts before_;
   std::vector<Row> rows_;

@@ -19,17 +19,14 @@ struct FigureFrame {
 
 class Figures {
  public:
-  Figures(const Character& character, std::uint32_t count)
-      : character_(&character), count_(count) {}
+  explicit Figures(std::uint32_t count) : count_(count) {}
+  virtual ~Figures() = default;
 
   std::uint32_t count() const { return count_; }
   /// Frames count from 1.
-  FigureFrame at(std::uint32_t figure, std::uint64_t frame) const;
+  virtual FigureFrame at(std::uint32_t figure, std::uint64_t frame) const = 0;
 
  private:
-  PoseKey poseAt(std::uint32_t figure, std::uint64_t frame) const;
-
-  const Character* character_;
   std::uint32_t count_;
 };
 

@@ -16,11 +16,16 @@
 #include "crowd.h"
 #include "crowd_check.h"
 #include "crowd_report.h"
+#include "drill.h"
 #include "driver_version.h"
+#include "film.h"
 #include "frames.h"
+#include "gait.h"
 #include "open_device.h"
 #include "options.h"
+#include "picture_writer.h"
 #include "shown_poses.h"
+#include "stroll.h"
 #include "timestamps.h"
 
 namespace {
@@ -40,6 +45,7 @@ struct Show {
   ShownPoses shown;
   CrowdCheck check;
   CrowdReport report;
+  std::unique_ptr<Film> film;  ///< null: there is none
   FrameLoop loop;
 };
 
@@ -52,6 +58,12 @@ Result<void> playFrame(Show& show, const Options& options) {
     return done;
   show.shown.follow(show.crowd, frame);
   show.report.add(show.crowd, show.shown.counts());
+  if (show.film != nullptr) {
+    if (Result<void> done = show.film->writeUpTo(show.loop.completed(), show.report); !done)
+      return done;
+    if (Result<void> done = show.film->record(show.crowd, frame, *commandBuffer); !done)
+      return done;
+  }
   if (options.verifies && (frame % options.checkInterval == 0 || frame == options.frames)) {
     if (Result<void> done = show.check.capture(show.crowd, show.shown, frame, *commandBuffer);
         !done)
@@ -60,13 +72,33 @@ Result<void> playFrame(Show& show, const Options& options) {
   return show.loop.submit();
 }
 
+/// The pictures that were in flight when the last frame was submitted.
+Result<void> finishFilm(Show& show, const Options& options) {
+  const std::uint64_t last = show.loop.frame(), inFlight = options.crowd.framesInFlight;
+  for (std::uint64_t ahead = inFlight; ahead-- > 0;) {
+    if (ahead >= last) continue;
+    const std::uint64_t completed = last - ahead;
+    if (Result<void> done = show.crowd.complete(completed + inFlight, completed); !done)
+      return done;
+    show.report.addCompleted(show.crowd);
+    if (Result<void> done = show.film->writeUpTo(completed, show.report); !done) return done;
+  }
+  return show.film->finish();
+}
+
 Result<void> play(Show& show, const Options& options) {
-  show.report.printTitle();
+  if (show.film != nullptr)
+    show.report.printLater();
+  else
+    show.report.printTitle();
   for (std::uint32_t frame = 0; frame < options.frames; ++frame) {
     if (Result<void> done = playFrame(show, options); !done) return done;
   }
   if (Result<void> done = show.loop.finish(); !done) return done;
   if (Result<void> done = show.check.compareUpTo(show.loop.completed()); !done) return done;
+  if (show.film != nullptr) {
+    if (Result<void> done = finishFilm(show, options); !done) return done;
+  }
   show.report.finish(show.crowd);
   return {};
 }
@@ -92,7 +124,7 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
   title.culledOnGpu = options.crowd.culledOnGpu;
   return std::make_unique<Show>(Show{std::move(*crowd), ShownPoses(character),
                                      CrowdCheck(*open.device, character),
-                                     CrowdReport(std::move(title)), std::move(*loop)});
+                                     CrowdReport(std::move(title)), nullptr, std::move(*loop)});
 }
 
 /// What speaks against the result; empty where nothing does.
@@ -111,18 +143,82 @@ std::string verdict(const Show& show, samples::Device& device) {
   return {};
 }
 
+/// Its ticks are the film's frames, so that feet and ground move in step.
+CharacterOptions characterOptions(const Options& options) {
+  CharacterOptions character;
+  if (options.film.output.empty()) return character;
+  constexpr double mostSeconds = 20;
+  character.ticksPerSecond = options.film.framesPerSecond;
+  character.mostTicks = static_cast<std::uint32_t>(mostSeconds * character.ticksPerSecond);
+  character.images = true;
+  return character;
+}
+
+/// What the figures do: exercises for the proof, or a stroll for the film.
+struct Script {
+  Gait gait;
+  std::unique_ptr<Figures> figures;
+  const Stroll* stroll = nullptr;  ///< those figures, where there is a film
+};
+
+Result<std::unique_ptr<Script>> makeScript(const Character& character, const Options& options) {
+  auto script = std::make_unique<Script>();
+  if (options.film.output.empty()) {
+    script->figures = std::make_unique<Drill>(character, options.figures);
+    return script;
+  }
+  Result<Gait> gait = measureGait(character);
+  if (!gait) return gait.error();
+  script->gait = std::move(*gait);
+  StrollOptions stroll;
+  stroll.figures = options.figures;
+  stroll.framesPerSecond = options.film.framesPerSecond;
+  stroll.start = options.film.start;
+  stroll.width = options.film.width;
+  stroll.height = options.film.height;
+  auto strolling = std::make_unique<Stroll>(character, script->gait, stroll);
+  script->stroll = strolling.get();
+  script->figures = std::move(strolling);
+  return script;
+}
+
+Result<std::unique_ptr<samples::PictureWriter>> openWriter(const FilmRequest& film) {
+  const samples::PictureKind kind = *samples::pictureKind(film.output);
+  if (kind == samples::PictureKind::png) return samples::writePngs(film.output);
+  return samples::writeFilm(film.output, kind, film.width, film.height, film.framesPerSecond);
+}
+
+ExitStatus addFilm(Show& show, samples::OpenDevice& open, const Character& character,
+                   const Stroll& stroll, const Options& options) {
+  Result<std::unique_ptr<samples::PictureWriter>> writer = openWriter(options.film);
+  if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
+  const FilmOptions filmOptions{options.film.width, options.film.height, options.frames,
+                                options.crowd.framesInFlight};
+  Result<std::unique_ptr<Film>> film =
+      Film::create(open, character, stroll, filmOptions, std::move(*writer));
+  if (!film) return reportDeviceError(film.error());
+  show.film = std::move(*film);
+  return ExitStatus::done;
+}
+
 ExitStatus run(const Options& options) {
-  const Result<Character> character = Character::load(options.model);
+  const Result<Character> character = Character::load(options.model, characterOptions(options));
   if (!character) return reportError(ExitStatus::badInput, character.error().message);
+  const Result<std::unique_ptr<Script>> script = makeScript(*character, options);
+  if (!script) return reportError(ExitStatus::badInput, script.error().message);
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
   deviceOptions.validation = options.validates;
+  deviceOptions.graphics = (*script)->stroll != nullptr;
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
   if (!open) return reportDeviceError(open.error());
 
-  const Figures script(*character, options.figures);
-  Result<std::unique_ptr<Show>> show = makeShow(*open, *character, script, options);
+  Result<std::unique_ptr<Show>> show = makeShow(*open, *character, *(*script)->figures, options);
   if (!show) return reportDeviceError(show.error());
+  if ((*script)->stroll != nullptr) {
+    const ExitStatus added = addFilm(**show, *open, *character, *(*script)->stroll, options);
+    if (added != ExitStatus::done) return added;
+  }
   if (Result<void> played = play(**show, options); !played)
     return reportDeviceError(played.error());
 

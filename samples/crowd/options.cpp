@@ -4,8 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
+
+#include "frame_name.h"
+#include "picture_writer.h"
 
 using namespace dermis;
 
@@ -20,6 +24,47 @@ const std::map<std::string, OverflowPolicy>& policies() {
                                                            {"keep", OverflowPolicy::keepLast},
                                                            {"bind", OverflowPolicy::bindPose}};
   return names;
+}
+
+constexpr std::uint32_t smallestSide = 64, largestSide = 16384;
+constexpr double mostFramesPerSecond = 240, latestStart = 1e6;
+
+/// What is wrong with the film that is asked for; empty where nothing is.
+std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
+  const std::optional<samples::PictureKind> kind = samples::pictureKind(film.output);
+  if (!kind)
+    return fmt::format("--film must end in .mp4, .gif, .apng or .png, not be '{}'", film.output);
+  for (const std::uint32_t side : {film.width, film.height}) {
+    if (side < smallestSide || side > largestSide) {
+      return fmt::format("--width and --height must be from {} to {} pixels", smallestSide,
+                         largestSide);
+    }
+  }
+  if (!(film.framesPerSecond >= 1 && film.framesPerSecond <= mostFramesPerSecond))
+    return fmt::format("--fps must be from 1 to {}", mostFramesPerSecond);
+  if (!(film.start >= 0 && film.start <= latestStart))
+    return "--time must be a number of seconds, 0 or more";
+  if (*kind != samples::PictureKind::png) return {};
+  if (samples::hasWrongPattern(film.output))
+    return "the place for a number in --film is %01d to %09d, and there is one at most";
+  if (hasFrames && !samples::frameName(film.output, 0)) {
+    return "--frames needs a place for the number in --film, such as frame%04d.png, or a film: "
+           ".mp4, .gif or .apng";
+  }
+  return {};
+}
+
+/// The options of the film, each of which needs one.
+void addFilm(CLI::App& app, FilmRequest& film) {
+  CLI::Option* output =
+      app.add_option("--film", film.output,
+                     "Draw the crowd to a film, .mp4, .gif or .apng (with ffmpeg), to pictures, "
+                     "frame%04d.png, or to one, .png");
+  app.add_option("--width", film.width, "Of the film, pixels [1280]")->needs(output);
+  app.add_option("--height", film.height, "Of the film, pixels [720]")->needs(output);
+  app.add_option("--fps", film.framesPerSecond, "Pictures a second [30]")->needs(output);
+  app.add_option("--time", film.start, "Seconds into the camera's flight, which takes 24 [0]")
+      ->needs(output);
 }
 
 }  // namespace
@@ -44,8 +89,9 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   std::uint32_t outputMebibytes = 0;
   app.add_option("--figures", options.figures, "How many there are [200]")
       ->check(CLI::Range(1u, mostFigures));
-  app.add_option("--frames", options.frames, "How many are skinned [120]")
-      ->check(CLI::Range(1u, mostFrames));
+  const CLI::Option* frames =
+      app.add_option("--frames", options.frames, "How many are skinned [120; one picture: 1]")
+          ->check(CLI::Range(1u, mostFrames));
   app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
   app.add_option("--device", options.device,
                  "auto, a number of 'dermis devices', or part of a name");
@@ -66,6 +112,7 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   app.add_flag("--no-verify", skipsVerification, "Do not read back: for times that count");
   app.add_flag("--gpu-culling", options.crowd.culledOnGpu,
                "Let the GPU choose which instances are visible");
+  addFilm(app, options.film);
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
   try {
     app.parse(argc, argv);
@@ -75,6 +122,14 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   } catch (const CLI::ParseError& error) {
     return reportError(ExitStatus::wrongUsage,
                        fmt::format("{} (dermis_crowd --help tells more)", error.what()));
+  }
+  if (app.get_option("--film")->count() != 0) {
+    const std::string complaint = complaintAbout(options.film, frames->count() != 0);
+    if (!complaint.empty()) return reportError(ExitStatus::wrongUsage, complaint);
+    const bool isOnePicture =
+        samples::pictureKind(options.film.output) == samples::PictureKind::png &&
+        !samples::frameName(options.film.output, 0);
+    if (isOnePicture) options.frames = 1;
   }
   options.verifies = !skipsVerification;
   options.crowd.policy = policies().at(options.policy);

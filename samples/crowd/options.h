@@ -21,6 +21,13 @@ enum class ExitStatus : int {
 /// One line on standard error: "dermis_crowd: error: …". Returns the status.
 ExitStatus reportError(ExitStatus status, const std::string& message);
 
+struct FilmRequest {
+  std::string output;  ///< empty: there is no film
+  std::uint32_t width = 1280, height = 720;
+  double framesPerSecond = 30;
+  double start = 0;  ///< seconds into the camera's flight
+};
+
 struct Options {
   std::uint32_t figures = 200;
   std::uint32_t frames = 120;
@@ -29,6 +36,7 @@ struct Options {
   std::string policy = "refuse";
   std::string json;
   CrowdOptions crowd;
+  FilmRequest film;
   bool verifies = true;
   std::uint32_t checkInterval = 10;  ///< frames from one that is compared to the next
   bool validates = false;            ///< with the validation layer

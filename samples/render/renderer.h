@@ -32,6 +32,8 @@ struct View {
   Camera camera;
   LightingStyle style;
   std::span<const Draw> draws;
+  /// What throws the shadows, where coarser triangles do for that; empty: `draws`.
+  std::span<const Draw> shadowDraws;
   Box casters;  ///< Around all that is drawn.
   /// Where it stands, and how far from the middle the ground reaches; nothing: there is none.
   std::optional<float> groundHeight;

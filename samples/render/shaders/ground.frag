@@ -16,6 +16,10 @@ void main() {
   vec3 skyColor = view.skyColor.rgb * 0.75;
   vec3 arriving = key * keyVisibility(worldPosition, up) + skyColor * sky.x;
   vec3 most = key + skyColor * sky.y;
+  if (view.haze.z > 0.0) {
+    float far = clamp((distance(view.eye.xyz, worldPosition) - view.haze.x) * view.haze.y, 0.0, 1.0);
+    fade *= 1.0 - view.haze.z * far;
+  }
   vec3 shaded = background * mix(vec3(1.0), arriving / most, fade);
   displayed = vec4(dithered(shaded, gl_FragCoord.xy), 1.0);
 }

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 /// The name of a frame: %0Nd in the pattern replaced by its number, or nothing where there is no
 /// such place.
@@ -15,4 +15,4 @@ std::optional<std::string> frameName(const std::string& pattern, std::uint32_t f
 /// goes.
 bool hasWrongPattern(const std::string& name);
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -10,7 +10,7 @@
 #include "dermis/result.h"
 #include "render/picture.h"
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 enum class PictureKind { png, mp4, gif, apng };
 
@@ -21,7 +21,7 @@ class PictureWriter {
  public:
   virtual ~PictureWriter() = default;
   /// Fails with `ioError`.
-  virtual Result<void> write(const samples::render::Picture& picture) = 0;
+  virtual Result<void> write(const render::Picture& picture) = 0;
   /// After the last picture: the file is not whole before. Fails with `ioError`.
   virtual Result<void> finish() = 0;
 };
@@ -35,4 +35,4 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
                                                  std::uint32_t width, std::uint32_t height,
                                                  double framesPerSecond);
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

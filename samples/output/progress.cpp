@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 Progress::Progress(std::string what, std::size_t total)
     : what_(std::move(what)), total_(total), visible_(total > 1 && isatty(STDERR_FILENO) == 1) {}
@@ -19,4 +19,4 @@ void Progress::step() {
   if (visible_) fmt::print(stderr, "\r{}: {} of {}", what_, done_, total_);
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -1,4 +1,4 @@
-#include "figures.h"
+#include "drill.h"
 
 #include <cmath>
 #include <numbers>
@@ -42,7 +42,7 @@ constexpr std::uint32_t jumpPeriod = 131, jumpSpread = 53;
 }  // namespace
 
 /// After it was away, and after a jump, it is in another clip or at another moment of it.
-PoseKey Figures::poseAt(std::uint32_t figure, std::uint64_t frame) const {
+PoseKey Drill::poseAt(std::uint32_t figure, std::uint64_t frame) const {
   const std::uint64_t comings = clockOf(figure, frame, awaySpread) / awayPeriod;
   const std::uint64_t jumps = clockOf(figure, frame, jumpSpread) / jumpPeriod;
   const auto clip = static_cast<std::uint32_t>((figure + comings) % character_->clipCount());
@@ -51,14 +51,14 @@ PoseKey Figures::poseAt(std::uint32_t figure, std::uint64_t frame) const {
   return {clip, static_cast<std::uint32_t>((frame + phase) % ticks)};
 }
 
-FigureFrame Figures::at(std::uint32_t figure, std::uint64_t frame) const {
+FigureFrame Drill::at(std::uint32_t figure, std::uint64_t frame) const {
   FigureFrame now;
   now.isPresent = clockOf(figure, frame, awaySpread) % awayPeriod >= awayFrames;
   now.pose = poseAt(figure, frame);
   now.teleports = clockOf(figure, frame, jumpSpread) % jumpPeriod == 0;
 
   // Distances are told in radii of the crowd, so that one of any size has some of each.
-  const double radius = spacing * std::sqrt(static_cast<double>(count_));
+  const double radius = spacing * std::sqrt(static_cast<double>(count()));
   const Camera camera = cameraAt(frame, radius);
   const Place own = placeOf(figure);
   const Place away{own.x - camera.place.x, own.z - camera.place.z};

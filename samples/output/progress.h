@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 class Progress {
  public:
@@ -22,4 +22,4 @@ class Progress {
   bool visible_;
 };
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -20,17 +20,17 @@
 
 extern char** environ;
 
-namespace dermis::cli {
+namespace dermis::samples {
 namespace {
 
-using samples::render::Picture;
+using render::Picture;
 
 class PngWriter final : public PictureWriter {
  public:
   explicit PngWriter(std::string output) : output_(std::move(output)) {}
 
   Result<void> write(const Picture& picture) override {
-    const Result<std::vector<std::byte>> bytes = samples::render::encodePng(picture);
+    const Result<std::vector<std::byte>> bytes = render::encodePng(picture);
     if (!bytes) return bytes.error();
     return writeFile(frameName(output_, frame_++).value_or(output_), *bytes);
   }
@@ -197,4 +197,4 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
   return std::unique_ptr<PictureWriter>(std::make_unique<FilmWriter>(output, ends[0], child));
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <regex>
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
   static const std::regex place("%0([1-9])d");
@@ -22,4 +22,4 @@ bool hasWrongPattern(const std::string& name) {
   return places > 1 || (places == 1 && !frameName(name, 0));
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <system_error>
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 Result<void> writeFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   const Error failure{ErrorCode::ioError, fmt::format("{} cannot be written", path.string())};
@@ -20,4 +20,4 @@ Result<void> writeFile(const std::filesystem::path& path, std::span<const std::b
   return failure;
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

@@ -1,0 +1,272 @@
+#include "film.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <span>
+#include <utility>
+
+#include <glm/trigonometric.hpp>
+
+#include "coarse_triangles.h"
+#include "dermis/vulkan/scope.h"
+#include "frames.h"
+
+using namespace dermis;
+
+namespace crowd {
+namespace {
+
+namespace render = samples::render;
+
+/// Units of a flight plan.
+constexpr double figureHeight = 1.75;
+
+/// Of the sun, degrees: it stands still while the camera flies.
+constexpr float sunAzimuth = 205, sunElevation = 38;
+
+/// Of the grids that make coarser triangles, as shares of a figure's height.
+constexpr std::array coarseCells{0.009, 0.016, 0.03};
+
+float determinant(const JointMatrix& matrix) {
+  const auto& m = matrix.m;
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+/// Whether most joints mirror: then triangles are wound the other way.
+bool isMirrored(std::span<const JointMatrix> palette) {
+  const auto mirrored = std::ranges::count_if(
+      palette, [](const JointMatrix& joint) { return determinant(joint) < 0; });
+  return static_cast<std::size_t>(mirrored) * 2 > palette.size();
+}
+
+/// Around all of the crowd in every frame: so that shadows do not crawl.
+Box boxOf(const FlightPlan& plan, double height) {
+  const auto side = static_cast<float>(plan.crowdRadius + plan.unit);
+  return {{-side, 0, -side}, {side, static_cast<float>(1.3 * height), side}};
+}
+
+/// Each map draws all that is in view once more: large crowds get fewer, and finer ones, as their
+/// figures are small.
+render::ShadowSizes shadowSizes(std::uint64_t triangles) {
+  render::ShadowSizes sizes;
+  sizes.keyMap = 4096;
+  sizes.skyMap = 2048;
+  sizes.skyLights = static_cast<std::uint32_t>(
+      std::clamp(2e8 / static_cast<double>(std::max<std::uint64_t>(triangles, 1)), 8.0, 24.0));
+  return sizes;
+}
+
+render::LightingStyle styleAt(const render::Camera& camera) {
+  render::LightingStyle style;
+  const float cameraAzimuth = glm::degrees(std::atan2(camera.towardsEye.x, camera.towardsEye.z));
+  style.keyAzimuth = sunAzimuth - cameraAzimuth;
+  style.keyElevation = sunElevation;
+  style.haze = 0.55f;
+  style.horizonColor = {0.64f, 0.605f, 0.55f};
+  style.zenithColor = {0.26f, 0.33f, 0.42f};
+  return style;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Film>> Film::create(samples::OpenDevice& device, const Character& character,
+                                           const Stroll& stroll, const FilmOptions& options,
+                                           std::unique_ptr<samples::PictureWriter> writer) {
+  Result<render::Renderer> renderer = render::Renderer::create(*device.device);
+  if (!renderer) return renderer.error();
+  std::unique_ptr<Film> film(
+      new Film(device, character, stroll, options, std::move(writer), std::move(*renderer)));
+  if (Result<void> prepared = film->prepareParts(); !prepared) return prepared.error();
+  if (Result<void> made = film->makeFrames(); !made) return made.error();
+  film->loadFont();
+  return film;
+}
+
+Result<void> Film::prepareParts() {
+  for (const Part& part : character_->parts()) {
+    const Result<render::Surface> surface = appearances_.surface(*part.source);
+    if (!surface) return surface.error();
+    const Result<const render::Geometry*> geometry = appearances_.geometry(*part.source);
+    if (!geometry) return geometry.error();
+    parts_.push_back({*geometry, {}, *surface});
+  }
+  for (const double cell : coarseCells) {
+    const std::vector<std::vector<std::uint32_t>> triangles =
+        coarseTriangles(character_->parts(), cell);
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      Result<render::Geometry> geometry =
+          appearances_.geometry(*character_->parts()[part].source, triangles[part]);
+      if (!geometry) return geometry.error();
+      parts_[part].coarse.push_back(std::move(*geometry));
+    }
+  }
+  isMirrored_ = isMirrored(character_->pose({}, 0));
+  for (const std::string& note : appearances_.notes())
+    fmt::print(stderr, "dermis_crowd: note: {}\n", note);
+  return {};
+}
+
+Result<void> Film::makeFrames() {
+  std::uint64_t triangles = 0;
+  for (const Part& part : character_->parts()) triangles += part.source->triangles.size() / 3;
+  render::FrameDescription description;
+  description.width = options_.width;
+  description.height = options_.height;
+  description.shadows = shadowSizes(triangles * stroll_->count());
+  for (std::uint32_t index = 0; index < options_.framesInFlight; ++index) {
+    Result<render::RenderFrame> frame = renderer_.createFrame(description);
+    if (!frame) return frame.error();
+    frames_.push_back(std::move(*frame));
+  }
+  return {};
+}
+
+void Film::loadFont() {
+  Result<render::Font> font = render::Font::load();
+  if (font) {
+    panel_.emplace(std::move(*font));
+  } else {
+    fmt::print(stderr, "dermis_crowd: note: {}; the film is without statistics\n",
+               font.error().message);
+  }
+}
+
+render::View Film::viewAt(std::uint64_t frame) const {
+  const FlightPlan& plan = stroll_->flight().plan();
+  const Eye eye = stroll_->eye(frame);
+  render::View view;
+  view.area.extent = {options_.width, options_.height};
+  view.camera = stroll_->flight().camera(eye);
+  view.casters = boxOf(plan, figureHeight * plan.unit);
+  // The haze begins half a radius before this distance.
+  view.camera.distance = 0.5f * render::radiusOf(view.casters) + static_cast<float>(5 * plan.unit);
+  view.style = styleAt(view.camera);
+  // A hair lower than soles, which are as flat as it is.
+  view.groundHeight = static_cast<float>(-0.004 * plan.unit);
+  view.groundRadius = static_cast<float>(3 * plan.crowdRadius);
+  return view;
+}
+
+/// What is near hides what is behind it before that is shaded.
+std::vector<Film::Seen> Film::nearestFirst(const Crowd& crowd, std::uint64_t frame) const {
+  const Eye eye = stroll_->eye(frame);
+  std::vector<Seen> seen;
+  for (std::uint32_t index = 0; index < crowd.figures().size(); ++index) {
+    const CrowdFigure& figure = crowd.figures()[index];
+    if (!figure.isThere() || !figure.now.isInView) continue;
+    const JointMatrix place = stroll_->place(index, frame);
+    seen.push_back({std::hypot(static_cast<double>(place.m[0][3]) - eye.place[0], eye.place[1],
+                               static_cast<double>(place.m[2][3]) - eye.place[2]),
+                    index});
+  }
+  std::ranges::sort(seen, {},
+                    [](const Seen& each) { return std::pair(each.distance, each.figure); });
+  return seen;
+}
+
+/// The coarsest that is nowhere farther than `error` from where it is to be.
+const render::Geometry* Film::geometryFor(const DrawnPart& part, double error) const {
+  const render::Geometry* chosen = part.geometry;
+  for (std::size_t level = 0; level < part.coarse.size(); ++level) {
+    if (coarseCells[level] * figureHeight * stroll_->flight().plan().unit / 2 <= error)
+      chosen = &part.coarse[level];
+  }
+  return chosen;
+}
+
+Result<Film::Draws> Film::drawsOf(const Crowd& crowd, std::uint64_t frame) const {
+  Draws draws;
+  const Eye eye = stroll_->eye(frame);
+  const std::vector<Seen> seen = nearestFirst(crowd, frame);
+  for (std::uint32_t index = 0; index < parts_.size(); ++index) {
+    const DrawnPart& part = parts_[index];
+    for (const auto& [distance, figure] : seen) {
+      const Result<InstanceOutput> output =
+          crowd.system().output(crowd.figures()[figure].instances[index]);
+      if (!output) return output.error();
+      if (output->state == OutputState::none) continue;
+      const auto stream = [&](const OutputAttribute& attribute) -> render::VertexStream {
+        return {crowd.system().outputBuffer(), attribute.offset, attribute.stride,
+                attribute.format};
+      };
+      render::Draw draw;
+      draw.positions = stream(output->positions);
+      if (output->normals.format != VertexFormat::none) draw.normals = stream(output->normals);
+      draw.surface = part.surface;
+      const std::array<float, 3> tint = wardrobe_.tint(figure, index);
+      for (std::size_t i = 0; i < 3; ++i) draw.surface.baseColor[i] *= tint[i];
+      draw.transform = stroll_->place(figure, frame);
+      draw.isMirrored = isMirrored_;
+      const double pixel = stroll_->flight().pixelSize(eye, distance);
+      draw.geometry = geometryFor(part, 0.7 * pixel);
+      draws.picture.push_back(draw);
+      draw.geometry = geometryFor(part, 2 * pixel);
+      draws.shadows.push_back(draw);
+    }
+  }
+  return draws;
+}
+
+Result<void> Film::record(const Crowd& crowd, std::uint64_t frame, VkCommandBuffer commandBuffer) {
+  const Result<Draws> draws = drawsOf(crowd, frame);
+  if (!draws) return draws.error();
+  render::View view = viewAt(frame);
+  view.draws = draws->picture;
+  view.shadowDraws = draws->shadows;
+  const samples::Device& device = *device_->device;
+  render::RenderFrame& target = frames_[frame % frames_.size()];
+  recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
+  if (Result<void> drawn = renderer_.record(commandBuffer, target, {&view, 1}); !drawn)
+    return drawn;
+  // The next frame skins over what this one has drawn.
+  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+  target.target().recordReadBack(device, commandBuffer);
+  recorded_ = frame;
+  return {};
+}
+
+PanelNumbers Film::numbersOf(const CrowdReport& report, std::uint64_t frame) const {
+  const CrowdReport::Frame& numbers = report.frame(frame);
+  const std::optional<std::uint32_t> skinned = report.skinnedBy(numbers);
+  PanelNumbers panel;
+  panel.device = device_->device->info().name;
+  panel.figures = numbers.figures;
+  panel.verticesOfFigure = character_->vertexCount();
+  panel.instances = numbers.instances;
+  panel.outOfView = numbers.outOfView;
+  panel.waiting = numbers.waiting;
+  if (skinned) {
+    panel.skinned = *skinned;
+    panel.notDue = numbers.displayed - std::min(numbers.displayed, *skinned);
+  }
+  if (!report.title().culledOnGpu) panel.vertices = numbers.cpu.skinnedVertices;
+  panel.dispatches = numbers.cpu.dispatches;
+  panel.cpuSeconds = numbers.cpu.planSeconds + numbers.cpu.recordSeconds;
+  if (numbers.gpu) panel.gpuSeconds = numbers.gpu->seconds;
+  return panel;
+}
+
+Result<void> Film::writeUpTo(std::uint64_t completedFrame, const CrowdReport& report) {
+  while (written_ < std::min(completedFrame, recorded_)) {
+    ++written_;
+    render::Picture picture{options_.width, options_.height,
+                            frames_[written_ % frames_.size()].target().pixels()};
+    if (panel_) panel_->draw(picture, numbersOf(report, written_));
+    if (Result<void> done = writer_->write(picture); !done) return done;
+    progress_->step();
+  }
+  return {};
+}
+
+Result<void> Film::finish() {
+  progress_.reset();
+  return writer_->finish();
+}
+
+}  // namespace crowd

@@ -1,0 +1,155 @@
+#include "stroll.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "chance.h"
+
+using namespace dermis;
+
+namespace crowd {
+namespace {
+
+/// What chance is for.
+enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
+
+// Metres of someone of 1.75 m; an animal that is longer than high counts by its length.
+constexpr double standingSpacing = 0.95;
+constexpr double aisleInside = 1.6, aisleWidth = 3.0;
+constexpr double ringSpacing = 1.3, walkingSpacing = 1.75;
+constexpr std::uint32_t ringsOneWay = 3;
+
+/// How far from the feet a figure, and the shadow that it throws, reach.
+constexpr double reach = 2.3;
+
+/// An update may come late by as much as the feet go in so many pixels.
+constexpr double unseenPixels = 2;
+
+}  // namespace
+
+Stroll::Stroll(const Character& character, const Gait& gait, const StrollOptions& options)
+    : Figures(options.figures),
+      character_(&character),
+      gait_(&gait),
+      framesPerSecond_(options.framesPerSecond),
+      startFrame_(static_cast<std::uint64_t>(std::llround(options.start * framesPerSecond_))),
+      unit_(std::max(gait.height / 1.75, gait.length / 1.3)) {
+  for (std::uint32_t clip = 0; clip < gait.clips.size(); ++clip)
+    (gait.clips[clip].walks() ? walkingClips_ : standingClips_).push_back(clip);
+  FlightPlan plan;
+  plan.unit = unit_;
+  plan.aspect = static_cast<double>(options.width) / options.height;
+  plan.height = options.height;
+  cast(options.figures);
+  double inside = 0;
+  for (const Role& role : roles_) {
+    plan.crowdRadius = std::max(plan.crowdRadius, role.radius + unit_);
+    if (role.step == 0) inside = std::max(inside, role.radius);
+  }
+  plan.aisleRadius = inside + (aisleInside + 0.5 * aisleWidth - 0.8) * unit_;
+  plan.crowdRadius = std::max(plan.crowdRadius, plan.aisleRadius + 3 * unit_);
+  flight_ = Flight(plan);
+}
+
+/// Where nobody can walk, all stand, and the other way round.
+void Stroll::cast(std::uint32_t figures) {
+  std::uint32_t standing = walkingClips_.empty() ? figures : (figures + 8) / 12;
+  if (standingClips_.empty()) standing = 0;
+  castStanding(0, standing);
+  castWalking(standing, figures - standing);
+}
+
+/// A sunflower's spiral: any number of figures, as dense everywhere (Vogel 1979).
+void Stroll::castStanding(std::uint32_t first, std::uint32_t count) {
+  const double goldenAngle = std::numbers::pi * (3 - std::sqrt(5.0));
+  for (std::uint32_t figure = first; figure < first + count; ++figure) {
+    Role role;
+    const double choice = chance(figure, clipChoice) * static_cast<double>(standingClips_.size());
+    role.clip = standingClips_[static_cast<std::size_t>(choice)];
+    role.phase =
+        static_cast<std::uint32_t>(chance(figure, phaseChoice) * character_->tickCount(role.clip));
+    role.radius = standingSpacing * unit_ * std::sqrt(figure + 0.5);
+    role.angle = goldenAngle * figure;
+    role.yaw = 0.7 * deviation(figure, look);
+    role.scale = 1 + 0.05 * deviation(figure, size);
+    roles_.push_back(role);
+  }
+}
+
+/// All of a ring are equally tall, so equally fast, and nobody runs into the next.
+void Stroll::castWalking(std::uint32_t first, std::uint32_t count) {
+  double radius = aisleInside + aisleWidth;
+  if (!roles_.empty()) radius += roles_.back().radius / unit_;
+  std::uint32_t figure = first;
+  for (std::uint32_t ring = 0; figure < first + count; ++ring, radius += ringSpacing) {
+    const auto room = static_cast<std::uint32_t>(2 * std::numbers::pi * radius / walkingSpacing);
+    const std::uint32_t here = std::min(room, first + count - figure);
+    const double direction = ring / ringsOneWay % 2 == 0 ? -1 : 1;
+    const double scale = 1 + 0.05 * deviation(ring, size);
+    const std::uint32_t clip = walkingClips_[static_cast<std::size_t>(
+        chance(ring, clipChoice) * static_cast<double>(walkingClips_.size()))];
+    const ClipGait& gait = gait_->clips[clip];
+    for (std::uint32_t place = 0; place < here; ++place, ++figure) {
+      Role role;
+      role.clip = clip;
+      role.phase =
+          static_cast<std::uint32_t>(chance(figure, phaseChoice) * character_->tickCount(clip));
+      role.radius = (radius + 0.2 * deviation(figure, across)) * unit_;
+      role.angle = 2 * std::numbers::pi * (place + 0.2 * deviation(figure, along)) / room + ring;
+      role.step = direction * scale * std::hypot(gait.stepX, gait.stepZ) / (radius * unit_);
+      role.yaw = direction * std::numbers::pi / 2;
+      role.scale = scale;
+      roles_.push_back(role);
+    }
+  }
+}
+
+Eye Stroll::eye(std::uint64_t frame) const {
+  return flight_.at(static_cast<double>(clock(frame)) / framesPerSecond_);
+}
+
+JointMatrix Stroll::place(std::uint32_t figure, std::uint64_t frame) const {
+  const Role& role = roles_[figure];
+  const ClipGait& gait = gait_->clips[role.clip];
+  const double angle = role.angle + role.step * static_cast<double>(clock(frame));
+  // From the direction in which it goes by itself to the one in which it is to go.
+  const double own = gait.walks() ? std::atan2(gait.stepX, gait.stepZ) : 0;
+  const double heading = angle + role.yaw;
+  const double turn = std::atan2(std::cos(heading), std::sin(heading)) - own;
+  const double cosine = role.scale * std::cos(turn), sine = role.scale * std::sin(turn);
+  JointMatrix matrix;
+  auto& m = matrix.m;
+  m[0][0] = m[2][2] = static_cast<float>(cosine);
+  m[0][2] = static_cast<float>(sine);
+  m[2][0] = static_cast<float>(-sine);
+  m[1][1] = static_cast<float>(role.scale);
+  m[0][3] = static_cast<float>(role.radius * std::cos(angle) - cosine * gait_->middleX -
+                               sine * gait_->middleZ);
+  m[1][3] = static_cast<float>(-role.scale * gait.ground);
+  m[2][3] = static_cast<float>(role.radius * std::sin(angle) + sine * gait_->middleX -
+                               cosine * gait_->middleZ);
+  return matrix;
+}
+
+FigureFrame Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
+  const Role& role = roles_[figure];
+  FigureFrame now;
+  now.isPresent = true;
+  now.pose = {role.clip, static_cast<std::uint32_t>((clock(frame) + role.phase) %
+                                                    character_->tickCount(role.clip))};
+  const double angle = role.angle + role.step * static_cast<double>(clock(frame));
+  const std::array<double, 3> middle{role.radius * std::cos(angle), 0.5 * gait_->height,
+                                     role.radius * std::sin(angle)};
+  const Eye seen = eye(frame);
+  now.isInView = flight_.sees(seen, middle, reach * unit_);
+  const double distance =
+      std::hypot(middle[0] - seen.place[0], middle[1] - seen.place[1], middle[2] - seen.place[2]);
+  // In the time of a frame a hand or foot goes about so far.
+  const double moved = 1.3 * unit_ / framesPerSecond_;
+  const double late = unseenPixels * flight_.pixelSize(seen, distance) / moved;
+  now.updateInterval = late < 1 ? 1 : late < 3 ? 2 : late < 7 ? 4 : 8;
+  return now;
+}
+
+}  // namespace crowd
