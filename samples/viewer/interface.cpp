@@ -7,6 +7,7 @@
 
 #include "gui_style.h"
 #include "keys.h"
+#include "legend.h"
 #include "overlay.h"
 
 namespace dermis::viewer {
@@ -98,16 +99,7 @@ void drawMethods(State& state) {
   if (state.isSideBySide) drawMethodChoice("##beside", state.methods[1]);
 }
 
-void drawLooks(const SceneView& view, State& state) {
-  heading("Show");
-  ImGui::Checkbox("joints", &state.showsJoints);
-  bool showsWeights = state.coloring == Coloring::weights;
-  if (ImGui::Checkbox("weights of a joint", &showsWeights))
-    state.coloring = showsWeights ? Coloring::weights : Coloring::surface;
-  bool showsError = state.coloring == Coloring::error;
-  if (ImGui::Checkbox("error against the reference", &showsError))
-    state.coloring = showsError ? Coloring::error : Coloring::surface;
-  if ((!state.showsJoints && !showsWeights) || view.joints().empty()) return;
+void drawJointChoice(const SceneView& view, State& state) {
   ImGui::SetNextItemWidth(-1);
   const std::string chosen = view.joints()[state.joint].name;
   if (!ImGui::BeginCombo("##joint", chosen.c_str(), ImGuiComboFlags_HeightLarge)) return;
@@ -118,6 +110,25 @@ void drawLooks(const SceneView& view, State& state) {
     ImGui::PopID();
   }
   ImGui::EndCombo();
+}
+
+void drawLooks(const Facts& facts, State& state) {
+  const SceneView& view = *facts.view;
+  heading("Show");
+  ImGui::Checkbox("joints", &state.showsJoints);
+  bool showsWeights = state.coloring == Coloring::weights;
+  if (ImGui::Checkbox("weights of a joint", &showsWeights))
+    state.coloring = showsWeights ? Coloring::weights : Coloring::surface;
+  bool showsError = state.coloring == Coloring::error;
+  if (ImGui::Checkbox("error against the reference", &showsError))
+    state.coloring = showsError ? Coloring::error : Coloring::surface;
+  if ((state.showsJoints || showsWeights) && !view.joints().empty()) drawJointChoice(view, state);
+  if (state.coloring == Coloring::surface) return;
+  ImGui::Dummy({0, 4});
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float width = ImGui::GetContentRegionAvail().x;
+  drawLegend(facts, state, *ImGui::GetWindowDrawList(), corner.x, corner.y, width);
+  ImGui::Dummy({width, legendHeight(facts, state)});
 }
 
 void drawTimes(const Facts& facts) {
@@ -145,7 +156,7 @@ void drawPanel(const Facts& facts, float height, State& state) {
   drawFile(facts, state);
   if (facts.view != nullptr) {
     drawMethods(state);
-    drawLooks(*facts.view, state);
+    drawLooks(facts, state);
     drawTimes(facts);
   }
   const float line = ImGui::GetTextLineHeight();

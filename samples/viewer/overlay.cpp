@@ -4,6 +4,7 @@
 
 #include "gui_style.h"
 #include "joint_overlay.h"
+#include "legend.h"
 
 namespace dermis::viewer {
 namespace {
@@ -39,72 +40,15 @@ void drawEmpty(const Facts& facts, const Area& picture) {
   list.AddText({x - size.x / 2, y - size.y / 2}, color(textColor), text.c_str());
 }
 
-/// The units' prefix is left to the model: what is 1 in it.
-std::string errorLine(const FigureError& error) {
-  return fmt::format("{}: at most {:.2g}, {:.0f} % of its bound", methodName(error.method),
-                     error.greatest, 100 * error.greatestPartOfBound);
-}
-
-struct Legend {
-  std::string title, low, high;
-  std::vector<std::string> lines;
-};
-
-Legend weightsLegend(const SceneView& view, const State& state) {
-  Legend legend{"weight", "0", "1", {}};
-  if (state.joint < view.joints().size()) legend.title += " of " + view.joints()[state.joint].name;
-  return legend;
-}
-
-Legend errorLegend(const Facts& facts, const State& state) {
-  Legend legend{"error of position, in the model's unit", "0", "", {}};
-  if (facts.errors == nullptr) {
-    legend.lines.push_back("computing the reference …");
-    return legend;
-  }
-  double greatest = 0;
-  for (const FigureError& error : facts.errors->figures) {
-    greatest = std::max(greatest, error.greatest);
-    legend.lines.push_back(errorLine(error));
-  }
-  legend.high = fmt::format("{:.2g}", greatest);
-  const bool isOld =
-      facts.errors->time != state.playback.time() || facts.errors->clip != state.clip;
-  legend.lines.push_back(
-      fmt::format("at {:.2f} s{}", facts.errors->time, isOld ? ", not of the pose shown" : ""));
-  return legend;
-}
-
-void drawLegend(const Legend& legend, const Area& picture) {
+/// Where there is no panel for it.
+void drawFreeLegend(const Facts& facts, const Area& picture, const State& state) {
+  const float width = 250, pad = 12;
+  const float height = legendHeight(facts, state);
+  const float x = picture.x + 16, y = picture.y + picture.height - 80 - height - 2 * pad;
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
-  const float line = ImGui::GetTextLineHeight() + 3, pad = 12, barWidth = 240, barHeight = 12;
-  float width = std::max(barWidth, ImGui::CalcTextSize(legend.title.c_str()).x);
-  for (const std::string& text : legend.lines)
-    width = std::max(width, ImGui::CalcTextSize(text.c_str()).x);
-  const float height =
-      2 * pad + line + barHeight + 4 + line + line * static_cast<float>(legend.lines.size());
-  const float x = picture.x + picture.width - width - 2 * pad - 16, y = picture.y + 56;
-  list.AddRectFilled({x, y}, {x + width + 2 * pad, y + height}, color(panelColor, 0.82f), 8);
-  const float left = x + pad;
-  float top = y + pad;
-  list.AddText({left, top}, color(textColor), legend.title.c_str());
-  top += line + 2;
-  constexpr int steps = 32;
-  for (int step = 0; step < steps; ++step) {
-    const float a = static_cast<float>(step) / steps, b = static_cast<float>(step + 1) / steps;
-    const ImU32 from = heatColor(a), to = heatColor(b);
-    list.AddRectFilledMultiColor({left + a * width, top}, {left + b * width, top + barHeight}, from,
-                                 to, to, from);
-  }
-  top += barHeight + 2;
-  list.AddText({left, top}, color(dimColor), legend.low.c_str());
-  const float high = ImGui::CalcTextSize(legend.high.c_str()).x;
-  list.AddText({left + width - high, top}, color(dimColor), legend.high.c_str());
-  top += line;
-  for (const std::string& text : legend.lines) {
-    list.AddText({left, top}, color(textColor, 0.9f), text.c_str());
-    top += line;
-  }
+  list.AddRectFilled({x, y}, {x + width + 2 * pad, y + height + 2 * pad}, color(panelColor, 0.82f),
+                     8);
+  drawLegend(facts, state, list, x + pad, y + pad, width);
 }
 
 samples::render::Camera cameraOf(const Area& area, const State& state) {
@@ -138,8 +82,8 @@ void drawOverlay(const Facts& facts, const Area& picture, const State& state) {
     drawEmpty(facts, picture);
   } else {
     drawViews(facts, picture, state);
-    if (state.coloring == Coloring::weights) drawLegend(weightsLegend(*facts.view, state), picture);
-    if (state.coloring == Coloring::error) drawLegend(errorLegend(facts, state), picture);
+    if (!state.showsPanel && state.coloring != Coloring::surface)
+      drawFreeLegend(facts, picture, state);
     if (facts.isLoading) {
       drawLabel(list, facts.loading, picture.x + 16, picture.y + 16, Align::left, color(warmColor));
     }

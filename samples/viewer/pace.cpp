@@ -14,7 +14,7 @@ const std::array<Quality, 5> levels{{
     {0.5f, {512, 128, 3}},
     {0.4f, {512, 128, 2}},
 }};
-const Quality softwareStill{1.0f, {1024, 256, 8}};
+const Quality softwareStill{1.0f, {1024, 256, 20}};
 
 }  // namespace
 
