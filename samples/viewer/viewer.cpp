@@ -412,7 +412,8 @@ void Viewer::countPicture() {
   ++counted_;
   const double elapsed = seconds(Clock::now() - countedSince_);
   if (elapsed < 0.5) return;
-  framesPerSecond_ = counted_ / elapsed;
+  // What was at rest for a while says nothing.
+  framesPerSecond_ = elapsed < 3 ? counted_ / elapsed : 0;
   counted_ = 0;
   countedSince_ = Clock::now();
 }
