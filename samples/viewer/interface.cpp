@@ -53,8 +53,8 @@ void drawFile(const Facts& facts, State& state) {
   heading("File");
   if (facts.view != nullptr) {
     say(facts.file);
-    sayDim(fmt::format("{} vertices, {} triangles, {} joints", facts.view->vertexCount(),
-                       facts.view->triangleCount(), facts.view->joints().size()));
+    sayDim(fmt::format("{} vertices, {} joints", facts.view->vertexCount(),
+                       facts.view->joints().size()));
   } else {
     sayDim("none");
   }
@@ -150,7 +150,8 @@ void drawPanel(const Facts& facts, float height, State& state) {
   ImGui::SetNextWindowSize({panelWidth, height});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
   ImGui::Begin("panel", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
   ImGui::PopStyleVar();
   drawFile(facts, state);
@@ -185,6 +186,22 @@ void drawClipChoice(const SceneView& view, State& state) {
   ImGui::EndCombo();
 }
 
+void drawScrubber(State& state) {
+  const std::string text =
+      fmt::format("{:.2f} / {:.2f} s", state.playback.time(), state.playback.duration());
+  const float width = ImGui::CalcTextSize("00.00 / 00.00 s").x;
+  const float gap = ImGui::GetStyle().ItemSpacing.x;
+  auto time = static_cast<float>(state.playback.time());
+  const auto end = static_cast<float>(state.playback.duration());
+  ImGui::SetNextItemWidth(std::max(ImGui::GetContentRegionAvail().x - width - gap, 60.0f));
+  if (ImGui::SliderFloat("##time", &time, 0, end > 0 ? end : 1, "")) {
+    state.playback.setPlaying(false);
+    state.playback.seek(static_cast<double>(time));
+  }
+  ImGui::SameLine();
+  say(text);
+}
+
 /// Along the foot of the picture: play, where in the clip, which clip.
 void drawTransport(const SceneView& view, const Area& picture, State& state) {
   const float height = 48, margin = 16;
@@ -201,14 +218,7 @@ void drawTransport(const SceneView& view, const Area& picture, State& state) {
   ImGui::SameLine();
   drawClipChoice(view, state);
   ImGui::SameLine();
-  auto time = static_cast<float>(state.playback.time());
-  const auto end = static_cast<float>(state.playback.duration());
-  ImGui::SetNextItemWidth(-1);
-  const std::string format = fmt::format("%.2f s of {:.2f} s", static_cast<double>(end));
-  if (ImGui::SliderFloat("##time", &time, 0, end > 0 ? end : 1, format.c_str())) {
-    state.playback.setPlaying(false);
-    state.playback.seek(static_cast<double>(time));
-  }
+  drawScrubber(state);
   ImGui::End();
 }
 

@@ -102,12 +102,6 @@ std::uint64_t SceneView::vertexCount() const {
   return count;
 }
 
-std::uint64_t SceneView::triangleCount() const {
-  std::uint64_t count = 0;
-  for (const cli::ScenePart& part : scene_.parts) count += part.primitive->triangles.size() / 3;
-  return count;
-}
-
 Result<void> SceneView::skin(std::uint32_t clip, double time) {
   if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
   if (Result<void> posed = drawn_->setPose(0, cli::scenePose(scene_, clip, time)); !posed)

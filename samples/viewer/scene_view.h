@@ -58,7 +58,6 @@ class SceneView {
   /// What of its materials could not be had.
   const std::vector<std::string>& notes() const { return drawn_->notes(); }
   std::uint64_t vertexCount() const;
-  std::uint64_t triangleCount() const;
 
   /// Around all poses of a clip, and the ground. The first time skins some of them, and waits.
   Result<Box> extent(std::uint32_t clip);

@@ -1,5 +1,6 @@
 #include "skeleton.h"
 
+#include <algorithm>
 #include <cstring>
 
 namespace dermis::viewer {
@@ -48,17 +49,28 @@ std::vector<Joint> jointsOf(const cli::Scene& scene) {
   for (const cli::ScenePart& part : scene.parts) {
     for (const std::uint32_t node : model.skins[part.source.skin].joints) isJoint[node] = true;
   }
+  std::vector<std::vector<std::uint32_t>> children(model.nodes.size());
+  std::vector<std::uint32_t> next;  // from the end on
+  for (std::uint32_t node = 0; node < model.nodes.size(); ++node) {
+    const std::uint32_t parent = model.nodes[node].parent;
+    (parent == gltf::none ? next : children[parent]).push_back(node);
+  }
+  // A limb after the other, as one would name them.
+  std::ranges::reverse(next);
   std::vector<std::uint32_t> place(model.nodes.size(), gltf::none);
   std::vector<Joint> joints;
-  for (const std::uint32_t node : model.nodeOrder) {
+  while (!next.empty()) {
+    const std::uint32_t node = next.back();
+    next.pop_back();
+    next.insert(next.end(), children[node].rbegin(), children[node].rend());
+    const std::uint32_t parent = model.nodes[node].parent;
+    place[node] = parent == gltf::none ? gltf::none : place[parent];
     if (!isJoint[node]) continue;
     Joint joint;
     joint.node = node;
+    joint.parent = place[node];
     joint.name = model.nodes[node].name;
     if (joint.name.empty()) joint.name = "node " + std::to_string(node);
-    std::uint32_t above = model.nodes[node].parent;
-    while (above != gltf::none && !isJoint[above]) above = model.nodes[above].parent;
-    if (above != gltf::none) joint.parent = place[above];
     place[node] = static_cast<std::uint32_t>(joints.size());
     joints.push_back(std::move(joint));
   }

@@ -50,7 +50,6 @@ struct Facts {
   bool isLoading = false;
   std::string loading;  ///< what is being done meanwhile
   const CheckResult* errors = nullptr;
-  bool isChecking = false;
   double framesPerSecond = 0;  ///< 0: nothing moves
   float scale = 1;             ///< `Quality::scale` of the last picture
 };

@@ -346,7 +346,6 @@ Facts Viewer::facts() const {
                         : fmt::format("reading {} …", fileName(current->path));
   }
   facts.errors = errors_ ? &*errors_ : nullptr;
-  facts.isChecking = check_ != nullptr && check_->isBusy();
   facts.framesPerSecond = state_.playback.isPlaying() ? framesPerSecond_ : 0;
   facts.scale = wasScaled_ ? pace_.moving().scale : 1;
   return facts;
@@ -369,7 +368,10 @@ Result<void> Viewer::draw() {
 
   const Result<bool> isReady = presenter_->prepare();
   if (!isReady) return isReady.error();
-  if (!*isReady) return {};
+  if (!*isReady) {
+    SDL_Delay(10);  // There is nothing to draw on, and nothing to wait for.
+    return {};
+  }
   const std::string notice = takesScreenshot ? std::exchange(state_.notice, {}) : state_.notice;
   presenter_->gui().beginFrame();
   drawInterface(facts(), area(), state_);
