@@ -71,9 +71,19 @@ void Viewer::waitForEvents() {
   const bool isBusy = !isSettled() || !screenshotName_.empty() || !state_.notice.empty();
   SDL_Event event;
   const bool isMinimised = presenter_->window().isMinimised();
+  if (framesToTextField_ > 0) --framesToTextField_;
   const int patience = isMinimised ? 100 : isHurried ? 0 : isBusy ? 15 : 250;
   if (patience > 0 && SDL_WaitEventTimeout(&event, patience) != 0) handle(event);
-  while (SDL_PollEvent(&event) != 0) handle(event);
+  while (!waitsForTextField() && SDL_PollEvent(&event) != 0) handle(event);
+}
+
+/// What is typed behind the key that opens the text field is meant for it, and it takes some frames
+/// until it has the keyboard.
+bool Viewer::waitsForTextField() {
+  if (state_.editsPath) framesToTextField_ = 4;
+  if (presenter_->gui().wantsText()) framesToTextField_ = 0;
+  framesToDraw_ = std::max(framesToDraw_, framesToTextField_);
+  return framesToTextField_ > 0;
 }
 
 void Viewer::handle(const SDL_Event& event) {

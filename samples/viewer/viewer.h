@@ -26,6 +26,7 @@ class Viewer {
 
   // Input
   void waitForEvents();
+  bool waitsForTextField();
   void handle(const SDL_Event& event);
   void handleMouseMotion(const SDL_MouseMotionEvent& motion);
   void handleMouseButton(const SDL_MouseButtonEvent& button);
@@ -72,6 +73,7 @@ class Viewer {
   bool hasNewColors_ = false, isStillDrawn_ = false, wasScaled_ = false;
   Clock::time_point lastChange_ = Clock::now(), lastUpdate_ = Clock::now(), noticeEnd_;
   int framesToDraw_ = 3;  ///< of the interface, which takes some to come to rest
+  int framesToTextField_ = 0;
   std::uint32_t shownFrames_ = 0;
   std::string screenshotName_;  ///< of the one to be taken; empty: none
   bool isEnding_ = false;
