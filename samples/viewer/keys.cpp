@@ -101,9 +101,6 @@ void handleAlways(SDL_Keycode key, State& state) {
 void handleTime(SDL_Keycode key, bool isShifted, const SceneView& view, State& state) {
   const double step = isShifted ? 10 * stepSeconds : stepSeconds;
   switch (key) {
-    case SDLK_SPACE:
-      state.playback.setPlaying(!state.playback.isPlaying());
-      break;
     case SDLK_LEFT:
       state.playback.step(-step);
       break;
@@ -128,6 +125,9 @@ void handleTime(SDL_Keycode key, bool isShifted, const SceneView& view, State& s
 
 void handleLooks(SDL_Keycode key, bool isShifted, const SceneView& view, State& state) {
   switch (key) {
+    case SDLK_SPACE:
+      state.playback.setPlaying(!state.playback.isPlaying());
+      break;
     case SDLK_m:
       state.methods[isShifted] = methodAfter(state.methods[isShifted]);
       if (isShifted) state.isSideBySide = true;

@@ -159,9 +159,16 @@ void SceneView::writeWeights(std::uint32_t joint) {
   weightsOf_ = joint;
 }
 
+void SceneView::setErrors(CheckResult result) {
+  errors_ = std::move(result);
+  writeErrors();
+}
+
 /// The colours end at the greatest error of all that is shown.
-void SceneView::setErrors(const CheckResult& result) {
+void SceneView::writeErrors() {
   clearValues();
+  if (!errors_) return;
+  const CheckResult& result = *errors_;
   double greatest = 0;
   for (const FigureError& figure : result.figures) greatest = std::max(greatest, figure.greatest);
   const float factor = greatest > 0 ? static_cast<float>(1 / greatest) : 0;
@@ -241,7 +248,7 @@ Result<void> SceneView::record(VkCommandBuffer commandBuffer, const Shot& shot,
   const Result<render::RenderFrame*> frame = frameOf(shot, quality, isStill);
   if (!frame) return frame.error();
   if (shot.coloring == Coloring::weights) writeWeights(shot.joint);
-  if (shot.coloring == Coloring::error && weightsOf_) clearValues();
+  if (shot.coloring == Coloring::error && weightsOf_) writeErrors();
   if (Result<void> done = recordSkinning(commandBuffer, shot); !done) return done;
   drawing_.recordBegin(commandBuffer);
   if (Result<void> done = draw(commandBuffer, shot, **frame, *extent); !done) return done;

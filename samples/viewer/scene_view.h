@@ -64,7 +64,7 @@ class SceneView {
   static Box withGround(const Box& extent);
 
   /// Shows them from now on, where errors are to be seen.
-  void setErrors(const CheckResult& result);
+  void setErrors(CheckResult result);
 
   /// Skins what has changed and draws it, in one command buffer. `copiesPositions`: then
   /// `skinned` has them. Where the scene does not allow a method it fails with `invalidArgument`.
@@ -98,6 +98,7 @@ class SceneView {
   Result<void> skin(std::uint32_t clip, double time);
   Result<void> makeValues();
   void writeWeights(std::uint32_t joint);
+  void writeErrors();
   void clearValues();
   Result<bool> pose(const Shot& shot);
   Result<void> recordSkinning(VkCommandBuffer commandBuffer, const Shot& shot);
@@ -116,9 +117,10 @@ class SceneView {
   std::optional<samples::render::Renderer> renderer_;
   std::optional<cli::DrawnScene> drawn_;
   std::array<Method, 2> methods_{Method::dualQuaternion, Method::dualQuaternion};
-  std::map<std::uint32_t, Box> extents_;  ///< by clip
-  std::vector<PartValues> values_;        ///< by part
-  std::optional<std::uint32_t> weightsOf_;
+  std::map<std::uint32_t, Box> extents_;    ///< by clip
+  std::vector<PartValues> values_;          ///< by part
+  std::optional<std::uint32_t> weightsOf_;  ///< the joint, where weights are shown
+  std::optional<CheckResult> errors_;
   std::array<PictureSlot, 2> slots_;
   const PictureSlot* shown_ = nullptr;
   samples::Timestamps skinning_, drawing_;

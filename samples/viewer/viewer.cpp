@@ -80,14 +80,26 @@ void Viewer::waitForEvents() {
 /// What is typed behind the key that opens the text field is meant for it, and it takes some frames
 /// until it has the keyboard.
 bool Viewer::waitsForTextField() {
-  if (state_.editsPath) framesToTextField_ = 4;
+  if (state_.editsPath) {
+    framesToTextField_ = 4;
+    opensTextField_ = true;
+  }
   if (presenter_->gui().wantsText()) framesToTextField_ = 0;
   framesToDraw_ = std::max(framesToDraw_, framesToTextField_);
   return framesToTextField_ > 0;
 }
 
+/// The key that opens the text field is a letter too, which does not belong into it.
+bool Viewer::isOpeningLetter(const SDL_TextInputEvent& text) {
+  const char letter = text.text[0];
+  const bool isIt = opensTextField_ && (letter == 'o' || letter == 'O') && text.text[1] == 0;
+  opensTextField_ = false;
+  return isIt;
+}
+
 void Viewer::handle(const SDL_Event& event) {
   framesToDraw_ = framesAfterEvent;
+  if (event.type == SDL_TEXTINPUT && isOpeningLetter(event.text)) return;
   presenter_->gui().handle(event);
   switch (event.type) {
     case SDL_QUIT:
@@ -211,8 +223,9 @@ Result<void> Viewer::adoptScene(const std::string& path, cli::Scene scene) {
   if (!made) return made.error();
   const std::uint32_t first = (*made)->scene().model->clips.empty() ? gltf::none : 0u;
   const bool isSame = view_ != nullptr && path == path_;
-  if (const Result<Box> box = (*made)->extent(isSame ? state_.clip : first); !box)
-    return box.error();
+  const std::uint32_t clip = isSame ? state_.clip : first;
+  if (const Result<Box> box = (*made)->extent(clip); !box) return box.error();
+  framedClip_ = clip;
   check_.reset();
   errors_.reset();
   drawn_.reset();
@@ -265,17 +278,18 @@ float Viewer::aspect() const {
 
 /// What has not been moved by hand follows the window's shape and the clip.
 void Viewer::placeCamera() {
-  const bool isOther = framedAspect_ != aspect() || framedClip_ != state_.clip;
-  if (!state_.frames && !(isOther && state_.camera.isFramed())) return;
-  state_.frames = false;
   const Result<Box> box = view_->extent(state_.clip);
   if (!box) {
     state_.error = box.error().message;
+    chooseClip(*view_, framedClip_, state_);
     return;
   }
+  const bool isOther = framedAspect_ != aspect() || framedClip_ != state_.clip;
+  framedClip_ = state_.clip;
+  if (!state_.frames && !(isOther && state_.camera.isFramed())) return;
+  state_.frames = false;
   state_.camera.frame(*box, aspect());
   framedAspect_ = aspect();
-  framedClip_ = state_.clip;
 }
 
 void Viewer::takeErrors() {

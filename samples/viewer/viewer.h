@@ -27,6 +27,7 @@ class Viewer {
   // Input
   void waitForEvents();
   bool waitsForTextField();
+  bool isOpeningLetter(const SDL_TextInputEvent& text);
   void handle(const SDL_Event& event);
   void handleMouseMotion(const SDL_MouseMotionEvent& motion);
   void handleMouseButton(const SDL_MouseButtonEvent& button);
@@ -74,11 +75,12 @@ class Viewer {
   Clock::time_point lastChange_ = Clock::now(), lastUpdate_ = Clock::now(), noticeEnd_;
   int framesToDraw_ = 3;  ///< of the interface, which takes some to come to rest
   int framesToTextField_ = 0;
+  bool opensTextField_ = false;
   std::uint32_t shownFrames_ = 0;
   std::string screenshotName_;  ///< of the one to be taken; empty: none
   bool isEnding_ = false;
   float framedAspect_ = 0;
-  std::optional<std::uint32_t> framedClip_;
+  std::uint32_t framedClip_ = gltf::none;  ///< the last that could be shown
   int pressedX_ = 0, pressedY_ = 0;
   bool isDragging_ = false, hasDragged_ = false;
   Clock::time_point countedSince_ = Clock::now();

@@ -184,6 +184,7 @@ TEST_F(ViewerTest, PlaysAndShowsWhatKeysAskFor) {
   const Picture error = screenshotAfter({"e"});
   EXPECT_GT(changes(error, weights, scene), 3000) << "the error";
   EXPECT_GT(changes(error, first, scene), 10'000);
+  EXPECT_LT(changes(error, screenshotAfter({"w", "e"}), scene), 50) << "the same error again";
   EXPECT_LT(changes(first, screenshotAfter({"e"}), scene), 50);
 
   EXPECT_GT(changes(first, screenshotAfter({"h"}), scene), 50'000) << "help";
@@ -259,6 +260,7 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithAFileAndGoesOn) {
   const Picture before = screenshot();
   typePath(broken);
   EXPECT_TRUE(waitUntil([&] { return errors().find("broken.gltf") != std::string::npos; }));
+  EXPECT_EQ(errors().find('o' + broken), std::string::npos) << "the key's own letter";
   const Picture told = screenshot();
   EXPECT_GT(changes(before, told, {340, 50, 920, 120}), 5000) << "a message over the picture";
   EXPECT_LT(changes(before, told, {300, 200, width, 500}), 50) << "of what was there before";
