@@ -3,6 +3,7 @@
 option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" ON)
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_BUILD_VIEWER "Build the viewer, one of the samples; needs SDL 2 and Dear ImGui" ON)
 option(DERMIS_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_FUZZERS "Build the libFuzzer programs; needs Clang, and instruments everything" OFF)
 option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package" ${PROJECT_IS_TOP_LEVEL})

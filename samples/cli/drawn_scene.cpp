@@ -108,6 +108,7 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
       !std::in_range<std::uint32_t>(std::uint64_t{instances} * figures)) {
     return Error{ErrorCode::limitExceeded, "so many figures have too many joints"};
   }
+  description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.meshBudget = std::max<std::uint64_t>(meshes, 4096);
   description.jointBudget = std::max(static_cast<std::uint32_t>(all), 1u);
   description.outputBudget = std::max<std::uint64_t>(outputs * figures, 4096);
@@ -162,27 +163,46 @@ Result<void> DrawnScene::prepare(Method method) {
 
 Result<void> DrawnScene::addFigure(Method method) {
   Figure figure;
+  figure.parts.resize(shared_.size());
   figure.palettes.resize(scene_->model->skins.size());
   std::vector<bool> isUsed(figure.palettes.size());
   for (std::size_t index = 0; index < shared_.size(); ++index) {
-    FigurePart& part = figure.parts.emplace_back();
-    if (!shared_[index].mesh) continue;
     const std::uint32_t skin = scene_->parts[index].source.skin;
-    if (!isUsed[skin]) {
-      const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
-      Result<PaletteHandle> palette = system_->addPalette(joints);
-      if (!palette) return palette.error();
-      figure.palettes[skin] = *palette;
-      isUsed[skin] = true;
-    }
-    InstanceDescription description = instanceOf(index, method);
-    description.palette = figure.palettes[skin];
-    Result<InstanceHandle> instance = system_->addInstance(description);
-    if (!instance) return instance.error();
-    part.instance = *instance;
+    if (!shared_[index].mesh || isUsed[skin]) continue;
+    const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
+    Result<PaletteHandle> palette = system_->addPalette(joints);
+    if (!palette) return palette.error();
+    figure.palettes[skin] = *palette;
+    isUsed[skin] = true;
   }
+  if (Result<void> added = addInstances(figure, method); !added) return added;
   figures_.push_back(std::move(figure));
   return {};
+}
+
+Result<void> DrawnScene::addInstances(Figure& figure, Method method) {
+  for (std::size_t index = 0; index < shared_.size(); ++index) {
+    if (!shared_[index].mesh) continue;
+    InstanceDescription description = instanceOf(index, method);
+    description.palette = figure.palettes[scene_->parts[index].source.skin];
+    Result<InstanceHandle> instance = system_->addInstance(description);
+    if (!instance) return instance.error();
+    figure.parts[index].instance = *instance;
+  }
+  return {};
+}
+
+Result<void> DrawnScene::setMethod(std::uint32_t index, Method method) {
+  if (Result<void> done = prepare(method); !done) return done;
+  Figure& figure = figures_[index];
+  for (FigurePart& part : figure.parts) {
+    if (!part.instance) continue;
+    if (Result<void> removed = system_->removeInstance(*part.instance); !removed) return removed;
+    part.instance.reset();
+  }
+  // There is room for the new ones when what the old ones had is free.
+  if (Result<void> begun = beginFrame(); !begun) return begun;
+  return addInstances(figure, method);
 }
 
 Result<void> DrawnScene::beginFrame() {
@@ -236,10 +256,12 @@ Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const Morph
 
 Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
   recordBarrier(*device_->device, commandBuffer,
-                vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+                vulkan::inputScope(vulkan::PreviousUse::vertexInput) |
+                    vulkan::inputScope(vulkan::PreviousUse::transfer));
   if (Result<void> done = system_->record(commandBuffer); !done) return done;
   recordBarrier(*device_->device, commandBuffer,
-                vulkan::outputScope(vulkan::Consumer::vertexInput));
+                vulkan::outputScope(vulkan::Consumer::vertexInput) |
+                    vulkan::outputScope(vulkan::Consumer::transfer));
   return {};
 }
 

@@ -31,7 +31,10 @@ class DrawnScene {
   /// Begins the next frame; all recorded before must be complete.
   Result<void> beginFrame();
   Result<void> setPose(std::uint32_t figure, const ScenePose& pose);
-  /// Skins, and makes what was skinned ready to be drawn.
+  /// Skins a figure by another method from now on, which the scene must allow; it has to be posed
+  /// again. Begins a frame of its own; all recorded before must be complete.
+  Result<void> setMethod(std::uint32_t figure, Method method);
+  /// Skins, and makes what was skinned ready to be drawn, and to be copied.
   Result<void> recordSkinning(VkCommandBuffer commandBuffer);
 
   /// What draws a figure as it was last posed, its bind space moved by `transform`.
@@ -40,6 +43,8 @@ class DrawnScene {
   /// Around a figure as it was skinned in the last complete frame; nothing where no vertex of it is
   /// finite. Call `beginFrame` before.
   Result<std::optional<Box>> bounds(std::uint32_t figure) const;
+
+  vulkan::SystemStatistics statistics() const { return system_->statistics(); }
 
   /// What of the materials could not be had.
   const std::vector<std::string>& notes() const { return appearances_->notes(); }
@@ -70,6 +75,7 @@ class DrawnScene {
   Result<void> makeSystem(std::uint32_t figures);
   Result<void> addSharedParts(samples::render::Renderer& renderer);
   Result<void> addFigure(Method method);
+  Result<void> addInstances(Figure& figure, Method method);
   Result<void> prepare(Method method);
   InstanceDescription instanceOf(std::size_t part, Method method) const;
   Result<void> placeFixed(const ScenePart& part, std::span<const MorphWeight> morphs,

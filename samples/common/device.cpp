@@ -138,7 +138,7 @@ Result<std::vector<DeviceInfo>> listDevices() {
   if (!loader) return loader.error();
   Device device;
   device.loader_ = *loader;
-  if (Result<void> made = device.createInstance(false); !made) return made.error();
+  if (Result<void> made = device.createInstance(false, {}); !made) return made.error();
   std::vector<DeviceInfo> infos;
   for (const VkPhysicalDevice physicalDevice :
        physicalDevices(device.functions_, device.instance_)) {
@@ -152,7 +152,9 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options) {
   if (!loader) return loader.error();
   std::unique_ptr<Device> device(new Device);
   device->loader_ = *loader;
-  if (Result<void> made = device->createInstance(options.validation); !made) return made.error();
+  if (Result<void> made = device->createInstance(options.validation, options.surfaceExtensions);
+      !made)
+    return made.error();
   if (Result<void> chosen = device->choose(options.device); !chosen) return chosen.error();
   if (Result<void> made = device->createDevice(options); !made) return made.error();
   return device;
@@ -172,7 +174,8 @@ Device::~Device() {
   if (instance_ != VK_NULL_HANDLE) functions_.DestroyInstance(instance_, nullptr);
 }
 
-Result<void> Device::createInstance(bool validation) {
+Result<void> Device::createInstance(bool validation,
+                                    std::span<const std::string> extensions) {
   const auto createInstance = reinterpret_cast<PFN_vkCreateInstance>(
       loader_->getInstanceProcAddr(nullptr, "vkCreateInstance"));
   VkApplicationInfo application{};
@@ -183,6 +186,8 @@ Result<void> Device::createInstance(bool validation) {
   info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
   info.pApplicationInfo = &application;
 
+  std::vector<const char*> names;
+  for (const std::string& extension : extensions) names.push_back(extension.c_str());
   ValidationRequest request;
   VkDebugUtilsMessengerCreateInfoEXT messengerInfo{};
   if (validation) {
@@ -198,10 +203,11 @@ Result<void> Device::createInstance(bool validation) {
     info.pNext = request.chain();
     info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &validationLayer;
-    info.enabledExtensionCount = static_cast<std::uint32_t>(request.extensions().size());
-    info.ppEnabledExtensionNames = request.extensions().data();
+    names.insert(names.end(), request.extensions().begin(), request.extensions().end());
     enabledExtensions_.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
+  info.enabledExtensionCount = static_cast<std::uint32_t>(names.size());
+  info.ppEnabledExtensionNames = names.data();
   if (const VkResult result = createInstance(&info, nullptr, &instance_); result != VK_SUCCESS) {
     instance_ = VK_NULL_HANDLE;
     return unusable(result == VK_ERROR_INCOMPATIBLE_DRIVER
@@ -271,6 +277,13 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   std::vector<const char*> extensions;
   if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  if (!options.surfaceExtensions.empty()) {
+    if (!hasExtension(deviceExtensions(functions_, physicalDevice_),
+                      VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {
+      return unusable("device '" + info_.name + "' cannot show pictures in a window");
+    }
+    extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
+  }
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
   if (options.pipelineStatistics && info_.pipelineStatistics)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,9 @@ struct DeviceOptions {
   bool graphics = false;        ///< the queue draws too; fails where the device has none that does
   bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
                                     ///< them
+  /// The instance extensions that a window's surface needs. Where there are any, the device must
+  /// have VK_KHR_swapchain, and it is enabled.
+  std::vector<std::string> surfaceExtensions;
 };
 
 /// Fails with `missingFeature` where there is no loader, or no instance can be made.
@@ -84,7 +88,7 @@ class Device {
 
  private:
   Device() = default;
-  Result<void> createInstance(bool validation);
+  Result<void> createInstance(bool validation, std::span<const std::string> extensions);
   Result<void> choose(const std::string& wanted);
   Result<void> createDevice(const DeviceOptions& options);
 

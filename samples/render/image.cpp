@@ -6,6 +6,11 @@
 namespace dermis::samples::render {
 namespace {
 
+VkFormat viewFormatOf(const ImageDescription& description) {
+  return description.viewFormat != VK_FORMAT_UNDEFINED ? description.viewFormat
+                                                       : description.format;
+}
+
 Result<Owned<VkImageView>> makeView(Device& device, VkImage image,
                                     const ImageDescription& description, VkImageViewType type,
                                     std::uint32_t firstLayer, std::uint32_t layers) {
@@ -13,7 +18,7 @@ Result<Owned<VkImageView>> makeView(Device& device, VkImage image,
   info.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;
   info.image = image;
   info.viewType = type;
-  info.format = description.format;
+  info.format = viewFormatOf(description);
   info.subresourceRange = {description.aspect, 0, description.levels, firstLayer, layers};
   return DERMIS_MAKE(device, ImageView, info);
 }
@@ -40,6 +45,8 @@ Result<Image> Image::create(Device& device, const ImageDescription& description)
   const std::uint32_t layers = std::max(description.layers, 1u);
   VkImageCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO;
+  if (viewFormatOf(description) != description.format)
+    info.flags = VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT;
   info.imageType = VK_IMAGE_TYPE_2D;
   info.format = description.format;
   info.extent = {description.width, description.height, 1};

@@ -9,6 +9,7 @@ namespace dermis::samples::render {
 
 struct ImageDescription {
   VkFormat format = VK_FORMAT_UNDEFINED;
+  VkFormat viewFormat = VK_FORMAT_UNDEFINED;  ///< of its views, where that is another
   std::uint32_t width = 0, height = 0;
   std::uint32_t layers = 0;  ///< 0: one, and not seen as an array
   std::uint32_t levels = 1;

@@ -22,6 +22,18 @@ constexpr std::array<const char*, 3> fontFiles{
     "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
 };
 
+/// Nothing where it cannot be read.
+std::vector<unsigned char> readBytes(const std::string& name) {
+  std::ifstream stream(name, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+bool isFont(const std::vector<unsigned char>& file) {
+  stbtt_fontinfo info;
+  const int offset = file.size() < 1024 ? -1 : stbtt_GetFontOffsetForIndex(file.data(), 0);
+  return offset >= 0 && stbtt_InitFont(&info, file.data(), offset) != 0;
+}
+
 /// The code points of a text; a byte that begins none counts as U+FFFD.
 std::vector<int> codePoints(std::string_view text) {
   std::vector<int> points;
@@ -74,22 +86,23 @@ Result<std::vector<std::byte>> encodePng(const Picture& picture) {
   return bytes;
 }
 
-Result<Font> Font::load() {
+Result<std::string> findFontFile() {
   std::vector<const char*> names(fontFiles.begin(), fontFiles.end());
   if (const char* own = std::getenv("DERMIS_FONT"); own != nullptr)
     names.insert(names.begin(), own);
   for (const char* name : names) {
-    std::ifstream stream(name, std::ios::binary);
-    if (!stream) continue;
-    Font font;
-    font.file_.assign(std::istreambuf_iterator<char>(stream), {});
-    stbtt_fontinfo info;
-    const int offset =
-        font.file_.size() < 1024 ? -1 : stbtt_GetFontOffsetForIndex(font.file_.data(), 0);
-    if (offset >= 0 && stbtt_InitFont(&info, font.file_.data(), offset) != 0) return font;
+    if (isFont(readBytes(name))) return std::string(name);
   }
   return Error{ErrorCode::ioError,
                "there is no DejaVuSans.ttf on this machine (Debian: fonts-dejavu-core)"};
+}
+
+Result<Font> Font::load() {
+  const Result<std::string> name = findFontFile();
+  if (!name) return name.error();
+  Font font;
+  font.file_ = readBytes(*name);
+  return font;
 }
 
 float Font::width(std::string_view text, float height) const {

@@ -10,5 +10,6 @@
 #pragma GCC diagnostic ignored "-Wundef"
 
 #define STB_IMAGE_IMPLEMENTATION
+#define STB_RECT_PACK_IMPLEMENTATION
 #define STB_TRUETYPE_IMPLEMENTATION
 #include "stb_headers.h"

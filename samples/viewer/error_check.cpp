@@ -1,0 +1,84 @@
+#include "error_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dermis/accuracy.h"
+#include "dermis/reference.h"
+
+namespace dermis::viewer {
+namespace {
+
+double distance(const reference::Double3& expected, const float* actual) {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double difference = expected[axis] - static_cast<double>(actual[axis]);
+    sum += difference * difference;
+  }
+  return std::sqrt(sum);
+}
+
+/// Where the answer is a matter of rounding there is no error.
+bool isDefined(const reference::Conditioning& conditioning) {
+  return !conditioning.degenerate && !conditioning.signAmbiguous;
+}
+
+Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const CheckRequest& request,
+                       const SkinnedFigure& figure, FigureError& result) {
+  std::vector<float>& errors = result.errors.emplace_back(part.primitive->vertexCount, 0.0f);
+  const std::vector<float>& positions = figure.positions[index];
+  if (part.mesh == nullptr || positions.empty()) return {};
+  const Result<reference::SkinnedMesh> expected = reference::skin(
+      part.mesh->view(), request.pose.palette(part), figure.method, request.pose.morphs[index]);
+  if (!expected) return expected.error();
+  for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
+    const reference::Conditioning& conditioning = expected->conditioning[vertex];
+    const double error = distance(expected->positions[vertex], &positions[3 * vertex]);
+    if (!isDefined(conditioning) || !std::isfinite(error)) continue;
+    errors[vertex] = static_cast<float>(error);
+    result.greatest = std::max(result.greatest, error);
+    const double bound = positionBound(figure.method, conditioning);
+    if (bound > 0) result.greatestPartOfBound = std::max(result.greatestPartOfBound, error / bound);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<CheckResult> checkErrors(const cli::Scene& scene, const CheckRequest& request) {
+  CheckResult result;
+  result.clip = request.clip;
+  result.time = request.time;
+  for (const SkinnedFigure& figure : request.figures) {
+    FigureError& checked = result.figures.emplace_back();
+    checked.method = figure.method;
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      if (Result<void> done = checkPart(scene.parts[index], index, request, figure, checked); !done)
+        return done.error();
+    }
+  }
+  return result;
+}
+
+void ErrorCheck::begin(CheckRequest request) {
+  isBusy_ = true;
+  thread_ = std::jthread([this, request = std::move(request)] {
+    Result<CheckResult> result = checkErrors(*scene_, request);
+    const std::lock_guard lock(mutex_);
+    done_.emplace(std::move(result));
+  });
+}
+
+std::optional<Result<CheckResult>> ErrorCheck::poll() {
+  if (!isBusy_) return std::nullopt;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!done_) return std::nullopt;
+  }
+  thread_.join();
+  isBusy_ = false;
+  return std::exchange(done_, std::nullopt);
+}
+
+}  // namespace dermis::viewer

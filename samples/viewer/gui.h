@@ -1,0 +1,41 @@
+// Dear ImGui on SDL and Vulkan: what differs between the versions of Debian 12 (1.86) and 13 (1.90)
+// is in gui.cpp alone.
+#pragma once
+
+#include <SDL.h>
+#include <vulkan/vulkan_core.h>
+
+#include "render/owned.h"
+#include "window.h"
+
+namespace dermis::viewer {
+
+/// Only one at a time. Window and device must outlive it.
+class Gui {
+ public:
+  /// `pass` is what it is drawn in. Fails with `vulkanError`.
+  static Result<Gui> create(const Window& window, samples::Device& device, VkRenderPass pass);
+  Gui() = default;
+  ~Gui();
+  Gui(Gui&& other) noexcept { *this = std::move(other); }
+  Gui& operator=(Gui&& other) noexcept;
+
+  void handle(const SDL_Event& event) const;
+  /// Whether it wants what the mouse does, and what is typed, for itself.
+  bool wantsMouse() const;
+  bool wantsText() const;
+
+  void beginFrame() const;
+  /// Ends the frame; then `record` draws it.
+  void endFrame() const;
+  void record(VkCommandBuffer commandBuffer) const;
+
+ private:
+  Result<void> makeFont(const Window& window);
+
+  samples::Device* device_ = nullptr;
+  samples::render::Owned<VkDescriptorPool> pool_;
+  bool hasContext_ = false, hasWindow_ = false, hasRenderer_ = false;
+};
+
+}  // namespace dermis::viewer

@@ -1,0 +1,93 @@
+#include "options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+namespace dermis::viewer {
+namespace {
+
+constexpr std::uint32_t largestSide = 16384;
+
+std::string methodNames() {
+  std::string names;
+  for (const Method method : allMethods)
+    names += (names.empty() ? "" : ", ") + std::string(methodName(method));
+  return names;
+}
+
+ExitStatus wrong(const std::string& message) {
+  return reportError(ExitStatus::wrongUsage, message + " (dermis_viewer --help tells more)");
+}
+
+std::optional<ExitStatus> readMethod(const std::string& name, std::optional<Method>& method) {
+  if (name.empty()) return std::nullopt;
+  method = methodFromName(name);
+  if (method) return std::nullopt;
+  return wrong(fmt::format("there is no method '{}'; there are {}", name, methodNames()));
+}
+
+std::string sampleFigure() {
+  std::error_code error;
+  return std::filesystem::exists(DERMIS_SAMPLE_FIGURE, error) ? DERMIS_SAMPLE_FIGURE : "";
+}
+
+}  // namespace
+
+ExitStatus reportError(ExitStatus status, const std::string& message) {
+  std::string line = message;
+  std::ranges::replace_if(
+      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
+  std::fflush(stdout);
+  fmt::print(stderr, "dermis_viewer: error: {}\n", line);
+  return status;
+}
+
+std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
+  CLI::App app("Shows skinned models, by every method of Dermis. F1 in its window shows the keys.",
+               "dermis_viewer");
+  app.footer(
+      "Exit status: 0 done, 2 wrong usage, 4 no usable device, 5 anything else that stopped it.");
+  std::string method, comparison;
+  bool isEmpty = false;
+  CLI::Option* model =
+      app.add_option("MODEL", options.model, "A .gltf or .glb file [the sample figure]");
+  app.add_flag("--empty", isEmpty, "Begin without a model")->excludes(model);
+  app.add_option("--method", method, methodNames() + " [dual_quaternion]");
+  app.add_option("--compare", comparison, "Another method beside it");
+  app.add_option("--animation", options.animation,
+                 "A clip's number or name, or none for the rest pose [the first]");
+  app.add_option("--time", options.time, "Seconds into the clip [0]");
+  app.add_flag("--paused", options.isPaused, "Begin with the clip stopped");
+  app.add_option("--width", options.width, "Of the window [1280]")
+      ->check(CLI::Range(64u, largestSide));
+  app.add_option("--height", options.height, "Of the window [800]")
+      ->check(CLI::Range(64u, largestSide));
+  app.add_option("--device", options.device,
+                 "auto, a number of 'dermis devices', or part of a name");
+  app.add_option("--frames", options.frames, "End after so many frames");
+  app.add_option("--screenshot", options.screenshot, "Write the window's last picture: a .png");
+  app.add_flag("--validation", options.validates,
+               "Run with the Vulkan validation layer, and fail where it says anything");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    app.exit(success);  // --help
+    return ExitStatus::done;
+  } catch (const CLI::ParseError& error) {
+    return wrong(error.what());
+  }
+  std::optional<Method> first;
+  if (const auto status = readMethod(method, first)) return status;
+  if (const auto status = readMethod(comparison, options.comparison)) return status;
+  options.method = first.value_or(options.method);
+  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (options.model.empty() && !isEmpty) options.model = sampleFigure();
+  return std::nullopt;
+}
+
+}  // namespace dermis::viewer

@@ -1,0 +1,135 @@
+// A model on the device, skinned by one method or by two side by side, and pictures of it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "drawn_scene.h"
+#include "error_check.h"
+#include "orbit_camera.h"
+#include "render/renderer.h"
+#include "skeleton.h"
+#include "timestamps.h"
+
+namespace dermis::viewer {
+
+enum class Coloring : std::uint8_t { surface, weights, error };
+
+/// What is to be seen. Two that are equal look the same, as long as no new errors are shown.
+struct Shot {
+  std::uint32_t clip = gltf::none;
+  double time = 0;
+  std::array<Method, 2> methods{Method::dualQuaternion, Method::linear};
+  std::uint32_t views = 1;  ///< 2: side by side
+  OrbitCamera camera;
+  Coloring coloring = Coloring::surface;
+  std::uint32_t joint = 0;  ///< whose weights: in `SceneView::joints`
+  VkExtent2D pixels{};      ///< of both views together
+
+  bool operator==(const Shot& other) const;
+};
+
+/// How well it is drawn, and so how long that takes.
+struct Quality {
+  float scale = 1;  ///< pixels drawn to a pixel shown, on each side
+  samples::render::ShadowSizes shadows;
+};
+
+/// What the last picture cost; 0 where it is not known.
+struct SceneTimes {
+  double skinningSeconds = 0;  ///< of the GPU, the last time that there was something to skin
+  double drawingSeconds = 0;   ///< of the GPU
+  double planSeconds = 0;      ///< of the CPU: `SkinningSystem::record`, likewise
+};
+
+/// One picture at a time: what was recorded must be complete before the next call that is not
+/// const.
+class SceneView {
+ public:
+  /// `device` must outlive it. Fails with `invalidData` where nothing of the scene is skinned.
+  static Result<std::unique_ptr<SceneView>> create(samples::OpenDevice& device, cli::Scene scene);
+
+  const cli::Scene& scene() const { return scene_; }
+  const std::vector<Joint>& joints() const { return joints_; }
+  /// What of its materials could not be had.
+  const std::vector<std::string>& notes() const { return drawn_->notes(); }
+  std::uint64_t vertexCount() const;
+
+  /// Around all poses of a clip, and the ground. The first time skins some of them, and waits.
+  Result<Box> extent(std::uint32_t clip);
+  static Box withGround(const Box& extent);
+
+  /// Shows them from now on, where errors are to be seen.
+  void setErrors(CheckResult result);
+
+  /// Skins what has changed and draws it, in one command buffer. `copiesPositions`: then
+  /// `skinned` has them. Where the scene does not allow a method it fails with `invalidArgument`.
+  Result<void> record(VkCommandBuffer commandBuffer, const Shot& shot, const Quality& quality,
+                      bool isStill, bool copiesPositions);
+  /// To be called when the GPU is done with it.
+  Result<void> finish();
+
+  /// The last picture; null before the first.
+  const samples::render::RenderTarget* picture() const;
+  const SceneTimes& times() const { return times_; }
+  CheckRequest skinned() const;
+
+ private:
+  struct PartValues {
+    std::array<samples::MappedBuffer, 2> figures;
+  };
+  struct PictureSlot {
+    std::uint32_t width = 0, height = 0, skyLights = 0;
+    std::optional<samples::render::RenderFrame> frame;
+  };
+  /// Where a part's positions stand in what was copied.
+  struct CopiedPart {
+    std::uint64_t offset = 0;
+    std::uint32_t stride = 0;  ///< 0: it is fixed
+  };
+
+  SceneView(samples::OpenDevice& device, cli::Scene scene)
+      : device_(&device), scene_(std::move(scene)) {}
+  Result<void> prepare();
+  Result<void> skin(std::uint32_t clip, double time);
+  Result<void> makeValues();
+  void writeWeights(std::uint32_t joint);
+  void writeErrors();
+  void clearValues();
+  Result<bool> pose(const Shot& shot);
+  Result<void> recordSkinning(VkCommandBuffer commandBuffer, const Shot& shot);
+  Result<void> draw(VkCommandBuffer commandBuffer, const Shot& shot,
+                    samples::render::RenderFrame& frame, const Box& extent);
+  Result<void> addDraws(std::uint32_t figure, Coloring coloring,
+                        std::vector<samples::render::Draw>& draws) const;
+  Result<samples::render::RenderFrame*> frameOf(const Shot& shot, const Quality& quality,
+                                                bool isStill);
+  Result<void> copyPositions(VkCommandBuffer commandBuffer, std::uint32_t figures);
+
+  samples::OpenDevice* device_;
+  cli::Scene scene_;
+  std::vector<Joint> joints_;
+  // What is declared later goes first: frames before the renderer.
+  std::optional<samples::render::Renderer> renderer_;
+  std::optional<cli::DrawnScene> drawn_;
+  std::array<Method, 2> methods_{Method::dualQuaternion, Method::dualQuaternion};
+  std::map<std::uint32_t, Box> extents_;    ///< by clip
+  std::vector<PartValues> values_;          ///< by part
+  std::optional<std::uint32_t> weightsOf_;  ///< the joint, where weights are shown
+  std::optional<CheckResult> errors_;
+  std::array<PictureSlot, 2> slots_;
+  const PictureSlot* shown_ = nullptr;
+  samples::Timestamps skinning_, drawing_;
+  bool hasSkinned_ = false;
+  SceneTimes times_;
+  std::optional<Shot> posed_;
+  cli::ScenePose pose_;
+  std::array<std::vector<CopiedPart>, 2> copied_;
+  samples::MappedBuffer positions_;
+};
+
+}  // namespace dermis::viewer

@@ -1,0 +1,71 @@
+// What keys, mouse and panel change, and the viewer then does.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "error_check.h"
+#include "orbit_camera.h"
+#include "playback.h"
+#include "scene_view.h"
+
+namespace dermis::viewer {
+
+struct State {
+  std::array<Method, 2> methods{Method::dualQuaternion, Method::linear};
+  bool isSideBySide = false;
+  bool showsJoints = false;
+  bool showsHelp = false;
+  bool showsPanel = true;
+  Coloring coloring = Coloring::surface;
+  std::uint32_t joint = 0;  ///< in `SceneView::joints`
+  std::uint32_t clip = gltf::none;
+  Playback playback;
+  OrbitCamera camera;
+  std::string error;   ///< what went wrong last; empty: nothing
+  std::string notice;  ///< what was done last, for a short while
+  std::string path;    ///< in the text field
+
+  // To be done once.
+  std::optional<std::string> opens;
+  bool frames = false;
+  bool takesScreenshot = false;
+  bool editsPath = false;
+  bool quits = false;
+
+  std::uint32_t views() const { return isSideBySide ? 2 : 1; }
+};
+
+/// What the panel tells.
+struct Facts {
+  const SceneView* view = nullptr;  ///< null: no model
+  std::string file;                 ///< its name, without folders
+  /// What is shown, where another method still has to wait for something.
+  std::array<Method, 2> methods{};
+  std::vector<std::string> notes;  ///< what was found wrong in it, or left out
+  std::string device;
+  bool isLoading = false;
+  std::string loading;  ///< what is being done meanwhile
+  const CheckResult* errors = nullptr;
+  double framesPerSecond = 0;  ///< 0: nothing moves
+  float scale = 1;             ///< `Quality::scale` of the last picture
+};
+
+/// A part of the window in the units of mouse and interface.
+struct Area {
+  float x = 0, y = 0, width = 0, height = 0;
+
+  bool holds(float px, float py) const {
+    return px >= x && px < x + width && py >= y && py < y + height;
+  }
+  /// One of several parts of the same width.
+  Area part(std::uint32_t index, std::uint32_t count) const {
+    const float each = width / static_cast<float>(count);
+    return {x + each * static_cast<float>(index), y, each, height};
+  }
+};
+
+}  // namespace dermis::viewer

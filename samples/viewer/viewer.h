@@ -1,0 +1,91 @@
+// The program: what is loaded, what is shown, and the loop around it.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "options.h"
+#include "pace.h"
+#include "presenter.h"
+#include "scene_loader.h"
+#include "state.h"
+
+namespace dermis::viewer {
+
+class Viewer {
+ public:
+  Viewer(const Options& options, Presenter& presenter);
+
+  /// Until the user ends it. Fails with `vulkanError` where the device does.
+  Result<void> run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // Input
+  void waitForEvents();
+  bool waitsForTextField();
+  bool isOpeningLetter(const SDL_TextInputEvent& text);
+  void handle(const SDL_Event& event);
+  void handleMouseMotion(const SDL_MouseMotionEvent& motion);
+  void handleMouseButton(const SDL_MouseButtonEvent& button);
+
+  // What follows from it
+  void update();
+  void openFiles();
+  void adopt(LoadedScene loaded);
+  Result<void> adoptScene(const std::string& path, cli::Scene scene);
+  void beginWith(const std::string& path);
+  void chooseMethods();
+  void placeCamera();
+  void takeErrors();
+
+  // Pictures
+  Result<void> draw();
+  Shot shot() const;
+  bool isChecked(const Shot& shot) const;
+  bool isSettled() const;
+  Facts facts() const;
+  Area area() const;
+  VkRect2D pixelArea() const;
+  Result<void> afterPicture(bool isStill, bool wasCopied);
+  void countPicture();
+  void keepScreenshot();
+  void tell(std::string notice);
+  float aspect() const;
+
+  const Options& options_;
+  Presenter* presenter_;
+  State state_;
+  SceneLoader loader_;
+  std::unique_ptr<SceneView> view_;
+  std::unique_ptr<ErrorCheck> check_;  // after the view, whose scene it reads
+  std::optional<CheckResult> errors_;
+  std::string path_;  ///< of the view's file
+  std::vector<std::string> notes_;
+  bool hasSoughtCenters_ = false;    ///< those of rotation, in the view's file
+  std::array<Method, 2> methods_{};  ///< that are shown
+  bool hasBegun_ = false;            ///< The first model has been read, or could not be.
+
+  Pace pace_;
+  std::optional<Shot> drawn_;
+  bool hasNewColors_ = false, isStillDrawn_ = false, wasScaled_ = false;
+  Clock::time_point lastChange_ = Clock::now(), lastUpdate_ = Clock::now(), noticeEnd_;
+  int framesToDraw_ = 3;  ///< of the interface, which takes some to come to rest
+  int framesToTextField_ = 0;
+  bool opensTextField_ = false;
+  std::uint32_t shownFrames_ = 0;
+  std::string screenshotName_;  ///< of the one to be taken; empty: none
+  bool isEnding_ = false;
+  float framedAspect_ = 0;
+  std::uint32_t framedClip_ = gltf::none;  ///< the last that could be shown
+  int pressedX_ = 0, pressedY_ = 0;
+  bool isDragging_ = false, hasDragged_ = false;
+  Clock::time_point countedSince_ = Clock::now();
+  int counted_ = 0;
+  double framesPerSecond_ = 0;
+};
+
+}  // namespace dermis::viewer
