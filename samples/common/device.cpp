@@ -174,8 +174,7 @@ Device::~Device() {
   if (instance_ != VK_NULL_HANDLE) functions_.DestroyInstance(instance_, nullptr);
 }
 
-Result<void> Device::createInstance(bool validation,
-                                    std::span<const std::string> extensions) {
+Result<void> Device::createInstance(bool validation, std::span<const std::string> extensions) {
   const auto createInstance = reinterpret_cast<PFN_vkCreateInstance>(
       loader_->getInstanceProcAddr(nullptr, "vkCreateInstance"));
   VkApplicationInfo application{};
