@@ -10,7 +10,7 @@ glslang-dev glslang-tools spirv-tools
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
 libpng-dev libstb-dev fonts-dejavu-core
-libsdl2-dev libimgui-dev xvfb xdotool
+libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
 "
 

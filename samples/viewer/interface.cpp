@@ -70,7 +70,10 @@ void drawFile(const Facts& facts, State& state) {
   }
   const float button = ImGui::CalcTextSize("Open").x + 2 * ImGui::GetStyle().FramePadding.x;
   ImGui::SetNextItemWidth(-button - ImGui::GetStyle().ItemSpacing.x);
-  if (state.editsPath) ImGui::SetKeyboardFocusHere();
+  if (state.editsPath) {
+    ImGui::SetWindowFocus();  // ImGui 1.90 looks for what is to be focused in the window before
+    ImGui::SetKeyboardFocusHere();
+  }
   state.editsPath = false;
   const bool isEntered = ImGui::InputTextWithHint(
       "##path", "path of a .gltf or .glb", &state.path,
