@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "barrier.h"
 #include "dermis/vulkan/scope.h"
 
 namespace dermis::cli {
@@ -26,14 +27,6 @@ Result<void> runOn(samples::Device& device, const Record& record) {
   if (done) done = device.submitAndWait(commandBuffer);
   device.freeCommandBuffer(commandBuffer);
   return done;
-}
-
-void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                        0, nullptr);
 }
 
 double diagonalOf(const Box& box) {

@@ -8,6 +8,8 @@
 #include <set>
 #include <utility>
 
+#include "appearance/winding.h"
+#include "barrier.h"
 #include "bind_pose.h"
 #include "dermis/vulkan/scope.h"
 
@@ -16,20 +18,6 @@ namespace {
 
 using samples::MappedBuffer;
 using samples::render::Draw;
-
-float determinant(const JointMatrix& matrix) {
-  const auto& m = matrix.m;
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
-/// Whether most joints mirror: then triangles are wound the other way.
-bool isMirrored(std::span<const JointMatrix> palette) {
-  const auto mirrored = std::ranges::count_if(
-      palette, [](const JointMatrix& joint) { return determinant(joint) < 0; });
-  return static_cast<std::size_t>(mirrored) * 2 > palette.size();
-}
 
 void include(std::optional<Box>& all, const Box& box) {
   if (!all) all = box;
@@ -49,14 +37,6 @@ Box boxOf(std::span<const float> positions) {
     box.max[i % 3] = std::max(box.max[i % 3], positions[i]);
   }
   return box;
-}
-
-void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                        0, nullptr);
 }
 
 constexpr std::uint32_t bytesPerVector = 3 * sizeof(float);
@@ -222,7 +202,7 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
       continue;
     }
     const std::vector<JointMatrix>& palette = pose.palette(part);
-    posed.isMirrored = isMirrored(palette);
+    posed.isMirrored = samples::isMirrored(palette);
     if (!isWritten[part.source.skin]) {
       isWritten[part.source.skin] = true;
       Result<std::span<JointMatrix>> place = system_->writePose(figure.palettes[part.source.skin]);

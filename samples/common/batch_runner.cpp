@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "dermis/vulkan/scope.h"
+#include "barrier.h"
 
 namespace dermis::samples {
 namespace {
@@ -41,14 +41,6 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
     std::memcpy(buffers.matrices.bytes().data() + layout.palettes[index].matrixOffset,
                 layout.poses[index].data(), layout.poses[index].size_bytes());
   }
-}
-
-void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                        0, nullptr);
 }
 
 Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,

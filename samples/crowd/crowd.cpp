@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "barrier.h"
 #include "frames.h"
 
 using namespace dermis;

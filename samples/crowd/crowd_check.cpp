@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "barrier.h"
 #include "frames.h"
 #include "in_parallel.h"
 

@@ -11,6 +11,8 @@
 
 #include <glm/trigonometric.hpp>
 
+#include "appearance/winding.h"
+#include "barrier.h"
 #include "coarse_triangles.h"
 #include "dermis/vulkan/scope.h"
 #include "frames.h"
@@ -30,20 +32,6 @@ constexpr float sunAzimuth = 205, sunElevation = 38;
 
 /// Of the grids that make coarser triangles, as shares of a figure's height.
 constexpr std::array coarseCells{0.009, 0.016, 0.03};
-
-float determinant(const JointMatrix& matrix) {
-  const auto& m = matrix.m;
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
-/// Whether most joints mirror: then triangles are wound the other way.
-bool isMirrored(std::span<const JointMatrix> palette) {
-  const auto mirrored = std::ranges::count_if(
-      palette, [](const JointMatrix& joint) { return determinant(joint) < 0; });
-  return static_cast<std::size_t>(mirrored) * 2 > palette.size();
-}
 
 /// Around all of the crowd in every frame: so that shadows do not crawl.
 Box boxOf(const FlightPlan& plan, double height) {
@@ -106,7 +94,7 @@ Result<void> Film::prepareParts() {
       parts_[part].coarse.push_back(std::move(*geometry));
     }
   }
-  isMirrored_ = isMirrored(character_->pose({}, 0));
+  isMirrored_ = samples::isMirrored(character_->pose({}, 0));
   for (const std::string& note : appearances_.notes())
     fmt::print(stderr, "dermis_crowd: note: {}\n", note);
   return {};

@@ -109,12 +109,4 @@ Result<void> FrameLoop::finish() {
   return {};
 }
 
-void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                        0, nullptr);
-}
-
 }  // namespace crowd

@@ -7,7 +7,6 @@
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/result.h"
-#include "dermis/vulkan/scope.h"
 #include "device.h"
 
 namespace crowd {
@@ -49,9 +48,5 @@ class FrameLoop {
   std::uint64_t frame_ = 0;
   std::uint64_t completed_ = 0;
 };
-
-/// A global memory barrier.
-void recordBarrier(const dermis::samples::Device& device, VkCommandBuffer commandBuffer,
-                   const dermis::vulkan::Dependency& dependency);
 
 }  // namespace crowd

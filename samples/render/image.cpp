@@ -80,10 +80,10 @@ Result<Owned<VkImageView>> Image::layerView(Device& device, std::uint32_t layer)
   return makeView(device, handle(), description_, VK_IMAGE_VIEW_TYPE_2D, layer, 1);
 }
 
-void recordTransition(const Device& device, VkCommandBuffer commandBuffer, const Image& image,
-                      VkImageLayout from, VkImageLayout to, VkPipelineStageFlags sourceStages,
-                      VkAccessFlags sourceAccesses, VkPipelineStageFlags destinationStages,
-                      VkAccessFlags destinationAccesses) {
+void recordTransition(const Device& device, VkCommandBuffer commandBuffer, VkImage image,
+                      const VkImageSubresourceRange& part, VkImageLayout from, VkImageLayout to,
+                      VkPipelineStageFlags sourceStages, VkAccessFlags sourceAccesses,
+                      VkPipelineStageFlags destinationStages, VkAccessFlags destinationAccesses) {
   VkImageMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
   barrier.srcAccessMask = sourceAccesses;
@@ -91,11 +91,21 @@ void recordTransition(const Device& device, VkCommandBuffer commandBuffer, const
   barrier.oldLayout = from;
   barrier.newLayout = to;
   barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.image = image.handle();
-  barrier.subresourceRange = {image.description().aspect, 0, image.description().levels, 0,
-                              std::max(image.description().layers, 1u)};
+  barrier.image = image;
+  barrier.subresourceRange = part;
   device.functions().CmdPipelineBarrier(commandBuffer, sourceStages, destinationStages, 0, 0,
                                         nullptr, 0, nullptr, 1, &barrier);
+}
+
+void recordTransition(const Device& device, VkCommandBuffer commandBuffer, const Image& image,
+                      VkImageLayout from, VkImageLayout to, VkPipelineStageFlags sourceStages,
+                      VkAccessFlags sourceAccesses, VkPipelineStageFlags destinationStages,
+                      VkAccessFlags destinationAccesses) {
+  const ImageDescription& description = image.description();
+  const VkImageSubresourceRange all{description.aspect, 0, description.levels, 0,
+                                    std::max(description.layers, 1u)};
+  recordTransition(device, commandBuffer, image.handle(), all, from, to, sourceStages,
+                   sourceAccesses, destinationStages, destinationAccesses);
 }
 
 }  // namespace dermis::samples::render

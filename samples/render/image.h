@@ -37,6 +37,12 @@ class Image {
   Owned<VkImageView> view_;
 };
 
+/// A barrier for a part of an image that need not be one of these.
+void recordTransition(const Device& device, VkCommandBuffer commandBuffer, VkImage image,
+                      const VkImageSubresourceRange& part, VkImageLayout from, VkImageLayout to,
+                      VkPipelineStageFlags sourceStages, VkAccessFlags sourceAccesses,
+                      VkPipelineStageFlags destinationStages, VkAccessFlags destinationAccesses);
+
 /// A barrier for all levels and layers of an image.
 void recordTransition(const Device& device, VkCommandBuffer commandBuffer, const Image& image,
                       VkImageLayout from, VkImageLayout to, VkPipelineStageFlags sourceStages,

@@ -14,6 +14,8 @@ namespace render = samples::render;
 constexpr VkImageSubresourceLayers allOfIt{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
 constexpr VkClearColorValue background{{0.012f, 0.015f, 0.020f, 1}};  // linear
 
+constexpr VkImageSubresourceRange allColors{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+
 bool isBlueFirst(VkFormat format) {
   return format == VK_FORMAT_B8G8R8A8_SRGB;
 }
@@ -21,23 +23,6 @@ bool isBlueFirst(VkFormat format) {
 /// The same bytes without a curve.
 VkFormat plainFormat(VkFormat format) {
   return isBlueFirst(format) ? VK_FORMAT_B8G8R8A8_UNORM : VK_FORMAT_R8G8B8A8_UNORM;
-}
-
-void recordBarrier(const samples::Device& device, VkCommandBuffer commandBuffer, VkImage image,
-                   VkImageLayout from, VkImageLayout to, VkPipelineStageFlags sourceStages,
-                   VkAccessFlags sourceAccesses, VkPipelineStageFlags destinationStages,
-                   VkAccessFlags destinationAccesses) {
-  VkImageMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
-  barrier.srcAccessMask = sourceAccesses;
-  barrier.dstAccessMask = destinationAccesses;
-  barrier.oldLayout = from;
-  barrier.newLayout = to;
-  barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-  barrier.image = image;
-  barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-  device.functions().CmdPipelineBarrier(commandBuffer, sourceStages, destinationStages, 0, 0,
-                                        nullptr, 0, nullptr, 1, &barrier);
 }
 
 VkOffset3D corner(std::uint32_t x, std::uint32_t y, std::int32_t z) {
@@ -126,12 +111,12 @@ Result<void> Canvas::resize(VkExtent2D pixels) {
 void Canvas::record(VkCommandBuffer commandBuffer, const render::RenderTarget* picture,
                     const VkRect2D& area, const std::function<void()>& drawInterface) const {
   const samples::VulkanFunctions& functions = device_->functions();
-  recordBarrier(*device_, commandBuffer, image_.handle(), VK_IMAGE_LAYOUT_UNDEFINED,
-                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT, 0,
-                VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
-  const VkImageSubresourceRange range{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  samples::render::recordTransition(*device_, commandBuffer, image_.handle(), allColors,
+                                    VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                                    VK_PIPELINE_STAGE_TRANSFER_BIT, 0,
+                                    VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
   vkCmdClearColorImage(commandBuffer, image_.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                       &background, 1, &range);
+                       &background, 1, &allColors);
   if (picture != nullptr) recordPicture(commandBuffer, *picture, area);
 
   VkRenderPassBeginInfo begin{};
@@ -146,10 +131,10 @@ void Canvas::record(VkCommandBuffer commandBuffer, const render::RenderTarget* p
 
 void Canvas::recordPicture(VkCommandBuffer commandBuffer, const render::RenderTarget& picture,
                            const VkRect2D& area) const {
-  recordBarrier(*device_, commandBuffer, image_.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                VK_ACCESS_TRANSFER_WRITE_BIT);
+  samples::render::recordTransition(
+      *device_, commandBuffer, image_.handle(), allColors, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+      VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
+      VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
   VkImageBlit blit{};
   blit.srcSubresource = blit.dstSubresource = allOfIt;
   blit.srcOffsets[1] = corner(picture.width(), picture.height(), 1);
@@ -162,17 +147,19 @@ void Canvas::recordPicture(VkCommandBuffer commandBuffer, const render::RenderTa
 }
 
 void Canvas::recordCopy(VkCommandBuffer commandBuffer, VkImage image) const {
-  recordBarrier(*device_, commandBuffer, image, VK_IMAGE_LAYOUT_UNDEFINED,
-                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT, 0,
-                VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+  samples::render::recordTransition(*device_, commandBuffer, image, allColors,
+                                    VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                                    VK_PIPELINE_STAGE_TRANSFER_BIT, 0,
+                                    VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
   VkImageCopy copy{};
   copy.srcSubresource = copy.dstSubresource = allOfIt;
   copy.extent = {extent_.width, extent_.height, 1};
   vkCmdCopyImage(commandBuffer, image_.handle(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, image,
                  VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
-  recordBarrier(*device_, commandBuffer, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0);
+  samples::render::recordTransition(
+      *device_, commandBuffer, image, allColors, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+      VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+      VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0);
 }
 
 Result<void> Canvas::recordReadBack(VkCommandBuffer commandBuffer) {

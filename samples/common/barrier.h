@@ -1,0 +1,13 @@
+// Memory barriers as dermis/vulkan/scope.h words them.
+#pragma once
+
+#include "dermis/vulkan/scope.h"
+#include "device.h"
+
+namespace dermis::samples {
+
+/// A global memory barrier.
+void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency);
+
+}  // namespace dermis::samples
