@@ -77,17 +77,8 @@ struct Place {
 };
 
 struct SceneInstance {
-  PlacedRun run;                       ///< the first, and mostly the only one
-  std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
-  std::uint32_t palette = 0;           ///< index
-  std::uint32_t nextOfPalette = notUsed, previousOfPalette = notUsed;
-  std::uint32_t updateInterval = 1;
-  std::uint32_t vertexCount = 0;
-  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
-  std::uint64_t lastFrame = 0;    ///< in which it was skinned
-  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
-  std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
-  Method method = Method::dualQuaternion;
+  // What every frame looks at stands together: where the GPU is the CPU, as in software Vulkan, the
+  // caches hold vertices when the next frame begins.
   bool isStale = false;   ///< something changed since it was skinned
   bool isListed = false;  ///< among the pending
   bool isVisible = true;
@@ -98,6 +89,19 @@ struct SceneInstance {
   bool willMove = false;       ///< the plan skins it, and its previous positions are others
   bool showsBindPose = false;  ///< it waited with one, or does
   bool isInternal = false;     ///< a bind pose: of no interest to the engine
+  Method method = Method::dualQuaternion;
+  std::uint32_t palette = 0;  ///< index
+  std::uint32_t nextOfPalette = notUsed, previousOfPalette = notUsed;
+  std::uint32_t updateInterval = 1;
+  std::uint32_t vertexCount = 0;
+  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
+  std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
+  std::uint64_t firstFrame = 0;   ///< in which it was skinned
+  PlacedRun run;                  ///< the first, and mostly the only one
+  VertexLayout layout;
+  std::optional<Place> target;  ///< where it is skinned to; nothing while it waits for room
+  InstanceExtras extras;
+  std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
 
   // Of those culled on the GPU.
   std::uint32_t version = 0;         ///< of what it should show
@@ -106,15 +110,13 @@ struct SceneInstance {
   std::uint32_t culledIndex = notUsed;
 
   // Seldom looked at.
+  std::uint64_t lastFrame = 0;    ///< in which it was skinned
+  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
   MeshHandle mesh;
   PaletteHandle paletteHandle;
-  VertexLayout layout;
   Box box;
   bool bounds = false;
-  std::uint64_t firstFrame = 0;  ///< in which it was skinned
-  InstanceExtras extras;
-  std::optional<Place> target;  ///< where it is skinned to; nothing while it waits for room
-  std::optional<Place> shown;   ///< where it was last recorded
+  std::optional<Place> shown;  ///< where it was last recorded
   /// Where `shown` has no target beside it: how to settle it.
   std::vector<PlacedRun> lastRuns;
   InstanceHandle bindPose;  ///< what stands in for it while it waits

@@ -19,7 +19,7 @@ class SlotMap {
     std::uint32_t index;
     if (free_.empty()) {
       index = static_cast<std::uint32_t>(slots_.size());
-      slots_.push_back({std::move(thing), 1, true});
+      slots_.push_back({1, true, std::move(thing)});
     } else {
       index = free_.back();
       free_.pop_back();
@@ -67,9 +67,9 @@ class SlotMap {
 
  private:
   struct Slot {
-    Thing thing;
     std::uint32_t generation = 1;
     bool isUsed = false;
+    Thing thing;
   };
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> free_;
