@@ -3,6 +3,7 @@
 #include <utility>
 
 #include <imgui.h>
+#include <imgui_internal.h>
 #if __has_include(<backends/imgui_impl_sdl2.h>)
 #include <backends/imgui_impl_sdl2.h>
 #else
@@ -46,6 +47,12 @@ Result<void> uploadFonts(samples::Device& device) {
   return done;
 }
 #endif
+
+/// Whether a key stands for a character, and not for a command.
+bool isLetter(const SDL_Keysym& key) {
+  return key.sym >= SDLK_SPACE && key.sym != SDLK_DELETE && (key.sym & SDLK_SCANCODE_MASK) == 0 &&
+         (key.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI)) == 0;
+}
 
 }  // namespace
 
@@ -96,6 +103,9 @@ Gui& Gui::operator=(Gui&& other) noexcept {
 }
 
 void Gui::handle(const SDL_Event& event) const {
+  // What is typed comes as text. Its keys beside it would have ImGui take a frame for each letter,
+  // and frames are slow here.
+  if (event.type == SDL_KEYDOWN && wantsText() && isLetter(event.key.keysym)) return;
   ImGui_ImplSDL2_ProcessEvent(&event);
 }
 
@@ -105,6 +115,14 @@ bool Gui::wantsMouse() const {
 
 bool Gui::wantsText() const {
   return ImGui::GetIO().WantTextInput;
+}
+
+bool Gui::hasQueuedInput() const {
+#if IMGUI_VERSION_NUM >= 18700
+  return !ImGui::GetCurrentContext()->InputEventsQueue.empty();
+#else
+  return false;
+#endif
 }
 
 void Gui::beginFrame() const {

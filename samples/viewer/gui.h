@@ -24,6 +24,9 @@ class Gui {
   /// Whether it wants what the mouse does, and what is typed, for itself.
   bool wantsMouse() const;
   bool wantsText() const;
+  /// Whether there is input for more frames: since 1.87 what came at once is spread over several,
+  /// so that a key that was pressed and let go is seen.
+  bool hasQueuedInput() const;
 
   void beginFrame() const;
   /// Ends the frame; then `record` draws it.

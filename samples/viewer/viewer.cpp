@@ -67,7 +67,8 @@ Result<void> Viewer::run() {
 // -- Input --------------------------------------------------------------------------------------
 
 void Viewer::waitForEvents() {
-  const bool isHurried = state_.playback.isPlaying() || options_.frames || framesToDraw_ > 0;
+  const bool isHurried = state_.playback.isPlaying() || options_.frames || framesToDraw_ > 0 ||
+                         presenter_->gui().hasQueuedInput();
   const bool isBusy = !isSettled() || !screenshotName_.empty() || !state_.notice.empty();
   SDL_Event event;
   const bool isMinimised = presenter_->window().isMinimised();
