@@ -71,10 +71,7 @@ class ComparisonTest : public DrawingTest {
  protected:
   void SetUp() override {
     DrawingTest::SetUp();
-    if (!drawingDevice()) return;
-    Result<render::Renderer> renderer = render::Renderer::create(device());
-    ASSERT_TRUE(renderer) << renderer.error().message;
-    renderer_.emplace(std::move(*renderer));
+    if (!renderer_) return;
     cli::MeshPreparation preparation;
     preparation.centersOfRotation = true;
     Result<cli::BuiltInScenes> scenes = cli::loadBuiltInScenes(preparation);
@@ -140,7 +137,6 @@ class ComparisonTest : public DrawingTest {
     return picture ? std::move(*picture) : render::Picture{};
   }
 
-  std::optional<render::Renderer> renderer_;
   std::optional<cli::BuiltInScenes> scenes_;
   std::vector<cli::ComparisonStrip> strips_;
 };

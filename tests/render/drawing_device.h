@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "render/renderer.h"
 #include "test_device.h"
 
 namespace dermis::test {
@@ -27,15 +28,19 @@ class DestroyDrawingDevice : public ::testing::Environment {
 class DrawingTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (drawingDevice()) return;
-    samples::DeviceOptions options = testDeviceOptions();
-    options.graphics = true;
-    Result<samples::OpenDevice> open = samples::openDevice(options);
-    if (!open) {
-      ASSERT_FALSE(isContinuousIntegration()) << open.error().message;
-      GTEST_SKIP() << open.error().message;
+    if (!drawingDevice()) {
+      samples::DeviceOptions options = testDeviceOptions();
+      options.graphics = true;
+      Result<samples::OpenDevice> open = samples::openDevice(options);
+      if (!open) {
+        ASSERT_FALSE(isContinuousIntegration()) << open.error().message;
+        GTEST_SKIP() << open.error().message;
+      }
+      drawingDevice().emplace(std::move(*open));
     }
-    drawingDevice().emplace(std::move(*open));
+    Result<samples::render::Renderer> renderer = samples::render::Renderer::create(device());
+    ASSERT_TRUE(renderer) << renderer.error().message;
+    renderer_.emplace(std::move(*renderer));
   }
 
   void TearDown() override {
@@ -44,6 +49,8 @@ class DrawingTest : public ::testing::Test {
   }
 
   samples::Device& device() { return *drawingDevice()->device; }
+
+  std::optional<samples::render::Renderer> renderer_;
 };
 
 }  // namespace dermis::test

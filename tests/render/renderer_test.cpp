@@ -30,10 +30,7 @@ class RendererTest : public DrawingTest {
  protected:
   void SetUp() override {
     DrawingTest::SetUp();
-    if (!drawingDevice()) return;
-    Result<render::Renderer> renderer = render::Renderer::create(device());
-    ASSERT_TRUE(renderer) << renderer.error().message;
-    renderer_.emplace(std::move(*renderer));
+    if (!renderer_) return;
     render::FrameDescription description;
     description.width = width;
     description.height = height;
@@ -86,7 +83,6 @@ class RendererTest : public DrawingTest {
     return view;
   }
 
-  std::optional<render::Renderer> renderer_;
   std::optional<render::RenderFrame> frame_;
 };
 
