@@ -221,9 +221,15 @@ void main() {
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
   if (vertex >= group.vertexEnd) return;
-  uint firstInstance = (local / group.vertexGroups) * INSTANCES;
+  // Shares of equal size but for the last: of workgroups that take as long as each other, no thread gets the short ones.
+  uint share = INSTANCES;
+  if (INSTANCES > 1u) {
+    uint shares = max((group.instanceCount + INSTANCES - 1u) / INSTANCES, 1u);
+    share = (group.instanceCount + shares - 1u) / shares;
+  }
+  uint firstInstance = (local / group.vertexGroups) * share;
   if (firstInstance >= group.instanceCount) return;
-  uint count = min(INSTANCES, group.instanceCount - firstInstance);
+  uint count = min(share, group.instanceCount - firstInstance);
 
   Work work;
   work.mesh = group.mesh;

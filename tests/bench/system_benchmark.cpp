@@ -1,6 +1,7 @@
-// What a scene costs in a SkinningSystem, from one instance to ten thousand: the GPU's time, the
-// CPU's, and memory. Prints a table of medians for instances of one mesh, and one for instances of
-// twenty, of which few share what is read of a mesh.
+// What a scene costs in a SkinningSystem, from one instance to ten thousand: the GPU's time by
+// timestamps, the time from submission to the fence and the CPU's without them, and memory. Prints
+// a table of medians for instances of one mesh, and one for instances of twenty, of which few share
+// what is read of a mesh.
 //
 //   dermis_system_benchmark [REPETITIONS [MOST-INSTANCES]]
 
@@ -57,16 +58,21 @@ PackedMesh makeMesh(std::uint32_t number, std::uint32_t vertexCount) {
 
 /// Seconds of one frame.
 struct FrameCost {
-  double gpu = 0, wall = 0;
+  double gpu = 0;  ///< 0 where it is not measured
+  double wall = 0;
   double record = 0;  ///< plan and record, on the CPU
   double poses = 0;   ///< writing all of them
 };
 
+/// Whether a scene asks for timestamps. They cost time themselves: lavapipe wakes its rasterizer's
+/// threads for each, so that the wall's and the CPU's time are taken where there are none.
+enum class GpuTime : std::uint8_t { notMeasured, measured };
+
 /// Instances, each with a pose of its own.
 class Scene {
  public:
-  Scene(samples::OpenDevice& open, const Meshes& from, std::uint32_t instanceCount)
-      : engine_(*open.device, description(open, from, instanceCount)) {
+  Scene(samples::OpenDevice& open, const Meshes& from, std::uint32_t instanceCount, GpuTime gpuTime)
+      : engine_(*open.device, description(open, from, instanceCount, gpuTime)) {
     engine_.begin();
     std::vector<MeshHandle> meshes;
     for (std::uint32_t mesh = 0; mesh < std::min(from.count, instanceCount); ++mesh)
@@ -113,7 +119,8 @@ class Scene {
  private:
   static vulkan::SkinningSystemDescription description(samples::OpenDevice& open,
                                                        const Meshes& from,
-                                                       std::uint32_t instanceCount) {
+                                                       std::uint32_t instanceCount,
+                                                       GpuTime gpuTime) {
     vulkan::SkinningSystemDescription description;
     description.context = &open.context;
     description.tuning = open.context.tuning();
@@ -124,7 +131,7 @@ class Scene {
     const std::uint64_t vertexCount =
         std::uint64_t{instanceCount} * (from.meanVertexCount + from.count * from.difference / 2);
     description.outputBudget = vertexCount * 24 + std::uint64_t{instanceCount} * 256;
-    description.measuresGpuTime = true;
+    description.measuresGpuTime = gpuTime == GpuTime::measured;
     return description;
   }
 
@@ -137,36 +144,56 @@ class Scene {
   vulkan::FrameStatistics lastFrame_;
 };
 
-struct Medians {
-  FrameCost cost;
-  vulkan::FrameStatistics frame;
-};
-
-Medians measure(Scene& scene, bool moves, std::uint32_t repetitions) {
+/// Of at least so many frames and half a second: how a system places threads on cores lasts for
+/// many short frames.
+FrameCost measure(Scene& scene, bool moves, std::uint32_t repetitions) {
+  constexpr double leastSeconds = 0.5;
   std::vector<double> gpu, wall, record, poses;
-  for (std::uint32_t i = 0; i < repetitions; ++i) {
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::uint32_t i = 0; i < repetitions || secondsSince(begin) < leastSeconds; ++i) {
     const FrameCost cost = scene.run(moves);
     gpu.push_back(cost.gpu);
     wall.push_back(cost.wall);
     record.push_back(cost.record);
     poses.push_back(cost.poses);
   }
-  return {{median(gpu), median(wall), median(record), median(poses)}, scene.lastFrame()};
+  return {median(gpu), median(wall), median(record), median(poses)};
 }
 
-void printRow(samples::OpenDevice& open, const Meshes& from, std::uint32_t instances,
-              std::uint32_t repetitions) {
-  Scene scene(open, from, instances);
-  // Few instances are over soon, so that there is time for more frames.
-  const std::uint32_t frames = repetitions * (instances <= 100 ? 10 : 1);
-  measure(scene, true, 2);  // drivers compile, memory is touched
-  const Medians moving = measure(scene, true, frames), resting = measure(scene, false, frames);
-  const auto vertices = static_cast<double>(scene.vertexCount()), count = double{1} * instances;
-  std::printf("%9u %9.2f %9.2f %9.2f %9.1f %9.1f %9.1f %10u %6u %8.1f\n", instances, vertices / 1e6,
-              moving.cost.gpu / vertices * 1e9, moving.cost.wall / vertices * 1e9,
-              moving.cost.record / count * 1e9, resting.cost.record / count * 1e9,
-              moving.cost.poses / count * 1e9, moving.frame.dispatches, moving.frame.copies,
-              static_cast<double>(scene.deviceMemory()) / (1 << 20));
+/// What a row of the table says.
+struct Row {
+  FrameCost moving, resting;
+  double gpuSeconds = 0;
+  vulkan::FrameStatistics frame;  ///< a moving one
+  double vertexCount = 0, deviceMemory = 0;
+};
+
+Row measureRow(samples::OpenDevice& open, const Meshes& from, std::uint32_t instances,
+               std::uint32_t repetitions) {
+  Row row;
+  {
+    Scene scene(open, from, instances, GpuTime::measured);
+    for (int warmUp = 0; warmUp < 2; ++warmUp)
+      scene.run(true);  // drivers compile, memory is touched
+    row.gpuSeconds = measure(scene, true, repetitions).gpu;
+  }
+  Scene scene(open, from, instances, GpuTime::notMeasured);
+  for (int warmUp = 0; warmUp < 2; ++warmUp) scene.run(true);
+  row.moving = measure(scene, true, repetitions);
+  row.frame = scene.lastFrame();
+  row.resting = measure(scene, false, repetitions);
+  row.vertexCount = static_cast<double>(scene.vertexCount());
+  row.deviceMemory = static_cast<double>(scene.deviceMemory());
+  return row;
+}
+
+void printRow(std::uint32_t instances, const Row& row) {
+  const double count = instances;
+  std::printf("%9u %9.2f %9.2f %9.2f %9.1f %9.1f %9.1f %10u %6u %8.1f\n", instances,
+              row.vertexCount / 1e6, row.gpuSeconds / row.vertexCount * 1e9,
+              row.moving.wall / row.vertexCount * 1e9, row.moving.record / count * 1e9,
+              row.resting.record / count * 1e9, row.moving.poses / count * 1e9,
+              row.frame.dispatches, row.frame.copies, row.deviceMemory / (1 << 20));
   std::fflush(stdout);
 }
 
@@ -178,8 +205,16 @@ void printTable(samples::OpenDevice& open, const Meshes& from, std::uint32_t mos
               "CPU ns/", "instance", "pose ns", "", "", "memory");
   std::printf("%9s %9s %9s %9s %9s %9s %9s %10s %6s %8s\n", "instances", "vertices", "/vertex",
               "/vertex", "moving", "at rest", "/palette", "dispatches", "copies", "MiB");
-  for (std::uint32_t instances = 1; instances <= mostInstances; instances *= 10)
-    printRow(open, from, instances, repetitions);
+  Row ten, most;
+  for (std::uint32_t instances = 1; instances <= mostInstances; instances *= 10) {
+    most = measureRow(open, from, instances, repetitions);
+    if (instances == 10) ten = most;
+    printRow(instances, most);
+  }
+  if (ten.vertexCount == 0) return;
+  std::printf("a vertex of 10 instances / of the most: %.2f GPU, %.2f wall\n",
+              (ten.gpuSeconds / ten.vertexCount) / (most.gpuSeconds / most.vertexCount),
+              (ten.moving.wall / ten.vertexCount) / (most.moving.wall / most.vertexCount));
 }
 
 std::uint32_t numberOr(int argc, char** argv, int index, std::uint32_t fallback) {
