@@ -14,9 +14,9 @@
 #include "drawn_scene.h"
 #include "frame_name.h"
 #include "method_options.h"
-#include "pass_counter.h"
 #include "picture_writer.h"
 #include "progress.h"
+#include "render/pass_counter.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -282,7 +282,7 @@ Result<void> Film::skin() {
 /// Skins what was posed and draws it, in one command buffer.
 Result<void> Film::skinAndDraw() {
   const std::uint32_t passes = 1 + render::Renderer::passCount(*frame_, 1);
-  Result<PassCounter> counter = PassCounter::create(*device_.device, passes);
+  Result<render::PassCounter> counter = render::PassCounter::create(*device_.device, passes);
   if (!counter) return counter.error();
   const samples::VulkanFunctions& functions = device_.device->functions();
   const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();

@@ -72,6 +72,7 @@ Result<std::unique_ptr<Film>> Film::create(samples::OpenDevice& device, const Ch
       new Film(device, character, stroll, options, std::move(writer), std::move(*renderer)));
   if (Result<void> prepared = film->prepareParts(); !prepared) return prepared.error();
   if (Result<void> made = film->makeFrames(); !made) return made.error();
+  if (Result<void> made = film->makeProgress(); !made) return made.error();
   film->loadFont();
   return film;
 }
@@ -112,6 +113,19 @@ Result<void> Film::makeFrames() {
     if (!frame) return frame.error();
     frames_.push_back(std::move(*frame));
   }
+  return {};
+}
+
+/// Pictures are counted, and where there is but one, the passes that it takes, the skinning first.
+Result<void> Film::makeProgress() {
+  std::uint32_t steps = options_.frames;
+  if (options_.frames == 1) {
+    steps = 1 + render::Renderer::passCount(frames_.front(), 1);
+    Result<render::PassCounter> passes = render::PassCounter::create(*device_->device, steps);
+    if (!passes) return passes.error();
+    passes_.emplace(std::move(*passes));
+  }
+  progress_.emplace("rendering", steps);
   return {};
 }
 
@@ -209,14 +223,23 @@ Result<void> Film::record(const Crowd& crowd, std::uint64_t frame, VkCommandBuff
   view.shadowDraws = draws->shadows;
   const samples::Device& device = *device_->device;
   render::RenderFrame& target = frames_[frame % frames_.size()];
+  const auto afterPass = [&] {
+    if (passes_) passes_->record(commandBuffer);
+  };
+  afterPass();
   recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
-  if (Result<void> drawn = renderer_.record(commandBuffer, target, {&view, 1}); !drawn)
+  if (Result<void> drawn = renderer_.record(commandBuffer, target, {&view, 1}, afterPass); !drawn)
     return drawn;
   // The next frame skins over what this one has drawn.
   recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
   target.target().recordReadBack(device, commandBuffer);
   recorded_ = frame;
   return {};
+}
+
+Result<void> Film::watch(VkFence submission) {
+  if (!passes_) return {};
+  return passes_->wait(submission, [&] { progress_->step(); });
 }
 
 PanelNumbers Film::numbersOf(const CrowdReport& report, std::uint64_t frame) const {
@@ -247,7 +270,7 @@ Result<void> Film::writeUpTo(std::uint64_t completedFrame, const CrowdReport& re
                             frames_[written_ % frames_.size()].target().pixels()};
     if (panel_) panel_->draw(picture, numbersOf(report, written_));
     if (Result<void> done = writer_->write(picture); !done) return done;
-    progress_->step();
+    if (!passes_) progress_->step();
   }
   return {};
 }

@@ -15,6 +15,7 @@
 #include "open_device.h"
 #include "picture_writer.h"
 #include "progress.h"
+#include "render/pass_counter.h"
 #include "render/renderer.h"
 #include "statistics_panel.h"
 #include "stroll.h"
@@ -38,6 +39,9 @@ class Film {
   /// Records the picture, behind `Crowd::skinFrame`.
   dermis::Result<void> record(const Crowd& crowd, std::uint64_t frame,
                               VkCommandBuffer commandBuffer);
+  /// Shows how far the only picture has come, until its submission is done with: a film counts
+  /// pictures instead, and returns at once.
+  dermis::Result<void> watch(VkFence submission);
   /// Writes the pictures up to a frame that the GPU is done with, and that the report has been told
   /// of. Before the next `record`.
   dermis::Result<void> writeUpTo(std::uint64_t completedFrame, const CrowdReport& report);
@@ -55,8 +59,7 @@ class Film {
         writer_(std::move(writer)),
         wardrobe_(character),
         renderer_(std::move(renderer)),
-        appearances_(*device.device, renderer_, character.model()),
-        progress_(std::in_place, "rendering", options.frames) {}
+        appearances_(*device.device, renderer_, character.model()) {}
 
   struct DrawnPart {
     const dermis::samples::render::Geometry* geometry = nullptr;
@@ -76,6 +79,7 @@ class Film {
 
   dermis::Result<void> prepareParts();
   dermis::Result<void> makeFrames();
+  dermis::Result<void> makeProgress();
   void loadFont();
   dermis::samples::render::View viewAt(std::uint64_t frame) const;
   std::vector<Seen> nearestFirst(const Crowd& crowd, std::uint64_t frame) const;
@@ -97,7 +101,8 @@ class Film {
   std::uint64_t written_ = 0;                                 ///< the last frame that was
   std::uint64_t recorded_ = 0;
   std::optional<StatisticsPanel> panel_;
-  std::optional<dermis::samples::Progress> progress_;  ///< until the film is finished
+  std::optional<dermis::samples::render::PassCounter> passes_;  ///< of the only picture
+  std::optional<dermis::samples::Progress> progress_;           ///< until the film is finished
 };
 
 }  // namespace crowd

@@ -26,6 +26,8 @@ class FrameLoop {
   /// Waits until there is a place for the next frame, and begins its command buffer.
   dermis::Result<VkCommandBuffer> begin();
   dermis::Result<void> submit();
+  /// Of the frame that was submitted last; the loop waits for it, too.
+  VkFence fence() const { return slots_[frame_ % slots_.size()].fence; }
   /// Waits for all that has been submitted.
   dermis::Result<void> finish();
 

@@ -69,7 +69,8 @@ Result<void> playFrame(Show& show, const Options& options) {
         !done)
       return done;
   }
-  return show.loop.submit();
+  if (Result<void> done = show.loop.submit(); !done) return done;
+  return show.film != nullptr ? show.film->watch(show.loop.fence()) : Result<void>();
 }
 
 /// The pictures that were in flight when the last frame was submitted.

@@ -18,14 +18,19 @@ namespace {
 
 using samples::render::Picture;
 
-CommandResult film(const std::string& out, std::uint32_t figures,
-                   const std::vector<std::string>& added,
-                   const std::vector<std::string>& environment = {}) {
+std::vector<std::string> filmCommand(const std::string& out, std::uint32_t figures,
+                                     const std::vector<std::string>& added) {
   std::vector<std::string> arguments{
       DERMIS_CROWD, "--film", out,        "--figures", std::to_string(figures),
       "--width",    "320",    "--height", "180"};
   arguments.insert(arguments.end(), added.begin(), added.end());
-  return runCommand(arguments, environment);
+  return arguments;
+}
+
+CommandResult film(const std::string& out, std::uint32_t figures,
+                   const std::vector<std::string>& added,
+                   const std::vector<std::string>& environment = {}) {
+  return runCommand(filmCommand(out, figures, added), environment);
 }
 
 /// Of the right half, where no statistics stand.
@@ -92,6 +97,29 @@ TEST(CrowdFilmTest, WhatIsNotDueLooksAsIfItWere) {
   EXPECT_LT(difference.worstColor, 40);
   EXPECT_LT(comparePictures(rightHalf(*first), rightHalf(*fresh)).similarity, 0.9)
       << "the time between them is seen";
+}
+
+TEST(CrowdFilmTest, LooksAsTheReferenceDoes) {
+  REQUIRE_DEVICE();
+  const std::string out = outFile("film.png");
+  ASSERT_EQ(film(out, 100, {"--time", "9", "--no-verify"}).status, 0);
+  const auto picture = readPng(out);
+  ASSERT_TRUE(picture);
+  expectAsReference("film", rightHalf(*picture));
+}
+
+TEST(CrowdFilmTest, ShowsOnATerminalHowFarItIs) {
+  REQUIRE_DEVICE();
+  const auto errors = [&](const std::string& out, const std::vector<std::string>& added) {
+    const CommandResult result = runOnTerminal(filmCommand(out, 1, added));
+    EXPECT_EQ(result.status, 0);
+    return result.errors;
+  };
+  EXPECT_EQ(errors(outFile("frame%01d.png"), {"--frames", "2"}),
+            "\rrendering: 1 of 2\rrendering: 2 of 2\r\x1b[K");
+  const std::string passes = errors(outFile("one.png"), {});
+  EXPECT_TRUE(passes.starts_with("\rrendering: 1 of 27\rrendering: 2 of 27\r")) << passes;
+  EXPECT_TRUE(passes.ends_with("\rrendering: 27 of 27\r\x1b[K")) << passes;
 }
 
 TEST(CrowdFilmTest, LooksTheSameWhoeverCulls) {

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -257,22 +255,11 @@ TEST_F(ComparisonTest, LooksAsTheReferenceDoes) {
     ASSERT_FALSE(isContinuousIntegration()) << font.error().message;
     GTEST_SKIP() << font.error().message;
   }
-  const std::string path =
-      std::string(DERMIS_SOURCE_DIR) + "/tests/render/references/comparison.png";
-  const render::Picture picture = drawSheet(
-      sheetOf({Method::linear, Method::dualQuaternion, Method::centerOfRotation}), &*font);
-  if (std::getenv("DERMIS_UPDATE_REFERENCES") != nullptr) {
-    const std::vector<std::byte> bytes = *render::encodePng(picture);
-    std::ofstream(path, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-  }
-  const auto reference = readPng(path);
-  ASSERT_TRUE(reference);
-  const PictureDifference difference = comparePictures(picture, *reference);
-  EXPECT_GT(difference.similarity, 0.99);
-  EXPECT_GT(difference.worstSimilarity, 0.6);
-  EXPECT_LT(difference.worstColor, 12);
+  expectAsReference(
+      "comparison",
+      drawSheet(sheetOf({Method::linear, Method::dualQuaternion, Method::centerOfRotation}),
+                &*font),
+      {.worstSimilarity = 0.6, .worstColor = 12});
 }
 
 TEST_F(ComparisonTest, WithoutATypefaceThePictureHasNoWords) {

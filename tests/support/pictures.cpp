@@ -1,9 +1,12 @@
 #include "pictures.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <span>
@@ -92,6 +95,26 @@ PictureDifference comparePictures(const Picture& a, const Picture& b) {
   }
   difference.similarity = sum / static_cast<double>(count);
   return difference;
+}
+
+void expectAsReference(const std::string& name, const Picture& picture,
+                       const PictureTolerance& tolerance) {
+  SCOPED_TRACE(name);
+  const std::string path =
+      std::string(DERMIS_SOURCE_DIR) + "/tests/render/references/" + name + ".png";
+  if (std::getenv("DERMIS_UPDATE_REFERENCES") != nullptr) {
+    const auto bytes = samples::render::encodePng(picture);
+    ASSERT_TRUE(bytes);
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes->data()),
+               static_cast<std::streamsize>(bytes->size()));
+  }
+  const auto reference = readPng(path);
+  ASSERT_TRUE(reference) << path;
+  const PictureDifference difference = comparePictures(picture, *reference);
+  EXPECT_GT(difference.similarity, tolerance.similarity);
+  EXPECT_GT(difference.worstSimilarity, tolerance.worstSimilarity);
+  EXPECT_LT(difference.worstColor, tolerance.worstColor);
 }
 
 }  // namespace dermis::test

@@ -25,4 +25,16 @@ struct PictureDifference {
 PictureDifference comparePictures(const samples::render::Picture& a,
                                   const samples::render::Picture& b);
 
+/// How little alike and how far apart pictures of the same may be.
+struct PictureTolerance {
+  double similarity = 0.99, worstSimilarity = 0.7;
+  double worstColor = 10;
+};
+
+/// A test fails unless the picture looks as tests/render/references/NAME.png does. With
+/// DERMIS_UPDATE_REFERENCES in the environment it becomes that file: look at it before it is
+/// committed.
+void expectAsReference(const std::string& name, const samples::render::Picture& picture,
+                       const PictureTolerance& tolerance = {});
+
 }  // namespace dermis::test
