@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "plain_text.h"
+#include "program/plain_text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -64,7 +64,7 @@ Json describe(const Scene& scene) {
 }
 
 void printText(const Json& json) {
-  const auto text = [](const Json& value) { return plainLine(value.get<std::string>()); };
+  const auto text = [](const Json& value) { return samples::plainLine(value.get<std::string>()); };
   fmt::print("{} skinned primitives, {} skins, {} clips\n", json["meshes"].size(),
              json["skins"].size(), json["clips"].size());
   for (const Json& mesh : json["meshes"]) {

@@ -6,9 +6,16 @@
 
 #include <functional>
 
-#include "exit_status.h"
+#include "program/exit_status.h"
 
 namespace dermis::cli {
+
+using samples::ExitStatus;
+using samples::reportDeviceError;
+using samples::reportError;
+using samples::reportModelError;
+using samples::reportNote;
+using samples::reportWarning;
 
 using Run = std::function<ExitStatus()>;
 

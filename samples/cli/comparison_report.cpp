@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "output_file.h"
-#include "plain_text.h"
+#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {
@@ -41,10 +41,10 @@ std::string_view sourceName(InstructionSource source) {
 }
 
 void printTitle(const ComparisonTitle& title, const MethodComparison& comparison) {
-  fmt::print(
-      "device   {}\n",
-      plainLine(title.driver.empty() ? title.device : title.device + ", driver " + title.driver));
-  fmt::print("model    {}, {}\n", plainLine(title.model), plainLine(title.pose));
+  fmt::print("device   {}\n",
+             samples::plainLine(title.driver.empty() ? title.device
+                                                     : title.device + ", driver " + title.driver));
+  fmt::print("model    {}, {}\n", samples::plainLine(title.model), samples::plainLine(title.pose));
   fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
              comparison.scales ? ", some of which scale or shear" : "");
   if (comparison.clock == Clock::none) {

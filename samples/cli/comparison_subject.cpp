@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <iterator>
 
-#include "plain_text.h"
+#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {
@@ -54,14 +54,14 @@ ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vecto
     ComparisonStrip& strip = sheet.strips.emplace_back();
     strip.scene = &*subject.model;
     strip.pose = subject.pose;
-    strip.title = plainLine(std::filesystem::path(subject.name).filename().string());
-    strip.remark = plainLine(subject.poseName) + ", the time that skinning takes";
+    strip.title = samples::plainLine(std::filesystem::path(subject.name).filename().string());
+    strip.remark = samples::plainLine(subject.poseName) + ", the time that skinning takes";
   } else {
     sheet.strips.back().remark += ", the time that skinning takes";
   }
   sheet.strips.back().showsCost = true;
   sheet.strips.back().hasHeatMap = true;
-  sheet.footer = plainLine(fmt::format(
+  sheet.footer = samples::plainLine(fmt::format(
       "Time: median of {}, {} of {} vertices, {}", counted(comparison.repetitions, "run"),
       counted(comparison.instances, "instance"), comparison.vertices, title.device));
   return sheet;

@@ -23,16 +23,17 @@ void addShares(CLI::App& command, MethodShares& shares) {
       ->check(CLI::Number);
 }
 
-ExitStatus checkShares(const MethodShares& shares) {
+samples::ExitStatus checkShares(const MethodShares& shares) {
   const std::array<std::pair<const char*, double>, 2> options{
       {{"--dual-quaternion-weight", shares.dualQuaternionWeight},
        {"--bulge-strength", shares.bulgeStrength}}};
   for (const auto& [name, value] : options) {
     // Not a number is neither.
     if (!(value >= 0 && value <= 1))
-      return reportError(ExitStatus::wrongUsage, fmt::format("{} must be from 0 to 1", name));
+      return samples::reportError(samples::ExitStatus::wrongUsage,
+                                  fmt::format("{} must be from 0 to 1", name));
   }
-  return ExitStatus::done;
+  return samples::ExitStatus::done;
 }
 
 std::string methodNames(const std::string& lastWord) {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "dermis/mesh.h"
-#include "exit_status.h"
+#include "program/exit_status.h"
 
 namespace dermis::cli {
 
@@ -20,7 +20,7 @@ struct MethodShares {
 void addShares(CLI::App& command, MethodShares& shares);
 
 /// Reports wrong usage where one is not from 0 to 1.
-ExitStatus checkShares(const MethodShares& shares);
+samples::ExitStatus checkShares(const MethodShares& shares);
 
 /// "linear, dual_quaternion, … or bulge_controlled"; the last word to choice.
 std::string methodNames(const std::string& lastWord);

@@ -8,14 +8,14 @@
 #include <utility>
 
 #include "mesh_formats.h"
-#include "plain_text.h"
+#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {
 
 /// One word: a backslash would join two lines, a number sign starts a comment.
 std::string oneWord(const std::string& name) {
-  std::string word = plainLine(name);
+  std::string word = samples::plainLine(name);
   std::replace_if(
       word.begin(), word.end(), [](char c) { return c == ' ' || c == '\\' || c == '#'; }, '_');
   return word;

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "plain_text.h"
+#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {
@@ -113,16 +113,16 @@ void printReport(const std::vector<ModelVerification>& models) {
       fmt::print(
           "{}  {}  {}: {} poses, {} variants, {} vertices compared{}; worst position {:.2f} of its "
           "bound, normal {:.2f}{}\n",
-          summary.failures == 0 ? "passed" : "FAILED", plainLine(model.model), method,
+          summary.failures == 0 ? "passed" : "FAILED", samples::plainLine(model.model), method,
           summary.poses.size(), summary.variants.size(), summary.vertices, exceptions(summary),
           summary.worstPosition, summary.worstNormal,
           summary.worstTangent > 0 ? fmt::format(", tangent {:.2f}", summary.worstTangent) : "");
     }
     for (const VerifiedCase& verified : model.cases) {
       if (!verified.passed()) {
-        fmt::print("  {}\n",
-                   plainLine(fmt::format("{}, {}, {}, {}: {}", verified.part, verified.method,
-                                         verified.pose, verified.variant, verified.failure())));
+        fmt::print("  {}\n", samples::plainLine(fmt::format("{}, {}, {}, {}: {}", verified.part,
+                                                            verified.method, verified.pose,
+                                                            verified.variant, verified.failure())));
       }
     }
   }

@@ -1,11 +1,8 @@
 #include "film.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <span>
 #include <utility>
 
@@ -16,6 +13,7 @@
 #include "coarse_triangles.h"
 #include "dermis/vulkan/scope.h"
 #include "frames.h"
+#include "program/exit_status.h"
 
 using namespace dermis;
 
@@ -96,8 +94,7 @@ Result<void> Film::prepareParts() {
     }
   }
   isMirrored_ = samples::isMirrored(character_->pose({}, 0));
-  for (const std::string& note : appearances_.notes())
-    fmt::print(stderr, "dermis_crowd: note: {}\n", note);
+  for (const std::string& note : appearances_.notes()) samples::reportNote(note);
   return {};
 }
 
@@ -134,8 +131,7 @@ void Film::loadFont() {
   if (font) {
     panel_.emplace(std::move(*font));
   } else {
-    fmt::print(stderr, "dermis_crowd: note: {}; the film is without statistics\n",
-               font.error().message);
+    samples::reportNote(font.error().message + "; the film is without statistics");
   }
 }
 

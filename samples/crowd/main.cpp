@@ -3,11 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <memory>
-#include <new>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,6 +21,7 @@
 #include "open_device.h"
 #include "options.h"
 #include "picture_writer.h"
+#include "program/program.h"
 #include "shown_poses.h"
 #include "stroll.h"
 #include "timestamps.h"
@@ -32,12 +30,9 @@ namespace {
 
 using namespace dermis;
 using namespace crowd;
-
-ExitStatus reportDeviceError(const Error& error) {
-  const bool noDevice =
-      error.code == ErrorCode::missingFeature || error.code == ErrorCode::missingEntryPoint;
-  return reportError(noDevice ? ExitStatus::noDevice : ExitStatus::stopped, error.message);
-}
+using samples::ExitStatus;
+using samples::reportDeviceError;
+using samples::reportError;
 
 /// The loop is declared last, so that it goes first: it waits for frames that use the others.
 struct Show {
@@ -237,17 +232,9 @@ ExitStatus run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ExitStatus status = ExitStatus::stopped;
-  try {
+  return samples::runProgram("dermis_crowd", [&] {
     Options options;
     const std::optional<ExitStatus> ended = readOptions(argc, argv, options);
-    status = ended ? *ended : run(options);
-  } catch (const std::bad_alloc&) {
-    status = reportError(ExitStatus::stopped, "out of memory");
-  } catch (const std::exception& error) {
-    status = reportError(ExitStatus::stopped, error.what());
-  }
-  if (std::fflush(stdout) != 0 && status == ExitStatus::done)
-    status = reportError(ExitStatus::stopped, "standard output cannot be written");
-  return static_cast<int>(status);
+    return ended ? *ended : run(options);
+  });
 }

@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <map>
 
 #include "frame_name.h"
 #include "picture_writer.h"
+#include "program/program.h"
 
 using namespace dermis;
 
@@ -69,22 +67,10 @@ void addFilm(CLI::App& app, FilmRequest& film) {
 
 }  // namespace
 
-ExitStatus reportError(ExitStatus status, const std::string& message) {
-  std::string line = message;
-  std::ranges::replace_if(
-      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
-  std::fflush(stdout);
-  fmt::print(stderr, "dermis_crowd: error: {}\n", line);
-  return status;
-}
-
-std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
+std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
   CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and proves every vertex right.",
                "dermis_crowd");
-  app.footer(
-      "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable "
-      "device,\n"
-      "5 anything else that stopped it.");
+  app.footer(samples::exitStatusHelp);
   bool skipsVerification = false;
   std::uint32_t outputMebibytes = 0;
   app.add_option("--figures", options.figures, "How many there are [200]")
@@ -114,18 +100,10 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
                "Let the GPU choose which instances are visible");
   addFilm(app, options.film);
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {
-    app.exit(success);  // --help
-    return ExitStatus::done;
-  } catch (const CLI::ParseError& error) {
-    return reportError(ExitStatus::wrongUsage,
-                       fmt::format("{} (dermis_crowd --help tells more)", error.what()));
-  }
+  if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
   if (app.get_option("--film")->count() != 0) {
     const std::string complaint = complaintAbout(options.film, frames->count() != 0);
-    if (!complaint.empty()) return reportError(ExitStatus::wrongUsage, complaint);
+    if (!complaint.empty()) return samples::reportWrongUsage(complaint);
     const bool isOnePicture =
         samples::pictureKind(options.film.output) == samples::PictureKind::png &&
         !samples::frameName(options.film.output, 0);

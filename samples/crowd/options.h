@@ -6,20 +6,9 @@
 #include <string>
 
 #include "crowd.h"
+#include "program/exit_status.h"
 
 namespace crowd {
-
-enum class ExitStatus : int {
-  done = 0,
-  verificationFailed = 1,
-  wrongUsage = 2,
-  badInput = 3,
-  noDevice = 4,
-  stopped = 5,  ///< output not writable, device lost, out of memory
-};
-
-/// One line on standard error: "dermis_crowd: error: …". Returns the status.
-ExitStatus reportError(ExitStatus status, const std::string& message);
 
 struct FilmRequest {
   std::string output;  ///< empty: there is no film
@@ -43,6 +32,6 @@ struct Options {
 };
 
 /// Nothing where the program is to go on.
-std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options);
+std::optional<dermis::samples::ExitStatus> readOptions(int argc, char** argv, Options& options);
 
 }  // namespace crowd

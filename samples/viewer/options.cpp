@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
+
+#include "program/program.h"
 
 namespace dermis::viewer {
 namespace {
@@ -20,15 +20,13 @@ std::string methodNames() {
   return names;
 }
 
-ExitStatus wrong(const std::string& message) {
-  return reportError(ExitStatus::wrongUsage, message + " (dermis_viewer --help tells more)");
-}
-
-std::optional<ExitStatus> readMethod(const std::string& name, std::optional<Method>& method) {
+std::optional<samples::ExitStatus> readMethod(const std::string& name,
+                                              std::optional<Method>& method) {
   if (name.empty()) return std::nullopt;
   method = methodFromName(name);
   if (method) return std::nullopt;
-  return wrong(fmt::format("there is no method '{}'; there are {}", name, methodNames()));
+  return samples::reportWrongUsage(
+      fmt::format("there is no method '{}'; there are {}", name, methodNames()));
 }
 
 std::string sampleFigure() {
@@ -38,16 +36,7 @@ std::string sampleFigure() {
 
 }  // namespace
 
-ExitStatus reportError(ExitStatus status, const std::string& message) {
-  std::string line = message;
-  std::ranges::replace_if(
-      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
-  std::fflush(stdout);
-  fmt::print(stderr, "dermis_viewer: error: {}\n", line);
-  return status;
-}
-
-std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
+std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
   CLI::App app("Shows skinned models, by every method of Dermis. F1 in its window shows the keys.",
                "dermis_viewer");
   app.footer(
@@ -73,19 +62,13 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   app.add_option("--screenshot", options.screenshot, "Write the window's last picture: a .png");
   app.add_flag("--validation", options.validates,
                "Run with the Vulkan validation layer, and fail where it says anything");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {
-    app.exit(success);  // --help
-    return ExitStatus::done;
-  } catch (const CLI::ParseError& error) {
-    return wrong(error.what());
-  }
+  if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
   std::optional<Method> first;
   if (const auto status = readMethod(method, first)) return status;
   if (const auto status = readMethod(comparison, options.comparison)) return status;
   options.method = first.value_or(options.method);
-  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (!std::isfinite(options.time))
+    return samples::reportWrongUsage("--time must be a number of seconds");
   if (options.model.empty() && !isEmpty) options.model = sampleFigure();
   return std::nullopt;
 }

@@ -1,4 +1,4 @@
-// What the viewer is started with, and how it ends.
+// What the viewer is started with.
 #pragma once
 
 #include <cstdint>
@@ -6,19 +6,9 @@
 #include <string>
 
 #include "dermis/method.h"
+#include "program/exit_status.h"
 
 namespace dermis::viewer {
-
-enum class ExitStatus : int {
-  done = 0,
-  wrongUsage = 2,
-  badInput = 3,
-  noDevice = 4,
-  stopped = 5,  ///< no window, device lost, out of memory, a message of the validation layer
-};
-
-/// One line on standard error: "dermis_viewer: error: …".
-ExitStatus reportError(ExitStatus status, const std::string& message);
 
 struct Options {
   std::string model;  ///< empty: none
@@ -35,6 +25,6 @@ struct Options {
 };
 
 /// Nothing: go on; otherwise help was printed, or an error.
-std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options);
+std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options);
 
 }  // namespace dermis::viewer

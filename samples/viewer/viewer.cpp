@@ -10,6 +10,7 @@
 #include "interface.h"
 #include "joint_overlay.h"
 #include "keys.h"
+#include "program/exit_status.h"
 #include "screenshot.h"
 
 namespace dermis::viewer {
@@ -210,7 +211,7 @@ void Viewer::adopt(LoadedScene loaded) {
     state_.methods = methods_;  // What was asked for may have been wanted for another method.
     const std::string name = fileName(path), message = done.error().message;
     state_.error = message.find(name) == std::string::npos ? name + ": " + message : message;
-    reportError(ExitStatus::badInput, state_.error);
+    samples::reportError(samples::ExitStatus::badInput, state_.error);
   }
   hasBegun_ = true;
 }
@@ -449,7 +450,7 @@ void Viewer::keepScreenshot() {
   const std::string name = std::exchange(screenshotName_, {});
   if (Result<void> written = writeScreenshot(presenter_->picture(), name); !written) {
     state_.error = written.error().message;
-    reportError(ExitStatus::stopped, state_.error);
+    samples::reportError(samples::ExitStatus::stopped, state_.error);
     return;
   }
   fmt::print("wrote {}\n", name);

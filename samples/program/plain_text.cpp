@@ -1,6 +1,6 @@
 #include "plain_text.h"
 
-namespace dermis::cli {
+namespace dermis::samples {
 
 std::string plainLine(std::string_view text) {
   std::string line(text);
@@ -15,4 +15,4 @@ std::string plainLine(std::string_view text) {
   return line;
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

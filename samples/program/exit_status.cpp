@@ -6,15 +6,25 @@
 
 #include "plain_text.h"
 
-namespace dermis::cli {
+namespace dermis::samples {
 namespace {
+
+const char* name = "dermis";
 
 void print(std::string_view kind, std::string_view message) {
   std::fflush(stdout);
-  fmt::print(stderr, "dermis: {}: {}\n", kind, plainLine(message));
+  fmt::print(stderr, "{}: {}: {}\n", name, kind, plainLine(message));
 }
 
 }  // namespace
+
+void setProgramName(const char* newName) {
+  name = newName;
+}
+
+const char* programName() {
+  return name;
+}
 
 ExitStatus reportError(ExitStatus status, std::string_view message) {
   print("error", message);
@@ -29,6 +39,11 @@ void reportNote(std::string_view message) {
   print("note", message);
 }
 
+ExitStatus reportWrongUsage(std::string_view message) {
+  return reportError(ExitStatus::wrongUsage,
+                     fmt::format("{} ({} --help tells more)", message, name));
+}
+
 ExitStatus reportModelError(const Error& error) {
   return reportError(ExitStatus::badInput, error.message);
 }
@@ -39,4 +54,4 @@ ExitStatus reportDeviceError(const Error& error) {
   return reportError(noDevice ? ExitStatus::noDevice : ExitStatus::stopped, error.message);
 }
 
-}  // namespace dermis::cli
+}  // namespace dermis::samples

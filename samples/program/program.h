@@ -1,0 +1,26 @@
+// From the command line to the exit status.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "exit_status.h"
+
+namespace CLI {
+class App;
+}
+
+namespace dermis::samples {
+
+/// Of a program that ends with any of them; the last word of its --help.
+inline constexpr const char* exitStatusHelp =
+    "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable device,\n"
+    "5 anything else that stopped it.";
+
+/// Nothing where the program is to go on; otherwise help was printed, or what is wrong.
+std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv);
+
+/// What `main` returns. What `run` throws, and standard output that cannot be written, is reported.
+int runProgram(const char* name, const std::function<ExitStatus()>& run);
+
+}  // namespace dermis::samples
