@@ -16,6 +16,9 @@
 namespace dermis::viewer {
 namespace {
 
+/// One that acts on it, one in which nobody asks for text any more, and one that begins by knowing.
+constexpr int framesPerKey = 3;
+
 /// Only the fonts' texture.
 Result<samples::render::Owned<VkDescriptorPool>> makePool(const samples::Device& device) {
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 4};
@@ -52,6 +55,10 @@ Result<void> uploadFonts(samples::Device& device) {
 bool isLetter(const SDL_Keysym& key) {
   return key.sym >= SDLK_SPACE && key.sym != SDLK_DELETE && (key.sym & SDLK_SCANCODE_MASK) == 0 &&
          (key.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI)) == 0;
+}
+
+bool isModifier(const SDL_Keysym& key) {
+  return key.sym >= SDLK_LCTRL && key.sym <= SDLK_RGUI;
 }
 
 }  // namespace
@@ -99,13 +106,17 @@ Gui& Gui::operator=(Gui&& other) noexcept {
   std::swap(hasContext_, other.hasContext_);
   std::swap(hasWindow_, other.hasWindow_);
   std::swap(hasRenderer_, other.hasRenderer_);
+  std::swap(framesToSeeKey_, other.framesToSeeKey_);
   return *this;
 }
 
-void Gui::handle(const SDL_Event& event) const {
-  // What is typed comes as text. Its keys beside it would have ImGui take a frame for each letter,
-  // and frames are slow here.
-  if (event.type == SDL_KEYDOWN && wantsText() && isLetter(event.key.keysym)) return;
+void Gui::handle(const SDL_Event& event) {
+  if (event.type == SDL_KEYDOWN && wantsText()) {
+    // What is typed comes as text. Its keys beside it would have ImGui take a frame for each
+    // letter, and frames are slow here.
+    if (isLetter(event.key.keysym)) return;
+    if (!isModifier(event.key.keysym)) framesToSeeKey_ = framesPerKey;
+  }
   ImGui_ImplSDL2_ProcessEvent(&event);
 }
 
@@ -125,10 +136,11 @@ bool Gui::hasQueuedInput() const {
 #endif
 }
 
-void Gui::beginFrame() const {
+void Gui::beginFrame() {
   ImGui_ImplVulkan_NewFrame();
   ImGui_ImplSDL2_NewFrame();
   ImGui::NewFrame();
+  if (framesToSeeKey_ > 0 && !hasQueuedInput()) --framesToSeeKey_;
 }
 
 void Gui::endFrame() const {

@@ -32,7 +32,7 @@ class Presenter {
 
   samples::OpenDevice& device() { return *device_; }
   const Window& window() const { return window_; }
-  const Gui& gui() const { return gui_; }
+  Gui& gui() { return gui_; }
 
   /// Makes images that fit the window. Whether there is anything to draw on.
   Result<bool> prepare();

@@ -68,6 +68,7 @@ Result<void> Viewer::run() {
 // -- Input --------------------------------------------------------------------------------------
 
 void Viewer::waitForEvents() {
+  if (presenter_->gui().hasUnseenKey()) framesToDraw_ = std::max(framesToDraw_, 1);
   const bool isHurried = state_.playback.isPlaying() || options_.frames || framesToDraw_ > 0 ||
                          presenter_->gui().hasQueuedInput();
   const bool isBusy = !isSettled() || !screenshotName_.empty() || !state_.notice.empty();
@@ -76,7 +77,8 @@ void Viewer::waitForEvents() {
   if (framesToTextField_ > 0) --framesToTextField_;
   const int patience = isMinimised ? 100 : isHurried ? 0 : isBusy ? 15 : 250;
   if (patience > 0 && SDL_WaitEventTimeout(&event, patience) != 0) handle(event);
-  while (!waitsForTextField() && SDL_PollEvent(&event) != 0) handle(event);
+  while (!waitsForTextField() && !presenter_->gui().hasUnseenKey() && SDL_PollEvent(&event) != 0)
+    handle(event);
 }
 
 /// What is typed behind the key that opens the text field is meant for it, and it takes some frames

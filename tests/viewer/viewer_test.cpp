@@ -259,7 +259,7 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithAFileAndGoesOn) {
   open({sampleModel("figure"), "--paused"});
   const Picture before = screenshot();
   typePath(broken);
-  EXPECT_TRUE(waitUntil([&] { return errors().find("broken.gltf") != std::string::npos; }));
+  ASSERT_TRUE(waitUntil([&] { return errors().find("broken.gltf") != std::string::npos; }));
   EXPECT_EQ(errors().find('o' + broken), std::string::npos) << "the key's own letter";
   const Picture told = screenshot();
   EXPECT_GT(changes(before, told, {340, 50, 920, 120}), 5000) << "a message over the picture";
@@ -272,6 +272,23 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithAFileAndGoesOn) {
   press({"q"});
   EXPECT_EQ(viewer_->wait(), 0);
   EXPECT_EQ(errors().find("Validation"), std::string::npos) << errors();
+}
+
+// However many keys come within one frame.
+TEST_F(ViewerTest, ReadsHastyFingers) {
+  open({sampleModel("figure"), "--paused"});
+  const Picture before = screenshot();
+  const auto hurry = [&](const char* end) {
+    display_->user({"key", "--delay", "0", "o", "a", "slash", "B", end, "j"});
+  };
+  hurry("Escape");
+  const Picture joints = screenshot();
+  EXPECT_GT(changes(before, joints, scene), 1000) << "j is no letter of the path any more";
+  hurry("Return");
+  EXPECT_TRUE(waitUntil([&] { return errors().find("'a/B'") != std::string::npos; })) << errors();
+  EXPECT_LT(changes(before, screenshotAfter({"Escape"}), scene), 50) << "j once more";
+  press({"q"});
+  EXPECT_EQ(viewer_->wait(), 0);
 }
 
 TEST_F(ViewerTest, BeginsWithoutAModel) {
