@@ -19,23 +19,15 @@ struct VerifyOptions {
   bool strict = false;
 };
 
-/// Fills `verification`; what it returns is a failure of the device. The ways to store are shared
-/// out among the poses, so that each comes once.
+/// Fills `verification`; what it returns is a failure of the device.
 Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
                          std::span<const OutputToVerify> outputs, ModelVerification& verification) {
   const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
   samples::Progress progress(verification.model, poses.size());
-  for (std::size_t index = 0; index < poses.size(); ++index) {
-    const std::size_t first = outputs.size() * index / poses.size();
-    const std::size_t end = outputs.size() * (index + 1) / poses.size();
-    const PoseToVerify& before = poses[(index + poses.size() - 1) % poses.size()];
-    Result<std::vector<VerifiedCase>> cases = verifyPose(
-        device, context, scene, poses[index], before, outputs.subspan(first, end - first));
-    if (!cases) return cases.error();
-    verification.cases.insert(verification.cases.end(), std::make_move_iterator(cases->begin()),
-                              std::make_move_iterator(cases->end()));
-    progress.step();
-  }
+  Result<std::vector<VerifiedCase>> cases =
+      verifyScene(device, context, scene, poses, outputs, [&progress] { progress.step(); });
+  if (!cases) return cases.error();
+  verification.cases = std::move(*cases);
   return {};
 }
 

@@ -18,52 +18,65 @@ std::string name(const Tuning& tuning) {
                      tuning.instancesPerInvocation);
 }
 
-/// What is skinned together in one pose, and from which pose it moves.
+/// A part with one of the methods that it allows.
+struct Figure {
+  std::size_t part;
+  Method method;
+};
+
+std::vector<Figure> figuresOf(const Scene& scene) {
+  std::vector<Figure> figures;
+  for (std::size_t part = 0; part < scene.parts.size(); ++part) {
+    const PreparedMesh* mesh = scene.parts[part].mesh.get();
+    if (mesh == nullptr) continue;
+    for (const Method method : allMethods) {
+      if (mesh->allows(method)) figures.push_back({part, method});
+    }
+  }
+  return figures;
+}
+
+/// What must come out, of every figure.
+struct ReferencePose {
+  ScenePose pose;
+  std::vector<reference::SkinnedMesh> figures;
+};
+
+Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> figures,
+                                    const PoseToVerify& pose) {
+  ReferencePose skinned{scenePose(scene, pose.clip, pose.time), {}};
+  for (const Figure& figure : figures) {
+    const ScenePart& part = scene.parts[figure.part];
+    Result<reference::SkinnedMesh> mesh =
+        reference::skin(part.mesh->view(), skinned.pose.palette(part), figure.method,
+                        skinned.pose.morphs[figure.part]);
+    if (!mesh) return mesh.error();
+    skinned.figures.push_back(std::move(*mesh));
+  }
+  return skinned;
+}
+
+/// All figures in one pose, and from which pose they move.
 struct PoseBatch {
-  ScenePose now, before;
+  const PoseToVerify& pose;
+  const std::vector<reference::SkinnedMesh>& expected;
   std::vector<samples::InstanceToVerify> instances;
   std::vector<const ScenePart*> parts;  ///< of the instances
-  std::vector<reference::SkinnedMesh> expected, expectedBefore;
 
-  PoseBatch(const Scene& scene, const PoseToVerify& pose, const PoseToVerify& previous)
-      : now(scenePose(scene, pose.clip, pose.time)),
-        before(scenePose(scene, previous.clip, previous.time)) {
-    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
-      const ScenePart& part = scene.parts[index];
-      if (part.mesh == nullptr) continue;
-      for (const Method method : allMethods) {
-        if (!part.mesh->allows(method)) continue;
-        instances.push_back({&part.mesh->packed(), now.palette(part), before.palette(part),
-                             now.morphs[index], before.morphs[index], method, nullptr, nullptr});
-        parts.push_back(&part);
-      }
+  PoseBatch(const Scene& scene, std::span<const Figure> figures, const PoseToVerify& name,
+            const ReferencePose& now, const ReferencePose& before)
+      : pose(name), expected(now.figures) {
+    for (std::size_t index = 0; index < figures.size(); ++index) {
+      const auto& [part, method] = figures[index];
+      parts.push_back(&scene.parts[part]);
+      instances.push_back({&parts.back()->mesh->packed(), now.pose.palette(*parts.back()),
+                           before.pose.palette(*parts.back()), now.pose.morphs[part],
+                           before.pose.morphs[part], method, &now.figures[index],
+                           &before.figures[index]});
     }
   }
-  PoseBatch(const PoseBatch&) = delete;
-  PoseBatch& operator=(const PoseBatch&) = delete;
 
-  /// What must come out, of all instances.
-  Result<void> skinReference() {
-    for (std::size_t index = 0; index < instances.size(); ++index) {
-      const samples::InstanceToVerify& instance = instances[index];
-      const MeshView mesh = parts[index]->mesh->view();
-      Result<reference::SkinnedMesh> skinned =
-          reference::skin(mesh, instance.palette, instance.method, instance.morphs);
-      if (!skinned) return skinned.error();
-      Result<reference::SkinnedMesh> skinnedBefore =
-          reference::skin(mesh, instance.previousPalette, instance.method, instance.previousMorphs);
-      if (!skinnedBefore) return skinnedBefore.error();
-      expected.push_back(std::move(*skinned));
-      expectedBefore.push_back(std::move(*skinnedBefore));
-    }
-    for (std::size_t index = 0; index < instances.size(); ++index) {
-      instances[index].expected = &expected[index];
-      instances[index].expectedBefore = &expectedBefore[index];
-    }
-    return {};
-  }
-
-  VerifiedCase newCase(std::size_t index, const PoseToVerify& pose, std::string variant) const {
+  VerifiedCase newCase(std::size_t index, std::string variant) const {
     VerifiedCase verified;
     verified.part = parts[index]->name;
     verified.method = methodName(instances[index].method);
@@ -80,8 +93,7 @@ bool hasBox(const samples::OutputCase& output) {
 
 /// Positions, normals and tangents as float32, with every tuning: not a bit may change.
 Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
-                           const PoseBatch& batch, const PoseToVerify& pose,
-                           std::vector<VerifiedCase>& cases) {
+                           const PoseBatch& batch, std::vector<VerifiedCase>& cases) {
   std::vector<samples::SkinRequest> requests;
   for (const samples::InstanceToVerify& instance : batch.instances) {
     samples::SkinRequest& request = requests.emplace_back();
@@ -91,6 +103,7 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
     request.morphs = instance.morphs;
   }
   std::vector<samples::SkinnedVertices> first;
+  std::vector<Comparison> firstComparisons;
   for (const Tuning& tuning : tunings) {
     samples::RunOptions options;
     options.tuning = tuning;
@@ -100,17 +113,49 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
     if (!result) return result.error();
     for (std::size_t index = 0; index < requests.size(); ++index) {
       const samples::SkinnedVertices& skinned = result->instances[index];
-      const Result<Comparison> comparison =
-          compare(batch.expected[index], skinned.view(), requests[index].method);
-      if (!comparison) return comparison.error();
-      VerifiedCase verified = batch.newCase(index, pose, name(tuning));
-      verified.comparison = *comparison;
+      VerifiedCase verified = batch.newCase(index, name(tuning));
       verified.status = skinned.status;
-      if (!first.empty() && skinned.streams != first[index].streams)
-        verified.wrong = "the result is not to the bit that of " + name(tunings[0]);
+      if (!first.empty() && skinned.streams == first[index].streams) {
+        verified.comparison = firstComparisons[index];
+      } else {
+        const Result<Comparison> comparison =
+            compare(batch.expected[index], skinned.view(), requests[index].method);
+        if (!comparison) return comparison.error();
+        verified.comparison = *comparison;
+        if (!first.empty())
+          verified.wrong = "the result is not to the bit that of " + name(tunings[0]);
+      }
+      if (first.empty()) firstComparisons.push_back(verified.comparison);
       cases.push_back(std::move(verified));
     }
     if (first.empty()) first = std::move(result->instances);
+  }
+  return {};
+}
+
+/// One way to store the result.
+Result<void> verifyOutput(samples::Device& device, vulkan::Context& context, const PoseBatch& batch,
+                          const OutputToVerify& output, std::vector<VerifiedCase>& cases) {
+  std::vector<samples::InstanceToVerify> instances;
+  std::vector<std::size_t> indices;
+  for (std::size_t index = 0; index < batch.instances.size(); ++index) {
+    if (std::ranges::count(output.methods, batch.instances[index].method) == 0) continue;
+    // Every other box of positions in snorm16 is too small, so that some are clamped.
+    for (std::size_t copy = 0; copy < (hasBox(output.output) ? 2 : 1); ++copy) {
+      instances.push_back(batch.instances[index]);
+      indices.push_back(index);
+    }
+  }
+  Result<std::vector<samples::VerifiedInstance>> verified =
+      samples::verifyBatch(device, context, instances, output.output);
+  if (!verified) return verified.error();
+  for (std::size_t place = 0; place < verified->size(); ++place) {
+    const bool clamps = hasBox(output.output) && place % 2 == 1;
+    VerifiedCase& added = cases.emplace_back(
+        batch.newCase(indices[place], output.output.name() + (clamps ? ", in a small box" : "")));
+    added.comparison = (*verified)[place].comparison;
+    added.status = (*verified)[place].status;
+    added.wrong = std::move((*verified)[place].wrong);
   }
   return {};
 }
@@ -154,37 +199,29 @@ std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits) {
   return outputs;
 }
 
-Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
-                                             const Scene& scene, const PoseToVerify& pose,
-                                             const PoseToVerify& before,
-                                             std::span<const OutputToVerify> outputs) {
-  PoseBatch batch(scene, pose, before);
-  if (Result<void> done = batch.skinReference(); !done) return done.error();
+Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::Context& context,
+                                              const Scene& scene,
+                                              std::span<const PoseToVerify> poses,
+                                              std::span<const OutputToVerify> outputs,
+                                              const std::function<void()>& done) {
+  const std::vector<Figure> figures = figuresOf(scene);
   std::vector<VerifiedCase> cases;
-  if (Result<void> done = verifyTunings(device, context, batch, pose, cases); !done)
-    return done.error();
-  for (const OutputToVerify& output : outputs) {
-    std::vector<samples::InstanceToVerify> instances;
-    std::vector<std::size_t> indices;
-    for (std::size_t index = 0; index < batch.instances.size(); ++index) {
-      if (std::ranges::count(output.methods, batch.instances[index].method) == 0) continue;
-      // Every other box of positions in snorm16 is too small, so that some are clamped.
-      for (std::size_t copy = 0; copy < (hasBox(output.output) ? 2 : 1); ++copy) {
-        instances.push_back(batch.instances[index]);
-        indices.push_back(index);
-      }
+  Result<ReferencePose> before = skinReference(scene, figures, poses.back());
+  for (std::size_t index = 0; index < poses.size(); ++index) {
+    if (!before) return before.error();
+    Result<ReferencePose> now = skinReference(scene, figures, poses[index]);
+    if (!now) return now.error();
+    const PoseBatch batch(scene, figures, poses[index], *now, *before);
+    if (Result<void> verified = verifyTunings(device, context, batch, cases); !verified)
+      return verified.error();
+    const std::size_t first = outputs.size() * index / poses.size();
+    const std::size_t end = outputs.size() * (index + 1) / poses.size();
+    for (const OutputToVerify& output : outputs.subspan(first, end - first)) {
+      if (Result<void> verified = verifyOutput(device, context, batch, output, cases); !verified)
+        return verified.error();
     }
-    Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyBatch(device, context, instances, output.output);
-    if (!verified) return verified.error();
-    for (std::size_t place = 0; place < verified->size(); ++place) {
-      const bool clamps = hasBox(output.output) && place % 2 == 1;
-      VerifiedCase& added = cases.emplace_back(batch.newCase(
-          indices[place], pose, output.output.name() + (clamps ? ", in a small box" : "")));
-      added.comparison = (*verified)[place].comparison;
-      added.status = (*verified)[place].status;
-      added.wrong = std::move((*verified)[place].wrong);
-    }
+    before = std::move(now);
+    done();
   }
   return cases;
 }

@@ -47,12 +47,15 @@ struct OutputToVerify {
 /// The ways that a device with these limits has. Over all of them every method meets every format.
 std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits);
 
-/// All parts in one batch: with all methods, once for each way to cut up the work (which must not
-/// change a bit), and once for each of these ways to store the result. Motion goes from `before`.
-Result<std::vector<VerifiedCase>> verifyPose(samples::Device& device, vulkan::Context& context,
-                                             const Scene& scene, const PoseToVerify& pose,
-                                             const PoseToVerify& before,
-                                             std::span<const OutputToVerify> outputs);
+/// In each pose all parts with all methods, once for each way to cut up the work (which must not
+/// change a bit), and once for each of these ways to store the result, which are shared out among
+/// the poses. Motion goes from the pose before, in the first from the last. `done` is called after
+/// each pose.
+Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::Context& context,
+                                              const Scene& scene,
+                                              std::span<const PoseToVerify> poses,
+                                              std::span<const OutputToVerify> outputs,
+                                              const std::function<void()>& done);
 
 /// The product of methods, inputs and outputs over random meshes, by pairs. `done` is called after
 /// each combination.
