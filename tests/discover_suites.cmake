@@ -1,7 +1,7 @@
 # Read by ctest, with `program` and `cost` set: one test for each suite of a GoogleTest program.
 #
-# A process opens a device and compiles kernels, which takes longer than most tests of them. Skipped tests are passed over
-# here: ctest would call a suite skipped even where another test of it failed. tests/run.sh lists them.
+# A process opens a device and compiles kernels, which takes longer than most tests of them. A suite with a skipped test ends
+# with 77, unless another test failed; tests/run.sh lists which were skipped.
 execute_process(COMMAND ${program} --gtest_list_tests OUTPUT_VARIABLE suites RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
   cmake_path(GET program FILENAME name)
@@ -13,5 +13,5 @@ string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${suites}")
 foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)
   add_test("${suite}*" ${program} "--gtest_filter=${suite}*")
-  set_tests_properties("${suite}*" PROPERTIES TIMEOUT 900 COST ${cost})
+  set_tests_properties("${suite}*" PROPERTIES TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
 endforeach()

@@ -24,7 +24,7 @@ echo "Running the tests; the log is $log ..."
 failed=0
 ctest --test-dir "build/$preset" --output-on-failure --timeout 900 -j "$(nproc)" >"$log" 2>&1 || failed=$?
 grep -v -E '^ +Start +[0-9]+: | Passed +[0-9.]+ sec$' "$log"
-# ctest does not tell of those within a suite that passed.
+# ctest names the suite only.
 awk '/: Skipped$/ { getline reason } /^\[  SKIPPED \] .* ms\)$/ { print "Skipped: " $4 ": " reason }' \
   "build/$preset/Testing/Temporary/LastTest.log" | sort -u
 [ "$failed" -eq 0 ] && exit 0
