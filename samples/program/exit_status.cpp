@@ -22,10 +22,6 @@ void setProgramName(const char* newName) {
   name = newName;
 }
 
-const char* programName() {
-  return name;
-}
-
 ExitStatus reportError(ExitStatus status, std::string_view message) {
   print("error", message);
   return status;

@@ -19,7 +19,6 @@ enum class ExitStatus : int {
 /// What stands before each message, followed by ": "; "dermis" until `runProgram` says otherwise.
 /// `name` must outlive the program.
 void setProgramName(const char* name);
-const char* programName();
 
 /// One line on standard error: "NAME: error: …".
 ExitStatus reportError(ExitStatus status, std::string_view message);
