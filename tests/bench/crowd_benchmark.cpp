@@ -17,6 +17,7 @@
 #include "crowd.h"
 #include "plain_scene.h"
 #include "test_data.h"
+#include "test_paths.h"
 
 namespace dermis::bench {
 namespace {
@@ -123,7 +124,7 @@ void registerCrowd(const std::string& name, const std::filesystem::path& path,
 
 std::vector<Ratio> registerCrowdBenchmarks() {
   std::vector<Ratio> ratios;
-  registerCrowd("crowd/1000_figure", std::filesystem::path(DERMIS_SAMPLE_MODELS) / "figure.glb",
+  registerCrowd("crowd/1000_figure", std::filesystem::path(test::sampleModels) / "figure.glb",
                 ratios);
   const std::string real = "crowd/1000_real_model";
   if (const std::optional<std::filesystem::path> folder = test::testDataFolder()) {

@@ -30,6 +30,7 @@
 #include "mock_vulkan.h"
 #include "ply.h"
 #include "random_rig.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -501,7 +502,7 @@ void expectRefusedSoon(const std::string& model, const std::string& text) {
 #endif
   const auto start = std::chrono::steady_clock::now();
   const CommandResult result =
-      runCommand({"/bin/sh", "-c", limit + "exec \"$0\" info \"$1\"", DERMIS_COMMAND, model});
+      runCommand({"/bin/sh", "-c", limit + "exec \"$0\" info \"$1\"", dermisProgram, model});
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_EQ(result.status, 3) << result.errors;
   expectOneErrorLine(result);

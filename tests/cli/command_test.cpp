@@ -17,12 +17,13 @@
 #include "dermis_command.h"
 #include "ply.h"
 #include "test_data.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
 
-const std::string figure = std::string(DERMIS_SAMPLE_MODELS) + "/figure.glb";
-const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+const std::string figure = std::string(sampleModels) + "/figure.glb";
+const std::string bar = std::string(sampleModels) + "/bar.glb";
 
 TEST(CommandTest, WrongUsageEndsWithTwo) {
   const std::string out = outFile("usage.ply");
@@ -332,7 +333,7 @@ TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
   REQUIRE_DEVICE();
   const std::string json = outFile("verify.json");
   const CommandResult result =
-      runOnTerminal({DERMIS_COMMAND, "verify", bar, "--random", "--json", json});
+      runOnTerminal({dermisProgram, "verify", bar, "--random", "--json", json});
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
   const nlohmann::json parsed = nlohmann::json::parse(readText(json));
   ASSERT_EQ(parsed.at("models").size(), 2u);
@@ -349,7 +350,7 @@ TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
 TEST(CommandTest, ProgressIsShownOnATerminalOnly) {
   const std::vector<std::string> frames{"skin",     bar, "-o",       outFile("frame_%02d.ply"),
                                         "--frames", "3", "--device", "cpu"};
-  std::vector<std::string> command{DERMIS_COMMAND};
+  std::vector<std::string> command{dermisProgram};
   command.insert(command.end(), frames.begin(), frames.end());
   const CommandResult terminal = runOnTerminal(command);
   EXPECT_EQ(terminal.status, 0);

@@ -21,12 +21,13 @@
 #include "dermis_command.h"
 #include "method_rotation.h"
 #include "ply.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
 
-const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
-const std::string arm = std::string(DERMIS_SAMPLE_MODELS) + "/arm.glb";
+const std::string bar = std::string(sampleModels) + "/bar.glb";
+const std::string arm = std::string(sampleModels) + "/arm.glb";
 
 struct Compared {
   CommandResult result;

@@ -12,6 +12,7 @@
 
 #include "dermis_command.h"
 #include "pictures.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -21,8 +22,8 @@ using samples::render::Picture;
 std::vector<std::string> filmCommand(const std::string& out, std::uint32_t figures,
                                      const std::vector<std::string>& added) {
   std::vector<std::string> arguments{
-      DERMIS_CROWD, "--film", out,        "--figures", std::to_string(figures),
-      "--width",    "320",    "--height", "180"};
+      dermisCrowdProgram, "--film", out,        "--figures", std::to_string(figures),
+      "--width",          "320",    "--height", "180"};
   arguments.insert(arguments.end(), added.begin(), added.end());
   return arguments;
 }
@@ -159,7 +160,7 @@ TEST(CrowdFilmTest, RefusesWrongUsage) {
   };
   for (std::vector<std::string> arguments : wrong) {
     SCOPED_TRACE(::testing::PrintToString(arguments));
-    arguments.insert(arguments.begin(), DERMIS_CROWD);
+    arguments.insert(arguments.begin(), dermisCrowdProgram);
     const CommandResult result = runCommand(arguments);
     EXPECT_EQ(result.status, 2);
     EXPECT_TRUE(result.errors.starts_with("dermis_crowd: error: ")) << result.errors;

@@ -16,6 +16,7 @@
 #include "coarse_triangles.h"
 #include "gait.h"
 #include "stroll.h"
+#include "test_paths.h"
 #include "wardrobe.h"
 
 namespace crowd {
@@ -25,7 +26,7 @@ class StrollTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     dermis::Result<Character> loaded =
-        Character::load(std::string(DERMIS_SAMPLE_MODELS) + "/figure.glb");
+        Character::load(std::string(test::sampleModels) + "/figure.glb");
     if (!loaded) return;
     character_ = new Character(std::move(*loaded));
     dermis::Result<Gait> gait = measureGait(*character_);

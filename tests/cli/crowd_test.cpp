@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "dermis_command.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
 
 CommandResult crowd(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), DERMIS_CROWD);
+  arguments.insert(arguments.begin(), dermisCrowdProgram);
   return runCommand(arguments);
 }
 

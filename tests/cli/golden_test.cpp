@@ -12,6 +12,7 @@
 #include "run_command.h"
 #include "test_data.h"
 #include "test_device.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -57,7 +58,7 @@ double skinAndCompare(const std::filesystem::path& model, const std::string& ani
   std::replace(test.begin(), test.end(), '/', '_');
   const std::string out = ::testing::TempDir() + "golden_" + test + ".ply";
   const CommandResult result = runCommand(
-      {DERMIS_COMMAND, "skin", model.string(), "-o", out, "--animation", animation, "--time", time,
+      {dermisProgram, "skin", model.string(), "-o", out, "--animation", animation, "--time", time,
        "--method", dualQuaternion ? "dual_quaternion" : "linear", "--device", device});
   EXPECT_EQ(result.status, 0) << result.errors;
   const std::optional<Ply> ply = readPly(out);

@@ -18,6 +18,7 @@
 #include "obj.h"
 #include "ply.h"
 #include "test_data.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -98,8 +99,7 @@ void expectSame(const Pose& pose) {
 TEST(OutputTest, SampleModelsAreTheSameInAllFormats) {
   for (const char* name : {"bar", "arm", "figure"}) {
     SCOPED_TRACE(name);
-    const Pose pose =
-        skinToAll(std::string(DERMIS_SAMPLE_MODELS) + "/" + name + ".glb", {"--time", "0.4"});
+    const Pose pose = skinToAll(std::string(sampleModels) + "/" + name + ".glb", {"--time", "0.4"});
     EXPECT_GE(pose.ply.faces.size(), 500u);
     expectSame(pose);
   }
@@ -369,7 +369,7 @@ TEST(OutputTest, OnlyAPlyHoldsWhatIsNotFinite) {
 }
 
 TEST(OutputTest, FramesAreWrittenInEveryFormat) {
-  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  const std::string bar = std::string(sampleModels) + "/bar.glb";
   const std::vector<std::string> frames{"--frames", "2", "--fps", "4", "--time", "0.25"};
   EXPECT_EQ(skin(bar, outFile("%02d.obj"), frames).status, 0);
   EXPECT_EQ(skin(bar, outFile("%02d.glb"), frames).status, 0);
@@ -383,7 +383,7 @@ TEST(OutputTest, FramesAreWrittenInEveryFormat) {
 }
 
 TEST(OutputTest, WhatCannotBeWrittenEndsWithFive) {
-  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  const std::string bar = std::string(sampleModels) + "/bar.glb";
   for (const std::string ending : {".ply", ".obj", ".glb"}) {
     EXPECT_EQ(skin(bar, "/nonexistent/folder/out" + ending).status, 5);
     const std::string link = outFile("full" + ending);
@@ -401,7 +401,7 @@ TEST(OutputTest, WhatCannotBeWrittenEndsWithFive) {
 }
 
 TEST(OutputTest, OtherEndingsAreRefused) {
-  const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+  const std::string bar = std::string(sampleModels) + "/bar.glb";
   for (const char* name : {"out.gltf", "out.stl", "out", "out.glb.zip", "out.fbx"}) {
     const CommandResult result = skin(bar, outFile(name));
     EXPECT_EQ(result.status, 2) << name;

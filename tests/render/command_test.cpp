@@ -9,12 +9,13 @@
 
 #include "dermis_command.h"
 #include "pictures.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
 
 std::string sampleModel(const std::string& name) {
-  return std::string(DERMIS_SAMPLE_MODELS) + "/" + name + ".glb";
+  return std::string(sampleModels) + "/" + name + ".glb";
 }
 
 CommandResult render(const std::string& model, const std::string& out,

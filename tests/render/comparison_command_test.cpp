@@ -9,11 +9,12 @@
 
 #include "dermis_command.h"
 #include "pictures.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
 
-const std::string bar = std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb";
+const std::string bar = std::string(sampleModels) + "/bar.glb";
 
 CommandResult compare(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"compare", "--repetitions", "1", "--instances", "1"});

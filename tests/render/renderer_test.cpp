@@ -18,6 +18,7 @@
 #include "pictures.h"
 #include "render/renderer.h"
 #include "test_data.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -130,7 +131,7 @@ Result<cli::Scene> sceneOf(const std::filesystem::path& path) {
 }
 
 TEST_F(RendererTest, DrawsTwoViewsAHeatMapAndNothingElse) {
-  const Result<cli::Scene> scene = sceneOf(std::string(DERMIS_SAMPLE_MODELS) + "/arm.glb");
+  const Result<cli::Scene> scene = sceneOf(std::string(sampleModels) + "/arm.glb");
   ASSERT_TRUE(scene);
   Result<cli::DrawnScene> drawn =
       cli::DrawnScene::create(*drawingDevice(), *renderer_, *scene, 1, Method::dualQuaternion);
@@ -176,7 +177,7 @@ TEST_F(RendererTest, DrawsTwoViewsAHeatMapAndNothingElse) {
 }
 
 TEST_F(RendererTest, RefusesWhatItCannotDraw) {
-  const Result<cli::Scene> scene = sceneOf(std::string(DERMIS_SAMPLE_MODELS) + "/bar.glb");
+  const Result<cli::Scene> scene = sceneOf(std::string(sampleModels) + "/bar.glb");
   ASSERT_TRUE(scene);
   Result<cli::DrawnScene> drawn =
       cli::DrawnScene::create(*drawingDevice(), *renderer_, *scene, 1, Method::linear);

@@ -10,12 +10,13 @@
 
 #include "run_command.h"
 #include "test_device.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 
 inline CommandResult dermis(std::vector<std::string> arguments,
                             const std::vector<std::string>& environment = {}) {
-  arguments.insert(arguments.begin(), DERMIS_COMMAND);
+  arguments.insert(arguments.begin(), dermisProgram);
   return runCommand(arguments, environment);
 }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "render/texture.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -100,8 +101,7 @@ PictureDifference comparePictures(const Picture& a, const Picture& b) {
 void expectAsReference(const std::string& name, const Picture& picture,
                        const PictureTolerance& tolerance) {
   SCOPED_TRACE(name);
-  const std::string path =
-      std::string(DERMIS_SOURCE_DIR) + "/tests/render/references/" + name + ".png";
+  const std::string path = std::string(sourceFolder) + "/tests/render/references/" + name + ".png";
   if (std::getenv("DERMIS_UPDATE_REFERENCES") != nullptr) {
     const auto bytes = samples::render::encodePng(picture);
     ASSERT_TRUE(bytes);

@@ -6,10 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "test_paths.h"
+
 namespace {
 
 std::string readText(const std::string& path) {
-  std::ifstream file(std::string(DERMIS_SOURCE_DIR) + "/" + path);
+  std::ifstream file(std::string(test::sourceFolder) + "/" + path);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 

@@ -6,6 +6,8 @@
 #include <optional>
 #include <system_error>
 
+#include "test_paths.h"
+
 namespace dermis::test {
 
 /// The folder that holds `models/` and `golden/`: DERMIS_TEST_DATA where that is set, otherwise
@@ -15,8 +17,7 @@ inline std::optional<std::filesystem::path> testDataFolder() {
   const char* set = std::getenv("DERMIS_TEST_DATA");
   const bool named = set != nullptr && *set != '\0';
   const std::filesystem::path folder =
-      named ? std::filesystem::path(set)
-            : std::filesystem::path(DERMIS_SOURCE_DIR) / ".." / "shared";
+      named ? std::filesystem::path(set) : std::filesystem::path(sourceFolder) / ".." / "shared";
   std::error_code error;
   if (!std::filesystem::is_directory(folder / "models", error)) return std::nullopt;
   return folder;

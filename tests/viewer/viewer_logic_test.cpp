@@ -16,6 +16,7 @@
 #include "playback.h"
 #include "scene_loader.h"
 #include "skeleton.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -24,8 +25,7 @@ using namespace viewer;
 
 cli::Scene figure() {
   cli::MeshPreparation preparation;
-  Result<cli::Scene> scene =
-      cli::loadScene(std::string(DERMIS_SAMPLE_MODELS) + "/figure.glb", preparation);
+  Result<cli::Scene> scene = cli::loadScene(std::string(sampleModels) + "/figure.glb", preparation);
   EXPECT_TRUE(scene) << scene.error().message;
   return std::move(*scene);
 }
@@ -208,7 +208,7 @@ TEST(ErrorCheckTest, WorksOnAThreadOfItsOwn) {
 
 TEST(SceneLoaderTest, ForgetsWhatIsNoLongerWanted) {
   SceneLoader loader;
-  const std::string folder = DERMIS_SAMPLE_MODELS;
+  const std::string folder = sampleModels;
   for (const char* name : {"/figure.glb", "/bar.glb", "/arm.glb"}) loader.load({folder + name});
   std::optional<LoadedScene> loaded;
   while (!(loaded = loader.poll())) std::this_thread::yield();

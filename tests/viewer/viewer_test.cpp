@@ -15,6 +15,7 @@
 #include "display.h"
 #include "pictures.h"
 #include "test_device.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -77,7 +78,7 @@ std::string textOf(const std::string& path) {
 }
 
 std::string sampleModel(const std::string& name) {
-  return std::string(DERMIS_SAMPLE_MODELS) + "/" + name + ".glb";
+  return std::string(sampleModels) + "/" + name + ".glb";
 }
 
 class ViewerTest : public ::testing::Test {
@@ -104,8 +105,8 @@ class ViewerTest : public ::testing::Test {
   void start(std::vector<std::string> arguments) {
     arguments.insert(
         arguments.begin(),
-        {"env", "DISPLAY=" + display_->name(), "SDL_VIDEODRIVER=x11", DERMIS_VIEWER, "--validation",
-         "--width", std::to_string(width), "--height", std::to_string(height)});
+        {"env", "DISPLAY=" + display_->name(), "SDL_VIDEODRIVER=x11", dermisViewerProgram,
+         "--validation", "--width", std::to_string(width), "--height", std::to_string(height)});
     const std::string device = testDeviceOptions().device;
     arguments.insert(arguments.end(), {"--device", device});
     viewer_ = std::make_unique<ChildProcess>(arguments, folder_, folder_ + "/output", errorFile());

@@ -1,0 +1,13 @@
+// Where the programs and files under test are. Defined in one place, so that no object of the tests
+// depends on a folder's name.
+#pragma once
+
+namespace dermis::test {
+
+extern const char* const sourceFolder;         ///< the repository
+extern const char* const sampleModels;         ///< the folder of the generated models
+extern const char* const dermisProgram;        ///< the command
+extern const char* const dermisCrowdProgram;   ///< dermis_crowd
+extern const char* const dermisViewerProgram;  ///< dermis_viewer; empty where it is not built
+
+}  // namespace dermis::test
