@@ -1,6 +1,8 @@
 #!/bin/sh
 # Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). Does nothing, and needs no
 # rights, where all of it is there. On another system it lists what is needed and ends with an error.
+#
+#   cmake/install-deps.sh [nightly]    nightly: also what only tests/run.sh nightly needs
 set -eu
 
 packages="
@@ -13,6 +15,17 @@ libpng-dev libstb-dev fonts-dejavu-core
 libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
 "
+if [ "${1:-}" = nightly ]; then
+  packages="$packages
+clang ffmpeg blender python3-numpy
+"
+  command -v npm >/dev/null 2>&1 || packages="$packages nodejs npm" # from wherever they are
+  # libFuzzer and the sanitizers of the release's Clang.
+  if command -v apt-cache >/dev/null 2>&1; then
+    clang_runtime=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/libclang-rt-\1-dev/p' | head -n 1)
+    packages="$packages $clang_runtime"
+  fi
+fi
 
 if ! command -v dpkg-query >/dev/null 2>&1; then
   echo "install-deps: this is not Debian; Dermis needs the equivalents of these packages:" >&2

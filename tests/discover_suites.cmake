@@ -1,4 +1,4 @@
-# Read by ctest, with `program` and `cost` set: one test for each suite of a GoogleTest program.
+# Read by ctest, with `program`, `cost`, `sanitized` and `nightly` set: one test for each suite of a GoogleTest program.
 #
 # A process opens a device and compiles kernels, which takes longer than most tests of them. A suite with a skipped test ends
 # with 77, unless another test failed; tests/run.sh lists which were skipped.
@@ -14,4 +14,11 @@ foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)
   add_test("${suite}*" ${program} "--gtest_filter=${suite}*")
   set_tests_properties("${suite}*" PROPERTIES TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
+  string(REPLACE ":" "|" pattern "${sanitized}")
+  if(sanitized STREQUAL "*" OR (sanitized AND suite MATCHES "^([A-Za-z0-9_]+/)?(${pattern})"))
+    set_tests_properties("${suite}*" PROPERTIES LABELS sanitized)
+  endif()
+  if(nightly)
+    set_tests_properties("${suite}*" PROPERTIES LABELS nightly TIMEOUT 1700)
+  endif()
 endforeach()

@@ -1,28 +1,57 @@
 #!/bin/sh
-# Builds Dermis with every warning an error and runs all of its tests; installs what is missing first.
+# Builds Dermis with every warning an error and runs its tests; installs what is missing first.
 #
-#   tests/run.sh [PRESET]     ci (the default), dev, release, asan or tsan
+#   tests/run.sh [PRESET]          ci (the default), dev, release, asan or tsan: builds all, runs all tests
+#   tests/run.sh sanitized         address and undefined-behaviour sanitizers: what works on the CPU, and a small suite on a device
+#   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, else in ../shared, and
-# skip where they are absent. With CI set in the environment, a missing Vulkan device or validation layer is a failure.
+# skip if both are absent. With CI set in the environment, a missing Vulkan device or validation layer is a failure.
 #
-# Prints what failed or was skipped; all the rest is in build/PRESET/tests.log. A test that failed is run three times more, with
-# nothing beside it, to tell whether it always fails; the run has failed either way.
+# Prints what failed or was skipped, and how long each step took; all the rest is in build/PRESET/tests.log. A test that failed
+# is run three times more, alone, to tell whether it always fails; the run has failed either way.
 set -eu
 cd "$(dirname "$0")/.."
-preset=${1:-ci}
+run=${1:-ci}
+if [ "$run" = nightly ]; then
+  shift
+  exec ./tests/nightly/run.sh "$@"
+fi
+preset=$run
+build_target=all
+tests="-LE nightly"
+if [ "$run" = sanitized ]; then
+  preset=asan
+  build_target=sanitized_tests
+  tests="-L sanitized"
+fi
 
-./cmake/install-deps.sh
+# step NAME COMMAND...: runs it, and prints how long it took.
+step() {
+  name=$1
+  shift
+  begin=$(date +%s)
+  status=0
+  "$@" || status=$?
+  seconds=$(($(date +%s) - begin))
+  echo "$run: $name took $((seconds / 60)) min $((seconds % 60)) s"
+  return "$status"
+}
 
-cmake --preset "$preset"
-cmake --build "build/$preset"
+step install ./cmake/install-deps.sh
+step configure cmake --preset "$preset"
+step build cmake --build "build/$preset" --target "$build_target"
 
 # LLVM, inside lavapipe, keeps memory until the process ends.
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}"
 log=build/$preset/tests.log
 echo "Running the tests; the log is $log ..."
 failed=0
-ctest --test-dir "build/$preset" --output-on-failure --timeout 900 -j "$(nproc)" >"$log" 2>&1 || failed=$?
+run_tests() {
+  # shellcheck disable=SC2086 # two words
+  ctest --test-dir "build/$preset" $tests --output-on-failure --no-tests=error --timeout 900 -j "$(nproc)" >"$log" 2>&1
+}
+step tests run_tests || failed=$?
 grep -v -E '^ +Start +[0-9]+: | Passed +[0-9.]+ sec$' "$log"
 # ctest names the suite only.
 awk '/: Skipped$/ { getline reason } /^\[  SKIPPED \] .* ms\)$/ { print "Skipped: " $4 ": " reason }' \

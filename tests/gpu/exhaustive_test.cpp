@@ -1,0 +1,87 @@
+// Every format with every other, and every method with the formats of positions and normals: what
+// ProductTest covers by pairs. Too long for every change; tests/run.sh nightly runs it.
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "test_device.h"
+#include "verification_product.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::array positionFormats{VertexFormat::float32x3, VertexFormat::float32x4,
+                                     VertexFormat::float16x3, VertexFormat::float16x4,
+                                     VertexFormat::snorm16x3, VertexFormat::snorm16x4};
+constexpr std::array normalFormats{
+    VertexFormat::none,           VertexFormat::float32x3,    VertexFormat::float32x4,
+    VertexFormat::float16x3,      VertexFormat::float16x4,    VertexFormat::snorm16x3,
+    VertexFormat::snorm16x4,      VertexFormat::snorm8x3,     VertexFormat::snorm8x4,
+    VertexFormat::octahedral16x2, VertexFormat::octahedral8x2};
+constexpr std::array tangentFormats{VertexFormat::none,         VertexFormat::float32x4,
+                                    VertexFormat::float16x4,    VertexFormat::snorm16x4,
+                                    VertexFormat::snorm8x4,     VertexFormat::octahedral16x2,
+                                    VertexFormat::octahedral8x2};
+constexpr std::array rigidities{samples::Rigidity::rigid, samples::Rigidity::shear,
+                                samples::Rigidity::mirrored};
+
+class ExhaustiveTest : public DeviceTest {
+ protected:
+  void SetUp() override {
+    DeviceTest::SetUp();
+    if (device_ == nullptr) return;
+    ASSERT_TRUE(context().limits().storage8Bit) << "the device stores no bytes";
+  }
+
+  /// Counts cases, so that each has an input and a cut of its own.
+  void verify(Method method, VertexFormat positions, VertexFormat normals, VertexFormat tangents) {
+    const std::size_t number = cases_++;
+    samples::RandomCase random;
+    random.method = method;
+    random.rigidity = rigidities[number % rigidities.size()];
+    random.vertices = 65;
+    random.joints = 40;
+    random.influences = static_cast<std::uint32_t>(1 + number % 5);
+    random.output.layout.positions = positions;
+    random.output.layout.normals = normals;
+    random.output.layout.tangents = tangents;
+    random.output.layout.gap = static_cast<std::uint32_t>(number % 4);
+    random.output.layout.bounds = number % 2 == 0;
+    const Result<std::vector<samples::VerifiedInstance>> verified =
+        samples::verifyRandomCase(device(), context(), random);
+    ASSERT_TRUE(verified.ok()) << verified.error().message;
+    ASSERT_EQ(verified->size(), 3u);
+    for (const samples::VerifiedInstance& instance : *verified) {
+      EXPECT_TRUE(instance.passed())
+          << random.output.name() << ", " << methodName(method) << ": " << instance.wrong << ", "
+          << instance.comparison.failures << " vertices outside their bounds, the first is "
+          << instance.comparison.firstFailure;
+    }
+  }
+
+  std::size_t cases_ = 0;
+};
+
+TEST_F(ExhaustiveTest, EveryFormatWithEveryOther) {
+  for (const VertexFormat positions : positionFormats) {
+    for (const VertexFormat normals : normalFormats) {
+      for (const VertexFormat tangents : tangentFormats)
+        verify(Method::dualQuaternion, positions, normals, tangents);
+    }
+  }
+  EXPECT_EQ(cases_, 462u);
+}
+
+TEST_F(ExhaustiveTest, EveryMethodWithEveryFormat) {
+  for (const Method method : allMethods) {
+    for (const VertexFormat positions : positionFormats) {
+      for (const VertexFormat normals : normalFormats)
+        verify(method, positions, normals, tangentFormats[cases_ % tangentFormats.size()]);
+    }
+  }
+  EXPECT_EQ(cases_, 594u);
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,146 @@
+#!/bin/sh
+# The tests that take too long for every change, in parts of at most 30 minutes on two cores.
+#
+#   tests/run.sh nightly [PART...]      without PART: all, in this order
+#
+#   asan         everything that has a device, under the address and undefined-behaviour sanitizers
+#   asan-rest    all other tests under them
+#   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
+#   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
+#   fuzz         each fuzzer for a minute
+#   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
+#   exhaustive   every combination of methods and formats, on the device
+#   programs     the quick start in a fresh clone, and films by a real ffmpeg
+#
+# Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
+# date, the commit and the minutes that it took; commit that file. A part that fails does not stop those after it.
+set -eu
+cd "$(dirname "$0")/../.."
+export CI="${CI:-true}"
+export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
+parts="asan asan-rest tsan clang fuzz mesa exhaustive programs"
+passed=tests/nightly/passed.tsv
+device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
+
+build() { # PRESET [TARGET...]: configures and builds
+  preset=$1
+  shift
+  cmake --preset "$preset"
+  if [ $# -eq 0 ]; then set -- all; fi
+  cmake --build "build/$preset" --target "$@"
+}
+
+tests() { # PRESET CTEST-ARGUMENTS...
+  preset=$1
+  shift
+  log=build/$preset/nightly-tests.log
+  outcome=0
+  ctest --test-dir "build/$preset" --output-on-failure --no-tests=error --timeout 1700 -j "$(nproc)" "$@" >"$log" 2>&1 ||
+    outcome=$?
+  grep -v -E '^ +Start +[0-9]+: | Passed +[0-9.]+ sec$' "$log"
+  return "$outcome"
+}
+
+part_asan() {
+  build asan
+  tests asan -LE nightly -R "$device_suites"
+}
+
+part_asan_rest() {
+  build asan
+  tests asan -LE nightly -E "$device_suites"
+}
+
+part_tsan() {
+  # What lavapipe and the validation layer do among themselves is not ours: they were not built with the sanitizer.
+  export TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp halt_on_error=1 ${TSAN_OPTIONS:-}"
+  build tsan gpu_test system_test
+  tests tsan -R 'ThreadsTest|SystemModelTest'
+}
+
+part_clang() {
+  build clang
+  tests clang -L sanitized
+  tests clang -R '^package\.'
+}
+
+part_fuzz() {
+  build fuzz
+  for fuzzer in gltf_fuzz mesh_fuzz packed_mesh_fuzz; do
+    corpus=build/fuzz/corpus/$fuzzer
+    mkdir -p "$corpus"
+    echo "$fuzzer ..."
+    "build/fuzz/tests/fuzz/$fuzzer" -rss_limit_mb=2048 -timeout=10 -max_total_time=60 -print_final_stats=1 \
+      -artifact_prefix=build/fuzz/ "$corpus" tests/fuzz/seeds >"build/fuzz/$fuzzer.log" 2>&1 ||
+      { tail -n 40 "build/fuzz/$fuzzer.log"; return 1; }
+    grep number_of_executed_units "build/fuzz/$fuzzer.log"
+  done
+}
+
+part_mesa() {
+  build ci
+  settings=$(./tests/nightly/unpack_mesa.sh build/nightly/mesa)
+  # shellcheck disable=SC2086 # NAME=VALUE words
+  export $settings
+  export DERMIS_REQUIRE_RAY_TRACING=1
+  build/ci/samples/cli/dermis devices
+  tests ci -LE nightly -R "$device_suites|Render|Crowd|Comparison"
+  build/ci/samples/cli/dermis verify build/ci/samples/models/*.glb
+}
+
+part_exhaustive() {
+  build ci exhaustive_test
+  tests ci -R ExhaustiveTest
+}
+
+part_programs() {
+  folder=build/nightly/quickstart
+  rm -rf "$folder"
+  git clone -q . "$folder"
+  "$folder/samples/quickstart.sh"
+  for file in compare.png crowd.png figure-00.ply figure-07.ply verify.json verify.xml crowd.json; do
+    [ -s "$folder/build/quickstart/$file" ] || { echo "the quick start wrote no $file"; return 1; }
+  done
+  rm -rf "$folder"
+  build ci real_film_test
+  tests ci -R RealFilmTest
+}
+
+if [ "${1:-}" = --alone ]; then # how this script calls itself: each part in a process of its own, in which `set -e` holds
+  "part_$(echo "$2" | tr - _)"
+  exit
+fi
+
+if [ $# -eq 0 ]; then
+  # shellcheck disable=SC2086 # a list of words
+  set -- $parts
+fi
+for part in "$@"; do
+  case " $parts " in
+    *" $part "*) ;;
+    *) echo "tests/run.sh nightly: there is no part '$part'; there are $parts" >&2; exit 2 ;;
+  esac
+done
+
+./cmake/install-deps.sh nightly
+mkdir -p build/nightly
+failed=
+for part in "$@"; do
+  echo "nightly: $part ..."
+  begin=$(date +%s)
+  status=0
+  ./tests/nightly/run.sh --alone "$part" || status=$?
+  minutes=$((($(date +%s) - begin + 30) / 60))
+  if [ "$status" -ne 0 ]; then
+    echo "nightly: $part FAILED after $minutes min"
+    failed="$failed $part"
+    continue
+  fi
+  echo "nightly: $part passed in $minutes min"
+  commit=$(git rev-parse --short HEAD)
+  [ -z "$(git status --porcelain --untracked-files=no -- . ":!$passed")" ] || commit=$commit+changes
+  { grep -v "^$part	" "$passed" 2>/dev/null || printf 'part\tlast passed\tcommit\tminutes\n'
+    printf '%s\t%s\t%s\t%s\n' "$part" "$(date -u +%Y-%m-%d)" "$commit" "$minutes"; } >"$passed.new"
+  mv "$passed.new" "$passed"
+done
+[ -z "$failed" ] || { echo "nightly: failed:$failed"; exit 1; }
