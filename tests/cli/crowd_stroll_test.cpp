@@ -26,7 +26,7 @@ class StrollTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     dermis::Result<Character> loaded =
-        Character::load(std::string(test::sampleModels) + "/figure.glb");
+        Character::load(std::string(dermis::test::sampleModels) + "/figure.glb");
     if (!loaded) return;
     character_ = new Character(std::move(*loaded));
     dermis::Result<Gait> gait = measureGait(*character_);

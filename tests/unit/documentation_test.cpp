@@ -11,7 +11,7 @@
 namespace {
 
 std::string readText(const std::string& path) {
-  std::ifstream file(std::string(test::sourceFolder) + "/" + path);
+  std::ifstream file(std::string(dermis::test::sourceFolder) + "/" + path);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 

@@ -1,7 +1,5 @@
 #include "gltf_builder.h"
 
-#include <gtest/gtest.h>
-
 namespace dermis::test {
 
 std::string encodeBase64(std::span<const std::byte> bytes) {

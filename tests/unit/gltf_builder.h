@@ -2,6 +2,7 @@
 #pragma once
 
 #include <dermis/gltf.h>
+#include <gtest/gtest.h>
 
 #include <cstddef>
 #include <cstdint>
