@@ -161,7 +161,6 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   const Scene::Counts counts = scene.counts();
   frameStatistics.frame = scene.frameNumber();
   frameStatistics.instances = counts.instances;
-  frameStatistics.waitingInstances = counts.waiting;
   frameStatistics.skinnedInstances = counts.skinned;
   frameStatistics.settledInstances = counts.settled;
   frameStatistics.convertedPalettes = counts.palettes;

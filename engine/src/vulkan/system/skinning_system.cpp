@@ -33,8 +33,6 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
   if (description.jointBudget == 0) return wrongField("jointBudget is 0");
   if (description.outputBudget == 0) return wrongField("outputBudget is 0");
   if (description.instanceBudget == 0) return wrongField("instanceBudget is 0");
-  if (description.overflow > OverflowPolicy::bindPose)
-    return wrongField("overflow is not one of OverflowPolicy");
   if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
     return wrongField("memory has one of its two functions only");
   for (const auto& [field, bytes] :
@@ -64,7 +62,6 @@ SceneDescription sceneOf(const SkinningSystemDescription& description,
   scene.instanceBudget = description.instanceBudget;
   scene.boundsBudget =
       limits.maxStorageBuffersPerStage < storageBuffersWanted ? 0 : description.boundsBudget;
-  scene.overflow = description.overflow;
   scene.limits = limits;
   scene.tuning = description.tuning.value_or(context.tuning);
   return scene;
@@ -202,16 +199,8 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
   job.previousPositions = laidOut->attributes[3];
   job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
   job.bounds = description.bounds;
-  const DeviceLimits& limits = state_->context->limits;
-  const Tuning& tuning = state_->scene.description().tuning;
-  std::vector<Variant> variants = everyVariant(job, limits, tuning);
-  if (state_->description.overflow == OverflowPolicy::bindPose) {
-    job.method = Method::dualQuaternion;
-    job.bounds = false;
-    const std::vector<Variant> bindPose = everyVariant(job, limits, tuning);
-    variants.insert(variants.end(), bindPose.begin(), bindPose.end());
-  }
-  for (const Variant& variant : variants) {
+  for (const Variant& variant :
+       everyVariant(job, state_->context->limits, state_->scene.description().tuning)) {
     if (Result<void> built =
             state_->context->pipelines->build(variant, state_->context->pipelineLayout);
         !built)
