@@ -109,7 +109,8 @@ void countWorkgroups(uint dispatch, uint arguments) {
     tables[group + GROUP_WORKGROUP_END] = workgroups;
   }
   uint most = push[PUSH_CULLED_FRAME];
-  uint rows = (workgroups + most - 1u) / most;
+  // `most` may be 2³² − 1; workgroups and rows are at most 2³¹ each (Plan::State::addDispatch).
+  uint rows = workgroups / most + (workgroups % most != 0u ? 1u : 0u);
   tables[arguments] = rows == 0u ? 0u : (workgroups + rows - 1u) / rows;
   tables[arguments + 1u] = rows;
   tables[arguments + 2u] = 1u;

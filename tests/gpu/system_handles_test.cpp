@@ -275,6 +275,12 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
   SkinningSystemDescription large = description();
   large.meshBudget = context().limits().maxStorageBufferRange + 4096;
   expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  // Sizes that no integer holds.
+  large.meshBudget = std::numeric_limits<std::uint64_t>::max();
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  large = description();
+  large.framesInFlight = large.jointBudget = std::numeric_limits<std::uint32_t>::max();
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "framesInFlight");
 }
 
 TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {

@@ -36,7 +36,8 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
   if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
     return wrongField("memory has one of its two functions only");
   for (const auto& [field, bytes] :
-       {std::pair{"meshBudget", scene.meshBudget},
+       {std::pair{"framesInFlight", description.framesInFlight * sizeof(JointMatrix)},
+        {"meshBudget", scene.meshBudget},
         {"jointBudget (matrices)", scene.matricesSize()},
         {"jointBudget (palettes)", scene.palettesSize()},
         {"boundsBudget", scene.resultsSize()},
@@ -47,8 +48,10 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
   return checkTuning(scene.tuning);
 }
 
+/// The largest multiple that there is, if the next one is larger.
 std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
-  return (value + multiple - 1) / multiple * multiple;
+  const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
+  return up <= ~value ? value + up : value / multiple * multiple;
 }
 
 SceneDescription sceneOf(const SkinningSystemDescription& description,
