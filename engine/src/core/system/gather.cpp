@@ -194,7 +194,6 @@ void Scene::commit() {
   settled_.clear();
   moved_.clear();
   movedLast_.clear();
-  fresh_.clear();
   for (const Conversion& conversion : conversions_) {
     ScenePalette& palette = palettes_.at(conversion.palette);
     palette.forms[conversion.form].version = palette.version;

@@ -70,9 +70,7 @@ Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale)
   palette.jointCount = jointCount;
   palette.mayScale = mayScale;
   palette.joints = *joints;
-  const PaletteHandle handle = palettes_.add(palette);
-  fresh_.push_back(handle);
-  return handle;
+  return palettes_.add(palette);
 }
 
 Result<void> Scene::removePalette(PaletteHandle handle) {

@@ -149,8 +149,6 @@ class Scene {
 
   const FrameBuilder& frame() const { return builder_; }
   std::span<const OutputMove> moves() const { return moves_; }
-  /// Palettes added since the last record, of which some may be gone, or written.
-  std::span<const PaletteHandle> freshPalettes() const { return fresh_; }
   std::uint64_t frameNumber() const { return frame_; }
   std::uint64_t recordNumber() const { return record_; }
 
@@ -235,7 +233,6 @@ class Scene {
   std::uint32_t nextVersion_ = 0, nextOwner_ = 0;
   std::vector<VertexRun> runsScratch_;
 
-  std::vector<PaletteHandle> fresh_;       ///< added since the last record
   std::vector<PaletteHandle> posed_;       ///< written since the last plan
   std::vector<InstanceHandle> pending_;    ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;   ///< `target` is not `shown`

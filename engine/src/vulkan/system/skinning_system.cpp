@@ -88,6 +88,11 @@ VkBufferUsageFlags SkinningSystem::State::readUsage() const {
                                                       : 0);
 }
 
+std::span<JointMatrix> SkinningSystem::State::poseAt(std::uint64_t offset,
+                                                     std::uint32_t jointCount) {
+  return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + offset), jointCount};
+}
+
 Result<void> SkinningSystem::State::createBuffers() {
   const VkBufferUsageFlags read = readUsage();
   constexpr VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
@@ -179,7 +184,12 @@ Result<void> SkinningSystem::removeMesh(MeshHandle mesh) {
 }
 
 Result<PaletteHandle> SkinningSystem::addPalette(std::uint32_t jointCount, bool mayScale) {
-  return state_->scene.addPalette(jointCount, mayScale);
+  Result<PaletteHandle> added = state_->scene.addPalette(jointCount, mayScale);
+  if (!added) return added;
+  // No frame under way reads its memory: that of a palette before it was free.
+  const ScenePalette& palette = *state_->scene.palettes().find(*added);
+  std::ranges::fill(state_->poseAt(state_->scene.poseOffset(palette), jointCount), JointMatrix{});
+  return added;
 }
 Result<void> SkinningSystem::removePalette(PaletteHandle palette) {
   return state_->scene.removePalette(palette);
@@ -225,8 +235,7 @@ Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t compl
 Result<std::span<JointMatrix>> SkinningSystem::writePose(PaletteHandle palette) {
   const Result<std::uint64_t> offset = state_->scene.writePose(palette);
   if (!offset) return offset.error();
-  auto* pose = reinterpret_cast<JointMatrix*>(state_->matrices.bytes().data() + *offset);
-  return std::span<JointMatrix>(pose, state_->scene.palettes().find(palette)->jointCount);
+  return state_->poseAt(*offset, state_->scene.palettes().find(palette)->jointCount);
 }
 
 Result<void> SkinningSystem::setVisible(InstanceHandle instance, bool isVisible) {
