@@ -20,6 +20,13 @@ layout(push_constant) uniform Push { uint push[PUSH_CULLED_WORDS]; };
 const uint MOST_INVOCATIONS = 128u;
 shared uint kept[MOST_INVOCATIONS];
 
+// As barrier(), and what invocations have read of storage buffers before it others may overwrite behind it: barrier() orders
+// shared memory only.
+void barrierOfBuffers() {
+  controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
+                 gl_SemanticsAcquireRelease);
+}
+
 uint instanceRecord(uint instance) { return push[PUSH_CULLED_INSTANCES] + instance * INSTANCE_WORDS; }
 
 void clearResult(uint record) {
@@ -80,14 +87,15 @@ void keepChosen(uint group) {
       stays = choose(candidate, place, record[INSTANCE_FLAGS]);
     }
     kept[own] = stays ? 1u : 0u;
-    barrier();
+    // All records of this stretch, and the group's count, have been read.
+    barrierOfBuffers();
     for (uint step = 1u; step < size; step *= 2u) {
       uint before = own >= step ? kept[own - step] : 0u;
       barrier();
       kept[own] += before;
       barrier();
     }
-    // All records of this stretch have been read; those that stay go to places in it, or before it.
+    // Those that stay go to places in this stretch, or before it.
     if (stays) {
       uint place = instanceRecord(first + total + kept[own] - 1u);
       for (uint word = 0u; word < INSTANCE_WORDS; ++word) tables[place + word] = record[word];
@@ -109,7 +117,8 @@ void countWorkgroups(uint dispatch, uint arguments) {
     tables[group + GROUP_WORKGROUP_END] = workgroups;
   }
   uint most = push[PUSH_CULLED_FRAME];
-  uint rows = (workgroups + most - 1u) / most;
+  // `most` may be 2³² − 1; workgroups and rows are at most 2³¹ each (Plan::State::addDispatch).
+  uint rows = workgroups / most + (workgroups % most != 0u ? 1u : 0u);
   tables[arguments] = rows == 0u ? 0u : (workgroups + rows - 1u) / rows;
   tables[arguments + 1u] = rows;
   tables[arguments + 2u] = 1u;

@@ -59,7 +59,6 @@ Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
   vulkan::SkinningSystemDescription description = budgets(character, script.count(), options);
   description.context = &context;
   description.framesInFlight = options.framesInFlight;
-  description.overflow = options.policy;
   description.measuresGpuTime = options.measuresGpuTime;
   description.tuning = context.tuning();
   Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
@@ -79,7 +78,7 @@ Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
 
 InstanceDescription Crowd::describe(const Part& part) const {
   InstanceDescription description;
-  description.method = Method::dualQuaternion;
+  description.method = method;
   description.layout = layoutOf(part);
   description.culledOnGpu = options_.culledOnGpu;
   return description;

@@ -23,7 +23,6 @@ namespace crowd {
 
 struct CrowdOptions {
   std::uint32_t framesInFlight = 3;
-  dermis::OverflowPolicy policy = dermis::OverflowPolicy::refuse;
   std::uint64_t outputBudget = 0;  ///< bytes; 0: enough for all figures
   bool culledOnGpu = false;        ///< the GPU decides which instances are visible
   bool measuresGpuTime = false;    ///< the queue has timestamps
@@ -40,6 +39,8 @@ struct CrowdFigure {
 
 class Crowd {
  public:
+  static constexpr dermis::Method method = dermis::Method::dualQuaternion;
+
   /// On a loading thread: it builds pipelines. What is passed must outlive the crowd.
   static dermis::Result<Crowd> create(dermis::samples::Device& device,
                                       dermis::vulkan::Context& context, const Character& character,

@@ -31,16 +31,6 @@ Result<std::vector<CrowdCheck::Instance>> CrowdCheck::displayedBy(const Crowd& c
     if (!output) return output.error();
     instances.push_back({std::move(each), *output});
   }
-  for (const CrowdFigure& figure : crowd.figures()) {
-    for (std::uint32_t part = 0; part < figure.instances.size(); ++part) {
-      const InstanceHandle handle = figure.instances[part];
-      const Result<InstanceOutput> output = crowd.system().output(handle);
-      if (!output) return output.error();
-      if (output->state != OutputState::bindPose) continue;
-      const ShownPose pose{References::bindPose, References::bindPose, 0};
-      instances.push_back({{handle, part, {pose}}, *output});
-    }
-  }
   return instances;
 }
 
@@ -168,7 +158,7 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
   finding.passed = true;
   for (const auto& [view, key] : {std::pair{&current, pose.current}, {&previous, pose.previous}}) {
     const Result<Comparison> comparison =
-        compare(references_.of({instance.shown.part, key}), *view, methodOf(key));
+        compare(references_.of({instance.shown.part, key}), *view, Crowd::method);
     if (!comparison) {
       finding.done = comparison.error();
       return finding;
@@ -183,7 +173,6 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
 
 void CrowdCheck::count(const Capture& capture, const Instance& instance, const Finding& finding) {
   ++totals_.instances;
-  if (instance.output.state == OutputState::bindPose) ++totals_.bindPoses;
   totals_.vertices += character_->parts()[instance.shown.part].packed.vertexCount();
   if (finding.passed) {
     totals_.worst = std::max(totals_.worst, finding.worst);

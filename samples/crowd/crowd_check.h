@@ -19,7 +19,6 @@ namespace crowd {
 struct CheckTotals {
   std::uint32_t frames = 0;
   std::uint64_t instances = 0;
-  std::uint64_t bindPoses = 0;  ///< those of them that wait for room, and show their bind pose
   std::uint64_t vertices = 0;
   std::uint64_t failures = 0;  ///< instances with a vertex outside its bound
   std::string firstFailure;    ///< a sentence

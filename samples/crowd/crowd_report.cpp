@@ -64,14 +64,15 @@ Json jsonOf(const ReportTitle& title) {
           {"meshes", title.meshes},
           {"verticesOfFigure", title.verticesOfFigure},
           {"framesInFlight", title.framesInFlight},
-          {"policy", title.policy},
           {"culledOnGpu", title.culledOnGpu}};
 }
 
 Json jsonOf(const CheckTotals& check) {
-  return {{"frames", check.frames},       {"instances", check.instances},
-          {"bindPoses", check.bindPoses}, {"vertices", check.vertices},
-          {"failures", check.failures},   {"firstFailure", check.firstFailure},
+  return {{"frames", check.frames},
+          {"instances", check.instances},
+          {"vertices", check.vertices},
+          {"failures", check.failures},
+          {"firstFailure", check.firstFailure},
           {"worst", check.worst}};
 }
 
@@ -111,7 +112,6 @@ void CrowdReport::add(const Crowd& crowd, const ShownCounts& counts) {
   };
   frame.instances = since(counts.instances, before_.instances);
   frame.outOfView = since(counts.outOfView, before_.outOfView);
-  frame.waiting = since(counts.waiting, before_.waiting);
   frame.displayed = since(counts.displayed, before_.displayed);
   before_ = counts;
   frames_.push_back(frame);
@@ -196,7 +196,6 @@ void CrowdReport::sumUp() {
     if (!skinned) continue;
     totals_.instances += frame.instances;
     totals_.outOfView += frame.outOfView;
-    totals_.waiting += frame.waiting;
     totals_.displayed += frame.displayed;
     totals_.skinned += *skinned;
   }
@@ -216,10 +215,9 @@ void CrowdReport::printTotals() const {
   }
   fmt::print(
       "instances {} of them skinned; left out: {} out of view, {} until their interval is "
-      "over, {} for want of room\n",
+      "over\n",
       share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
-      share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances),
-      share(sums.waiting, sums.instances));
+      share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
   if (sums.refusals != 0) fmt::print("refused   a figure {} times\n", sums.refusals);
   fmt::print("memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of the device in all\n",
              mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
@@ -232,9 +230,6 @@ void CrowdReport::printCheck(const CheckTotals& check) const {
       "checked   in {} frames: all {} vertices of {} instances are inside their bounds; the "
       "largest error is {:.0f} % of its bound\n",
       check.frames, check.vertices, check.instances, 100 * check.worst);
-  if (check.bindPoses != 0)
-    fmt::print("          {} of those instances waited for room, in their bind pose\n",
-               check.bindPoses);
 }
 
 std::string CrowdReport::json(const CheckTotals* check) const {
@@ -256,7 +251,6 @@ std::string CrowdReport::json(const CheckTotals* check) const {
                     {"skinned", sums.skinned},
                     {"outOfView", sums.outOfView},
                     {"withinInterval", sums.displayed - std::min(sums.displayed, sums.skinned)},
-                    {"waiting", sums.waiting},
                     {"refusals", sums.refusals},
                     {"vertices", title_.culledOnGpu ? Json() : Json(sums.vertices)},
                     {"verticesPerSecond", number(sums.verticesPerSecond)},

@@ -19,7 +19,6 @@ struct ReportTitle {
   std::size_t meshes = 0;
   std::uint64_t verticesOfFigure = 0;
   std::uint32_t framesInFlight = 0;
-  std::string policy;
   bool culledOnGpu = false;
 };
 
@@ -29,7 +28,7 @@ class CrowdReport {
 
   struct Frame {
     std::uint32_t figures = 0;
-    std::uint32_t instances = 0, outOfView = 0, waiting = 0, displayed = 0;
+    std::uint32_t instances = 0, outOfView = 0, displayed = 0;
     dermis::vulkan::FrameStatistics cpu;
     std::optional<dermis::vulkan::GpuStatistics> gpu;  ///< once it is complete
   };
@@ -63,7 +62,7 @@ class CrowdReport {
     std::optional<double> skinned, settled, vertices, nanoseconds, gpuSeconds;
   };
   struct Totals {
-    std::uint64_t instances = 0, outOfView = 0, waiting = 0, displayed = 0, skinned = 0;
+    std::uint64_t instances = 0, outOfView = 0, displayed = 0, skinned = 0;
     std::uint64_t vertices = 0;
     double cpuSeconds = 0;
     std::optional<double> verticesPerSecond;  ///< of GPU time

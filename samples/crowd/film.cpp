@@ -188,7 +188,7 @@ Result<Film::Draws> Film::drawsOf(const Crowd& crowd, std::uint64_t frame) const
       const Result<InstanceOutput> output =
           crowd.system().output(crowd.figures()[figure].instances[index]);
       if (!output) return output.error();
-      if (output->state == OutputState::none) continue;
+      if (output->size == 0) continue;
       const auto stream = [&](const OutputAttribute& attribute) -> render::VertexStream {
         return {crowd.system().outputBuffer(), attribute.offset, attribute.stride,
                 attribute.format};
@@ -247,7 +247,6 @@ PanelNumbers Film::numbersOf(const CrowdReport& report, std::uint64_t frame) con
   panel.verticesOfFigure = character_->vertexCount();
   panel.instances = numbers.instances;
   panel.outOfView = numbers.outOfView;
-  panel.waiting = numbers.waiting;
   if (skinned) {
     panel.skinned = *skinned;
     panel.notDue = numbers.displayed - std::min(numbers.displayed, *skinned);

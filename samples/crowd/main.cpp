@@ -116,7 +116,6 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
   title.meshes = character.parts().size();
   title.verticesOfFigure = character.vertexCount();
   title.framesInFlight = options.crowd.framesInFlight;
-  title.policy = options.policy;
   title.culledOnGpu = options.crowd.culledOnGpu;
   return std::make_unique<Show>(Show{std::move(*crowd), ShownPoses(character),
                                      CrowdCheck(*open.device, character),

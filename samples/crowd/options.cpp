@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <map>
 
 #include "frame_name.h"
 #include "picture_writer.h"
@@ -16,13 +15,6 @@ namespace {
 
 constexpr std::uint32_t mostFigures = 100'000, mostFrames = 1'000'000, mostFramesInFlight = 16;
 constexpr std::uint32_t mostMebibytes = 1u << 20;
-
-const std::map<std::string, OverflowPolicy>& policies() {
-  static const std::map<std::string, OverflowPolicy> names{{"refuse", OverflowPolicy::refuse},
-                                                           {"keep", OverflowPolicy::keepLast},
-                                                           {"bind", OverflowPolicy::bindPose}};
-  return names;
-}
 
 constexpr std::uint32_t smallestSide = 64, largestSide = 16384;
 constexpr double mostFramesPerSecond = 240, latestStart = 1e6;
@@ -84,12 +76,8 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   app.add_option("--frames-in-flight", options.crowd.framesInFlight,
                  "Frames that the CPU is ahead of the GPU [3]")
       ->check(CLI::Range(1u, mostFramesInFlight));
-  app.add_option(
-         "--policy", options.policy,
-         "What becomes of figures without room in the output: refuse, keep or bind [refuse]")
-      ->check(CLI::IsMember(policies()));
   app.add_option("--output-budget", outputMebibytes,
-                 "MiB of skinned vertices [enough for all figures]")
+                 "MiB of skinned vertices; figures without room come later [enough for all]")
       ->check(CLI::Range(1u, mostMebibytes));
   app.add_option("--json", options.json, "Write the same numbers to a file");
   app.add_option("--check-every", options.checkInterval,
@@ -110,7 +98,6 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
     if (isOnePicture) options.frames = 1;
   }
   options.verifies = !skipsVerification;
-  options.crowd.policy = policies().at(options.policy);
   options.crowd.outputBudget = std::uint64_t{outputMebibytes} << 20;
   return std::nullopt;
 }

@@ -22,7 +22,6 @@ struct Options {
   std::uint32_t frames = 120;
   std::string model = DERMIS_SAMPLE_FIGURE;
   std::string device = "auto";
-  std::string policy = "refuse";
   std::string json;
   CrowdOptions crowd;
   FilmRequest film;

@@ -3,24 +3,17 @@
 #include <utility>
 #include <vector>
 
+#include "crowd.h"
 #include "in_parallel.h"
 
 using namespace dermis;
 
 namespace crowd {
 
-Method methodOf(PoseKey pose) {
-  return pose == References::bindPose ? Method::linear : Method::dualQuaternion;
-}
-
 Result<reference::SkinnedMesh> References::skin(const ReferenceKey& key) const {
   const Part& part = character_->parts()[key.part];
-  const MeshView mesh = part.primitive.mesh();
-  const std::vector<JointMatrix> rest(character_->jointCounts()[part.skin]);
-  const bool isBindPose = key.pose == bindPose;
-  return reference::skin(
-      mesh, isBindPose ? std::span<const JointMatrix>(rest) : character_->pose(key.pose, part.skin),
-      methodOf(key.pose));
+  return reference::skin(part.primitive.mesh(), character_->pose(key.pose, part.skin),
+                         Crowd::method);
 }
 
 Result<void> References::prepare(std::span<const ReferenceKey> keys) {

@@ -25,11 +25,8 @@ class References {
 
   /// Finds what is missing of them, on all cores.
   dermis::Result<void> prepare(std::span<const ReferenceKey> keys);
-  /// Of a key that has been prepared. For `bindPose`, of the mesh as it is.
+  /// Of a key that has been prepared.
   const dermis::reference::SkinnedMesh& of(const ReferenceKey& key) const;
-
-  /// The pose of instances that have no room of their own: the identity in every joint.
-  static constexpr PoseKey bindPose{0xffffffffu, 0};
 
  private:
   dermis::Result<dermis::reference::SkinnedMesh> skin(const ReferenceKey& key) const;
@@ -37,8 +34,5 @@ class References {
   const Character* character_;
   std::map<ReferenceKey, std::unique_ptr<dermis::reference::SkinnedMesh>> kept_;
 };
-
-/// What the skin kernel was asked to do.
-dermis::Method methodOf(PoseKey pose);
 
 }  // namespace crowd

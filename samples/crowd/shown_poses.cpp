@@ -37,13 +37,9 @@ void ShownPoses::followInstance(const Crowd& crowd, const FigureFrame& now, Entr
     entry.intervalSince = frame;
   }
   entry.restarts |= now.teleports;
-  if (!entry.hasOutput) {
-    const Result<InstanceOutput> output = crowd.system().output(entry.handle);
-    entry.hasOutput = output && output->state == OutputState::own;
-  }
-  if (!now.isInView || !entry.hasOutput) {
+  if (!now.isInView) {
     entry.isDisplayed = false;
-    ++(now.isInView ? counts_.waiting : counts_.outOfView);
+    ++counts_.outOfView;
     return;
   }
   ++counts_.displayed;

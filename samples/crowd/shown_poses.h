@@ -32,7 +32,6 @@ struct ShownCounts {
   std::uint64_t instances = 0;
   std::uint64_t displayed = 0;
   std::uint64_t outOfView = 0;
-  std::uint64_t waiting = 0;  ///< in view, but without room in the output
 };
 
 class ShownPoses {
@@ -52,7 +51,6 @@ class ShownPoses {
   struct Entry {
     dermis::InstanceHandle handle;
     std::vector<ShownPose> poses;
-    bool hasOutput = false;
     bool isDisplayed = false;
     bool restarts = false;  ///< it has teleported since it was skinned
     std::uint32_t interval = 0;

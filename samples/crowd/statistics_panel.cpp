@@ -17,8 +17,7 @@ namespace {
 using Color = std::array<std::uint8_t, 3>;
 
 constexpr Color ground{15, 18, 23}, white{244, 246, 248}, grey{158, 168, 180};
-constexpr Color skinnedColor{255, 176, 59}, notDueColor{88, 166, 214}, outOfViewColor{82, 91, 104},
-    waitingColor{214, 84, 84};
+constexpr Color skinnedColor{255, 176, 59}, notDueColor{88, 166, 214}, outOfViewColor{82, 91, 104};
 
 /// A rectangle between whole pixels.
 struct Area {
@@ -72,8 +71,6 @@ std::vector<Row> rowsOf(const PanelNumbers& numbers) {
   std::vector<Row> rows{{"skinned", orDash(numbers.skinned), skinnedColor},
                         {"not due yet", orDash(numbers.notDue), notDueColor},
                         {"out of view", grouped(numbers.outOfView), outOfViewColor}};
-  if (numbers.waiting != 0)
-    rows.push_back({"wait for room", grouped(numbers.waiting), waitingColor});
   rows.push_back({"vertices skinned", orDash(numbers.vertices), {}});
   rows.push_back({"dispatches", grouped(numbers.dispatches), {}});
   rows.push_back({"CPU, plan and record", duration(numbers.cpuSeconds), {}});
@@ -95,7 +92,6 @@ void drawBar(Picture& picture, const Area& area, const PanelNumbers& numbers) {
   };
   part(numbers.skinned.value_or(0), skinnedColor);
   part(numbers.notDue.value_or(0), notDueColor);
-  part(numbers.waiting, waitingColor);
 }
 
 /// A column of text: where the next line stands.

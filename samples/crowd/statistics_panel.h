@@ -18,7 +18,7 @@ struct PanelNumbers {
   std::uint64_t figures = 0, verticesOfFigure = 0, instances = 0;
   /// Of the instances. Nothing: the GPU chose, and nobody tells.
   std::optional<std::uint64_t> skinned, notDue;
-  std::uint64_t outOfView = 0, waiting = 0;
+  std::uint64_t outOfView = 0;
   std::optional<std::uint64_t> vertices;  ///< skinned
   std::uint64_t dispatches = 0;
   double cpuSeconds = 0;             ///< of planning and recording

@@ -204,6 +204,36 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
   full.submit();
 }
 
+// Whatever another palette has left in its memory, and whether or not the frame in which it was
+// added had anything else to do.
+TEST_F(SystemHandlesTest, APaletteRestsInTheIdentityUntilItIsWritten) {
+  SkinningSystemDescription small = description();
+  small.jointBudget = 8;
+  for (const bool hasWork : {false, true}) {
+    SingleInstance one(device(), small, plainLayout());
+    one.engine.submit();
+    for (std::uint32_t frame = 0; frame < small.framesInFlight; ++frame) {
+      one.engine.begin();
+      one.engine.writePose(one.description.palette, systemPose(3 + frame));
+      one.engine.submit();
+    }
+    one.engine.begin();
+    must(one.engine->removeInstance(one.instance));
+    must(one.engine->removePalette(one.description.palette));
+    one.engine.submit();
+    one.engine.begin();
+    one.description.palette = must(one.engine->addPalette(8));
+    if (!hasWork) {
+      one.engine.submit();
+      EXPECT_EQ(one.engine.lastFrame().dispatches, 0u);
+      one.engine.begin();
+    }
+    one.instance = one.engine.addInstance(one.description);
+    one.engine.submit();
+    expectSkinned(one.engine.read(one.instance), alone(one.packed, Pose(8), one.description));
+  }
+}
+
 TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
   SkinningSystemDescription small = description();
   small.instanceBudget = 3;
@@ -275,6 +305,12 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
   SkinningSystemDescription large = description();
   large.meshBudget = context().limits().maxStorageBufferRange + 4096;
   expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  // Sizes that no integer holds.
+  large.meshBudget = std::numeric_limits<std::uint64_t>::max();
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  large = description();
+  large.framesInFlight = large.jointBudget = std::numeric_limits<std::uint32_t>::max();
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "framesInFlight");
 }
 
 TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {

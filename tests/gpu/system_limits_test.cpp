@@ -171,6 +171,40 @@ TEST_F(SystemLimitsTest, WorkgroupsAreFoldedWhereADimensionIsShort) {
   expectCrowd(engine);
 }
 
+// So few that rows are folded, and what drivers say that have no limit.
+TEST_F(SystemLimitsTest, CullingOnTheGpuCountsWorkgroupsOnEveryDevice) {
+  for (const std::uint32_t most : {13u, 0xffffffffu}) {
+    SCOPED_TRACE(most);
+    InterceptedDevice patched(device().description());
+    patched.changeLimits([=](VkPhysicalDeviceLimits& limits) {
+      limits.maxComputeWorkGroupCount[0] = limits.maxComputeWorkGroupCount[1] = most;
+    });
+    vulkan::Context patchedContext = must(vulkan::Context::create(patched.description()));
+    vulkan::SkinningSystemDescription system = description();
+    system.context = &patchedContext;
+    system.tuning = Tuning{32, 1};
+    SystemEngine engine(device(), system);
+    engine.begin();
+    InstanceDescription instance;
+    instance.layout = plainLayout();
+    instance.culledOnGpu = true;
+    instance.mesh = engine.addMesh(meshes_[1]);
+    instance.palette = engine.addPalette(systemPose(1));
+    std::vector<InstanceHandle> instances;
+    for (int i = 0; i < 20; ++i) instances.push_back(engine.addInstance(instance));
+    const samples::MappedBuffer words = must(samples::MappedBuffer::create(
+        device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    std::ranges::fill(words.bytes(), std::byte{1});
+    engine.submit({words.handle(), 0});
+    const std::vector<std::byte> bytes = engine.readOutput();
+    const Streams expected = alone(meshes_[1], systemPose(1), instance);
+    for (const InstanceHandle handle : instances)
+      expectSkinned(engine.read(bytes, handle), expected);
+    engine.begin();
+    EXPECT_EQ(engine->statistics().lastCompletedFrame.workgroups, 3u * instances.size());
+  }
+}
+
 TEST_F(SystemLimitsTest, FourStorageBuffersAreEnough) {
   for (const bool pushDescriptors : {true, false}) {
     useDevice(pushDescriptors);

@@ -37,11 +37,12 @@ void SystemModel::beginFrame() {
 }
 
 void SystemModel::checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed) {
-  const bool hasPlace = output.state == OutputState::own || output.state == OutputState::last;
+  const bool hasPlace = output.size != 0;
   const bool hadPlace = instance.hasPlace();
   const bool stays = hasPlace && hadPlace && output.offset == instance.output.offset &&
                      output.size == instance.output.size;
-  EXPECT_TRUE(isListed || stays || !hadPlace || !hasPlace) << "it moved";
+  EXPECT_TRUE(hasPlace || !hadPlace) << "it lost its place";
+  EXPECT_TRUE(isListed || stays || !hadPlace) << "it moved";
   EXPECT_FALSE(isListed && stays) << "it did not move";
   // Where another stood that a frame under way may still read.
   for (const Place& place : locked_) {
@@ -108,16 +109,10 @@ void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists&
 
 void SystemModel::updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
   EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
-  if (instance.output.state == OutputState::own) {
-    const bool isSettled = lists.settled.contains(instance.handle.index);
-    EXPECT_FALSE(isSettled && !instance.isMoving) << "it did not move";
-    if (isSettled) instance.before = instance.shown;
-    if (isPlaced) instance.shown = instance.before = std::nullopt;
-  } else {
-    // Whether the last result of an old mesh settles is not said.
-    if (instance.output.state != OutputState::last) instance.shown = std::nullopt;
-    instance.before = std::nullopt;
-  }
+  const bool isSettled = lists.settled.contains(instance.handle.index);
+  EXPECT_FALSE(isSettled && !instance.isMoving) << "it did not move";
+  if (isSettled) instance.before = instance.shown;
+  if (isPlaced) instance.shown = instance.before = std::nullopt;
   instance.isMoving = false;
   instance.wasDisplayed = false;
 }
@@ -125,16 +120,14 @@ void SystemModel::updateHidden(ModelInstance& instance, bool isPlaced, const Lis
 void SystemModel::update(ModelInstance& instance, Lists& lists) {
   const InstanceOutput output = must(engine_->output(instance.handle));
   checkPlace(instance, output, lists.moved.contains(instance.handle.index));
-  const bool isOwn = output.state == OutputState::own;
-  const bool isPlaced = isOwn && output.mesh == instance.description.mesh &&
-                        (instance.output.state != OutputState::own || instance.changesMesh);
+  // Out of view it has the place and the vertices of its old mesh until somebody looks.
+  const bool isWanted = output.size != 0 && output.mesh == instance.description.mesh;
+  const bool isPlaced = isWanted && instance.changesMesh;
   if (instance.hasPlace() && output.offset != instance.output.offset) lock(instance.output);
   instance.output = output;
-  // Out of view it has the place and the vertices of its old mesh until somebody looks.
-  const bool isWanted = output.mesh == instance.description.mesh;
-  if (isOwn && isWanted) instance.changesMesh = false;
-  EXPECT_TRUE(!isOwn || isWanted || !instance.isVisible);
-  if (isOwn && instance.isDisplayed()) {
+  if (isWanted) instance.changesMesh = false;
+  EXPECT_TRUE(isWanted || !instance.isVisible);
+  if (instance.isDisplayed()) {
     updateDisplayed(instance, isPlaced, lists);
   } else {
     updateHidden(instance, isPlaced, lists);
@@ -148,16 +141,11 @@ void SystemModel::checkStatistics(const Lists& lists) const {
   EXPECT_EQ(frame.instances, instances.size());
   EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());
   EXPECT_EQ(frame.settledInstances, lists.settled.size());
-  std::uint64_t vertices = 0, waiting = 0, waitingInView = 0;
+  std::uint64_t vertices = 0;
   for (const ModelInstance& instance : instances) {
     if (lists.skinned.contains(instance.handle.index)) vertices += instance.vertexCount;
-    waiting += instance.output.state != OutputState::own;
-    waitingInView += instance.output.state != OutputState::own && instance.isVisible;
   }
-  EXPECT_GE(frame.skinnedVertices, vertices) << "bind poses are skinned besides";
-  // What has never been in view may have room all the same.
-  EXPECT_LE(frame.waitingInstances, waiting);
-  EXPECT_GE(frame.waitingInstances, waitingInView);
+  EXPECT_EQ(frame.skinnedVertices, vertices);
   const bool didNothing =
       lists.skinned.empty() && lists.settled.empty() && frame.culledCandidates == 0;
   EXPECT_TRUE(!didNothing || frame.copies != 0 || frame.dispatches == 0) << "nothing changed";

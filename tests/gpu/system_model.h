@@ -46,9 +46,7 @@ struct ModelInstance {
   bool isMoving = false;  ///< its previous positions were not its positions
   std::optional<ShownPose> shown, before;
 
-  bool hasPlace() const {
-    return output.state == OutputState::own || output.state == OutputState::last;
-  }
+  bool hasPlace() const { return output.size != 0; }
   bool isDisplayed() const { return isVisible && (!description.culledOnGpu || isShownByGpu); }
 };
 

@@ -179,7 +179,7 @@ Streams SystemEngine::read(std::span<const std::byte> bytes, InstanceHandle inst
   const InstanceOutput output = must(system_.output(instance));
   const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
   Streams streams;
-  if (output.state == OutputState::none) return streams;
+  if (output.size == 0) return streams;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     streams[stream] = readAttribute(bytes, attributes[stream], vertexCount(output.mesh));
   return streams;

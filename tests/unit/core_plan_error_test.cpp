@@ -522,6 +522,25 @@ TEST_F(PlanErrors, TooManyWorkgroups) {
   expectGood();
 }
 
+// However many the device can count, kernels count in 32 bits, and round up.
+TEST_F(PlanErrors, MoreWorkgroupsThanKernelsCount) {
+  limits.maxStorageBufferRange = 0xfffffffc;
+  limits.maxWorkgroupCountX = limits.maxWorkgroupCountY = 0xffffffff;
+  tuning = {8, 1};
+  batch.outputSize = limits.maxStorageBufferRange;
+  batch.jobs.resize(1);
+  Job& first = batch.jobs[0];
+  first.mesh.vertexCount = 1u << 28;
+  first.positions.offset = 0;
+  first.positions.stride = 12;
+  first.normals = {};
+  const Job large = first;  // 2^25 workgroups
+  batch.jobs.assign(64, large);
+  expectGood();
+  batch.jobs.push_back(large);
+  expectRefused(ErrorCode::limitExceeded, {"workgroups", "2181038080"});
+}
+
 TEST_F(PlanErrors, BuffersLargerThanARange) {
   batch.addMesh(meshOf(30, 1, 1, true));
   limits.maxStorageBufferRange = batch.meshesSize;

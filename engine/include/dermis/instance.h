@@ -11,16 +11,6 @@
 
 namespace dermis {
 
-/// What happens to an instance for whose vertices there is no room in the output.
-enum class OverflowPolicy : std::uint8_t {
-  refuse,    ///< `addInstance` and `setMesh` fail with `limitExceeded`; nothing changes.
-  keepLast,  ///< It waits for room. Until then it keeps what it had: a new instance nothing, one
-             ///< whose mesh is changed the last result of its old mesh.
-  bindPose,  ///< It waits for room. Until then its output is the bind pose of its mesh, which all
-             ///< that wait share. Room for the bind pose is taken with the first instance of a mesh
-             ///< and layout; where there is none, adding fails.
-};
-
 enum class Arrangement : std::uint8_t {
   interleaved,  ///< vertex after vertex: positions, normals, tangents, previous positions
   planar,       ///< attribute after attribute, each beginning at a multiple of 16 bytes
@@ -59,21 +49,13 @@ struct InstanceDescription {
   bool culledOnGpu = false;
 };
 
-/// Where an instance's vertices are.
-enum class OutputState : std::uint8_t {
-  none,      ///< nowhere: it waits for room
-  own,       ///< its own, skinned by every `record` in which something changed
-  last,      ///< its own, as it was last skinned: it waits for room for another mesh
-  bindPose,  ///< the bind pose of its mesh, shared
-};
-
 /// Where the vertices of an instance stand in `SkinningSystem::outputBuffer`.
 struct InstanceOutput {
-  OutputState state = OutputState::none;
-  MeshHandle mesh;           ///< whose vertices they are
+  MeshHandle mesh;  ///< whose vertices they are: out of view, those of the mesh that it was
+                    ///< last skinned with
   std::uint64_t offset = 0;  ///< bytes; interleaved: a multiple of the stride, so that
                              ///< `firstVertex` may say it as well as the offset of a vertex buffer
-  std::uint64_t size = 0;
+  std::uint64_t size = 0;    ///< 0: there are none yet
   /// Offsets count from the beginning of the buffer.
   OutputAttribute positions, normals, tangents, previousPositions;
 };

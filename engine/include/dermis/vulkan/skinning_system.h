@@ -45,7 +45,6 @@ struct SkinningSystemDescription {
   std::uint32_t jointBudget = 65536;                     ///< joints of all palettes together
   std::uint64_t outputBudget = std::uint64_t{64} << 20;  ///< bytes of skinned vertices; may be more
                                                          ///< than a storage buffer range
-  OverflowPolicy overflow = OverflowPolicy::refuse;
   std::uint32_t instanceBudget = 65536;  ///< instances that there may be at one time
   std::uint32_t boundsBudget = 16384;    ///< those of them with bounds, or positions in snorm16; 32
                                          ///< bytes each
@@ -80,7 +79,6 @@ struct StoreStatistics {
 struct FrameStatistics {
   std::uint64_t frame = 0;
   std::uint32_t instances = 0;         ///< that there are
-  std::uint32_t waitingInstances = 0;  ///< for room in the output
   std::uint32_t skinnedInstances = 0;  ///< without those culled on the GPU
   std::uint32_t settledInstances = 0;  ///< those of which only previous positions were written
   std::uint32_t convertedPalettes = 0;
@@ -147,7 +145,8 @@ class SkinningSystem {
 
   /// Skinned for the first time by the next `record`. Fails with `invalidArgument` where the
   /// description breaks a rule of `Job`, with `missingFeature` or `limitExceeded` as `makePlan`
-  /// does, and with `limitExceeded` where the policy says so.
+  /// does, and with `limitExceeded` if a budget has no room for it; nothing changes then. `compact`
+  /// may make room in the output.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
 
@@ -180,7 +179,8 @@ class SkinningSystem {
   Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
   /// The same instance with another mesh (a level of detail): its output moves, its motion
   /// restarts. Its morph weights stay where both meshes have as many targets; otherwise they are
-  /// gone.
+  /// gone. The old output stays until frames in flight are complete, so there must be room for
+  /// both: if not, it fails with `limitExceeded`, and the instance keeps its mesh.
   Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
 
   /// Moves outputs from the end of the output buffer into gaps before them, at most so many bytes,
@@ -205,6 +205,7 @@ class SkinningSystem {
 
   /// One buffer for all outputs; the same for as long as the system lives.
   VkBuffer outputBuffer() const;
+  /// Before the first `record` that displays the instance its size is 0.
   Result<InstanceOutput> output(InstanceHandle instance) const;
 
   /// What was skinned, in no order: vertices, bounds, and whatever was built from them is new.

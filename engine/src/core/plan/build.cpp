@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <string>
 #include <tuple>
@@ -12,6 +11,9 @@
 
 namespace dermis {
 namespace {
+
+/// Kernels number workgroups in 32 bits, with those that fill the last row: up to twice as many.
+constexpr std::uint64_t maxWorkgroups = std::uint64_t{1} << 31;
 
 std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
   return (value + divisor - 1) / divisor;
@@ -99,9 +101,8 @@ Result<void> Plan::State::gatherPieces(const Batch& batch, const Tuning& tuning)
 
 Result<void> Plan::State::addDispatch(const Variant& variant, std::uint64_t workgroups,
                                       const DispatchConstants& constants) {
-  if (workgroups >
-      std::min<std::uint64_t>(std::uint64_t{limits.maxWorkgroupCountX} * limits.maxWorkgroupCountY,
-                              std::numeric_limits<std::uint32_t>::max())) {
+  if (workgroups > std::min(std::uint64_t{limits.maxWorkgroupCountX} * limits.maxWorkgroupCountY,
+                            maxWorkgroups)) {
     return Error{ErrorCode::limitExceeded,
                  "the batch needs " + std::to_string(workgroups) +
                      " workgroups in one dispatch, more than the device can count; split it"};

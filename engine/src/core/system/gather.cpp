@@ -96,7 +96,7 @@ void Scene::gatherPending() {
     const InstanceHandle handle = pending_[entry];
     SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr) continue;
-    if (!instance->isStale || !instance->isVisible || !instance->target) {
+    if (!instance->isStale || !instance->isVisible) {
       instance->isListed = false;
       continue;
     }
@@ -111,16 +111,11 @@ void Scene::gatherPending() {
 void Scene::gatherSettling() {
   for (const InstanceHandle handle : movedLast_) {
     const SceneInstance* instance = instances_.find(handle);
-    if (instance == nullptr || instance->plannedIn == planNumber_ || !instance->shown) continue;
-    const bool hasPlace = instance->target && instance->shown->mesh == instance->target->mesh;
-    if (!hasPlace && instance->lastRuns.empty()) continue;
+    if (instance == nullptr || instance->plannedIn == planNumber_) continue;
+    // Out of view it may have another mesh, in which it has not been skinned.
+    if (instance->shown->mesh != instance->target.mesh) continue;
     settling_.push_back(handle.index);
-    if (hasPlace) {
-      addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
-    } else {
-      for (const PlacedRun& run : instance->lastRuns)
-        builder_.add(run, 0, abi::INSTANCE_SETTLES, nullptr);
-    }
+    addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
 }
 
@@ -128,7 +123,7 @@ void Scene::gatherSettling() {
 void Scene::gatherCulled() {
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
-    if (!instance.target || !instance.isVisible) continue;
+    if (!instance.isVisible) continue;
     if (instance.version == 0 || (instance.isStale && isDue(instance))) {
       instance.version = ++nextVersion_;
       if (instance.restartsMotion) instance.restartVersion = instance.version;
@@ -146,11 +141,11 @@ void Scene::gatherCulled() {
 void Scene::gatherMoves() {
   for (const InstanceHandle handle : shifting_) {
     const SceneInstance* instance = instances_.find(handle);
-    if (instance == nullptr || !instance->target || !instance->shown ||
-        instance->shown->mesh != instance->target->mesh || instance->shown == instance->target)
+    if (instance == nullptr || !instance->shown || instance->shown->mesh != instance->target.mesh ||
+        instance->shown == instance->target)
       continue;
-    moves_.push_back({instance->shown->bytes.offset, instance->target->bytes.offset,
-                      instance->target->bytes.size});
+    moves_.push_back({instance->shown->bytes.offset, instance->target.bytes.offset,
+                      instance->target.bytes.size});
   }
 }
 
@@ -169,7 +164,6 @@ Result<void> Scene::plan() {
   builder_.begin({description_.meshBudget, description_.matricesSize(), description_.palettesSize(),
                   description_.resultsSize(), outputs});
   gatherPoses();
-  placeWaiting();
   gatherMoves();
   gatherPending();
   gatherSettling();
@@ -181,14 +175,14 @@ Result<void> Scene::plan() {
 
 /// Whether `target` has now been recorded, and so is shown.
 bool Scene::commitShift(SceneInstance& instance, InstanceHandle handle) {
-  if (!instance.target) return true;  // waiting; listed again when it is placed
-  const bool isMove = instance.shown && instance.shown->mesh == instance.target->mesh;
+  const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
-  const bool moves = instance.shown && instance.shown != instance.target;
-  if (moves) retire(Retired::Store::output, instance.shown->bytes);
-  if ((moves && !instance.isInternal) || instance.showsBindPose) moved_.push_back(handle);
-  instance.showsBindPose = false;
+  if (instance.shown && instance.shown != instance.target) {
+    retire(Retired::Store::output, instance.shown->bytes);
+    moved_.push_back(handle);
+  }
   instance.shown = instance.target;
+  instance.isShifting = false;
   return true;
 }
 
@@ -200,7 +194,6 @@ void Scene::commit() {
   settled_.clear();
   moved_.clear();
   movedLast_.clear();
-  fresh_.clear();
   for (const Conversion& conversion : conversions_) {
     ScenePalette& palette = palettes_.at(conversion.palette);
     palette.forms[conversion.form].version = palette.version;
@@ -211,14 +204,11 @@ void Scene::commit() {
     instance.isStale = instance.isListed = instance.isUrgent = instance.restartsMotion = false;
     if (instance.firstFrame == 0) instance.firstFrame = frame_;
     if (instance.willMove) movedLast_.push_back(handle);
-    if (!instance.isInternal) skinned_.push_back(handle);
+    skinned_.push_back(handle);
   }
   std::erase_if(pending_,
                 [this](InstanceHandle handle) { return !instances_.at(handle.index).isStale; });
-  for (const std::uint32_t index : settling_) {
-    releaseLastRuns(instances_.at(index));
-    if (!instances_.at(index).isInternal) settled_.push_back(instances_.handleOf(index));
-  }
+  for (const std::uint32_t index : settling_) settled_.push_back(instances_.handleOf(index));
   for (const std::uint32_t index : versioned_) {
     SceneInstance& instance = instances_.at(index);
     instance.isStale = instance.isUrgent = instance.restartsMotion = false;

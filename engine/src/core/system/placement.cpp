@@ -97,20 +97,24 @@ Result<void> Scene::reserveUnits(const SceneInstance& instance) {
                    std::to_string(unitStore_.largestFree() * unitBytes) + " are free in one piece"};
 }
 
-Result<bool> Scene::findRoom(SceneInstance& instance) {
+/// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
+Result<void> Scene::findRoom(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
   const std::optional<Range> bytes = outputStore_.allocate(laidOut->size, laidOut->alignment);
-  if (!bytes) return false;
-  instance.target = Place{*bytes, instance.mesh, mesh.info.vertexCount};
-  instance.vertexCount = mesh.info.vertexCount;
-  if (Result<void> good = makeRuns(instance); !good) {
-    outputStore_.free(*bytes);
-    instance.target.reset();
-    return good.error();
+  if (!bytes) {
+    return Error{ErrorCode::limitExceeded,
+                 "the instance takes " + std::to_string(laidOut->size) + " bytes of output, of " +
+                     std::to_string(outputStore_.capacity()) + " in the budget " +
+                     std::to_string(outputStore_.capacity() - outputStore_.used()) + " are free, " +
+                     std::to_string(outputStore_.largestFree()) + " in one piece"};
   }
-  return true;
+  instance.target = {*bytes, instance.mesh, mesh.info.vertexCount};
+  instance.vertexCount = mesh.info.vertexCount;
+  Result<void> made = makeRuns(instance);
+  if (!made) outputStore_.free(*bytes);
+  return made;
 }
 
 Result<void> Scene::makeRuns(SceneInstance& instance) {
@@ -118,7 +122,7 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
   const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
   const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
-  const Job job = jobOf(instance, mesh, *laidOut, instance.target->bytes.offset);
+  const Job job = jobOf(instance, mesh, *laidOut, instance.target.bytes.offset);
   const OutputStreams streams = outputStreams(job);
   Variant variant = outputVariant(job);
   variant.morphs = !instance.extras.morphs.empty();
@@ -174,17 +178,10 @@ void Scene::releaseRuns(SceneInstance& instance) {
   instance.furtherRuns.clear();
 }
 
-void Scene::releaseLastRuns(SceneInstance& instance) {
-  for (const PlacedRun& run : instance.lastRuns) groups_.release(run.group);
-  instance.lastRuns.clear();
-}
-
-/// What was recorded there is still drawn from.
-void Scene::retireTarget(SceneInstance& instance) {
-  if (!instance.target) return;
+/// What was recorded is still drawn from, and stays `shown`; what never was is free at once.
+void Scene::releaseTarget(SceneInstance& instance) {
   releaseRuns(instance);
-  if (instance.shown != instance.target) retire(Retired::Store::output, instance.target->bytes);
-  instance.target.reset();
+  if (instance.shown != instance.target) outputStore_.free(instance.target.bytes);
 }
 
 void Scene::link(std::uint32_t index) {
@@ -209,81 +206,6 @@ void Scene::unlink(std::uint32_t index) {
   if (instance.nextOfPalette != notUsed)
     instances_.at(instance.nextOfPalette).previousOfPalette = instance.previousOfPalette;
   --palette.users;
-}
-
-Error Scene::noRoomFor(const SceneInstance& instance) const {
-  const Result<LaidOutVertices> laidOut =
-      layOut(instance.layout, meshes_.at(instance.mesh.index).info.vertexCount);
-  return {ErrorCode::limitExceeded,
-          "the instance takes " + std::to_string(laidOut->size) + " bytes of output, of " +
-              std::to_string(outputStore_.capacity()) + " in the budget " +
-              std::to_string(outputStore_.capacity() - outputStore_.used()) + " are free, " +
-              std::to_string(outputStore_.largestFree()) + " in one piece"};
-}
-
-Result<InstanceHandle> Scene::insert(const InstanceDescription& description, bool isInternal) {
-  SceneInstance instance;
-  instance.palette = description.palette.index;
-  instance.updateInterval = description.updateInterval;
-  instance.method = description.method;
-  instance.isCulled = description.culledOnGpu;
-  instance.hasMotion = description.layout.previousPositions;
-  instance.isInternal = isInternal;
-  instance.mesh = description.mesh;
-  instance.paletteHandle = description.palette;
-  instance.layout = description.layout;
-  instance.box = description.box;
-  instance.bounds = description.bounds;
-  if (Result<void> good = check(instance); !good) return good.error();
-  if (instances_.capacity() >= description_.instanceBudget && !instances_.hasHole()) {
-    return Error{ErrorCode::limitExceeded, "there are as many instances as the budget has, " +
-                                               std::to_string(description_.instanceBudget)};
-  }
-  if (Result<void> good = reserveUnits(instance); !good) return good.error();
-  if (description_.overflow == OverflowPolicy::bindPose && !isInternal) {
-    Result<InstanceHandle> bindPose = acquireBindPose(instance);
-    if (!bindPose) return bindPose.error();
-    instance.bindPose = *bindPose;
-  }
-  instance.extras.box = instance.box;
-  instance.extras.hasBox = isSnormPosition(instance.layout.positions);
-  Result<void> taken = takeResult(instance);
-  Result<bool> found = taken ? findRoom(instance) : Result<bool>(taken.error());
-  if (found && !*found && (isInternal || description_.overflow == OverflowPolicy::refuse))
-    found = noRoomFor(instance);
-  if (!found) {
-    if (instance.extras.result != notUsed) freeResults_.push_back(instance.extras.result);
-    releaseBindPose(instance.bindPose);
-    return found.error();
-  }
-
-  ++meshes_.at(instance.mesh.index).users;
-  const InstanceHandle handle = instances_.add(std::move(instance));
-  SceneInstance& added = instances_.at(handle.index);
-  link(handle.index);
-  if (added.isCulled) {
-    added.owner = ++nextOwner_;
-    added.culledIndex = static_cast<std::uint32_t>(culled_.size());
-    culled_.push_back(handle.index);
-  }
-  added.showsBindPose = !added.target && added.bindPose;
-  (added.target ? shifting_ : waiting_).push_back(handle);
-  makeStale(handle.index);
-  return handle;
-}
-
-void Scene::placeWaiting() {
-  if (!outputWasFreed_ || waiting_.empty()) return;
-  outputWasFreed_ = false;
-  std::erase_if(waiting_, [this](InstanceHandle handle) {
-    SceneInstance& instance = instances_.at(handle.index);
-    const Result<bool> found = findRoom(instance);
-    if (!found || !*found) return false;
-    shifting_.push_back(handle);
-    instance.isUrgent = true;
-    makePending(handle.index);
-    return true;
-  });
 }
 
 }  // namespace dermis

@@ -70,9 +70,7 @@ Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale)
   palette.jointCount = jointCount;
   palette.mayScale = mayScale;
   palette.joints = *joints;
-  const PaletteHandle handle = palettes_.add(palette);
-  fresh_.push_back(handle);
-  return handle;
+  return palettes_.add(palette);
 }
 
 Result<void> Scene::removePalette(PaletteHandle handle) {
@@ -130,9 +128,7 @@ void Scene::free(const Retired& retired) {
     case Retired::Store::units:
       return unitStore_.free(retired.range);
     case Retired::Store::output:
-      outputStore_.free(retired.range);
-      outputWasFreed_ = true;
-      return;
+      return outputStore_.free(retired.range);
   }
 }
 
@@ -170,7 +166,7 @@ void Scene::makeStale(std::uint32_t index) {
 
 void Scene::makePending(std::uint32_t index) {
   SceneInstance& instance = instances_.at(index);
-  if (instance.isListed || !instance.isVisible || !instance.target || instance.isCulled) return;
+  if (instance.isListed || !instance.isVisible || instance.isCulled) return;
   instance.isListed = true;
   pending_.push_back(instances_.handleOf(index));
 }
@@ -228,7 +224,7 @@ Result<void> Scene::setMorphWeights(InstanceHandle handle, std::span<const Morph
   std::sort(active.begin(), active.end(),
             [](const MorphWeight& a, const MorphWeight& b) { return a.target < b.target; });
   // With and without are two kernels.
-  if (hadMorphs == active.empty() && instance->target) {
+  if (hadMorphs == active.empty()) {
     releaseRuns(*instance);
     if (Result<void> good = makeRuns(*instance); !good) return good;
   }
@@ -238,8 +234,7 @@ Result<void> Scene::setMorphWeights(InstanceHandle handle, std::span<const Morph
 
 Scene::Counts Scene::counts() const {
   Counts counts;
-  counts.instances = instances_.size() - internalInstances_;
-  counts.waiting = static_cast<std::uint32_t>(waiting_.size());
+  counts.instances = instances_.size();
   counts.skinned = static_cast<std::uint32_t>(skinned_.size());
   counts.settled = static_cast<std::uint32_t>(settled_.size());
   counts.palettes = builder_.paletteCount();

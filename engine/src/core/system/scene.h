@@ -27,7 +27,6 @@ struct SceneDescription {
   std::uint64_t outputBudget = 0;  ///< bytes
   std::uint32_t instanceBudget = 0;
   std::uint32_t boundsBudget = 0;
-  OverflowPolicy overflow = OverflowPolicy::refuse;
   DeviceLimits limits;
   Tuning tuning;
 
@@ -87,8 +86,7 @@ struct SceneInstance {
   bool restartsMotion = true;  ///< when it is skinned next
   bool isUrgent = true;        ///< whatever its interval
   bool willMove = false;       ///< the plan skins it, and its previous positions are others
-  bool showsBindPose = false;  ///< it waited with one, or does
-  bool isInternal = false;     ///< a bind pose: of no interest to the engine
+  bool isShifting = false;     ///< among the shifting
   Method method = Method::dualQuaternion;
   std::uint32_t palette = 0;  ///< index
   std::uint32_t nextOfPalette = notUsed, previousOfPalette = notUsed;
@@ -99,7 +97,7 @@ struct SceneInstance {
   std::uint64_t firstFrame = 0;   ///< in which it was skinned
   PlacedRun run;                  ///< the first, and mostly the only one
   VertexLayout layout;
-  std::optional<Place> target;  ///< where it is skinned to; nothing while it waits for room
+  Place target;  ///< where it is skinned to
   InstanceExtras extras;
   std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
 
@@ -117,9 +115,6 @@ struct SceneInstance {
   Box box;
   bool bounds = false;
   std::optional<Place> shown;  ///< where it was last recorded
-  /// Where `shown` has no target beside it: how to settle it.
-  std::vector<PlacedRun> lastRuns;
-  InstanceHandle bindPose;  ///< what stands in for it while it waits
 };
 
 /// Bytes of the output that move.
@@ -154,8 +149,6 @@ class Scene {
 
   const FrameBuilder& frame() const { return builder_; }
   std::span<const OutputMove> moves() const { return moves_; }
-  /// Palettes added since the last record, of which some may be gone, or written.
-  std::span<const PaletteHandle> freshPalettes() const { return fresh_; }
   std::uint64_t frameNumber() const { return frame_; }
   std::uint64_t recordNumber() const { return record_; }
 
@@ -176,7 +169,7 @@ class Scene {
   std::span<const InstanceHandle> settled() const { return settled_; }
   std::span<const InstanceHandle> moved() const { return moved_; }
   struct Counts {
-    std::uint32_t instances = 0, waiting = 0, skinned = 0, settled = 0, palettes = 0, culled = 0;
+    std::uint32_t instances = 0, skinned = 0, settled = 0, palettes = 0, culled = 0;
     std::uint64_t vertices = 0, writtenBytes = 0, poseBytes = 0;
   };
   Counts counts() const;
@@ -187,34 +180,21 @@ class Scene {
     enum class Store : std::uint8_t { meshes, joints, units, output } store;
     Range range;
   };
-  struct BindPose {
-    MeshHandle mesh;
-    VertexLayout layout;
-    Box box;
-    InstanceHandle instance;
-    PaletteHandle palette;
-    std::uint32_t users = 0;
-  };
 
   // placement.cpp
-  Result<InstanceHandle> insert(const InstanceDescription& description, bool isInternal);
   Result<void> check(const SceneInstance& instance) const;
   Result<void> takeResult(SceneInstance& instance);
   Result<void> reserveUnits(const SceneInstance& instance);
-  Result<bool> findRoom(SceneInstance& instance);
-  Result<bool> takeBackOrFindRoom(SceneInstance& changed);
+  Result<void> findRoom(SceneInstance& instance);
   Result<void> makeRuns(SceneInstance& instance);
   void releaseRuns(SceneInstance& instance);
-  void releaseLastRuns(SceneInstance& instance);
-  void retireTarget(SceneInstance& instance);
-  void placeWaiting();
+  void releaseTarget(SceneInstance& instance);
   void link(std::uint32_t index);
   void unlink(std::uint32_t index);
-  Error noRoomFor(const SceneInstance& instance) const;
 
-  // bind_poses.cpp
-  Result<InstanceHandle> acquireBindPose(const SceneInstance& instance);
-  void releaseBindPose(InstanceHandle bindPose);
+  // instances.cpp
+  Result<void> takeBackOrFindRoom(SceneInstance& changed);
+  void shift(InstanceHandle handle);
 
   // scene.cpp
   void makeStale(std::uint32_t index);
@@ -245,21 +225,16 @@ class Scene {
   FrameGroups groups_;
   FrameBuilder builder_;
   std::deque<Retired> retired_;
-  std::vector<BindPose> bindPoses_;
 
   std::uint64_t frame_ = 0, completed_ = 0;
   std::uint64_t record_ = 0;         ///< the last that was committed
   std::uint64_t recordedFrame_ = 0;  ///< its frame
   bool hasBegun_ = false;
   std::uint32_t nextVersion_ = 0, nextOwner_ = 0;
-  std::uint32_t internalInstances_ = 0;
-  bool outputWasFreed_ = false;
   std::vector<VertexRun> runsScratch_;
 
-  std::vector<PaletteHandle> fresh_;       ///< added since the last record
   std::vector<PaletteHandle> posed_;       ///< written since the last plan
-  std::vector<InstanceHandle> pending_;    ///< stale, visible, placed, and not culled
-  std::vector<InstanceHandle> waiting_;    ///< for room
+  std::vector<InstanceHandle> pending_;    ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;   ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;      ///< all that are culled on the GPU
   std::vector<InstanceHandle> movedLast_;  ///< with motion, skinned by the last record

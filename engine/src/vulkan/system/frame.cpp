@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstring>
 #include <string>
 
 #include "abi.h"
@@ -100,18 +99,6 @@ Result<void> SkinningSystem::State::makeHistory() {
   return {};
 }
 
-/// Palettes rest in the identity until the engine writes them.
-void SkinningSystem::State::writeFreshPalettes() {
-  for (const PaletteHandle handle : scene.freshPalettes()) {
-    const ScenePalette* palette = scene.palettes().find(handle);
-    if (palette == nullptr || palette->poseFrame != 0) continue;
-    std::byte* place = matrices.bytes().data() + scene.poseOffset(*palette);
-    const JointMatrix identity;
-    for (std::uint32_t joint = 0; joint < palette->jointCount; ++joint)
-      std::memcpy(place + joint * sizeof(JointMatrix), &identity, sizeof(JointMatrix));
-  }
-}
-
 bool SkinningSystem::State::hasWork() const {
   return !scene.frame().plan().dispatches().empty() || !scene.moves().empty() || !uploads.empty();
 }
@@ -144,7 +131,6 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   if (works) {
     if (Result<void> room = makeRoomForTables(); !room) return room;
     if (Result<void> good = bindings.state_->check(plan); !good) return good;
-    writeFreshPalettes();
     if (Result<void> written = writeTables(plan, slot().staging.bytes()); !written) return written;
   }
   const double planSeconds = planning.seconds();
@@ -161,7 +147,6 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   const Scene::Counts counts = scene.counts();
   frameStatistics.frame = scene.frameNumber();
   frameStatistics.instances = counts.instances;
-  frameStatistics.waitingInstances = counts.waiting;
   frameStatistics.skinnedInstances = counts.skinned;
   frameStatistics.settledInstances = counts.settled;
   frameStatistics.convertedPalettes = counts.palettes;

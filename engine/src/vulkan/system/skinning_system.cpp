@@ -33,12 +33,11 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
   if (description.jointBudget == 0) return wrongField("jointBudget is 0");
   if (description.outputBudget == 0) return wrongField("outputBudget is 0");
   if (description.instanceBudget == 0) return wrongField("instanceBudget is 0");
-  if (description.overflow > OverflowPolicy::bindPose)
-    return wrongField("overflow is not one of OverflowPolicy");
   if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
     return wrongField("memory has one of its two functions only");
   for (const auto& [field, bytes] :
-       {std::pair{"meshBudget", scene.meshBudget},
+       {std::pair{"framesInFlight", description.framesInFlight * sizeof(JointMatrix)},
+        {"meshBudget", scene.meshBudget},
         {"jointBudget (matrices)", scene.matricesSize()},
         {"jointBudget (palettes)", scene.palettesSize()},
         {"boundsBudget", scene.resultsSize()},
@@ -49,8 +48,10 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
   return checkTuning(scene.tuning);
 }
 
+/// The largest multiple that there is, if the next one is larger.
 std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
-  return (value + multiple - 1) / multiple * multiple;
+  const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
+  return up <= ~value ? value + up : value / multiple * multiple;
 }
 
 SceneDescription sceneOf(const SkinningSystemDescription& description,
@@ -64,7 +65,6 @@ SceneDescription sceneOf(const SkinningSystemDescription& description,
   scene.instanceBudget = description.instanceBudget;
   scene.boundsBudget =
       limits.maxStorageBuffersPerStage < storageBuffersWanted ? 0 : description.boundsBudget;
-  scene.overflow = description.overflow;
   scene.limits = limits;
   scene.tuning = description.tuning.value_or(context.tuning);
   return scene;
@@ -86,6 +86,11 @@ VkBufferUsageFlags SkinningSystem::State::readUsage() const {
   return VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
          (context->limits.maxTexelBufferElements != 0 ? VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
                                                       : 0);
+}
+
+std::span<JointMatrix> SkinningSystem::State::poseAt(std::uint64_t offset,
+                                                     std::uint32_t jointCount) {
+  return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + offset), jointCount};
 }
 
 Result<void> SkinningSystem::State::createBuffers() {
@@ -179,7 +184,12 @@ Result<void> SkinningSystem::removeMesh(MeshHandle mesh) {
 }
 
 Result<PaletteHandle> SkinningSystem::addPalette(std::uint32_t jointCount, bool mayScale) {
-  return state_->scene.addPalette(jointCount, mayScale);
+  Result<PaletteHandle> added = state_->scene.addPalette(jointCount, mayScale);
+  if (!added) return added;
+  // No frame under way reads its memory: that of a palette before it was free.
+  const ScenePalette& palette = *state_->scene.palettes().find(*added);
+  std::ranges::fill(state_->poseAt(state_->scene.poseOffset(palette), jointCount), JointMatrix{});
+  return added;
 }
 Result<void> SkinningSystem::removePalette(PaletteHandle palette) {
   return state_->scene.removePalette(palette);
@@ -202,16 +212,8 @@ Result<void> SkinningSystem::prepare(const InstanceDescription& description) con
   job.previousPositions = laidOut->attributes[3];
   job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
   job.bounds = description.bounds;
-  const DeviceLimits& limits = state_->context->limits;
-  const Tuning& tuning = state_->scene.description().tuning;
-  std::vector<Variant> variants = everyVariant(job, limits, tuning);
-  if (state_->description.overflow == OverflowPolicy::bindPose) {
-    job.method = Method::dualQuaternion;
-    job.bounds = false;
-    const std::vector<Variant> bindPose = everyVariant(job, limits, tuning);
-    variants.insert(variants.end(), bindPose.begin(), bindPose.end());
-  }
-  for (const Variant& variant : variants) {
+  for (const Variant& variant :
+       everyVariant(job, state_->context->limits, state_->scene.description().tuning)) {
     if (Result<void> built =
             state_->context->pipelines->build(variant, state_->context->pipelineLayout);
         !built)
@@ -233,8 +235,7 @@ Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t compl
 Result<std::span<JointMatrix>> SkinningSystem::writePose(PaletteHandle palette) {
   const Result<std::uint64_t> offset = state_->scene.writePose(palette);
   if (!offset) return offset.error();
-  auto* pose = reinterpret_cast<JointMatrix*>(state_->matrices.bytes().data() + *offset);
-  return std::span<JointMatrix>(pose, state_->scene.palettes().find(palette)->jointCount);
+  return state_->poseAt(*offset, state_->scene.palettes().find(palette)->jointCount);
 }
 
 Result<void> SkinningSystem::setVisible(InstanceHandle instance, bool isVisible) {

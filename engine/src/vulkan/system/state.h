@@ -44,7 +44,7 @@ struct SkinningSystem::State {
   Result<void> prepareVisibility();
   const Visibility* preparedVisibility();
   Result<void> makeHistory();
-  void writeFreshPalettes();
+  std::span<JointMatrix> poseAt(std::uint64_t offset, std::uint32_t jointCount);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   void recordCommands(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   void recordCopies(VkCommandBuffer commandBuffer);

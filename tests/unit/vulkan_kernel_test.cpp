@@ -1,0 +1,89 @@
+// What stands in the SPIR-V of kernels, where no test on a device could find it missing: drivers
+// for CPUs run the invocations of a workgroup in an order that hides races.
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "abi.h"
+#include "dermis_kernels.h"
+
+namespace dermis::test {
+namespace {
+
+// The SPIR-V specification, section 3.
+constexpr std::uint32_t opConstant = 43, opLoad = 61, opStore = 62, opAccessChain = 65,
+                        opDecorate = 71, opControlBarrier = 224;
+constexpr std::uint32_t decorationBinding = 33;
+constexpr std::uint32_t acquireRelease = 0x8, uniformMemory = 0x40, workgroupMemory = 0x100;
+
+/// An instruction's operands, behind the word that names it.
+struct Instruction {
+  std::uint32_t opcode = 0;
+  std::span<const std::uint32_t> operands;
+};
+
+std::vector<Instruction> instructionsOf(std::span<const std::uint32_t> module) {
+  constexpr std::size_t headerWords = 5;
+  std::vector<Instruction> instructions;
+  for (std::size_t word = headerWords; word < module.size();) {
+    const std::size_t count = module[word] >> 16;
+    if (count == 0 || count > module.size() - word) break;
+    instructions.push_back({module[word] & 0xffff, module.subspan(word + 1, count - 1)});
+    word += count;
+  }
+  return instructions;
+}
+
+/// Reads and writes of the tables, and barriers, in the order of the module.
+struct Event {
+  enum class Kind { load, store, barrier } kind;
+  std::uint32_t semantics = 0;  ///< of a barrier
+};
+
+std::vector<Event> traceOf(std::span<const std::uint32_t> module) {
+  std::vector<Event> trace;
+  std::map<std::uint32_t, std::uint32_t> constants;
+  std::set<std::uint32_t> tables;  // the variable, and pointers into it
+  for (const auto& [opcode, operands] : instructionsOf(module)) {
+    if (opcode == opConstant) constants[operands[1]] = operands[2];
+    if (opcode == opDecorate && operands[1] == decorationBinding &&
+        operands[2] == abi::BINDING_TABLES)
+      tables.insert(operands[0]);
+    if (opcode == opAccessChain && tables.contains(operands[2])) tables.insert(operands[1]);
+    if (opcode == opLoad && tables.contains(operands[2])) trace.push_back({Event::Kind::load});
+    if (opcode == opStore && tables.contains(operands[0])) trace.push_back({Event::Kind::store});
+    if (opcode == opControlBarrier)
+      trace.push_back({Event::Kind::barrier, constants.at(operands[2])});
+  }
+  return trace;
+}
+
+// An invocation overwrites the record that another one has read: between the two stands the first
+// barrier, which must order storage buffers besides shared memory.
+TEST(KernelTest, RecordsAreReadBeforeOthersOverwriteThem) {
+  for (const std::span<const std::uint32_t> module :
+       {std::span<const std::uint32_t>(kernels::visibility_spirv),
+        std::span<const std::uint32_t>(kernels::visibility_one_output_spirv)}) {
+    std::size_t loads = 0, storesBefore = 0, storesBehind = 0, barriers = 0;
+    for (const auto& [kind, semantics] : traceOf(module)) {
+      if (kind == Event::Kind::barrier && barriers++ == 0) {
+        EXPECT_EQ(semantics, acquireRelease | uniformMemory | workgroupMemory);
+      }
+      if (kind == Event::Kind::load && barriers == 0) ++loads;
+      if (kind == Event::Kind::store) ++(barriers == 0 ? storesBefore : storesBehind);
+    }
+    EXPECT_GT(loads, 0u);
+    EXPECT_EQ(storesBefore, 0u);
+    EXPECT_GT(storesBehind, 0u);
+    EXPECT_GT(barriers, 1u);
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
