@@ -165,10 +165,15 @@ TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
   EXPECT_TRUE(SkinningSystem::create(system).ok());
 }
 
-// An allocator that fails in the middle of a game: nothing is recorded, and all is tried again.
+// An allocator that fails in the middle of a game, at each of the two allocations that tables which
+// have outgrown their buffers take: nothing is recorded, and all is tried again.
 TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
   CountingMemory memory(device());
   vulkan::SkinningSystemDescription own = description();
+  own.context = &watched;
   own.memory = memory.callbacks();
   SystemEngine engine(device(), own);
   const PackedMesh packed = systemMesh(1, 20);
@@ -179,22 +184,29 @@ TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   instance.palette = engine.addPalette(systemPose(1));
   std::vector<InstanceHandle> instances{engine.addInstance(instance)};
   engine.submit();
-  // So many that whatever was prepared for does not do.
   engine.begin();
   engine.writePose(instance.palette, systemPose(2));
   while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
-  memory.failsAt = memory.allocations;
-  const Result<void> recorded = engine.trySubmit();
-  if (!recorded) {
+  const std::uint32_t before = memory.allocations;
+  for (std::uint32_t failed = 0; failed < 2; ++failed) {
+    memory.failsAt = before + failed;
+    log.calls.clear();
+    const Result<void> recorded = engine.trySubmit();
+    ASSERT_FALSE(recorded.ok()) << failed;
     EXPECT_EQ(recorded.error().code, ErrorCode::ioError);
-    memory.failsAt = ~0u;
-    engine.runFrame();
+    EXPECT_EQ(recorded.error().message, "the engine's allocator has had enough");
+    for (const auto& [name, count] : log.calls)
+      EXPECT_FALSE(name.starts_with("vkCmd")) << name << " was recorded";
+    engine.begin();
   }
+  memory.failsAt = ~0u;
+  engine.submit();
+  EXPECT_EQ(memory.allocations, before + 2) << "what the failed frames took was kept";
   EXPECT_EQ(engine.lastFrame().skinnedInstances, 3000u);
   const std::vector<std::byte> bytes = engine.readOutput();
   const Streams expected = alone(packed, systemPose(2), instance);
-  for (const std::size_t i : {std::size_t{0}, std::size_t{1}, std::size_t{1500}, std::size_t{2999}})
-    expectSkinned(engine.read(bytes, instances[i]), expected);
+  for (const InstanceHandle handle : instances)
+    ASSERT_TRUE(engine.read(bytes, handle)[positionStream] == expected[positionStream]);
 }
 
 TEST_F(SystemMemoryTest, MemoryOfItsOwnIsTakenInFewBlocks) {
@@ -251,21 +263,6 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
     EXPECT_EQ(store.largestFree, store.capacity);
 }
 
-TEST_F(SystemMemoryTest, TheGpusTimeIsKnownWhereItIsMeasured) {
-  vulkan::SkinningSystemDescription measured = description();
-  for (const bool measures : {true, false}) {
-    measured.measuresGpuTime = measures;
-    SingleInstance one(device(), measured, motionLayout(), 2000);
-    one.engine.submit();
-    one.engine.begin();
-    const vulkan::GpuStatistics gpu = one.engine->statistics().lastCompletedFrame;
-    EXPECT_EQ(gpu.frame, 1u);
-    EXPECT_EQ(gpu.seconds.has_value(), measures);
-    EXPECT_GE(gpu.seconds.value_or(0), 0.0);
-    one.engine.submit();
-  }
-}
-
 TEST_F(SystemMemoryTest, StatisticsAddUp) {
   SingleInstance one(device(), description(), motionLayout());
   const vulkan::SystemStatistics statistics = one.engine->statistics();
@@ -281,8 +278,6 @@ TEST_F(SystemMemoryTest, StatisticsAddUp) {
   one.engine.submit();
   EXPECT_EQ(one.engine.lastFrame().frame, 1u);
   EXPECT_GE(one.engine.lastFrame().uploadedBytes, one.packed.bytes().size() + 8 * 48);
-  EXPECT_GE(one.engine.lastFrame().planSeconds, 0.0);
-  EXPECT_GE(one.engine.lastFrame().recordSeconds, 0.0);
 }
 
 }  // namespace

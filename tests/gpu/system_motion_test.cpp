@@ -271,6 +271,30 @@ TEST_F(SystemIntervalTest, InstancesOfAPaletteKeepTogetherWhenOneChangesAlone) {
   }
 }
 
+// Whatever the beat of its interval, and whether its pose is written before or after it is shown.
+TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
+  for (const bool poseFirst : {true, false}) {
+    SingleInstance one(device(), description(), motionLayout());
+    must(one.engine->setUpdateInterval(one.instance, 5));
+    one.engine.submit();
+    for (std::uint32_t away = 1; away <= 10; ++away) {
+      SCOPED_TRACE(away);
+      one.engine.begin();
+      must(one.engine->setVisible(one.instance, false));
+      one.engine.submit();
+      for (std::uint32_t frame = 1; frame < away; ++frame) one.engine.runFrame();
+      one.engine.begin();
+      if (!poseFirst) must(one.engine->setVisible(one.instance, true));
+      one.engine.writePose(one.description.palette, systemPose(away));
+      if (poseFirst) must(one.engine->setVisible(one.instance, true));
+      one.engine.submit();
+      EXPECT_EQ(one.engine.lastFrame().skinnedInstances, 1u);
+      const Streams expected = alone(one.packed, systemPose(away), one.description);
+      EXPECT_TRUE(one.engine.read(one.instance) == expected);
+    }
+  }
+}
+
 TEST_F(SystemIntervalTest, PalettesAreSpreadOverTheFramesAndTheirInstancesKeepTogether) {
   SystemEngine engine(device(), description());
   engine.begin();

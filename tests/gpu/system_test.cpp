@@ -1,15 +1,73 @@
 #include "system_test.h"
 
+#include <cstring>
+
 #include "batch_runner.h"
+#include "dermis/accuracy.h"
+#include "dermis/reference.h"
+#include "reference/decompose.h"
 
 namespace dermis::test {
+namespace {
+
+using Blob = std::vector<std::byte>;
+
+Blob blobOf(const PackedMesh& mesh) {
+  return {mesh.bytes().begin(), mesh.bytes().end()};
+}
+
+/// What every packed mesh was packed from, by its bytes: the reference starts from there.
+std::map<Blob, OwnedMesh>& sources() {
+  static std::map<Blob, OwnedMesh> all;
+  return all;
+}
+
+/// A pose without the scale that its palette does not declare: each joint turned by the rotation of
+/// its polar decomposition.
+Pose rotationsOf(std::span<const JointMatrix> pose) {
+  Pose rotations(pose.begin(), pose.end());
+  for (JointMatrix& joint : rotations) {
+    glm::dmat3 matrix;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) matrix[column][row] = double{joint.m[row][column]};
+    }
+    const glm::dmat3 rotation = reference::polarParts(matrix).rotation;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column)
+        joint.m[row][column] = static_cast<float>(rotation[column][row]);
+    }
+  }
+  return rotations;
+}
+
+/// The kernels of both tiers are the same: what the other one gives must be right, too.
+void expectReference(const samples::SkinnedVertices& skinned, const samples::SkinRequest& request) {
+  const auto source = sources().find(blobOf(*request.mesh));
+  ASSERT_NE(source, sources().end()) << "not a mesh of systemMesh";
+  const bool isTurnedOnly = !request.mayScale && request.method != Method::linear;
+  const Pose rotations = isTurnedOnly ? rotationsOf(request.palette) : Pose();
+  const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.palette;
+  const reference::SkinnedMesh expected =
+      must(reference::skin(source->second.view(), pose, request.method, request.morphs));
+  const Comparison comparison = must(compare(expected, skinned.view(), request.method));
+  EXPECT_EQ(comparison.failures, 0u)
+      << "the first is vertex " << comparison.firstFailure << "; positions "
+      << comparison.worstPosition << ", normals " << comparison.worstNormal << ", tangents "
+      << comparison.worstTangent << " of the bound";
+  EXPECT_EQ(comparison.compared + comparison.onlyFinite, expected.positions.size());
+  EXPECT_LE(comparison.onlyFinite, expected.positions.size() / 100);
+}
+
+}  // namespace
 
 PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                       std::uint32_t influences) {
   OwnedMesh mesh = randomMesh(seed, vertexCount, jointCount, influences);
   addTangents(mesh, seed + 1);
   addMorphs(mesh, seed + 2, 3);
-  return must(pack(mesh.view(), jointCount));
+  PackedMesh packed = must(pack(mesh.view(), jointCount));
+  sources().try_emplace(blobOf(packed), std::move(mesh));
+  return packed;
 }
 
 VertexLayout plainLayout() {
@@ -57,6 +115,7 @@ Streams SystemTest::alone(const PackedMesh& mesh, std::span<const JointMatrix> p
   options.countUntouched = false;
   samples::BatchResult result =
       must(samples::runBatch(device(), context(), {&request, 1}, options));
+  expectReference(result.instances[0], request);
   Streams streams = std::move(result.instances[0].streams);
   if (description.layout.previousPositions) streams[previousStream] = streams[positionStream];
   return streams;

@@ -1,5 +1,6 @@
 // What the tests of SkinningSystem share: meshes, poses, and each instance skinned alone by
-// makePlan and `Context::record`, which is what the system must give, bit for bit.
+// makePlan and `Context::record`, which is what the system must give, bit for bit. That itself is
+// held against the reference: both go through the same kernels.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -47,7 +48,8 @@ class SystemTest : public DeviceTest {
   /// Small, and with an output that the engine may copy from and fill.
   vulkan::SkinningSystemDescription description();
 
-  /// What tier 1 makes of it as the only job. Previous positions are the current ones.
+  /// What tier 1 makes of a mesh of `systemMesh` as the only job, inside the bounds of the
+  /// reference. Previous positions are the current ones.
   Streams alone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                 const InstanceDescription& description, std::span<const MorphWeight> morphs = {},
                 bool mayScale = true);

@@ -146,23 +146,69 @@ TEST(ContextTest, EveryObjectUsesTheEnginesAllocatorAndIsDestroyed) {
   EXPECT_FALSE(mock.wrongAllocator);
 }
 
-TEST(ContextTest, AFailureWhileBindingOrPreparingIsAnErrorAndLeaksNothing) {
-  for (const char* function :
-       {"vkCreateDescriptorPool", "vkAllocateDescriptorSets", "vkCreateComputePipelines"}) {
+/// A batch on a driver where one function fails, after succeeding so many times.
+struct FailingContext {
+  explicit FailingContext(const char* function, int failAfter)
+      : context(vulkan::Context::create(mock.description())),
+        batch(MockBatch::withAllMethods(context->limits())) {
+    mock.failing = function;
+    mock.failAfter = failAfter;
+  }
+  MockVulkan mock;
+  Result<vulkan::Context> context;
+  MockBatch batch;
+};
+
+void expectFailureOf(const char* function, const Error& error) {
+  EXPECT_EQ(error.code, ErrorCode::vulkanError) << function;
+  EXPECT_EQ(error.vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY) << function;
+  EXPECT_NE(error.message.find(function), std::string::npos) << error.message;
+}
+
+TEST(ContextTest, AFailureWhileBindingIsAnErrorAndLeaksNothing) {
+  for (const char* function : {"vkCreateDescriptorPool", "vkAllocateDescriptorSets"}) {
+    FailingContext failing(function, 0);
+    const int before = failing.mock.aliveObjects();
+    const Result<vulkan::Bindings> bindings =
+        failing.context->createBindings(failing.batch.buffers());
+    ASSERT_FALSE(bindings.ok()) << function;
+    expectFailureOf(function, bindings.error());
+    EXPECT_EQ(failing.mock.aliveObjects(), before) << function;
+    failing.mock.failing.clear();
+    EXPECT_TRUE(failing.context->createBindings(failing.batch.buffers()).ok()) << function;
+    EXPECT_EQ(failing.mock.aliveObjects(), before) << function;
+  }
+}
+
+// What was built before the failure stays built, and the next attempt builds the rest.
+TEST(ContextTest, AFailureWhilePreparingIsAnErrorAndLeaksNothing) {
+  const int pipelines = 1 + static_cast<int>(allMethods.size());
+  for (int built = 0; built < pipelines; ++built) {
+    FailingContext failing("vkCreateComputePipelines", built);
+    const Result<void> prepared = failing.context->prepare(failing.batch.plan.variants());
+    ASSERT_FALSE(prepared.ok()) << built;
+    expectFailureOf("vkCreateComputePipelines", prepared.error());
+    EXPECT_EQ(failing.mock.alive["Pipeline"], built);
+    failing.mock.failing.clear();
+    EXPECT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
+    EXPECT_EQ(failing.mock.alive["Pipeline"], pipelines);
+    failing.context = Error{};
+    EXPECT_EQ(failing.mock.aliveObjects(), 0);
+  }
+}
+
+// The engine stores it, loads it and destroys it.
+TEST(ContextTest, EveryPipelineIsBuiltWithTheEnginesCache) {
+  for (const std::uintptr_t handle : {std::uintptr_t{0}, std::uintptr_t{77}}) {
+    const auto cache = reinterpret_cast<VkPipelineCache>(handle);
     MockVulkan mock;
-    {
-      Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-      const MockBatch batch = MockBatch::withAllMethods(context->limits());
-      mock.failing = function;
-      const bool prepared = context->prepare(batch.plan.variants()).ok();
-      const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-      EXPECT_FALSE(prepared && bindings.ok()) << function;
-      if (!bindings) {
-        EXPECT_NE(bindings.error().message.find(function), std::string::npos)
-            << bindings.error().message;
-      }
-    }
-    EXPECT_EQ(mock.aliveObjects(), 0) << function;
+    vulkan::DeviceDescription description = mock.description();
+    description.pipelineCache = cache;
+    Result<vulkan::Context> context = vulkan::Context::create(description);
+    const MockBatch batch = MockBatch::withAllMethods(context->limits());
+    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+    const std::vector<VkPipelineCache> expected(1 + allMethods.size(), cache);
+    EXPECT_EQ(mock.cachesOfPipelines, expected);
   }
 }
 

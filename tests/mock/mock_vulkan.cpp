@@ -62,13 +62,14 @@ MOCK_CREATE(PipelineLayout, VkPipelineLayoutCreateInfo, VkPipelineLayout)
 MOCK_CREATE(DescriptorPool, VkDescriptorPoolCreateInfo, VkDescriptorPool)
 MOCK_CREATE(BufferView, VkBufferViewCreateInfo, VkBufferView)
 
-VkResult VKAPI_CALL createComputePipelines(VkDevice, VkPipelineCache, std::uint32_t,
+VkResult VKAPI_CALL createComputePipelines(VkDevice, VkPipelineCache cache, std::uint32_t,
                                            const VkComputePipelineCreateInfo* info,
                                            const VkAllocationCallbacks* allocator,
                                            VkPipeline* pipeline) {
   const VkResult result = create("vkCreateComputePipelines", "Pipeline", allocator, pipeline);
-  if (result == VK_SUCCESS)
-    mock->codeOfPipeline[*pipeline] = mock->codeOfModule.at(info->stage.module);
+  if (result != VK_SUCCESS) return result;
+  mock->codeOfPipeline[*pipeline] = mock->codeOfModule.at(info->stage.module);
+  mock->cachesOfPipelines.push_back(cache);
   return result;
 }
 void VKAPI_CALL destroyPipeline(VkDevice, VkPipeline pipeline,

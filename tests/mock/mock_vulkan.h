@@ -58,7 +58,8 @@ struct MockVulkan {
   std::vector<VkBufferMemoryBarrier> bufferBarriers;
   bool wrongAllocator = false;  ///< an object came or went without the engine's allocator
 
-  std::vector<const std::uint32_t*> modules;  ///< the code of each that was created
+  std::vector<const std::uint32_t*> modules;       ///< the code of each that was created
+  std::vector<VkPipelineCache> cachesOfPipelines;  ///< of each that was created
   std::vector<MockSetLayout> setLayouts;
   std::vector<MockDispatch> dispatches;
   std::map<VkDescriptorSet, MockDescriptors> sets;

@@ -58,6 +58,7 @@ Dependency inputScope(PreviousUse use) {
 
 Dependency outputScope(Consumer consumer, QueueTransfer transfer) {
   Dependency dependency{{compute, VK_ACCESS_SHADER_WRITE_BIT}, scopeOf(consumer)};
+  if (consumer == Consumer::hostRead) return dependency;
   if (transfer == QueueTransfer::release)
     dependency.destination = {VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0};
   if (transfer == QueueTransfer::acquire)

@@ -60,7 +60,8 @@ enum class Consumer : std::uint8_t {
 
 /// A queue-family ownership transfer is two barriers: the release on the queue that skinned, the
 /// acquire on the other one. In the release the destination scope is ignored, in the acquire the
-/// source scope (Vulkan 1.3, 7.7.4).
+/// source scope (Vulkan 1.3, 7.7.4). The host belongs to no queue family: for
+/// `Consumer::hostRead` there is nothing to transfer, and all three give the same dependency.
 enum class QueueTransfer : std::uint8_t { none, release, acquire };
 
 /// The barrier before `record`, for a buffer that was last used so.
