@@ -34,7 +34,7 @@ namespace dermis::vulkan {
 
 /// How much a system may hold, and of what. Budgets are taken from memory when the system is made.
 struct SkinningSystemDescription {
-  /// Borrowed; must outlive the system, and not be moved meanwhile.
+  /// Borrowed: it, or the Context that it is moved to, must outlive the system.
   Context* context = nullptr;
   /// Frames that the engine records ahead of the GPU: `beginFrame(f)` comes after frame
   /// f - framesInFlight is complete. 1 or more.
