@@ -237,7 +237,7 @@ DERMIS_CONSTANT INDIRECT_WORDS = 4u;
 DERMIS_CONSTANT HISTORY_OWNER = 0u;
 DERMIS_CONSTANT HISTORY_VERSION = 1u;       // that was last skinned
 DERMIS_CONSTANT HISTORY_LAST_VISIBLE = 2u;  // frame
-DERMIS_CONSTANT HISTORY_LAST_MOVED = 3u;  // frame in which it was skinned, its motion not restarted
+DERMIS_CONSTANT HISTORY_MOVES = 3u;  // 1: its previous positions are not its positions
 DERMIS_CONSTANT HISTORY_WORDS = 4u;
 
 // What the visibility kernel counts, for the engine's statistics.

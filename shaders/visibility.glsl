@@ -48,7 +48,6 @@ bool choose(uint candidate, uint record, inout uint flags) {
   uint remembered = slot * HISTORY_WORDS;
   bool isNew = history[remembered + HISTORY_OWNER] != tables[candidate + CANDIDATE_OWNER];
   bool wasVisible = !isNew && history[remembered + HISTORY_LAST_VISIBLE] == frame - 1u;
-  bool moved = !isNew && frame > 1u && history[remembered + HISTORY_LAST_MOVED] == frame - 1u;
   history[remembered + HISTORY_OWNER] = tables[candidate + CANDIDATE_OWNER];
   history[remembered + HISTORY_LAST_VISIBLE] = frame;
   uint version = tables[candidate + CANDIDATE_VERSION];
@@ -59,11 +58,12 @@ bool choose(uint candidate, uint record, inout uint flags) {
     // What an instance showed before it was out of view is no motion.
     if (!wasVisible && (flags & INSTANCE_HAS_MOTION) != 0u) flags |= INSTANCE_RESTARTS;
     // Where motion restarts nothing is left to settle.
-    history[remembered + HISTORY_LAST_MOVED] = (flags & INSTANCE_RESTARTS) != 0u ? 0u : frame;
+    history[remembered + HISTORY_MOVES] = (flags & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
     return true;
   }
-  // It rests where it was: its previous positions become the current ones, once.
-  if ((flags & INSTANCE_HAS_MOTION) == 0u || (wasVisible && !moved)) return false;
+  // It rests where it was, in view or since it was: its previous positions become the current ones, once.
+  if (history[remembered + HISTORY_MOVES] == 0u) return false;
+  history[remembered + HISTORY_MOVES] = 0u;
   atomicAdd(counters[COUNTER_SETTLED], 1u);
   flags |= INSTANCE_SETTLES;
   return true;

@@ -313,6 +313,37 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
   expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "framesInFlight");
 }
 
+// The context may move to another place while a system lives, which goes on to make bindings and
+// pipelines with it.
+TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
+  std::optional<vulkan::Context> first = must(vulkan::Context::create(device().description()));
+  SkinningSystemDescription own = description();
+  own.context = &*first;
+  SystemEngine engine(device(), own);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = plainLayout();
+  const PackedMesh packed = systemMesh(1, 20);
+  instance.mesh = engine.addMesh(packed);
+  instance.palette = engine.addPalette(systemPose(1));
+  std::vector<InstanceHandle> instances{engine.addInstance(instance)};
+  engine.submit();
+  const vulkan::Context second = std::move(*first);
+  first.reset();
+  // So many that new tables are needed.
+  engine.begin();
+  instance.culledOnGpu = true;
+  must(engine->prepare(instance));
+  instance.culledOnGpu = false;
+  while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
+  engine.submit();
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 2999u);
+  const std::vector<std::byte> bytes = engine.readOutput();
+  const Streams expected = alone(packed, systemPose(1), instance);
+  for (const InstanceHandle handle : {instances.front(), instances.back()})
+    expectSkinned(engine.read(bytes, handle), expected);
+}
+
 TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   // A context of its own, which has no pipelines yet.
   vulkan::Context fresh = must(vulkan::Context::create(device().description()));

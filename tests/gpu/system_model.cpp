@@ -34,6 +34,13 @@ void SystemModel::remove(std::size_t index) {
 void SystemModel::beginFrame() {
   std::erase_if(locked_,
                 [&](const Place& place) { return place.frame <= engine_.completedFrame(); });
+  const vulkan::GpuStatistics gpu = engine_->statistics().lastCompletedFrame;
+  const auto counted = gpuCounts_.find(gpu.frame);
+  if (counted == gpuCounts_.end()) return;
+  EXPECT_EQ(gpu.visibleInstances, counted->second.visible) << "frame " << gpu.frame;
+  EXPECT_EQ(gpu.skinnedInstances, counted->second.skinned) << "frame " << gpu.frame;
+  EXPECT_EQ(gpu.settledInstances, counted->second.settled) << "frame " << gpu.frame;
+  gpuCounts_.erase(gpuCounts_.begin(), std::next(counted));
 }
 
 void SystemModel::checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed) {
@@ -69,7 +76,7 @@ bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lis
   const bool comesBack = !instance.wasDisplayed;
   const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
   const bool isForced = isPlaced || instance.teleports || isOwed;
-  if (instance.description.culledOnGpu) return isForced || comesBack;
+  if (instance.description.culledOnGpu) return isForced;
   const bool isSkinned = lists.skinned.contains(instance.handle.index);
   if (isForced) {
     EXPECT_TRUE(isSkinned) << "it changed";
@@ -86,8 +93,11 @@ bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lis
 void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
   const bool comesBack = !instance.wasDisplayed;
   const bool hasPrevious = instance.description.layout.previousPositions;
+  const bool isCulled = instance.description.culledOnGpu;
   const bool isSettled = lists.settled.contains(instance.handle.index);
+  lists.gpu.visible += isCulled;
   if (isSkinnedNow(instance, isPlaced, lists)) {
+    lists.gpu.skinned += isCulled;
     EXPECT_FALSE(isSettled) << "it was skinned";
     const bool restarts = isPlaced || instance.teleports || comesBack;
     const ShownPose now = wantedPose(instance);
@@ -97,8 +107,9 @@ void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists&
     instance.isChanged = false;
     instance.waitedFrames = 0;
   } else {
-    EXPECT_TRUE(instance.description.culledOnGpu || comesBack || isSettled == instance.isMoving)
-        << "it settles in the frame after it moved, and in no other";
+    lists.gpu.settled += isCulled && instance.isMoving;
+    EXPECT_TRUE(isCulled || isSettled == instance.isMoving)
+        << "it settles in the next frame that displays it, and in no other";
     instance.before = instance.shown;
     instance.isMoving = false;
     if (instance.isChanged) ++instance.waitedFrames;
@@ -109,11 +120,8 @@ void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists&
 
 void SystemModel::updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
   EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
-  const bool isSettled = lists.settled.contains(instance.handle.index);
-  EXPECT_FALSE(isSettled && !instance.isMoving) << "it did not move";
-  if (isSettled) instance.before = instance.shown;
+  EXPECT_FALSE(lists.settled.contains(instance.handle.index)) << "nobody sees it";
   if (isPlaced) instance.shown = instance.before = std::nullopt;
-  instance.isMoving = false;
   instance.wasDisplayed = false;
 }
 
@@ -155,6 +163,7 @@ void SystemModel::afterRecord() {
   Lists lists{indicesOf(engine_->skinnedInstances()),
               indicesOf(engine_->settledInstances()),
               indicesOf(engine_->movedInstances()),
+              {},
               {}};
   for (ModelInstance& instance : instances) {
     SCOPED_TRACE("frame " + std::to_string(engine_.frame()) + ", instance " +
@@ -163,6 +172,7 @@ void SystemModel::afterRecord() {
   }
   checkPlacesAreApart();
   checkStatistics(lists);
+  gpuCounts_[engine_.frame()] = lists.gpu;
 }
 
 }  // namespace dermis::test

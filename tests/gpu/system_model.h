@@ -43,7 +43,7 @@ struct ModelInstance {
   // As of the last `record`.
   InstanceOutput output;
   bool wasDisplayed = false;
-  bool isMoving = false;  ///< its previous positions were not its positions
+  bool isMoving = false;  ///< its previous positions are not its positions
   std::optional<ShownPose> shown, before;
 
   bool hasPlace() const { return output.size != 0; }
@@ -63,7 +63,8 @@ class SystemModel {
   /// The instance was removed in the frame that was begun last.
   void remove(std::size_t index);
 
-  /// After `beginFrame`: places are free again.
+  /// After `beginFrame`: places are free again, and what the GPU did in the newest complete frame
+  /// is known, which is checked.
   void beginFrame();
   /// After `record`: checks what was skinned, settled and moved, and where everything stands.
   void afterRecord();
@@ -73,8 +74,13 @@ class SystemModel {
     std::uint64_t begin = 0, end = 0;
     std::uint64_t frame = 0;  ///< free when it is complete
   };
+  /// Instances culled on the GPU.
+  struct GpuCounts {
+    std::uint32_t visible = 0, skinned = 0, settled = 0;
+  };
   struct Lists {
     std::set<std::uint32_t> skinned, settled, moved;
+    GpuCounts gpu;
     /// By palette and interval, whether its instances took this frame.
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> beats;
   };
@@ -92,6 +98,7 @@ class SystemModel {
 
   SystemEngine& engine_;
   std::vector<Place> locked_;
+  std::map<std::uint64_t, GpuCounts> gpuCounts_;  ///< by frame
 };
 
 }  // namespace dermis::test

@@ -207,7 +207,7 @@ void SystemModelTest::changeInstance() {
       instance.waitedFrames = 0;
       return must(system().setUpdateInterval(instance.handle, instance.description.updateInterval));
     case 4:
-      instance.teleports = true;
+      instance.teleports = instance.isChanged = true;
       return must(system().teleport(instance.handle));
     default:
       return setMesh(instance);

@@ -119,17 +119,71 @@ TEST_F(SystemMotionTest, WhatComesBackIntoViewDoesNotMove) {
   expectMotion(4, 3);
 }
 
+// It settles when it is displayed again, and nothing is done for it before.
 TEST_F(SystemMotionTest, WhatComesBackInTheSamePoseDoesNotMove) {
   engine().submit();
   moveInFrame(2);
   engine().begin();
   must(engine()->setVisible(one_->instance, false));
   engine().submit();
+  EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
+  EXPECT_EQ(engine().lastFrame().dispatches, 0u);
   engine().runFrame();
   engine().begin();
   must(engine()->setVisible(one_->instance, true));
   engine().submit();
+  EXPECT_TRUE(wasSettled());
+  EXPECT_FALSE(wasSkinned());
+  EXPECT_EQ(engine().lastFrame().settledInstances, 1u);
   expectMotion(2, 2);
+  engine().runFrame();
+  EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
+}
+
+// What is skinned when it comes back, or had settled before it left, has nothing to settle.
+TEST_F(SystemMotionTest, WhatComesBackSettlesOnlyIfItHasTo) {
+  engine().submit();
+  moveInFrame(2);
+  const auto leaveAndReturn = [this](std::optional<std::uint32_t> pose) {
+    engine().begin();
+    must(engine()->setVisible(one_->instance, false));
+    engine().submit();
+    EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
+    engine().begin();
+    // Shown, hidden and shown again before the record is shown once.
+    for (const bool isVisible : {true, false, true})
+      must(engine()->setVisible(one_->instance, isVisible));
+    if (pose) move(*pose);
+    engine().submit();
+    EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
+  };
+  leaveAndReturn(3);
+  EXPECT_TRUE(wasSkinned());
+  expectMotion(3, 3);
+  moveInFrame(4);
+  engine().runFrame();
+  EXPECT_TRUE(wasSettled());
+  leaveAndReturn(std::nullopt);
+  EXPECT_FALSE(wasSkinned());
+  EXPECT_EQ(engine().lastFrame().dispatches, 0u);
+  expectMotion(4, 4);
+}
+
+TEST_F(SystemMotionTest, WhatHasAnotherMeshWhenItComesBackHasNothingToSettle) {
+  engine().submit();
+  moveInFrame(2);
+  engine().begin();
+  must(engine()->setVisible(one_->instance, false));
+  const PackedMesh coarse = systemMesh(9, 40);
+  must(engine()->setMesh(one_->instance, engine().addMesh(coarse)));
+  engine().submit();
+  EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
+  engine().begin();
+  must(engine()->setVisible(one_->instance, true));
+  engine().submit();
+  EXPECT_TRUE(wasSkinned());
+  EXPECT_FALSE(wasSettled());
+  EXPECT_TRUE(engine().read(one_->instance) == alone(coarse, systemPose(2), one_->description));
 }
 
 TEST_F(SystemMotionTest, HiddenAndShownBetweenTwoFramesWasNeverAway) {

@@ -137,6 +137,45 @@ TEST_F(SystemVisibilityTest, WhatRestsInViewOfTheGpuSettlesAndIsNotSkinnedAgain)
   for (std::uint32_t i = 0; i < instanceCount; ++i) expectPoisoned(bytes, i);
 }
 
+// Instances that moved, then leave and return: those that are skinned again, or had settled before,
+// have nothing to settle.
+TEST_F(SystemVisibilityTest, WhatTheGpuShowsAgainSettlesOnlyIfItHasTo) {
+  open(true, motionLayout());
+  submit();
+  moveAllInFrame(100);
+  show(0, 20);
+  engine_->begin();
+  submit();  // the first twenty settle, the others are out of view
+  vulkan::GpuStatistics gpu = completed();
+  EXPECT_EQ(gpu.settledInstances, 20u);
+  submit();
+  show(0, 0);
+  engine_->begin();
+  submit();
+  gpu = completed();
+  EXPECT_EQ(gpu.visibleInstances, 0u);
+  EXPECT_EQ(gpu.settledInstances, 0u) << "nobody sees them";
+  submit();
+  show(0, 40);
+  engine_->begin();
+  submit();
+  gpu = completed();
+  EXPECT_EQ(gpu.skinnedInstances, 0u);
+  EXPECT_EQ(gpu.settledInstances, 20u) << "those that left while they moved";
+  std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < 40; ++i) expectMotion(bytes, i, 100, 100);
+  for (std::uint32_t i = 40; i < instanceCount; ++i) expectMotion(bytes, i, 100, 0);
+  show(0, instanceCount);
+  moveAll(200);
+  submit();
+  gpu = completed();
+  EXPECT_EQ(gpu.skinnedInstances, instanceCount);
+  EXPECT_EQ(gpu.settledInstances, 0u);
+  bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, 200, i < 40 ? 100 : 200);
+  submit();
+}
+
 // Of what is visible, only what is due is skinned; of what is not visible, nothing.
 TEST_F(SystemVisibilityTest, UpdateIntervalsHoldForWhatTheGpuSees) {
   constexpr std::uint32_t visible = 20, interval = 4;

@@ -241,7 +241,10 @@ Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
 Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
-  const State& context = *state_;
+  return state_->createBindings(buffers);
+}
+
+Result<Bindings> Context::State::createBindings(const BatchBuffers& buffers) const {
   const OutputBuffers& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
@@ -253,16 +256,16 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
         {&outputs.normals, "outputs.normals", true},
         {&outputs.tangents, "outputs.tangents", true},
         {&outputs.previousPositions, "outputs.previousPositions", true}}) {
-    if (Result<void> good = checkRange(*range, name, context.limits, mayBeLarger); !good)
+    if (Result<void> good = checkRange(*range, name, limits, mayBeLarger); !good)
       return good.error();
   }
-  if (context.bindingCount() != abi::BINDING_COUNT) {
+  if (bindingCount() != abi::BINDING_COUNT) {
     for (const BufferRange* range :
          {&outputs.normals, &outputs.tangents, &outputs.previousPositions}) {
       if (range->buffer != VK_NULL_HANDLE && !isSame(*range, outputs.positions)) {
         return Error{ErrorCode::limitExceeded,
                      "BatchBuffers::outputs: on a device with " +
-                         std::to_string(context.limits.maxStorageBuffersPerStage) +
+                         std::to_string(limits.maxStorageBuffersPerStage) +
                          " storage buffers a stage all attributes go to one buffer"};
       }
     }
@@ -271,11 +274,11 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   Bindings bindings;
   bindings.state_ = std::make_unique<Bindings::State>();
   Bindings::State& state = *bindings.state_;
-  state.context = &context;
+  state.context = this;
   state.buffers = buffers;
-  state.windowStep = outputWindowStep(context.limits);
+  state.windowStep = outputWindowStep(limits);
   if (Result<void> good = state.createTexelViews(); !good) return good.error();
-  if (context.pushesDescriptors()) return bindings;
+  if (pushesDescriptors()) return bindings;
   if (Result<void> good = state.createSets(); !good) return good.error();
   return bindings;
 }

@@ -33,6 +33,7 @@ struct Context::State {
   }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
+  Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
   VkInstance instance;
   PFN_vkGetInstanceProcAddr getInstanceProcAddr;

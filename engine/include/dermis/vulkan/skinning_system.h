@@ -34,7 +34,7 @@ namespace dermis::vulkan {
 
 /// How much a system may hold, and of what. Budgets are taken from memory when the system is made.
 struct SkinningSystemDescription {
-  /// Borrowed; must outlive the system, and not be moved meanwhile.
+  /// Borrowed: it, or the Context that it is moved to, must outlive the system.
   Context* context = nullptr;
   /// Frames that the engine records ahead of the GPU: `beginFrame(f)` comes after frame
   /// f - framesInFlight is complete. 1 or more.
@@ -168,8 +168,8 @@ class SkinningSystem {
   /// again; calling it is what makes them.
   Result<std::span<JointMatrix>> writePose(PaletteHandle palette);
 
-  /// What is invisible is not skinned; when it comes back, its previous positions are its current
-  /// ones. Instances begin visible.
+  /// What is invisible is neither skinned nor settled; when it comes back, its previous positions
+  /// are its current ones. Instances begin visible.
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
   /// Previous positions do not reach back beyond the next time that it is skinned, which is now,
@@ -211,7 +211,8 @@ class SkinningSystem {
   /// What was skinned, in no order: vertices, bounds, and whatever was built from them is new.
   /// Without those culled on the GPU.
   std::span<const InstanceHandle> skinnedInstances() const;
-  /// Those of which only previous positions changed: they have come to rest.
+  /// Those of which only previous positions changed: they have come to rest, or come back into view
+  /// in the pose in which they left it.
   std::span<const InstanceHandle> settledInstances() const;
   /// Those whose output stands elsewhere than before.
   std::span<const InstanceHandle> movedInstances() const;

@@ -106,14 +106,13 @@ void Scene::gatherPending() {
   pending_.resize(kept);
 }
 
-/// What moved the last time and is not skinned this time rests: its previous positions become the
-/// current ones.
+/// What moved when it was last displayed and is displayed without being skinned rests: its previous
+/// positions become the current ones. What leaves the view is left alone; mostly it is skinned when
+/// it returns.
 void Scene::gatherSettling() {
-  for (const InstanceHandle handle : movedLast_) {
+  for (const InstanceHandle handle : moving_) {
     const SceneInstance* instance = instances_.find(handle);
-    if (instance == nullptr || instance->plannedIn == planNumber_) continue;
-    // Out of view it may have another mesh, in which it has not been skinned.
-    if (instance->shown->mesh != instance->target.mesh) continue;
+    if (instance == nullptr || instance->plannedIn == planNumber_ || !instance->isVisible) continue;
     settling_.push_back(handle.index);
     addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
@@ -193,7 +192,7 @@ void Scene::commit() {
   skinned_.clear();
   settled_.clear();
   moved_.clear();
-  movedLast_.clear();
+  moving_.clear();
   for (const Conversion& conversion : conversions_) {
     ScenePalette& palette = palettes_.at(conversion.palette);
     palette.forms[conversion.form].version = palette.version;
@@ -203,12 +202,16 @@ void Scene::commit() {
     const InstanceHandle handle = instances_.handleOf(index);
     instance.isStale = instance.isListed = instance.isUrgent = instance.restartsMotion = false;
     if (instance.firstFrame == 0) instance.firstFrame = frame_;
-    if (instance.willMove) movedLast_.push_back(handle);
+    instance.isMoving = instance.willMove;
+    if (instance.isMoving) moving_.push_back(handle);
     skinned_.push_back(handle);
   }
   std::erase_if(pending_,
                 [this](InstanceHandle handle) { return !instances_.at(handle.index).isStale; });
-  for (const std::uint32_t index : settling_) settled_.push_back(instances_.handleOf(index));
+  for (const std::uint32_t index : settling_) {
+    instances_.at(index).isMoving = false;
+    settled_.push_back(instances_.handleOf(index));
+  }
   for (const std::uint32_t index : versioned_) {
     SceneInstance& instance = instances_.at(index);
     instance.isStale = instance.isUrgent = instance.restartsMotion = false;

@@ -180,8 +180,11 @@ Result<void> Scene::setVisible(InstanceHandle handle, bool isVisible) {
     instance->hiddenAfter = record_;
     return {};
   }
-  // Not displayed by the last record: what it showed before is no motion.
-  if (instance->hiddenAfter != record_) instance->visibleFrom = record_ + 1;
+  if (instance->hiddenAfter != record_) {
+    // Not displayed by the last record: what it showed before is no motion.
+    instance->visibleFrom = record_ + 1;
+    if (instance->isMoving) moving_.push_back(handle);
+  }
   if (instance->isStale) {
     instance->isUrgent = true;
     makePending(handle.index);

@@ -86,6 +86,7 @@ struct SceneInstance {
   bool restartsMotion = true;  ///< when it is skinned next
   bool isUrgent = true;        ///< whatever its interval
   bool willMove = false;       ///< the plan skins it, and its previous positions are others
+  bool isMoving = false;       ///< its previous positions are others, as of the last record
   bool isShifting = false;     ///< among the shifting
   Method method = Method::dualQuaternion;
   std::uint32_t palette = 0;  ///< index
@@ -237,7 +238,7 @@ class Scene {
   std::vector<InstanceHandle> pending_;    ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;   ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;      ///< all that are culled on the GPU
-  std::vector<InstanceHandle> movedLast_;  ///< with motion, skinned by the last record
+  std::vector<InstanceHandle> moving_;     ///< to settle if they are not skinned: in view
 
   // Of the plan.
   std::uint64_t planNumber_ = 0;

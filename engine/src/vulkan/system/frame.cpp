@@ -56,7 +56,7 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
                          palettes.range(),
                          OutputBuffers::oneBuffer(output.range()),
                          results.range()};
-    Result<Bindings> bound = description.context->createBindings(buffers);
+    Result<Bindings> bound = context->createBindings(buffers);
     if (!bound) return bound.error();
     retired.push_back({scene.frameNumber(), std::exchange(tables, std::move(*made)),
                        std::exchange(bindings, std::move(*bound))});
@@ -91,7 +91,7 @@ const Visibility* SkinningSystem::State::preparedVisibility() {
 Result<void> SkinningSystem::State::makeHistory() {
   if (history.size() != 0) return {};
   Result<SystemBuffer> made = SystemBuffer::create(
-      source, {std::uint64_t{description.instanceBudget} * abi::HISTORY_WORDS * 4,
+      source, {std::uint64_t{scene.description().instanceBudget} * abi::HISTORY_WORDS * 4,
                VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                MemoryUse::device, "dermis history"});
   if (!made) return made.error();
@@ -219,7 +219,7 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
   const CulledTables& culled = builder.culled();
   if (culled.candidateCount != 0) {
     const BufferRange chosen{frame.visibility, frame.visibilityOffset,
-                             std::uint64_t{description.instanceBudget} * 4};
+                             std::uint64_t{scene.description().instanceBudget} * 4};
     preparedVisibility()->record(
         commandBuffer, culled,
         {tables.range(), chosen, history.range(), counters.range(), results.range()},

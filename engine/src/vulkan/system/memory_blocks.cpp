@@ -10,6 +10,11 @@ namespace {
 
 constexpr VkDeviceSize blockSize = VkDeviceSize{64} << 20;
 
+/// Other properties need features that the engine may not have enabled, or are for other ends.
+constexpr VkMemoryPropertyFlags usualProperties =
+    VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+    VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+
 struct Wishes {
   VkMemoryPropertyFlags required, preferred;
 };
@@ -51,18 +56,19 @@ MemoryCallbacks MemoryBlocks::callbacks() {
   return callbacks;
 }
 
-/// The first type that has all that is preferred too, else the first that will do.
-Result<std::uint32_t> MemoryBlocks::findType(const MemoryRequest& request) const {
+/// The types that will do: first those that have all that is preferred, each in the order of the
+/// device.
+std::vector<std::uint32_t> MemoryBlocks::typesFor(const MemoryRequest& request) const {
   const auto [required, preferred] = wishesOf(request.use);
-  for (const VkMemoryPropertyFlags wanted : {required | preferred, required}) {
-    for (std::uint32_t type = 0; type < properties_.memoryTypeCount; ++type) {
-      const bool isAllowed = (request.requirements.memoryTypeBits >> type & 1) != 0;
-      if (isAllowed && (properties_.memoryTypes[type].propertyFlags & wanted) == wanted)
-        return type;
-    }
+  std::vector<std::uint32_t> types, others;
+  for (std::uint32_t type = 0; type < properties_.memoryTypeCount; ++type) {
+    const VkMemoryPropertyFlags flags = properties_.memoryTypes[type].propertyFlags;
+    const bool isAllowed = (request.requirements.memoryTypeBits >> type & 1) != 0;
+    if (!isAllowed || (flags & required) != required || (flags & ~usualProperties) != 0) continue;
+    ((flags & preferred) == preferred ? types : others).push_back(type);
   }
-  return Error{ErrorCode::missingFeature,
-               std::string("no memory type of the device suits the buffer '") + request.name + "'"};
+  types.insert(types.end(), others.begin(), others.end());
+  return types;
 }
 
 Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type,
@@ -100,14 +106,25 @@ Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type,
   return blocks_.back().get();
 }
 
+/// A heap may be full, such as the 256 MiB of many GPUs that are device-local and mapped, although
+/// another type that will do has memory.
 Result<MemoryBlock> MemoryBlocks::allocate(const MemoryRequest& request) {
-  const Result<std::uint32_t> type = findType(request);
-  if (!type) return type.error();
+  Result<MemoryBlock> memory =
+      Error{ErrorCode::missingFeature,
+            std::string("no memory type of the device suits the buffer '") + request.name + "'"};
+  for (const std::uint32_t type : typesFor(request)) {
+    memory = allocateFrom(type, request);
+    if (memory) break;
+  }
+  return memory;
+}
+
+Result<MemoryBlock> MemoryBlocks::allocateFrom(std::uint32_t type, const MemoryRequest& request) {
   const bool isMapped = request.use != MemoryUse::device;
   Block* found = nullptr;
   std::optional<Range> range;
   for (const std::unique_ptr<Block>& block : blocks_) {
-    if (block->type != *type || block->hasAddress != request.hasDeviceAddress ||
+    if (block->type != type || block->hasAddress != request.hasDeviceAddress ||
         (block->mapped != nullptr) != isMapped)
       continue;
     range = block->ranges.allocate(request.requirements.size, request.requirements.alignment);
@@ -115,7 +132,7 @@ Result<MemoryBlock> MemoryBlocks::allocate(const MemoryRequest& request) {
     if (range) break;
   }
   if (!range) {
-    Result<Block*> added = addBlock(*type, request);
+    Result<Block*> added = addBlock(type, request);
     if (!added) return added.error();
     found = *added;
     range = found->ranges.allocate(request.requirements.size, request.requirements.alignment);

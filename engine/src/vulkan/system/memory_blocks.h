@@ -35,7 +35,8 @@ class MemoryBlocks {
 
   Result<MemoryBlock> allocate(const MemoryRequest& request);
   void free(const MemoryBlock& memory);
-  Result<std::uint32_t> findType(const MemoryRequest& request) const;
+  std::vector<std::uint32_t> typesFor(const MemoryRequest& request) const;
+  Result<MemoryBlock> allocateFrom(std::uint32_t type, const MemoryRequest& request);
   Result<Block*> addBlock(std::uint32_t type, const MemoryRequest& request);
 
   const Context::State& context_;

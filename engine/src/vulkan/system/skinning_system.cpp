@@ -77,9 +77,8 @@ SkinningSystem::~SkinningSystem() = default;
 SkinningSystem::SkinningSystem(SkinningSystem&&) noexcept = default;
 SkinningSystem& SkinningSystem::operator=(SkinningSystem&&) noexcept = default;
 
-SkinningSystem::State::State(const SkinningSystemDescription& described,
-                             Context::State& contextState, const SceneDescription& sceneDescription)
-    : context(&contextState), description(described), scene(sceneDescription) {}
+SkinningSystem::State::State(Context::State& contextState, const SceneDescription& sceneDescription)
+    : context(&contextState), scene(sceneDescription) {}
 
 /// Of what kernels read, through texel buffers where the device has them.
 VkBufferUsageFlags SkinningSystem::State::readUsage() const {
@@ -93,7 +92,7 @@ std::span<JointMatrix> SkinningSystem::State::poseAt(std::uint64_t offset,
   return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + offset), jointCount};
 }
 
-Result<void> SkinningSystem::State::createBuffers() {
+Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage) {
   const VkBufferUsageFlags read = readUsage();
   constexpr VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
   constexpr VkBufferUsageFlags to = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
@@ -108,7 +107,7 @@ Result<void> SkinningSystem::State::createBuffers() {
         {&matrices, {sizes.matricesSize(), read, MemoryUse::upload, "dermis matrices"}},
         {&palettes, {sizes.palettesSize(), read, MemoryUse::device, "dermis palettes"}},
         {&output,
-         {sizes.outputBudget, storage | to | from | description.outputUsage, MemoryUse::device,
+         {sizes.outputBudget, storage | to | from | outputUsage, MemoryUse::device,
           "dermis output"}},
         {&counters,
          {abi::COUNTER_WORDS * 4, storage | to | from, MemoryUse::device, "dermis counters"}},
@@ -137,7 +136,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   if (!functions) return functions.error();
 
   SkinningSystem system;
-  system.state_ = std::make_unique<State>(description, context, scene);
+  system.state_ = std::make_unique<State>(context, scene);
   State& state = *system.state_;
   state.functions = *functions;
   state.source.context = &context;
@@ -148,7 +147,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
     state.source.memory = state.blocks->callbacks();
   }
   state.slots.resize(description.framesInFlight);
-  if (Result<void> made = state.createBuffers(); !made) return made.error();
+  if (Result<void> made = state.createBuffers(description.outputUsage); !made) return made.error();
   if (description.measuresGpuTime) {
     if (Result<void> made =
             state.timestamps.create(context, state.functions, description.framesInFlight);
@@ -280,7 +279,7 @@ std::span<const InstanceHandle> SkinningSystem::movedInstances() const {
   return state_->scene.moved();
 }
 std::uint32_t SkinningSystem::instanceCapacity() const {
-  return state_->description.instanceBudget;
+  return state_->scene.description().instanceBudget;
 }
 Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) const {
   const Result<InstanceOutput> known = state_->scene.output(instance);

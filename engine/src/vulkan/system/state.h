@@ -34,10 +34,9 @@ struct MeshUpload {
 };
 
 struct SkinningSystem::State {
-  State(const SkinningSystemDescription& description, Context::State& context,
-        const SceneDescription& sceneDescription);
+  State(Context::State& context, const SceneDescription& sceneDescription);
   VkBufferUsageFlags readUsage() const;
-  Result<void> createBuffers();
+  Result<void> createBuffers(VkBufferUsageFlags outputUsage);
 
   // frame.cpp
   Result<void> makeRoomForTables();
@@ -61,8 +60,7 @@ struct SkinningSystem::State {
     return static_cast<std::uint32_t>((scene.recordNumber() + 1) % slots.size());
   }
 
-  Context::State* context;
-  SkinningSystemDescription description;
+  Context::State* context;  ///< stays where it is when the Context is moved
   SystemFunctions functions;
   std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
   BufferSource source;
