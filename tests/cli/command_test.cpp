@@ -10,6 +10,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -257,11 +258,59 @@ TEST(CommandTest, InfoListsMeshesAndClips) {
   EXPECT_GE(parsed["skins"][0]["joints"].get<int>(), 20);
 }
 
+/// What `devices` should say of a device, asked of the driver.
+std::string describe(const samples::Device& device) {
+  const samples::VulkanFunctions& functions = device.functions();
+  VkPhysicalDeviceProperties properties{};
+  functions.GetPhysicalDeviceProperties(device.physicalDevice(), &properties);
+  VkPhysicalDevice8BitStorageFeatures bytes{};
+  bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  halves.pNext = &bytes;
+  VkPhysicalDeviceFeatures2 features{};
+  features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  features.pNext = &halves;
+  functions.GetPhysicalDeviceFeatures2(device.physicalDevice(), &features);
+  std::uint32_t count = 0;
+  functions.EnumerateDeviceExtensionProperties(device.physicalDevice(), nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  functions.EnumerateDeviceExtensionProperties(device.physicalDevice(), nullptr, &count,
+                                               extensions.data());
+  const bool pushes = std::ranges::any_of(extensions, [](const VkExtensionProperties& extension) {
+    return std::string(extension.extensionName) == VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME;
+  });
+  const auto yes = [](bool is) { return is ? "yes" : "no"; };
+  const char* types[] = {"other", "integrated GPU", "discrete GPU", "virtual GPU", "CPU"};
+  std::ostringstream text;
+  text << properties.deviceName << "\n   " << types[properties.deviceType] << ", Vulkan "
+       << VK_API_VERSION_MAJOR(properties.apiVersion) << '.'
+       << VK_API_VERSION_MINOR(properties.apiVersion) << '.'
+       << VK_API_VERSION_PATCH(properties.apiVersion) << ", usable\n   storage buffers of "
+       << (properties.limits.maxStorageBufferRange >> 20) << " MiB, "
+       << properties.limits.maxPerStageDescriptorStorageBuffers << " a stage; "
+       << properties.limits.maxComputeWorkGroupCount[0]
+       << " workgroups a dimension; push descriptors: " << yes(pushes)
+       << "; stores of 2 bytes: " << yes(halves.storageBuffer16BitAccess == VK_TRUE)
+       << ", of 1 byte: " << yes(bytes.storageBuffer8BitAccess == VK_TRUE) << '\n';
+  return text.str();
+}
+
 TEST(CommandTest, DevicesListsTheDevice) {
   REQUIRE_DEVICE();
+  std::string reason;
+  const std::string expected = describe(*testDevice(true, reason)->device);
   const CommandResult result = dermis({"devices"});
   EXPECT_EQ(result.status, 0);
-  EXPECT_TRUE(result.output.starts_with("0  ")) << result.output;
+  EXPECT_EQ(result.errors, "");
+  const std::size_t place = result.output.find("  " + expected);
+  ASSERT_NE(place, std::string::npos) << result.output << "\nexpected " << expected;
+  // The number before it counts the devices, of which each takes three lines.
+  const std::size_t line = result.output.rfind('\n', place) + 1;  // npos + 1 is the first line
+  const auto before = std::count(result.output.begin(),
+                                 result.output.begin() + static_cast<std::ptrdiff_t>(line), '\n');
+  EXPECT_EQ(before % 3, 0);
+  EXPECT_EQ(result.output.substr(line, place - line), std::to_string(before / 3));
 }
 
 std::string readText(const std::string& path) {
@@ -331,6 +380,7 @@ TEST(CommandTest, VerifyWithoutAModelVerifiesRandomMeshes) {
 
 TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
   REQUIRE_DEVICE();
+  REQUIRE_TERMINAL();
   const std::string json = outFile("verify.json");
   const CommandResult result =
       runOnTerminal({dermisProgram, "verify", bar, "--random", "--json", json});
@@ -348,6 +398,7 @@ TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
 }
 
 TEST(CommandTest, ProgressIsShownOnATerminalOnly) {
+  REQUIRE_TERMINAL();
   const std::vector<std::string> frames{"skin",     bar, "-o",       outFile("frame_%02d.ply"),
                                         "--frames", "3", "--device", "cpu"};
   std::vector<std::string> command{dermisProgram};

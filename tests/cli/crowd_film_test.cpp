@@ -111,6 +111,7 @@ TEST(CrowdFilmTest, LooksAsTheReferenceDoes) {
 
 TEST(CrowdFilmTest, ShowsOnATerminalHowFarItIs) {
   REQUIRE_DEVICE();
+  REQUIRE_TERMINAL();
   const auto errors = [&](const std::string& out, const std::vector<std::string>& added) {
     const CommandResult result = runOnTerminal(filmCommand(out, 1, added));
     EXPECT_EQ(result.status, 0);

@@ -52,3 +52,13 @@ inline void expectOneErrorLine(const CommandResult& result) {
       GTEST_SKIP() << reason;                                            \
     }                                                                    \
   } while (false)
+
+/// Skips, or fails in CI, where the system has no pseudo-terminals.
+#define REQUIRE_TERMINAL()                                               \
+  do {                                                                   \
+    const std::string reason = ::dermis::test::whyNoTerminal();          \
+    if (!reason.empty()) {                                               \
+      ASSERT_FALSE(::dermis::test::isContinuousIntegration()) << reason; \
+      GTEST_SKIP() << reason;                                            \
+    }                                                                    \
+  } while (false)

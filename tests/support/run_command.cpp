@@ -4,8 +4,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <stdexcept>
 
 namespace dermis::test {
 namespace {
@@ -59,10 +62,20 @@ CommandResult runCommand(const std::vector<std::string>& command,
   return {status, readAll(output), readAll(errors)};
 }
 
+std::string whyNoTerminal() {
+  int master = -1, terminal = -1;
+  if (openpty(&master, &terminal, nullptr, nullptr, nullptr) != 0)
+    return std::string("the system gives no pseudo-terminal: ") + std::strerror(errno);
+  close(master);
+  close(terminal);
+  return {};
+}
+
 CommandResult runOnTerminal(const std::vector<std::string>& command) {
   CommandResult result;
   int master = -1, terminal = -1;
-  if (openpty(&master, &terminal, nullptr, nullptr, nullptr) != 0) return result;
+  if (openpty(&master, &terminal, nullptr, nullptr, nullptr) != 0)
+    throw std::runtime_error(whyNoTerminal());
   std::FILE* output = std::tmpfile();
   const pid_t child = fork();
   if (child == 0) execute(command, {}, fileno(output), terminal);

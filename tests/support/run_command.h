@@ -16,6 +16,9 @@ struct CommandResult {
 CommandResult runCommand(const std::vector<std::string>& command,
                          const std::vector<std::string>& environment = {});
 
+/// Why `runOnTerminal` cannot run anything here; empty where it can.
+std::string whyNoTerminal();
+
 /// The same with a terminal for standard error.
 CommandResult runOnTerminal(const std::vector<std::string>& command);
 
