@@ -230,7 +230,7 @@ TEST(CommandTest, FramesAreNumberedPosesFromTimeOn) {
 
 TEST(CommandTest, StrictRefusesWhatIsRepairedOtherwise) {
   const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  if (!data) GTEST_SKIP() << noTestData;
   const std::string wasp = (*data / "models/QuaterniusWasp/Wasp.glb").string();
   const CommandResult lenient =
       dermis({"skin", wasp, "-o", outFile("wasp.ply"), "--device", "cpu"});
@@ -372,7 +372,7 @@ TEST(CommandTest, VerifyGoesOnAfterABadModel) {
 TEST(CommandTest, RealModelsVerify) {
   REQUIRE_DEVICE();
   const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  if (!data) GTEST_SKIP() << noTestData;
   std::vector<std::string> arguments{"verify"};
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*data / "models")) {
     const std::string path = entry.path().string();
@@ -396,7 +396,7 @@ TEST(CommandTest, RealModelsVerify) {
 // tests give the reasons).
 TEST(CommandTest, BrokenModelsAreRefusedWithOneSentence) {
   const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << "no test data: neither DERMIS_TEST_DATA nor ../shared is there";
+  if (!data) GTEST_SKIP() << noTestData;
   std::size_t files = 0, refused = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*data / "models")) {
     const std::string path = entry.path().string();
