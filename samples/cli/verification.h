@@ -24,7 +24,8 @@ struct VerifiedCase {
   std::string wrong;  ///< what else is wrong; empty where nothing is
 
   bool passed() const {
-    return comparison.passed() && wrong.empty() && comparison.compared + comparison.onlyFinite != 0;
+    return comparison.passed() && wrong.empty() &&
+           comparison.compared + comparison.exempt.onlyFinite != 0;
   }
   std::string failure() const;  ///< a sentence, where it did not pass
 };

@@ -153,8 +153,9 @@ class BatchVerifier {
   }
 
   Result<void> compareAttributes(const SkinnedVertices& skinned, std::size_t index) {
+    const InstanceToVerify& instance = instances_[index];
     const Result<Comparison> comparison =
-        compare(*instances_[index].expected, skinned.view(), instances_[index].method);
+        compare(*instance.expected, skinned.view(), instance.method, instance.exemptions);
     if (!comparison) return comparison.error();
     results_[index].comparison = *comparison;
     results_[index].status = skinned.status;
@@ -176,9 +177,13 @@ class BatchVerifier {
     SkinnedView view;
     view.positions = frames.now.instances[index].attribute(Stream::previousPositions);
     view.box = boxes_[index];
+    const InstanceToVerify& instance = instances_[index];
     const Result<Comparison> comparison =
-        compare(*instances_[index].expectedBefore, view, instances_[index].method);
+        compare(*instance.expectedBefore, view, instance.method, instance.exemptionsBefore);
     if (!comparison) return comparison.error();
+    if (comparison->exempt != comparison->expectedExempt)
+      fail(index, "of the previous positions, " + std::to_string(comparison->compared) +
+                      " were compared, which is not as many as should be");
     if (comparison->failures != 0) {
       fail(index, std::to_string(comparison->failures) +
                       " previous positions are outside their bound, the first is vertex " +
