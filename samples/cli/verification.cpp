@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "method_rotation.h"
 
@@ -63,6 +64,20 @@ Exemptions exemptionsIn(std::span<const JointMatrix> palette, const reference::S
   return exemptions;
 }
 
+/// Nobody can be asked to compute in float32 what it does not hold. Sums on the way to a position
+/// reach a few times its size.
+Result<void> checkReach(const ScenePart& part, const PoseToVerify& pose,
+                        const reference::SkinnedMesh& skinned) {
+  constexpr double most = static_cast<double>(std::numeric_limits<float>::max()) / 8;
+  for (const reference::Conditioning& conditioning : skinned.conditioning) {
+    if (conditioning.undefined || !(conditioning.scale > most)) continue;
+    return Error{ErrorCode::invalidMesh,
+                 fmt::format("{}, {}: positions reach {:.3g}, which is too far for float32",
+                             part.name, pose.name, conditioning.scale)};
+  }
+  return {};
+}
+
 Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> figures,
                                     const PoseToVerify& pose) {
   ReferencePose skinned{scenePose(scene, pose.clip, pose.time), {}, {}};
@@ -72,6 +87,7 @@ Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> 
         reference::skin(part.mesh->view(), skinned.pose.palette(part), figure.method,
                         skinned.pose.morphs[figure.part]);
     if (!mesh) return mesh.error();
+    if (Result<void> checked = checkReach(part, pose, *mesh); !checked) return checked.error();
     skinned.exemptions.push_back(exemptionsIn(skinned.pose.palette(part), *mesh, figure.method));
     skinned.figures.push_back(std::move(*mesh));
   }

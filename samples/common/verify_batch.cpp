@@ -44,8 +44,10 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
     box.max[axis] = std::clamp(box.max[axis], -1e37f, 1e37f);
     const float side = box.max[axis] - box.min[axis];
     const float margin = clamps ? -0.2f * side : 0.05f * side;
-    box.min[axis] -= margin + 0.01f;
-    box.max[axis] += margin + 0.01f;
+    // What is added is not lost in the rounding of large numbers.
+    const float least = 0.01f + 1e-6f * std::max(std::abs(box.min[axis]), std::abs(box.max[axis]));
+    box.min[axis] -= margin + least;
+    box.max[axis] += margin + least;
   }
   return box;
 }
