@@ -6,7 +6,8 @@
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, else in ../shared, and
-# skip if both are absent. With CI set in the environment, a missing Vulkan device or validation layer is a failure.
+# skip where they are absent. With CI set in the environment, a missing Vulkan device or validation layer is a failure, and so
+# is data that is not there where $DERMIS_TEST_DATA names it, or not whole where ../shared is there.
 #
 # Prints what failed or was skipped, and how long each step took; all the rest is in build/PRESET/tests.log. A test that failed
 # is run three times more, alone, to tell whether it always fails; the run has failed either way.

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "commands.h"
 #include "open_device.h"
@@ -19,36 +21,79 @@ struct VerifyOptions {
   bool strict = false;
 };
 
-/// Fills `verification`; what it returns is a failure of the device.
-Result<void> verifyModel(samples::Device& device, vulkan::Context& context, const Scene& scene,
-                         std::span<const OutputToVerify> outputs, ModelVerification& verification) {
-  const std::vector<PoseToVerify> poses = posesToVerify(*scene.model);
-  samples::Progress progress(verification.model, poses.size());
-  Result<std::vector<VerifiedCase>> cases =
-      verifyScene(device, context, scene, poses, outputs, [&progress] { progress.step(); });
-  if (!cases) return cases.error();
-  verification.cases = std::move(*cases);
-  return {};
+using Cases = Result<std::vector<VerifiedCase>>;
+
+bool isSkinned(const Scene& scene) {
+  return std::ranges::any_of(scene.parts,
+                             [](const ScenePart& part) { return part.mesh != nullptr; });
 }
 
-Result<ModelVerification> verifyRandom(samples::Device& device, vulkan::Context& context) {
-  ModelVerification verification{"random meshes", {}, {}};
-  const std::vector<samples::RandomCase> cases = samples::randomCases(context.limits());
-  samples::Progress progress(verification.model, cases.size());
-  Result<std::vector<VerifiedCase>> verified =
-      verifyRandomMeshes(device, context, cases, [&progress] { progress.step(); });
-  if (!verified) return verified.error();
-  verification.cases = std::move(*verified);
-  return verification;
-}
-
-/// Why there is nothing to verify in a model, or empty.
-std::string nothingToVerify(const Scene& scene) {
-  for (const ScenePart& part : scene.parts) {
-    if (part.mesh != nullptr) return {};
+/// What became of one model, whatever it is; the others have verdicts of their own.
+class Verifier {
+ public:
+  Verifier(samples::OpenDevice& open, bool strict)
+      : open_(open), outputs_(outputsToVerify(open.context.limits())) {
+    preparation_.strict = strict;
+    preparation_.centersOfRotation = true;
   }
-  return "it has no skinned mesh with joints and weights in its scene";
-}
+
+  void verifyRandom() {
+    const std::vector<samples::RandomCase> cases = samples::randomCases(open_.context.limits());
+    samples::Progress progress("random meshes", cases.size());
+    add("random meshes",
+        verifyRandomMeshes(*open_.device, open_.context, cases, [&progress] { progress.step(); }));
+  }
+
+  void verify(const std::string& model) {
+    const Result<Scene> scene = loadScene(model, preparation_);
+    if (!scene) return refuse(model, ExitStatus::badInput, scene.error().message);
+    for (const std::string& warning : scene->warnings) reportWarning(warning);
+    if (!isSkinned(*scene)) {
+      return refuse(
+          model, ExitStatus::badInput,
+          fmt::format("{}: it has no skinned mesh with joints and weights in its scene", model));
+    }
+    const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
+    samples::Progress progress(model, poses.size());
+    add(model, verifyScene(*open_.device, open_.context, *scene, poses, outputs_,
+                           [&progress] { progress.step(); }));
+  }
+
+  const std::vector<ModelVerification>& models() const { return models_; }
+  /// The worst that happened.
+  ExitStatus status() const { return status_; }
+
+ private:
+  void add(const std::string& model, Cases cases) {
+    if (!cases) {
+      const Error& error = cases.error();
+      return refuse(model, statusOf(error), fmt::format("{}: {}", model, error.message));
+    }
+    models_.push_back({model, {}, std::move(*cases)});
+    if (models_.back().failures() != 0) worsen(ExitStatus::verificationFailed);
+  }
+
+  /// A mesh or a pose that cannot be verified, unless the device is to blame.
+  static ExitStatus statusOf(const Error& error) {
+    return error.code == ErrorCode::invalidMesh || error.code == ErrorCode::invalidArgument ||
+                   error.code == ErrorCode::limitExceeded
+               ? ExitStatus::badInput
+               : samples::deviceErrorStatus(error);
+  }
+
+  void refuse(const std::string& model, ExitStatus status, std::string why) {
+    worsen(reportError(status, why));
+    models_.push_back({model, std::move(why), {}});
+  }
+
+  void worsen(ExitStatus status) { status_ = std::max(status_, status); }
+
+  samples::OpenDevice& open_;
+  std::vector<OutputToVerify> outputs_;
+  MeshPreparation preparation_;
+  std::vector<ModelVerification> models_;
+  ExitStatus status_ = ExitStatus::done;
+};
 
 ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
                         const std::vector<ModelVerification>& models) {
@@ -76,47 +121,17 @@ ExitStatus verify(const VerifyOptions& options) {
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
   if (!open) return reportDeviceError(open.error());
 
-  ExitStatus status = ExitStatus::done;
-  std::vector<ModelVerification> models;
-  if (options.random || options.models.empty()) {
-    Result<ModelVerification> verified = verifyRandom(*open->device, open->context);
-    if (!verified) return reportDeviceError(verified.error());
-    if (verified->failures() != 0) status = ExitStatus::verificationFailed;
-    models.push_back(std::move(*verified));
-  }
-  const std::vector<OutputToVerify> outputs = outputsToVerify(open->context.limits());
-  MeshPreparation preparation;
-  preparation.strict = options.strict;
-  preparation.centersOfRotation = true;
-  for (const std::string& model : options.models) {
-    models.push_back({model, {}, {}});
-    Result<Scene> scene = loadScene(model, preparation);
-    if (!scene) models.back().error = scene.error().message;
-    if (scene) {
-      for (const std::string& warning : scene->warnings) reportWarning(warning);
-      if (const std::string nothing = nothingToVerify(*scene); !nothing.empty()) {
-        models.back().error = fmt::format("{}: {}", model, nothing);
-      }
-    }
-    if (!models.back().error.empty()) {
-      status = reportError(ExitStatus::badInput, models.back().error);
-      continue;
-    }
-    if (Result<void> verified =
-            verifyModel(*open->device, open->context, *scene, outputs, models.back());
-        !verified) {
-      return reportDeviceError(verified.error());
-    }
-    if (models.back().failures() != 0 && status == ExitStatus::done)
-      status = ExitStatus::verificationFailed;
-  }
+  Verifier verifier(*open, options.strict);
+  if (options.random || options.models.empty()) verifier.verifyRandom();
+  for (const std::string& model : options.models) verifier.verify(model);
   fmt::print("device  {}\n", open->device->info().name);
-  printReport(models);
-  if (const ExitStatus written = writeReports(options, open->device->info().name, models);
+  printReport(verifier.models());
+  if (const ExitStatus written =
+          writeReports(options, open->device->info().name, verifier.models());
       written != ExitStatus::done) {
     return written;
   }
-  return status;
+  return verifier.status();
 }
 
 }  // namespace

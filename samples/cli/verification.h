@@ -24,7 +24,8 @@ struct VerifiedCase {
   std::string wrong;  ///< what else is wrong; empty where nothing is
 
   bool passed() const {
-    return comparison.passed() && wrong.empty() && comparison.compared + comparison.onlyFinite != 0;
+    return comparison.passed() && wrong.empty() &&
+           comparison.compared + comparison.exempt.onlyFinite != 0;
   }
   std::string failure() const;  ///< a sentence, where it did not pass
 };
@@ -50,7 +51,7 @@ std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits);
 /// In each pose all parts with all methods, once for each way to cut up the work (which must not
 /// change a bit), and once for each of these ways to store the result, which are shared out among
 /// the poses. Motion goes from the pose before, in the first from the last. `done` is called after
-/// each pose.
+/// each pose. Fails with `invalidMesh` where a pose has positions that float32 cannot hold.
 Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::Context& context,
                                               const Scene& scene,
                                               std::span<const PoseToVerify> poses,

@@ -50,7 +50,8 @@ Result<void> writeText(const std::filesystem::path& path, const std::string& tex
 
 struct Summary {
   std::set<std::string> poses, variants;
-  std::uint64_t vertices = 0, onlyFinite = 0, skipped = 0;
+  std::uint64_t vertices = 0, onlyUnitNormals = 0, onlyUnitTangents = 0;
+  Exemptions exempt;
   double worstPosition = 0, worstNormal = 0, worstTangent = 0;
   std::size_t failures = 0;
 };
@@ -58,10 +59,14 @@ struct Summary {
 /// What was not held against a bound, where there is any.
 std::string exceptions(const Summary& summary) {
   std::string text;
-  if (summary.onlyFinite != 0)
-    text += fmt::format(", {} only asked to be finite", summary.onlyFinite);
-  if (summary.skipped != 0)
-    text += fmt::format(", {} left out: a joint is not finite", summary.skipped);
+  if (summary.exempt.onlyFinite != 0)
+    text += fmt::format(", {} only asked to be finite", summary.exempt.onlyFinite);
+  if (summary.exempt.skipped != 0)
+    text += fmt::format(", {} left out: a joint is not finite", summary.exempt.skipped);
+  if (summary.onlyUnitNormals != 0)
+    text += fmt::format(", {} normals only asked to be of unit length", summary.onlyUnitNormals);
+  if (summary.onlyUnitTangents != 0)
+    text += fmt::format(", {} tangents only asked to be of unit length", summary.onlyUnitTangents);
   return text;
 }
 
@@ -75,8 +80,10 @@ Json describe(const VerifiedCase& verified) {
   json["passed"] = verified.passed();
   if (!verified.passed()) json["failure"] = verified.failure();
   json["vertices"] = comparison.compared;
-  json["onlyFinite"] = comparison.onlyFinite;
-  json["skipped"] = comparison.skipped;
+  json["onlyFinite"] = comparison.exempt.onlyFinite;
+  json["skipped"] = comparison.exempt.skipped;
+  json["onlyUnitNormals"] = comparison.onlyUnitNormals;
+  json["onlyUnitTangents"] = comparison.onlyUnitTangents;
   json["failures"] = comparison.failures;
   json["worstPositionOfBound"] = comparison.worstPosition;
   json["worstNormalOfBound"] = comparison.worstNormal;
@@ -102,8 +109,10 @@ void printReport(const std::vector<ModelVerification>& models) {
       summary.poses.insert(verified.pose);
       summary.variants.insert(verified.variant);
       summary.vertices += verified.comparison.compared;
-      summary.onlyFinite += verified.comparison.onlyFinite;
-      summary.skipped += verified.comparison.skipped;
+      summary.exempt.onlyFinite += verified.comparison.exempt.onlyFinite;
+      summary.exempt.skipped += verified.comparison.exempt.skipped;
+      summary.onlyUnitNormals += verified.comparison.onlyUnitNormals;
+      summary.onlyUnitTangents += verified.comparison.onlyUnitTangents;
       summary.worstPosition = std::max(summary.worstPosition, verified.comparison.worstPosition);
       summary.worstNormal = std::max(summary.worstNormal, verified.comparison.worstNormal);
       summary.worstTangent = std::max(summary.worstTangent, verified.comparison.worstTangent);

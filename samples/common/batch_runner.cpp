@@ -12,6 +12,10 @@ constexpr std::array<BufferRole, streamCount> outputRoles{BufferRole::positions,
                                                           BufferRole::normals, BufferRole::tangents,
                                                           BufferRole::previousPositions};
 
+constexpr std::array<const char*, streamCount> outputNames{
+    "the positions' buffer", "the normals' buffer", "the tangents' buffer",
+    "the previous positions' buffer"};
+
 struct Buffers {
   MappedBuffer meshes, matrices, tables, palettes, results;
 };
@@ -115,8 +119,7 @@ vulkan::OutputBuffers BatchRunner::outputRanges() const {
   return {outputs_[0].range(), outputs_[1].range(), outputs_[2].range(), outputs_[3].range()};
 }
 
-std::uint64_t BatchRunner::countChangedBytes() const {
-  std::uint64_t changed = 0;
+void BatchRunner::countChangedBytes(BatchResult& result) const {
   std::array<std::vector<bool>, streamCount> written;
   for (std::size_t buffer = 0; buffer < streamCount; ++buffer)
     written[buffer].resize(outputs_[buffer].bytes().size());
@@ -134,10 +137,11 @@ std::uint64_t BatchRunner::countChangedBytes() const {
   for (std::size_t buffer = 0; buffer < streamCount; ++buffer) {
     const std::span<const std::byte> bytes = outputs_[buffer].bytes();
     for (std::size_t byte = 0; byte < bytes.size(); ++byte) {
-      if (!written[buffer][byte] && bytes[byte] != options_.poison) ++changed;
+      if (written[buffer][byte] || bytes[byte] == options_.poison) continue;
+      if (result.untouchedBytesChanged++ == 0)
+        result.firstChanged = "byte " + std::to_string(byte) + " of " + outputNames[buffer];
     }
   }
-  return changed;
 }
 
 BatchResult BatchRunner::readBack(const Plan& plan, const MappedBuffer& palettes,
@@ -162,7 +166,7 @@ BatchResult BatchRunner::readBack(const Plan& plan, const MappedBuffer& palettes
       std::memcpy(&skinned.result, results.bytes().data() + place, sizeof(skinned.result));
     result.instances.push_back(std::move(skinned));
   }
-  if (options_.countUntouched) result.untouchedBytesChanged = countChangedBytes();
+  if (options_.countUntouched) countChangedBytes(result);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "batch_layout.h"
@@ -45,6 +46,7 @@ struct BatchResult {
   std::size_t dispatches = 0;
   std::uint64_t untouchedBytesChanged =
       0;  ///< bytes outside the attributes that are not as they were, where they are counted
+  std::string firstChanged;  ///< which is the first of them: "byte 12 of the positions' buffer"
 };
 
 /// Skins one batch after another into the same outputs, as an engine does frame by frame.
@@ -61,7 +63,7 @@ class BatchRunner {
   vulkan::OutputBuffers outputRanges() const;
   BatchResult readBack(const Plan& plan, const MappedBuffer& palettes,
                        const MappedBuffer& results) const;
-  std::uint64_t countChangedBytes() const;
+  void countChangedBytes(BatchResult& result) const;
 
   Device& device_;
   vulkan::Context& context_;

@@ -216,8 +216,13 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
     poses.push_back(randomPose(10 + pose, random.joints, random.rigidity));
   std::vector<InstanceToVerify> instances;
   for (std::size_t instance = 0; instance < 3; ++instance) {
-    instances.push_back({&*packed, poses[instance], poses[instance + 3], morphs, previousMorphs,
-                         random.method, nullptr, nullptr});
+    InstanceToVerify& verified = instances.emplace_back();
+    verified.packed = &*packed;
+    verified.palette = poses[instance];
+    verified.previousPalette = poses[instance + 3];
+    verified.morphs = morphs;
+    verified.previousMorphs = previousMorphs;
+    verified.method = random.method;
   }
   // One that no morph target is at work on, beside two others.
   instances[1].morphs = {};
@@ -235,6 +240,10 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
     expected[instance + 3] = std::move(*before);
     verified.expected = &expected[instance];
     verified.expectedBefore = &expected[instance + 3];
+    // All joints are finite: no vertex is without an answer.
+    verified.exemptions = {exemptionsOf(expected[instance], verified.method).onlyFinite, 0};
+    verified.exemptionsBefore = {exemptionsOf(expected[instance + 3], verified.method).onlyFinite,
+                                 0};
   }
   return verifyBatch(device, context, instances, random.output, true);
 }

@@ -33,6 +33,8 @@ struct InstanceToVerify {
   /// What must come out, in this pose and the previous one.
   const reference::SkinnedMesh* expected = nullptr;
   const reference::SkinnedMesh* expectedBefore = nullptr;
+  /// How many vertices of them may be left out.
+  Exemptions exemptions = {}, exemptionsBefore = {};
 };
 
 /// What came out for one instance.

@@ -165,6 +165,7 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
     }
     if (finding.passed && !comparison->passed()) finding.firstFailure = comparison->firstFailure;
     finding.passed &= comparison->passed();
+    if (view == &current) finding.compared = comparison->compared;
     finding.worst = std::max({finding.worst, comparison->worstPosition, comparison->worstNormal});
     if (!finding.passed) break;
   }
@@ -173,7 +174,7 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
 
 void CrowdCheck::count(const Capture& capture, const Instance& instance, const Finding& finding) {
   ++totals_.instances;
-  totals_.vertices += character_->parts()[instance.shown.part].packed.vertexCount();
+  totals_.vertices += finding.compared;
   if (finding.passed) {
     totals_.worst = std::max(totals_.worst, finding.worst);
     return;

@@ -19,7 +19,7 @@ namespace crowd {
 struct CheckTotals {
   std::uint32_t frames = 0;
   std::uint64_t instances = 0;
-  std::uint64_t vertices = 0;
+  std::uint64_t vertices = 0;  ///< held against their bound
   std::uint64_t failures = 0;  ///< instances with a vertex outside its bound
   std::string firstFailure;    ///< a sentence
   double worst = 0;            ///< the largest error ÷ its bound
@@ -52,6 +52,7 @@ class CrowdCheck {
   struct Finding {
     dermis::Result<void> done;
     double worst = 0;
+    std::uint64_t compared = 0;  ///< vertices, in the current pose
     std::uint32_t firstFailure = 0;
     bool passed = false;
   };

@@ -44,10 +44,14 @@ ExitStatus reportModelError(const Error& error) {
   return reportError(ExitStatus::badInput, error.message);
 }
 
-ExitStatus reportDeviceError(const Error& error) {
+ExitStatus deviceErrorStatus(const Error& error) {
   const bool noDevice =
       error.code == ErrorCode::missingFeature || error.code == ErrorCode::missingEntryPoint;
-  return reportError(noDevice ? ExitStatus::noDevice : ExitStatus::stopped, error.message);
+  return noDevice ? ExitStatus::noDevice : ExitStatus::stopped;
+}
+
+ExitStatus reportDeviceError(const Error& error) {
+  return reportError(deviceErrorStatus(error), error.message);
 }
 
 }  // namespace dermis::samples

@@ -30,5 +30,6 @@ ExitStatus reportWrongUsage(std::string_view message);
 /// An error of a model file, and one of a device, with the status that each means.
 ExitStatus reportModelError(const Error& error);
 ExitStatus reportDeviceError(const Error& error);
+ExitStatus deviceErrorStatus(const Error& error);
 
 }  // namespace dermis::samples

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "dermis/accuracy.h"
@@ -34,8 +35,11 @@ Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const Chec
   if (!expected) return expected.error();
   for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
     const reference::Conditioning& conditioning = expected->conditioning[vertex];
-    const double error = distance(expected->positions[vertex], &positions[3 * vertex]);
-    if (!isDefined(conditioning) || !std::isfinite(error)) continue;
+    if (!isDefined(conditioning)) continue;
+    // What is not finite is as wrong as can be told.
+    constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
+    const double apart = distance(expected->positions[vertex], &positions[3 * vertex]);
+    const double error = apart < most ? apart : most;
     errors[vertex] = static_cast<float>(error);
     result.greatest = std::max(result.greatest, error);
     const double bound = positionBound(figure.method, conditioning);

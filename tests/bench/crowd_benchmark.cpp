@@ -16,7 +16,7 @@
 #include "bench_scene.h"
 #include "crowd.h"
 #include "plain_scene.h"
-#include "test_data.h"
+#include "test_data_folder.h"
 #include "test_paths.h"
 
 namespace dermis::bench {
@@ -127,10 +127,10 @@ std::vector<Ratio> registerCrowdBenchmarks() {
   registerCrowd("crowd/1000_figure", std::filesystem::path(test::sampleModels) / "figure.glb",
                 ratios);
   const std::string real = "crowd/1000_real_model";
-  if (const std::optional<std::filesystem::path> folder = test::testDataFolder()) {
-    registerCrowd(real, *folder / "models/CesiumMan/glTF-Binary/CesiumMan.glb", ratios);
+  if (const test::TestData data = test::findTestData(); data.folder) {
+    registerCrowd(real, *data.folder / "models/CesiumMan/glTF-Binary/CesiumMan.glb", ratios);
   } else {
-    std::printf("%s: skipped: %s\n", real.c_str(), test::noTestData);
+    std::printf("%s: skipped: %s\n", real.c_str(), data.absence.c_str());
   }
   return ratios;
 }

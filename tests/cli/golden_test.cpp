@@ -1,5 +1,5 @@
-// Poses from other programs: every line of golden/manifest.jsonl, both methods, through `dermis
-// skin`.
+// Poses from other programs: every line of golden/manifest.jsonl, both methods, skinned as `dermis
+// skin` does it, and two of them by the command itself.
 
 #include <gtest/gtest.h>
 
@@ -7,12 +7,15 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "dermis_command.h"
 #include "ply.h"
-#include "run_command.h"
+#include "scene_skinner.h"
 #include "test_data.h"
 #include "test_device.h"
-#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -49,37 +52,39 @@ Golden readGolden(const std::filesystem::path& path) {
   return golden;
 }
 
-/// The largest distance over the model's size.
-double skinAndCompare(const std::filesystem::path& model, const std::string& animation,
-                      const std::string& time, bool dualQuaternion, const std::string& device,
-                      const Golden& golden) {
-  // Of the running test alone: others may run at the same time.
-  std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  std::replace(test.begin(), test.end(), '/', '_');
-  const std::string out = ::testing::TempDir() + "golden_" + test + ".ply";
-  const CommandResult result = runCommand(
-      {dermisProgram, "skin", model.string(), "-o", out, "--animation", animation, "--time", time,
-       "--method", dualQuaternion ? "dual_quaternion" : "linear", "--device", device});
-  EXPECT_EQ(result.status, 0) << result.errors;
-  const std::optional<Ply> ply = readPly(out);
-  if (!ply || ply->positions.size() != golden.vertices()) {
-    ADD_FAILURE() << "the PLY file is not as it should be";
+/// The largest distance over the model's size. `positions`: 3 floats a vertex.
+double compareWith(const Golden& golden, bool dualQuaternion, std::span<const float> positions) {
+  if (positions.size() != 3 * golden.vertices() || golden.vertices() == 0) {
+    ADD_FAILURE() << positions.size() / 3 << " vertices, not " << golden.vertices();
     return HUGE_VAL;
   }
   double worst = 0;
+  std::size_t compared = 0;
   for (std::size_t vertex = 0; vertex < golden.vertices(); ++vertex) {
     double squared = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double difference = golden.at(dualQuaternion, vertex, axis) -
-                                static_cast<double>(ply->positions[vertex][axis]);
+      const float position = positions[3 * vertex + axis];
+      const double difference =
+          golden.at(dualQuaternion, vertex, axis) - static_cast<double>(position);
       squared += difference * difference;
       // NaN stands where the file's own weights are NaN; what we write must be finite even there.
-      EXPECT_TRUE(std::isfinite(ply->positions[vertex][axis])) << "vertex " << vertex;
+      EXPECT_TRUE(std::isfinite(position)) << "vertex " << vertex;
     }
-    if (!std::isnan(squared)) worst = std::max(worst, std::sqrt(squared));
+    if (std::isnan(squared)) continue;
+    worst = std::max(worst, std::sqrt(squared));
+    ++compared;
   }
+  EXPECT_GT(compared, 0u);
   return worst / golden.size();
 }
+
+/// One pose of a model, by one method.
+struct GoldenPose {
+  std::filesystem::path model;
+  std::string animation;  ///< as for `--animation`
+  double time = 0;
+  bool dualQuaternion = false;
+};
 
 class GoldenTest : public ::testing::TestWithParam<const char*> {
  protected:
@@ -88,32 +93,66 @@ class GoldenTest : public ::testing::TestWithParam<const char*> {
     if (!data) GTEST_SKIP() << noTestData;
     data_ = *data;
     std::string reason;
-    if (std::string(GetParam()) != "cpu" && testDevice(true, reason) == nullptr) {
+    if (onDevice()) device_ = testDevice(true, reason);
+    if (onDevice() && device_ == nullptr) {
       ASSERT_FALSE(isContinuousIntegration()) << reason;
       GTEST_SKIP() << reason;
     }
   }
 
+  bool onDevice() const { return std::string(GetParam()) != "cpu"; }
+
+  /// All positions of the scene, 3 a vertex.
+  std::vector<float> skin(const cli::Scene& scene, const GoldenPose& pose) const {
+    const Result<std::uint32_t> clip = cli::chooseClip(*scene.model, pose.animation);
+    EXPECT_TRUE(clip.ok()) << (clip ? "" : clip.error().message);
+    if (!clip) return {};
+    const Method method = pose.dualQuaternion ? Method::dualQuaternion : Method::linear;
+    const cli::SkinParts skinner =
+        onDevice() ? cli::deviceSkinner(scene, method, false, *device_->device, device_->context)
+                   : cli::referenceSkinner(scene, method);
+    const Result<std::vector<cli::SkinnedPart>> parts =
+        skinner(cli::scenePose(scene, *clip, pose.time));
+    EXPECT_TRUE(parts.ok()) << (parts ? "" : parts.error().message);
+    std::vector<float> positions;
+    for (const cli::SkinnedPart& part : parts ? *parts : std::vector<cli::SkinnedPart>{})
+      positions.insert(positions.end(), part.positions.begin(), part.positions.end());
+    return positions;
+  }
+
+  double skinAndCompare(const cli::Scene& scene, GoldenPose pose, const Golden& golden) const {
+    double worst = 0;
+    for (const bool dualQuaternion : {false, true}) {
+      pose.dualQuaternion = dualQuaternion;
+      const double error = compareWith(golden, dualQuaternion, skin(scene, pose));
+      EXPECT_LE(error, 1e-5) << (dualQuaternion ? "dual_quaternion" : "linear");
+      worst = std::max(worst, error);
+    }
+    return worst;
+  }
+
   std::filesystem::path data_;
+  samples::OpenDevice* device_ = nullptr;
 };
 
 TEST_P(GoldenTest, EveryPoseAgrees) {
   std::ifstream manifest(data_ / "golden" / "manifest.jsonl");
   std::size_t poses = 0;
   double worst = 0;
+  // Poses of one model follow each other.
+  std::filesystem::path loaded;
+  Result<cli::Scene> scene = Error{};
   for (std::string line; std::getline(manifest, line);) {
+    SCOPED_TRACE(line.substr(0, 160));
     const nlohmann::json entry = nlohmann::json::parse(line);
     const Golden golden = readGolden(data_ / "golden" / entry["golden"].get<std::string>());
+    const std::filesystem::path model = data_ / "models" / entry["file"].get<std::string>();
+    if (model != loaded) scene = cli::loadScene(loaded = model, {});
+    ASSERT_TRUE(scene.ok()) << scene.error().message;
     std::string animation = entry["anim"].get<std::string>();
     if (animation == "-") animation = "none";
-    SCOPED_TRACE(line.substr(0, 160));
-    for (const bool dualQuaternion : {false, true}) {
-      const double error =
-          skinAndCompare(data_ / "models" / entry["file"].get<std::string>(), animation,
-                         entry["time"].dump(), dualQuaternion, GetParam(), golden);
-      EXPECT_LE(error, 1e-5) << (dualQuaternion ? "dual_quaternion" : "linear");
-      worst = std::max(worst, error);
-    }
+    const GoldenPose pose{model, animation, entry["time"].get<double>()};
+    worst = std::max(worst, skinAndCompare(*scene, pose, golden));
     ++poses;
   }
   EXPECT_GE(poses, 76u);
@@ -124,10 +163,30 @@ TEST_P(GoldenTest, EveryPoseAgrees) {
 // skinner. Its floats, and the importer's, agree to 6e-6 of the figure's size.
 TEST_P(GoldenTest, BlenderAgrees) {
   const Golden golden = readGolden(data_ / "golden" / "CesiumMan.blender.f64");
+  const std::filesystem::path model = data_ / "models" / "CesiumMan/glTF-Binary/CesiumMan.glb";
+  const Result<cli::Scene> scene = cli::loadScene(model, {});
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  skinAndCompare(*scene, {model, "0", 0.37}, golden);
+}
+
+// From the options to the file, with the command itself.
+TEST_P(GoldenTest, TheCommandWritesWhatAgrees) {
+  const Golden golden = readGolden(data_ / "golden" / "CesiumMan.blender.f64");
+  const std::filesystem::path model = data_ / "models" / "CesiumMan/glTF-Binary/CesiumMan.glb";
   for (const bool dualQuaternion : {false, true}) {
-    EXPECT_LE(skinAndCompare(data_ / "models" / "CesiumMan/glTF-Binary/CesiumMan.glb", "0", "0.37",
-                             dualQuaternion, GetParam(), golden),
-              1e-5);
+    std::string out = outFile("pose.ply");
+    std::replace(out.begin() + static_cast<std::ptrdiff_t>(::testing::TempDir().size()), out.end(),
+                 '/', '_');
+    const CommandResult result =
+        dermis({"skin", model.string(), "-o", out, "--animation", "0", "--time", "0.37", "--method",
+                dualQuaternion ? "dual_quaternion" : "linear", "--device", GetParam()});
+    ASSERT_EQ(result.status, 0) << result.errors;
+    const std::optional<Ply> ply = readPly(out);
+    ASSERT_TRUE(ply.has_value()) << "the PLY file is not as it should be";
+    std::vector<float> positions;
+    for (const auto& position : ply->positions)
+      positions.insert(positions.end(), position.begin(), position.end());
+    EXPECT_LE(compareWith(golden, dualQuaternion, positions), 1e-5);
   }
 }
 

@@ -62,6 +62,67 @@ double similarityOf(const Window& a, const Window& b) {
          ((meanA * meanA + meanB * meanB + c1) * ((varianceA + varianceB) / count + c2));
 }
 
+/// Every fourth place, and the last, so that no pixel is left out.
+std::vector<std::uint32_t> windowPlaces(std::uint32_t size) {
+  std::vector<std::uint32_t> places;
+  for (std::uint32_t place = 0; place + window < size; place += window / 2) places.push_back(place);
+  places.push_back(size - window);
+  return places;
+}
+
+/// Of a whole picture.
+struct Statistics {
+  std::array<double, 3> color{};
+  double deviation = 0;  ///< of the luminance
+};
+
+Statistics statisticsOf(const Picture& picture) {
+  const double count = static_cast<double>(picture.width) * picture.height;
+  Statistics result;
+  double sum = 0, squares = 0;
+  for (std::size_t pixel = 0; pixel < picture.pixels.size(); pixel += 4) {
+    const std::uint8_t* rgb = &picture.pixels[pixel];
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      result.color[channel] += rgb[channel] / count;
+    const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    sum += luminance / count;
+    squares += luminance * luminance / count;
+  }
+  result.deviation = std::sqrt(std::max(0.0, squares - sum * sum));
+  return result;
+}
+
+void compareWholes(const Picture& a, const Picture& b, PictureDifference& difference) {
+  const Statistics ofA = statisticsOf(a), ofB = statisticsOf(b);
+  difference.meanColor = 0;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    difference.meanColor =
+        std::max(difference.meanColor, std::abs(ofA.color[channel] - ofB.color[channel]));
+  }
+  // One step of 255 more, so that pictures of one colour have a quotient, too.
+  difference.contrast = std::abs((ofA.deviation + 1) / (ofB.deviation + 1) - 1);
+}
+
+int differenceAt(const Picture& a, const Picture& b, std::size_t pixel) {
+  int largest = 0;
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    largest =
+        std::max(largest, std::abs(a.pixels[4 * pixel + channel] - b.pixels[4 * pixel + channel]));
+  return largest;
+}
+
+void comparePatches(const Picture& a, const Picture& b, PictureDifference& difference) {
+  difference.worstPatch = 0;
+  for (std::size_t top = 0; top + 3 <= a.height; ++top) {
+    for (std::size_t left = 0; left + 3 <= a.width; ++left) {
+      int least = 255;
+      for (std::size_t i = 0; i < 9; ++i)
+        least = std::min(least, differenceAt(a, b, (top + i / 3) * a.width + left + i % 3));
+      difference.worstPatch = std::max(difference.worstPatch, static_cast<double>(least));
+    }
+  }
+}
+
 }  // namespace
 
 std::optional<Picture> readPng(const std::string& path) {
@@ -81,8 +142,8 @@ PictureDifference comparePictures(const Picture& a, const Picture& b) {
   difference.worstSimilarity = 1;
   double sum = 0;
   std::size_t count = 0;
-  for (std::uint32_t top = 0; top + window <= a.height; top += window / 2) {
-    for (std::uint32_t left = 0; left + window <= a.width; left += window / 2) {
+  for (const std::uint32_t top : windowPlaces(a.height)) {
+    for (const std::uint32_t left : windowPlaces(a.width)) {
       const Window ofA = windowAt(a, left, top), ofB = windowAt(b, left, top);
       const double similarity = similarityOf(ofA, ofB);
       sum += similarity;
@@ -95,7 +156,17 @@ PictureDifference comparePictures(const Picture& a, const Picture& b) {
     }
   }
   difference.similarity = sum / static_cast<double>(count);
+  compareWholes(a, b, difference);
+  comparePatches(a, b, difference);
   return difference;
+}
+
+bool isWithin(const PictureTolerance& tolerance, const PictureDifference& difference) {
+  return difference.similarity > tolerance.similarity &&
+         difference.worstSimilarity > tolerance.worstSimilarity &&
+         difference.worstColor < tolerance.worstColor &&
+         difference.meanColor < tolerance.meanColor && difference.contrast < tolerance.contrast &&
+         difference.worstPatch < tolerance.worstPatch;
 }
 
 void expectAsReference(const std::string& name, const Picture& picture,
@@ -112,9 +183,11 @@ void expectAsReference(const std::string& name, const Picture& picture,
   const auto reference = readPng(path);
   ASSERT_TRUE(reference) << path;
   const PictureDifference difference = comparePictures(picture, *reference);
-  EXPECT_GT(difference.similarity, tolerance.similarity);
-  EXPECT_GT(difference.worstSimilarity, tolerance.worstSimilarity);
-  EXPECT_LT(difference.worstColor, tolerance.worstColor);
+  EXPECT_TRUE(isWithin(tolerance, difference))
+      << "similarity " << difference.similarity << ", in the worst window "
+      << difference.worstSimilarity << "; colours differ by " << difference.worstColor
+      << " in a window, " << difference.meanColor << " altogether, " << difference.worstPatch
+      << " in 3 x 3 pixels; contrast by " << difference.contrast;
 }
 
 }  // namespace dermis::test

@@ -19,6 +19,7 @@ namespace dermis::test {
 namespace {
 
 constexpr double u = 1.0 / 16777216.0;  // 2^-24
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Accuracy, TheUnitIsTwoToTheMinus24) {
   EXPECT_EQ(floatRounding, u);
@@ -165,8 +166,9 @@ struct CompareTest : public ::testing::Test {
     skinned.tangents = {tangents.data(), count, 16, VertexFormat::float32x4};
     return skinned;
   }
-  Comparison compared(Method method = Method::dualQuaternion) const {
-    const Result<Comparison> result = compare(expected, view(), method);
+  Comparison compared(Method method = Method::dualQuaternion,
+                      const Exemptions& exemptions = {}) const {
+    const Result<Comparison> result = compare(expected, view(), method, exemptions);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     return result ? *result : Comparison{};
   }
@@ -175,6 +177,18 @@ struct CompareTest : public ::testing::Test {
     EXPECT_FALSE(comparison.passed());
     EXPECT_EQ(comparison.failures, 1u);
     EXPECT_EQ(comparison.firstFailure, vertex);
+  }
+
+  /// Fewer vertices compared than the caller expected are a failure, and more are.
+  void expectOtherExemptionsToFail(const Exemptions& right,
+                                   Method method = Method::dualQuaternion) const {
+    for (std::uint64_t onlyFinite = 0; onlyFinite < 3; ++onlyFinite) {
+      for (std::uint64_t skipped = 0; skipped < 3; ++skipped) {
+        const Exemptions wanted{onlyFinite, skipped};
+        EXPECT_EQ(compared(method, wanted).passed(), wanted == right);
+        EXPECT_EQ(compared(method, wanted).failures, 0u);
+      }
+    }
   }
 
   static constexpr std::uint32_t count = 20;
@@ -188,7 +202,9 @@ TEST_F(CompareTest, TheSamePasses) {
     const Comparison comparison = compared(method);
     EXPECT_TRUE(comparison.passed());
     EXPECT_EQ(comparison.compared, count);
-    EXPECT_EQ(comparison.onlyFinite, 0u);
+    EXPECT_EQ(comparison.exempt, Exemptions{});
+    EXPECT_EQ(comparison.onlyUnitNormals, 0u);
+    EXPECT_EQ(comparison.onlyUnitTangents, 0u);
     EXPECT_EQ(comparison.worstPosition, 0);
     EXPECT_EQ(comparison.worstNormal, 0);
     EXPECT_EQ(comparison.worstTangent, 0);
@@ -288,10 +304,12 @@ TEST_F(CompareTest, WhatIsAMatterOfRoundingNeedOnlyBeFinite) {
        {&reference::Conditioning::signAmbiguous, &reference::Conditioning::degenerate}) {
     expected.conditioning[6].*excuse = true;
     positions[6 * 3] += 10;
-    const Comparison comparison = compared();
+    const Comparison comparison = compared(Method::dualQuaternion, {1, 0});
     EXPECT_TRUE(comparison.passed());
-    EXPECT_EQ(comparison.onlyFinite, 1u);
+    EXPECT_EQ(comparison.exempt, (Exemptions{1, 0}));
+    EXPECT_EQ(comparison.exempt, exemptionsOf(expected, Method::dualQuaternion));
     EXPECT_EQ(comparison.compared, count - 1);
+    expectOtherExemptionsToFail({1, 0});
     // Linear blending knows neither signs nor rotations.
     expectOneFailure(6, Method::linear);
     positions[6 * 3] -= 10;
@@ -299,12 +317,68 @@ TEST_F(CompareTest, WhatIsAMatterOfRoundingNeedOnlyBeFinite) {
   }
 }
 
-TEST_F(CompareTest, VerticesWithoutAFiniteAnswerAreNotLookedAt) {
-  expected.positions[6][1] = std::numeric_limits<double>::quiet_NaN();
-  positions[6 * 3] = std::numeric_limits<float>::infinity();
-  const Comparison comparison = compared();
-  EXPECT_TRUE(comparison.passed());
-  EXPECT_EQ(comparison.compared, count - 1);
+TEST_F(CompareTest, VerticesWithoutAnAnswerAreNotLookedAt) {
+  for (const Method method : allMethods) {
+    expected.positions[6][1] = nan;
+    expected.conditioning[6].undefined = true;
+    positions[6 * 3] = std::numeric_limits<float>::infinity();
+    const Comparison comparison = compared(method, {0, 1});
+    EXPECT_TRUE(comparison.passed());
+    EXPECT_EQ(comparison.exempt, (Exemptions{0, 1}));
+    EXPECT_EQ(comparison.exempt, exemptionsOf(expected, method));
+    EXPECT_EQ(comparison.compared, count - 1);
+    expectOtherExemptionsToFail({0, 1}, method);
+  }
+}
+
+// A reference that is broken excuses nothing: not what it computed, nor what that is held against.
+TEST_F(CompareTest, AReferenceThatIsNotFiniteFails) {
+  const reference::SkinnedMesh good = expected;
+  const auto expectFailureOf = [&](auto spoil) {
+    for (const Method method : allMethods) {
+      expected = good;
+      spoil(expected);
+      expectOneFailure(6, method);
+    }
+  };
+  for (const double bad : {nan, HUGE_VAL, -HUGE_VAL}) {
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.positions[6][2] = bad; });
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.normals[6][0] = bad; });
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.tangents[6][1] = bad; });
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.tangents[6][3] = bad; });
+    // Where a direction is only asked to be of unit length, too.
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) {
+      mesh.normals[6][0] = bad;
+      mesh.conditioning[6].normalRounding = HUGE_VAL;
+    });
+  }
+  // Nor is a bound that is none.
+  for (const double bad : {nan, HUGE_VAL})
+    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.conditioning[6].scale = bad; });
+  expected = good;
+  expected.conditioning[6].turning = HUGE_VAL;
+  expectOneFailure(6, Method::dualQuaternionIterative);
+}
+
+TEST_F(CompareTest, AReferenceOfNothingButNaNsFails) {
+  for (auto& position : expected.positions) position = {nan, nan, nan};
+  positions.assign(positions.size(), 1e9f);
+  for (const Method method : allMethods) {
+    const Comparison comparison = compared(method);
+    EXPECT_FALSE(comparison.passed());
+    EXPECT_EQ(comparison.failures, count);
+    EXPECT_EQ(comparison.compared, 0u);
+    EXPECT_FALSE(compared(method, {0, count}).passed()) << "whatever the caller says";
+  }
+  // One that calls all of it undefined, or arbitrary, passes where the caller expected that alone.
+  for (bool reference::Conditioning::*excuse :
+       {&reference::Conditioning::undefined, &reference::Conditioning::signAmbiguous,
+        &reference::Conditioning::degenerate}) {
+    for (auto& conditioning : expected.conditioning) conditioning.*excuse = true;
+    EXPECT_FALSE(compared().passed());
+    EXPECT_EQ(compared().compared, 0u);
+    for (auto& conditioning : expected.conditioning) conditioning.*excuse = false;
+  }
 }
 
 TEST_F(CompareTest, Truth16_ABadlyAlignedNormalNeedOnlyBeOfUnitLength) {
@@ -313,8 +387,14 @@ TEST_F(CompareTest, Truth16_ABadlyAlignedNormalNeedOnlyBeOfUnitLength) {
   }
   expected.conditioning[8].normalAlignment = 0.5e-3;
   normals[8 * 3 + 2] = -0.8f;
-  EXPECT_TRUE(compared().passed());
-  EXPECT_TRUE(compared(Method::linear).passed());
+  for (const Method method : {Method::dualQuaternion, Method::linear}) {
+    EXPECT_TRUE(compared(method).passed());
+    EXPECT_EQ(compared(method).onlyUnitNormals, 1u);
+    EXPECT_EQ(compared(method).onlyUnitTangents, 0u);
+    EXPECT_EQ(compared(method).compared, count);
+  }
+  expected.conditioning[3].tangentAlignment = expected.conditioning[5].tangentAlignment = 0.5e-3;
+  EXPECT_EQ(compared().onlyUnitTangents, 2u);
   normals[8 * 3 + 2] = -0.81f;
   expectOneFailure(8);
   expectOneFailure(8, Method::linear);

@@ -1,26 +1,22 @@
-// Where the tests find the models and golden poses that are not part of the repository.
+// The models and golden poses that are not part of the repository, for tests that want them.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
-#include <system_error>
 
-#include "test_paths.h"
+#include "test_data_folder.h"
 
 namespace dermis::test {
 
-/// The folder that holds `models/` and `golden/`: DERMIS_TEST_DATA where that is set, otherwise
-/// `shared` beside the repository. Nothing where there is no such folder; a test then skips itself
-/// with that as its reason.
-inline std::optional<std::filesystem::path> testDataFolder() {
-  const char* set = std::getenv("DERMIS_TEST_DATA");
-  const bool named = set != nullptr && *set != '\0';
-  const std::filesystem::path folder =
-      named ? std::filesystem::path(set) : std::filesystem::path(sourceFolder) / ".." / "shared";
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder / "models", error)) return std::nullopt;
-  return folder;
+/// The folder, if there is one. Otherwise the test fails, where this is continuous integration and
+/// the data was promised; it is for the caller to skip the rest.
+inline std::optional<std::filesystem::path> testDataFolder(const TestData& data = findTestData()) {
+  const bool isContinuousIntegration = std::getenv("CI") != nullptr;
+  if (!data.folder && data.isPromised && isContinuousIntegration) ADD_FAILURE() << data.absence;
+  return data.folder;
 }
 
 /// The reason to give to GTEST_SKIP.

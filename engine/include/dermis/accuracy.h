@@ -53,6 +53,19 @@ double normalFormatBound(VertexFormat format);
 /// (δ, η, δ + η) with η = 1 / (L − 1) + 12 u, times √3.
 double tangentFormatBound(VertexFormat format);
 
+/// How many vertices no bound can be asked of. Whoever compares says how many that must be: a
+/// reference that excuses more is as wrong as a skinned vertex can be.
+struct Exemptions {
+  std::uint64_t onlyFinite = 0;  ///< the answer is a matter of rounding: it is asked to be finite
+  std::uint64_t skipped = 0;     ///< there is no answer (`Conditioning::undefined`): not looked at
+
+  friend bool operator==(const Exemptions&, const Exemptions&) = default;
+};
+
+/// How many the reference says there are. For poses that the caller did not make; whoever did make
+/// them knows the numbers.
+Exemptions exemptionsOf(const reference::SkinnedMesh& expected, Method method);
+
 /// What a comparison found. An error is counted against its vertex' own bound: 1 is the bound.
 struct Comparison {
   double worstPosition = 0;  ///< the largest error ÷ bound
@@ -63,14 +76,17 @@ struct Comparison {
   std::uint32_t worstNormalVertex = 0;
   std::uint32_t worstTangentVertex = 0;
   std::uint64_t compared = 0;  ///< vertices held against their bound
-  std::uint64_t onlyFinite =
-      0;                      ///< vertices whose answer is a matter of rounding: asked to be finite
-  std::uint64_t skipped = 0;  ///< vertices not looked at: a joint of theirs is not finite
-  std::uint64_t clamped = 0;  ///< vertices that the reference has outside the box of snorm16
-  std::uint64_t failures = 0;  ///< vertices outside their bound, or not finite
+  Exemptions exempt;           ///< vertices that were not
+  Exemptions expectedExempt;   ///< as many as the caller said
+  /// Of the vertices compared, those whose direction was only asked to be of unit length.
+  std::uint64_t onlyUnitNormals = 0;
+  std::uint64_t onlyUnitTangents = 0;
+  std::uint64_t clamped = 0;   ///< vertices that the reference has outside the box of snorm16
+  std::uint64_t failures = 0;  ///< vertices outside their bound, or not finite in either
   std::uint32_t firstFailure = 0;
 
-  bool passed() const { return failures == 0; }
+  /// No vertex failed, and as many were compared as should be.
+  bool passed() const { return failures == 0 && exempt == expectedExempt; }
 };
 
 /// One attribute of skinned vertices where it stands in an output buffer. No alignment is needed.
@@ -90,8 +106,10 @@ struct SkinnedView {
 };
 
 /// Compares skinned positions, normals and tangents with the reference's, each against the bound of
-/// its method plus that of its format. Normals and tangents are compared where both have them. A
-/// vertex with a joint that is not finite is not looked at.
+/// its method plus that of its format. Normals and tangents are compared where both have them.
+/// `exemptions` is how many vertices must be left out of that, exactly: none, unless the caller
+/// says otherwise. A vertex of the reference that is not finite, or whose bound is not, is a
+/// failure unless the reference says that it has no answer.
 ///
 /// A handedness must be the reference's exactly, and 1 or -1 where the sign of the determinant is a
 /// matter of rounding; a fourth component of a position must be 1, of a normal 0. A zero direction
@@ -102,6 +120,6 @@ struct SkinnedView {
 /// Fails with `invalidArgument` where the counts disagree, a format does not fit its attribute, a
 /// stride is less than its element, or the box of snorm16 is not finite or upside down.
 Result<Comparison> compare(const reference::SkinnedMesh& expected, const SkinnedView& actual,
-                           Method method);
+                           Method method, const Exemptions& exemptions = {});
 
 }  // namespace dermis

@@ -59,6 +59,7 @@ struct Conditioning {
   bool signAmbiguous = false;
   bool degenerate =
       false;  ///< a joint of rank ≤ 1, or not finite: a result is only asked to be finite
+  bool undefined = false;  ///< a joint is not finite: there is no answer
 };
 
 struct SkinnedMesh {

@@ -39,11 +39,10 @@ dvec4 quaternionOf(const dmat3& r) {
 
 Joint takeApart(const JointMatrix& matrix) {
   Joint joint;
-  bool finite = true;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
       const double value = static_cast<double>(matrix.m[row][column]);
-      finite &= std::isfinite(value);
+      joint.finite &= std::isfinite(value);
       if (column < 3) {
         joint.linear[column][row] = value;
       } else {
@@ -51,7 +50,7 @@ Joint takeApart(const JointMatrix& matrix) {
       }
     }
   }
-  if (!finite) {
+  if (!joint.finite) {
     const double nan = std::nan("");
     joint.rigid = {dvec4(nan), dvec4(nan)};
     joint.scaleShear = dmat3(nan);

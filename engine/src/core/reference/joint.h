@@ -15,6 +15,7 @@ struct Joint {
   Rigid rigid;  ///< the rotation of the polar decomposition, and the translation
   glm::dmat3 scaleShear;
   double largest = 1;  ///< singular value
+  bool finite = true;
   bool degenerate = false;
   bool rigidForKernels = false;
   double distanceFromRotation = 0;

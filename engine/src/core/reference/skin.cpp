@@ -29,6 +29,7 @@ void conditionOf(std::span<const Joint> joints, std::span<const Influence> influ
     translation = std::max(translation, glm::length(joint.translation));
     largest = std::max(largest, joint.largest);
     conditioning.degenerate |= joint.degenerate;
+    conditioning.undefined |= !joint.finite;
     if (joint.rigidForKernels) {
       conditioning.rigidShortcut = std::max(conditioning.rigidShortcut, joint.distanceFromRotation);
     }

@@ -125,6 +125,7 @@ void printSizes() {
                                  sizeof(JointBounds),
                                  sizeof(SkinnedView),
                                  sizeof(Comparison),
+                                 sizeof(Exemptions),
                                  sizeof(reference::Conditioning),
                                  sizeof(reference::SkinnedMesh),
                                  sizeof(RepairedMesh)})

@@ -1,0 +1,84 @@
+#include "scene_skinner.h"
+
+#include <cstddef>
+#include <cstring>
+#include <tuple>
+#include <utility>
+
+#include "batch_runner.h"
+#include "dermis/reference.h"
+
+namespace dermis::cli {
+namespace {
+
+template <typename Vector>
+std::vector<float> toFloats(const std::vector<Vector>& vectors) {
+  std::vector<float> floats;
+  floats.reserve(vectors.size() * std::tuple_size_v<Vector>);
+  for (const Vector& vector : vectors) {
+    for (const double value : vector) floats.push_back(static_cast<float>(value));
+  }
+  return floats;
+}
+
+SkinnedPart fromDevice(samples::SkinnedVertices&& vertices) {
+  SkinnedPart part{std::move(vertices.positions), std::move(vertices.normals), {}};
+  const std::vector<std::byte>& tangents =
+      vertices.streams[static_cast<std::size_t>(Stream::tangents)];
+  part.tangents.resize(tangents.size() / sizeof(float));
+  if (!tangents.empty()) std::memcpy(part.tangents.data(), tangents.data(), tangents.size());
+  return part;
+}
+
+}  // namespace
+
+SkinParts referenceSkinner(const Scene& scene, Method method) {
+  return [&scene, method](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
+    std::vector<SkinnedPart> all;
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      if (part.mesh == nullptr) {
+        all.push_back(bindPose(part, pose.morphs[index]));
+        continue;
+      }
+      const Result<reference::SkinnedMesh> skinned =
+          reference::skin(part.mesh->view(), pose.palette(part), method, pose.morphs[index]);
+      if (!skinned) return skinned.error();
+      all.push_back(
+          {toFloats(skinned->positions), toFloats(skinned->normals), toFloats(skinned->tangents)});
+    }
+    return all;
+  };
+}
+
+SkinParts deviceSkinner(const Scene& scene, Method method, bool tangents, samples::Device& device,
+                        vulkan::Context& context) {
+  samples::RunOptions options;
+  options.countUntouched = false;
+  if (tangents) options.output.tangents = VertexFormat::float32x4;
+  return [&scene, method, options, &device,
+          &context](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
+    std::vector<samples::SkinRequest> requests;
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      if (part.mesh == nullptr) continue;
+      samples::SkinRequest& request = requests.emplace_back();
+      request.mesh = &part.mesh->packed();
+      request.palette = pose.palette(part);
+      request.method = method;
+      request.morphs = pose.morphs[index];
+    }
+    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
+    if (!result) return result.error();
+    std::vector<SkinnedPart> all;
+    std::size_t next = 0;
+    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+      const ScenePart& part = scene.parts[index];
+      all.push_back(part.mesh != nullptr ? fromDevice(std::move(result->instances[next++]))
+                                         : bindPose(part, pose.morphs[index]));
+    }
+    return all;
+  };
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,118 @@
+// One wrong byte in what the device wrote, and whoever checks it says so: `dermis verify` with its
+// reports, the crowd, the sample that embeds Dermis. They know nothing of the layer behind which
+// they run.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dermis_command.h"
+#include "wrong_bytes.h"
+
+namespace dermis::test {
+namespace {
+
+/// `plants` as in wrong_bytes_layer.cpp.
+CommandResult runWithWrongBytes(const std::vector<std::string>& command,
+                                const std::string& plants) {
+  return runCommand(command, {std::string("VK_LAYER_PATH=") + DERMIS_LAYER_FOLDER,
+                              std::string("VK_INSTANCE_LAYERS=") + wrongBytesLayer,
+                              "DERMIS_WRONG_BYTES=" + plants});
+}
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::size_t countOf(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
+}
+
+// Of the first pose, the second way to cut up the work: the sign and exponent of vertex 0's x.
+TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
+  REQUIRE_DEVICE();
+  const std::string bar = std::string(sampleModels) + "/bar.glb";
+  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
+  const CommandResult result =
+      runWithWrongBytes({dermisProgram, "verify", bar, "--json", json, "--junit", junit},
+                        "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
+  EXPECT_EQ(result.status, 1) << result.errors;
+  const std::string what = "1 vertices are outside their bound, the first is 0;";
+  const std::string bits = "the result is not to the bit that of 64 invocations, 4 instances each";
+
+  EXPECT_EQ(countOf(result.output, "FAILED  "), 1u) << result.output;
+  EXPECT_EQ(countOf(result.output, "FAILED  " + bar + "  linear: "), 1u) << result.output;
+  EXPECT_EQ(countOf(result.output, "linear, rest pose, 8 invocations, 1 instances each: " + what),
+            1u)
+      << result.output;
+  EXPECT_EQ(countOf(result.output, bits), 1u) << result.output;
+
+  const nlohmann::json report = nlohmann::json::parse(readText(json));
+  EXPECT_FALSE(report.at("passed").get<bool>());
+  EXPECT_EQ(report.at("models")[0].at("failures"), 1);
+  std::size_t failed = 0;
+  for (const nlohmann::json& verified : report.at("models")[0].at("cases")) {
+    EXPECT_EQ(verified.at("passed"), !verified.contains("failure"));
+    if (verified.at("passed").get<bool>()) continue;
+    ++failed;
+    EXPECT_EQ(verified.at("method"), "linear");
+    EXPECT_EQ(verified.at("pose"), "rest pose");
+    EXPECT_EQ(verified.at("variant"), "8 invocations, 1 instances each");
+    EXPECT_EQ(verified.at("failures"), 1);
+    EXPECT_GT(verified.at("worstPositionOfBound").get<double>(), 1);
+    EXPECT_TRUE(verified.at("failure").get<std::string>().starts_with(what)) << verified;
+  }
+  EXPECT_EQ(failed, 1u);
+
+  const std::string xml = readText(junit);
+  EXPECT_EQ(countOf(xml, "failures=\"1\" errors=\"0\""), 2u) << "of the model, and of all";
+  EXPECT_EQ(countOf(xml, "<failure message=\"" + what), 1u);
+  EXPECT_EQ(countOf(xml, "<failure"), 1u);
+}
+
+// All bits of a few words of the output, in every frame that is read back.
+TEST(WrongBytesCommandsTest, TheCrowdsCheckTellsWhichVertexIsWrong) {
+  REQUIRE_DEVICE();
+  std::string plants;
+  for (std::size_t byte = 100000; byte < 100016; ++byte) {
+    plants += "1 1000000 " + std::to_string(VK_BUFFER_USAGE_TRANSFER_DST_BIT) + " " +
+              std::to_string(byte) + " 255 ";
+  }
+  const std::string json = outFile("crowd.json");
+  const std::vector<std::string> command{
+      dermisCrowdProgram,   "--figures", "3", "--frames", "3", "--check-every", "1", "--json", json,
+      "--frames-in-flight", "1"};
+  const CommandResult result = runWithWrongBytes(command, plants);
+  EXPECT_EQ(result.status, 1) << result.output << result.errors;
+  EXPECT_EQ(countOf(result.errors, "instances are not as they must be; the first: frame 1, "), 1u)
+      << result.errors;
+  EXPECT_EQ(countOf(result.errors, ", vertex "), 1u) << result.errors;
+  EXPECT_EQ(countOf(result.output, "are inside their bounds"), 0u) << result.output;
+  EXPECT_GE(nlohmann::json::parse(readText(json)).at("check").at("failures").get<int>(), 1);
+  // The layer alone changes nothing.
+  EXPECT_EQ(runWithWrongBytes(command, "").status, 0);
+}
+
+TEST(WrongBytesCommandsTest, TheEmbeddingSampleTellsWhichVertexIsWrong) {
+  REQUIRE_DEVICE();
+  const std::uint32_t usage =
+      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
+  const CommandResult result =
+      runWithWrongBytes({DERMIS_EMBED}, "1 100 " + std::to_string(usage) + " 3 192");
+  EXPECT_EQ(result.status, 1) << result.output;
+  EXPECT_EQ(result.errors,
+            "dermis_embed: error: instance 0, vertex 0 is outside its error bound\n");
+  EXPECT_EQ(runWithWrongBytes({DERMIS_EMBED}, "").status, 0);
+}
+
+}  // namespace
+}  // namespace dermis::test
