@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <memory>
 
 #include "commands.h"
@@ -67,9 +68,15 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
 
 ExitStatus verify(const VerifyOptions& options) {
   if (options.device == "cpu") {
-    return reportError(ExitStatus::wrongUsage,
-                       "--device cpu is the reference itself, and would be compared with itself; "
-                       "name a Vulkan device");
+    return reportWrongUsage(
+        "--device cpu is the reference itself, and would be compared with itself; "
+        "name a Vulkan device");
+  }
+  const std::array<samples::RequestedOutput, 2> outputFiles{
+      {{"--json", options.json}, {"--junit", options.junit}}};
+  for (const std::string& model : options.models) {
+    if (const ExitStatus kept = checkInput(model, outputFiles); kept != ExitStatus::done)
+      return kept;
   }
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
@@ -110,13 +117,11 @@ ExitStatus verify(const VerifyOptions& options) {
     if (models.back().failures() != 0 && status == ExitStatus::done)
       status = ExitStatus::verificationFailed;
   }
+  // Files first: standard output may be closed.
+  const ExitStatus written = writeReports(options, open->device->info().name, models);
   fmt::print("device  {}\n", open->device->info().name);
   printReport(models);
-  if (const ExitStatus written = writeReports(options, open->device->info().name, models);
-      written != ExitStatus::done) {
-    return written;
-  }
-  return status;
+  return written == ExitStatus::done ? status : written;
 }
 
 }  // namespace
