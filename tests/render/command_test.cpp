@@ -213,6 +213,21 @@ TEST(RenderCommandTest, NamesFfmpegWhereThereIsNone) {
   EXPECT_NE(result.errors.find("%04d.png"), std::string::npos) << result.errors;
 }
 
+TEST(RenderCommandTest, SaysWhatTheDeviceCannotDraw) {
+  REQUIRE_DEVICE();
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow is larger
+  const CommandResult result = runCommand(
+      {"/bin/sh", "-c", "ulimit -v 8000000; exec \"$0\" \"$@\"", dermisProgram, "render",
+       sampleModel("bar"), "-o", outFile("huge.png"), "--width", "16384", "--height", "16384"});
+  EXPECT_EQ(result.status, 5);
+  expectOneErrorLine(result);
+  EXPECT_NE(result.errors.find(" cannot draw a picture of 16384 x 16384 pixels: "),
+            std::string::npos)
+      << result.errors;
+  EXPECT_NE(result.errors.find(" MiB, and "), std::string::npos) << result.errors;
+#endif
+}
+
 TEST(RenderCommandTest, RefusesWrongUsage) {
   const std::vector<std::vector<std::string>> wrong{
       {"-o", "a.jpg"},
