@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -11,7 +12,7 @@
 #include "commands.h"
 #include "comparison_subject.h"
 #include "driver_version.h"
-#include "frame_name.h"
+#include "file_name.h"
 #include "open_device.h"
 #include "output_file.h"
 #include "picture_writer.h"
@@ -40,38 +41,39 @@ struct CompareOptions {
   bool strict = false;
 };
 
-ExitStatus wrong(const std::string& message) {
-  return reportError(ExitStatus::wrongUsage, message);
-}
-
 ExitStatus checkPicture(const CompareOptions& options) {
   if (options.model.empty() && options.output.empty())
-    return wrong("compare needs MODEL, or -o OUT.png for a picture of the built-in models");
+    return reportWrongUsage(
+        "compare needs MODEL, or -o OUT.png for a picture of the built-in models");
   if (options.model.empty() && (options.animation || options.time != 0))
-    return wrong("--animation and --time are those of MODEL, and there is none");
+    return reportWrongUsage("--animation and --time are those of MODEL, and there is none");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
-    return wrong(fmt::format("OUT must end in .png, not be '{}'", options.output));
+    return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
-    return wrong("OUT has a place for a number; there is one picture only");
+    return reportWrongUsage("-o OUT has a place for a number; there is one picture only");
   if (options.device == "cpu")
-    return wrong("--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+    return reportWrongUsage(
+        "--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
   if (options.width < leastWidth || options.width > largestWidth)
-    return wrong(fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
+    return reportWrongUsage(
+        fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
   for (auto name = options.methods.begin(); name != options.methods.end(); ++name) {
     if (!methodFromName(*name))
-      return wrong(fmt::format("there is no method '{}'; there are {}", *name, methodNames("and")));
+      return reportWrongUsage(fmt::format("--methods: there is no method '{}'; there are {}", *name,
+                                          methodNames("and")));
     if (std::find(options.methods.begin(), name, *name) != name)
-      return wrong(fmt::format("--methods names {} twice", *name));
+      return reportWrongUsage(fmt::format("--methods names {} twice", *name));
   }
   return ExitStatus::done;
 }
 
 ExitStatus checkUsage(const CompareOptions& options) {
-  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (!std::isfinite(options.time)) return reportWrongUsage("--time must be a number of seconds");
   if (options.repetitions == 0 || options.repetitions > mostRepetitions)
-    return wrong(fmt::format("--repetitions must be from 1 to {}", mostRepetitions));
-  if (options.instances && *options.instances == 0) return wrong("--instances must be at least 1");
+    return reportWrongUsage(fmt::format("--repetitions must be from 1 to {}", mostRepetitions));
+  if (options.instances && *options.instances == 0)
+    return reportWrongUsage("--instances must be at least 1");
   if (const ExitStatus picture = checkPicture(options); picture != ExitStatus::done) return picture;
   return checkShares(options.shares);
 }
@@ -105,7 +107,7 @@ ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) 
         fmt::format("{} has no skinned mesh with joints and weights in its scene", options.model));
   }
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
-  if (!clip) return wrong(clip.error().message);
+  if (!clip) return reportWrongUsage(clip.error().message);
   subject.name = options.model;
   subject.poseName = poseName(*scene->model, *clip, options.time);
   subject.pose = scenePose(*scene, *clip, options.time);
@@ -170,14 +172,18 @@ ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& 
 
 ExitStatus compare(const CompareOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  const std::array<samples::RequestedOutput, 2> outputs{
+      {{"-o", options.output}, {"--json", options.json}}};
+  if (const ExitStatus kept = checkInput(options.model, outputs); kept != ExitStatus::done)
+    return kept;
   ComparisonSubject subject;
   if (const ExitStatus loaded = loadSubject(options, subject); loaded != ExitStatus::done)
     return loaded;
   const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
-  if (!columns) return wrong(columns.error().message);
+  if (!columns) return reportWrongUsage(columns.error().message);
   if (options.width < columns->size() * leastColumnWidth) {
-    return wrong(fmt::format("{} methods side by side need a --width of {} pixels", columns->size(),
-                             columns->size() * leastColumnWidth));
+    return reportWrongUsage(fmt::format("{} methods side by side need a --width of {} pixels",
+                                        columns->size(), columns->size() * leastColumnWidth));
   }
 
   ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
@@ -201,14 +207,14 @@ ExitStatus compare(const CompareOptions& options) {
   }();
   if (!comparison) {
     return comparison.error().code == ErrorCode::invalidArgument
-               ? wrong(comparison.error().message)
+               ? reportWrongUsage(comparison.error().message)
                : reportDeviceError(comparison.error());
   }
-  printComparison(title, *comparison);
   if (!options.json.empty()) {
     if (Result<void> written = writeJsonComparison(options.json, title, *comparison); !written)
       return reportError(ExitStatus::stopped, written.error().message);
   }
+  printComparison(title, *comparison);
   if (options.output.empty()) return ExitStatus::done;
   return writePicture(options, subject, *columns, title, *comparison, *open);
 }

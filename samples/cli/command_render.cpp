@@ -12,7 +12,7 @@
 #include "commands.h"
 #include "crowd.h"
 #include "drawn_scene.h"
-#include "frame_name.h"
+#include "file_name.h"
 #include "method_options.h"
 #include "picture_writer.h"
 #include "progress.h"
@@ -47,53 +47,54 @@ struct RenderOptions {
 constexpr std::uint32_t largestSide = 16384;
 constexpr std::uint32_t mostInstances = 100'000;
 
-ExitStatus wrong(const std::string& message) {
-  return reportError(ExitStatus::wrongUsage, message);
-}
-
 ExitStatus checkNumbers(const RenderOptions& options) {
-  if (!std::isfinite(options.time)) return wrong("--time must be a number of seconds");
+  if (!std::isfinite(options.time)) return reportWrongUsage("--time must be a number of seconds");
   if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond))
-    return wrong("--fps must be a number above 0");
-  if (options.frames && *options.frames == 0) return wrong("--frames must be at least 1");
+    return reportWrongUsage("--fps must be a number above 0");
+  if (options.frames && *options.frames == 0)
+    return reportWrongUsage("--frames must be at least 1");
   if (options.instances == 0 || options.instances > mostInstances)
-    return wrong(fmt::format("--instances must be from 1 to {}", mostInstances));
+    return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostInstances));
   for (const std::uint32_t side : {options.width, options.height}) {
     if (side < 16 || side > largestSide)
-      return wrong(fmt::format("--width and --height must be from 16 to {} pixels", largestSide));
+      return reportWrongUsage(
+          fmt::format("--width and --height must be from 16 to {} pixels", largestSide));
   }
   if (!std::isfinite(options.azimuth.value_or(0)))
-    return wrong("--azimuth must be a number of degrees");
+    return reportWrongUsage("--azimuth must be a number of degrees");
   if (!(std::abs(options.elevation.value_or(0)) <= 90))
-    return wrong("--elevation must be from -90 to 90 degrees");
+    return reportWrongUsage("--elevation must be from -90 to 90 degrees");
   return checkShares(options.shares);
 }
 
 ExitStatus checkUsage(const RenderOptions& options) {
   const std::optional<PictureKind> kind = samples::pictureKind(options.output);
   if (!kind) {
-    return wrong(
-        fmt::format("OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
+    return reportWrongUsage(
+        fmt::format("-o OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
-    return wrong(
-        fmt::format("there is no method '{}'; there are {}", options.method, methodNames("and")));
+    return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
+                                        options.method, methodNames("and")));
   }
   if (options.device == "cpu")
-    return wrong("--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+    return reportWrongUsage(
+        "--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
   if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
   if (*kind != PictureKind::png)
-    return options.frames ? ExitStatus::done : wrong("a film needs --frames, how many it has");
+    return options.frames ? ExitStatus::done
+                          : reportWrongUsage("a film needs --frames, how many it has");
   if (samples::hasWrongPattern(options.output))
-    return wrong("the place for a number in OUT is %01d to %09d, and there is one at most");
+    return reportWrongUsage(
+        "the place for a number in -o OUT is %01d to %09d, and there is one at most");
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && !pattern) {
-    return wrong(
-        "--frames needs a place for the number in OUT, such as frame%04d.png, or a film: .mp4, "
+    return reportWrongUsage(
+        "--frames needs a place for the number in -o OUT, such as frame%04d.png, or a film: .mp4, "
         ".gif or .apng");
   }
   if (!options.frames && pattern)
-    return wrong("OUT has a place for a number; --frames says how many there are");
+    return reportWrongUsage("-o OUT has a place for a number; --frames says how many there are");
   return ExitStatus::done;
 }
 
@@ -359,8 +360,19 @@ ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {
   return ExitStatus::done;
 }
 
+/// What would be a pity to notice after all pictures are drawn.
+ExitStatus checkOutput(const RenderOptions& options) {
+  const samples::RequestedOutput output{"-o", options.output, options.frames.value_or(1)};
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
+    return kept;
+  if (*samples::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
+  const Result<void> film = samples::checkFilmProgram(options.output);
+  return film ? ExitStatus::done : reportError(ExitStatus::stopped, film.error().message);
+}
+
 ExitStatus renderModel(const RenderOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  if (const ExitStatus checked = checkOutput(options); checked != ExitStatus::done) return checked;
   MeshPreparation preparation;
   preparation.strict = options.strict;
   preparation.images = true;
@@ -372,8 +384,11 @@ ExitStatus renderModel(const RenderOptions& options) {
   if (const ExitStatus checked = checkScene(options, *scene); checked != ExitStatus::done)
     return checked;
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
-  if (!clip) return wrong(clip.error().message);
+  if (!clip) return reportWrongUsage(clip.error().message);
 
+  // First: what cannot be written is noticed before anything is prepared.
+  Result<std::unique_ptr<PictureWriter>> writer = openWriter(options);
+  if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
   deviceOptions.graphics = true;
@@ -384,8 +399,6 @@ ExitStatus renderModel(const RenderOptions& options) {
     if (prepared.error().code == ErrorCode::invalidData) return reportModelError(prepared.error());
     return reportDeviceError(prepared.error());
   }
-  Result<std::unique_ptr<PictureWriter>> writer = openWriter(options);
-  if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
   return writePictures(options, film, **writer);
 }
 

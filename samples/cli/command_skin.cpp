@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "commands.h"
-#include "frame_name.h"
+#include "file_name.h"
 #include "mesh_output.h"
 #include "method_options.h"
 #include "open_device.h"
@@ -56,35 +56,32 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
 
 ExitStatus checkUsage(const SkinOptions& options) {
   if (!outputFormat(options.output)) {
-    return reportError(
-        ExitStatus::wrongUsage,
-        fmt::format("OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
+    return reportWrongUsage(
+        fmt::format("-o OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
-    return reportError(ExitStatus::wrongUsage, fmt::format("there is no method '{}'; there are {}",
-                                                           options.method, methodNames("and")));
+    return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
+                                        options.method, methodNames("and")));
   }
   if (const ExitStatus shares = checkShares(options.shares); shares != ExitStatus::done)
     return shares;
-  if (!std::isfinite(options.time))
-    return reportError(ExitStatus::wrongUsage, "--time must be a number of seconds");
+  if (!std::isfinite(options.time)) return reportWrongUsage("--time must be a number of seconds");
   if (!(options.framesPerSecond > 0) || !std::isfinite(options.framesPerSecond)) {
-    return reportError(ExitStatus::wrongUsage, "--fps must be a number above 0");
+    return reportWrongUsage("--fps must be a number above 0");
   }
   if (samples::hasWrongPattern(options.output)) {
-    return reportError(ExitStatus::wrongUsage,
-                       "the place for a number in OUT is %01d to %09d, and there is one at most");
+    return reportWrongUsage(
+        "the place for a number in -o OUT is %01d to %09d, and there is one at most");
   }
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && *options.frames == 0)
-    return reportError(ExitStatus::wrongUsage, "--frames must be at least 1");
+    return reportWrongUsage("--frames must be at least 1");
   if (options.frames && !pattern) {
-    return reportError(ExitStatus::wrongUsage,
-                       "--frames needs a place for the number in OUT, such as pose%04d.ply");
+    return reportWrongUsage(
+        "--frames needs a place for the number in -o OUT, such as pose%04d.ply");
   }
   if (!options.frames && pattern) {
-    return reportError(ExitStatus::wrongUsage,
-                       "OUT has a place for a number; --frames says how many there are");
+    return reportWrongUsage("-o OUT has a place for a number; --frames says how many there are");
   }
   return ExitStatus::done;
 }
@@ -119,6 +116,9 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
 
 ExitStatus skin(const SkinOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  const samples::RequestedOutput output{"-o", options.output, options.frames.value_or(1)};
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
+    return kept;
   const Method method = *methodFromName(options.method);
   MeshPreparation preparation;
   preparation.strict = options.strict;
@@ -140,7 +140,7 @@ ExitStatus skin(const SkinOptions& options) {
                                    options.model, options.method));
   }
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
-  if (!clip) return reportError(ExitStatus::wrongUsage, clip.error().message);
+  if (!clip) return reportWrongUsage(clip.error().message);
 
   if (options.device == "cpu")
     return writePoses(options, *scene, *clip, referenceSkinner(*scene, method));

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <utility>
 
@@ -112,9 +113,15 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
 
 ExitStatus verify(const VerifyOptions& options) {
   if (options.device == "cpu") {
-    return reportError(ExitStatus::wrongUsage,
-                       "--device cpu is the reference itself, and would be compared with itself; "
-                       "name a Vulkan device");
+    return reportWrongUsage(
+        "--device cpu is the reference itself, and would be compared with itself; "
+        "name a Vulkan device");
+  }
+  const std::array<samples::RequestedOutput, 2> outputFiles{
+      {{"--json", options.json}, {"--junit", options.junit}}};
+  for (const std::string& model : options.models) {
+    if (const ExitStatus kept = checkInput(model, outputFiles); kept != ExitStatus::done)
+      return kept;
   }
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
@@ -124,14 +131,11 @@ ExitStatus verify(const VerifyOptions& options) {
   Verifier verifier(*open, options.strict);
   if (options.random || options.models.empty()) verifier.verifyRandom();
   for (const std::string& model : options.models) verifier.verify(model);
+  // Files first: standard output may be closed.
+  const ExitStatus written = writeReports(options, open->device->info().name, verifier.models());
   fmt::print("device  {}\n", open->device->info().name);
   printReport(verifier.models());
-  if (const ExitStatus written =
-          writeReports(options, open->device->info().name, verifier.models());
-      written != ExitStatus::done) {
-    return written;
-  }
-  return verifier.status();
+  return written == ExitStatus::done ? verifier.status() : written;
 }
 
 }  // namespace

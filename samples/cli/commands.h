@@ -4,8 +4,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include <filesystem>
 #include <functional>
+#include <span>
+#include <string>
 
+#include "file_name.h"
 #include "program/exit_status.h"
 
 namespace dermis::cli {
@@ -16,6 +20,15 @@ using samples::reportError;
 using samples::reportModelError;
 using samples::reportNote;
 using samples::reportWarning;
+using samples::reportWrongUsage;
+
+/// Reports wrong usage if an output would overwrite the model.
+inline ExitStatus checkInput(const std::string& model,
+                             std::span<const samples::RequestedOutput> outputs) {
+  const std::filesystem::path input = model;
+  const Result<void> kept = samples::checkInputsAreKept(outputs, {&input, 1});
+  return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
+}
 
 using Run = std::function<ExitStatus()>;
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <span>
 #include <string_view>
 
 #include "output_file.h"
@@ -147,7 +146,7 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
     json["methods"].push_back(describe(compared));
   // Names come from a file: what is not UTF-8 in them is replaced.
   const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  return samples::writeFile(path, std::as_bytes(std::span(text)));
+  return samples::writeFile(path, text);
 }
 
 }  // namespace dermis::cli

@@ -4,15 +4,16 @@
 
 #include <cmath>
 
+#include "file_name.h"
 #include "mesh_formats.h"
 #include "output_file.h"
 
 namespace dermis::cli {
 
 std::optional<OutputFormat> outputFormat(std::string_view fileName) {
-  if (fileName.ends_with(".ply")) return OutputFormat::ply;
-  if (fileName.ends_with(".obj")) return OutputFormat::obj;
-  if (fileName.ends_with(".glb")) return OutputFormat::glb;
+  if (samples::hasEnding(fileName, ".ply")) return OutputFormat::ply;
+  if (samples::hasEnding(fileName, ".obj")) return OutputFormat::obj;
+  if (samples::hasEnding(fileName, ".glb")) return OutputFormat::glb;
   return std::nullopt;
 }
 
@@ -55,7 +56,7 @@ Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                  fmt::format("{} would be larger than the 4 GiB of a GLB", path.string())};
   }
   const std::string bytes = format == OutputFormat::ply ? plyFile(mesh) : objFile(mesh);
-  return samples::writeFile(path, std::as_bytes(std::span(bytes)));
+  return samples::writeFile(path, bytes);
 }
 
 }  // namespace dermis::cli

@@ -31,7 +31,7 @@ struct OutputMesh {
 
 enum class OutputFormat { ply, obj, glb };
 
-/// The format that a file's ending means, or nothing.
+/// The format that a file's ending means, in any case, or nothing.
 std::optional<OutputFormat> outputFormat(std::string_view fileName);
 
 /// What a part is called: its node's name, or its mesh's, or the node's number; and which of the
@@ -48,8 +48,8 @@ bool holdsNonFinite(OutputFormat format);
 /// Only GLB: for the others tangents need not be skinned.
 bool holdsTangents(OutputFormat format);
 
-/// Writes a file whole or not at all: where it stops half-way, it is removed. Fails with `ioError`,
-/// and with `limitExceeded` where the format cannot hold so large a mesh. What is not finite must
+/// Writes a file whole or not at all. Fails with `ioError`, and with `limitExceeded` where the
+/// format cannot hold so large a mesh. What is not finite must
 /// have been refused before, unless the format holds it.
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh);

@@ -30,8 +30,7 @@ samples::ExitStatus checkShares(const MethodShares& shares) {
   for (const auto& [name, value] : options) {
     // Not a number is neither.
     if (!(value >= 0 && value <= 1))
-      return samples::reportError(samples::ExitStatus::wrongUsage,
-                                  fmt::format("{} must be from 0 to 1", name));
+      return samples::reportWrongUsage(fmt::format("{} must be from 0 to 1", name));
   }
   return samples::ExitStatus::done;
 }

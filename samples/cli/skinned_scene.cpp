@@ -125,8 +125,8 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
   if (*wanted == "none") return gltf::none;
   if (const std::optional<std::uint32_t> clip = gltf::findClip(model, *wanted)) return *clip;
   return Error{ErrorCode::invalidArgument,
-               fmt::format("there is no animation '{}' among the {} of the file", *wanted,
-                           model.clips.size())};
+               fmt::format("--animation: there is no animation '{}' among the {} of the file",
+                           *wanted, model.clips.size())};
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {

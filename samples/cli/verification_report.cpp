@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "output_file.h"
 #include "program/plain_text.h"
 
 namespace dermis::cli {
@@ -38,14 +38,6 @@ std::string xmlText(std::string_view text) {
     }
   }
   return escaped;
-}
-
-Result<void> writeText(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (!file) return Error{ErrorCode::ioError, fmt::format("{} cannot be written", path.string())};
-  return {};
 }
 
 struct Summary {
@@ -154,7 +146,7 @@ Result<void> writeJsonReport(const std::filesystem::path& path, const std::strin
     for (const VerifiedCase& verified : model.cases) entry["cases"].push_back(describe(verified));
     json["models"].push_back(std::move(entry));
   }
-  return writeText(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  return samples::writeFile(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Result<void> writeJunitReport(const std::filesystem::path& path,
@@ -185,7 +177,7 @@ Result<void> writeJunitReport(const std::filesystem::path& path,
     failures += model.failures();
     errors += modelErrors;
   }
-  return writeText(
+  return samples::writeFile(
       path,
       fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"dermis verify\" "
                   "tests=\"{}\" failures=\"{}\" errors=\"{}\">\n{}</testsuites>\n",

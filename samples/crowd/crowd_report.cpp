@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "output_file.h"
 
 using namespace dermis;
 
@@ -270,11 +271,7 @@ std::string CrowdReport::json(const CheckTotals* check) const {
 
 Result<void> CrowdReport::writeJson(const std::filesystem::path& path,
                                     const CheckTotals* check) const {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << json(check) << '\n';
-  file.close();
-  if (!file) return Error{ErrorCode::ioError, fmt::format("cannot write '{}'", path.string())};
-  return {};
+  return samples::writeFile(path, json(check) + "\n");
 }
 
 }  // namespace crowd

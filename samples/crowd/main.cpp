@@ -197,6 +197,12 @@ ExitStatus addFilm(Show& show, samples::OpenDevice& open, const Character& chara
 }
 
 ExitStatus run(const Options& options) {
+  const bool isFilm = !options.film.output.empty() &&
+                      samples::pictureKind(options.film.output) != samples::PictureKind::png;
+  if (isFilm) {
+    if (Result<void> program = samples::checkFilmProgram(options.film.output); !program)
+      return reportError(ExitStatus::stopped, program.error().message);
+  }
   const Result<Character> character = Character::load(options.model, characterOptions(options));
   if (!character) return reportError(ExitStatus::badInput, character.error().message);
   const Result<std::unique_ptr<Script>> script = makeScript(*character, options);

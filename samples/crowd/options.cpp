@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
+#include <filesystem>
 
-#include "frame_name.h"
+#include "file_name.h"
 #include "picture_writer.h"
 #include "program/program.h"
 
@@ -89,7 +91,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   addFilm(app, options.film);
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
   if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
-  if (app.get_option("--film")->count() != 0) {
+  if (!options.film.output.empty()) {
     const std::string complaint = complaintAbout(options.film, frames->count() != 0);
     if (!complaint.empty()) return samples::reportWrongUsage(complaint);
     const bool isOnePicture =
@@ -97,6 +99,11 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
         !samples::frameName(options.film.output, 0);
     if (isOnePicture) options.frames = 1;
   }
+  const std::array<samples::RequestedOutput, 2> outputs{
+      {{"--film", options.film.output, options.frames}, {"--json", options.json}}};
+  const std::filesystem::path model = options.model;
+  if (Result<void> kept = samples::checkInputsAreKept(outputs, {&model, 1}); !kept)
+    return samples::reportWrongUsage(kept.error().message);
   options.verifies = !skipsVerification;
   options.crowd.outputBudget = std::uint64_t{outputMebibytes} << 20;
   return std::nullopt;

@@ -6,16 +6,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
-#include <filesystem>
 #include <sstream>
-#include <system_error>
 #include <utility>
 #include <vector>
 
-#include "frame_name.h"
+#include "file_name.h"
 #include "output_file.h"
 
 extern char** environ;
@@ -46,13 +44,12 @@ class PngWriter final : public PictureWriter {
 /// early, writing to it is then an error and no signal.
 class FilmWriter final : public PictureWriter {
  public:
-  FilmWriter(std::string output, int input, pid_t child)
-      : output_(std::move(output)), input_(input), child_(child) {}
+  FilmWriter(std::string name, std::unique_ptr<OutputFile> output, int input, pid_t child)
+      : name_(std::move(name)), output_(std::move(output)), input_(input), child_(child) {
+    setUnfinishedChild(child);
+  }
   ~FilmWriter() override {
-    if (child_ == 0) return;
-    (void)end();
-    std::error_code error;
-    std::filesystem::remove(output_, error);  // Half a film.
+    if (child_ != 0) (void)end();
   }
   FilmWriter(const FilmWriter&) = delete;
   FilmWriter& operator=(const FilmWriter&) = delete;
@@ -71,20 +68,24 @@ class FilmWriter final : public PictureWriter {
   }
 
   Result<void> finish() override {
-    if (end()) return {};
-    std::error_code error;
-    std::filesystem::remove(output_, error);
-    return failure();
+    if (!end()) return failure();
+    return output_->commit();
   }
 
  private:
   Error failure() const {
-    return {ErrorCode::ioError, fmt::format("{}: ffmpeg could not write it", output_)};
+    return {ErrorCode::ioError, fmt::format("{} cannot be written: ffmpeg failed", name_)};
   }
 
   /// Waits for ffmpeg; whether it has done its work.
   bool end() {
     close(input_);
+    siginfo_t information{};
+    // It is reaped only when no signal can mean it any more.
+    while (waitid(P_PID, static_cast<id_t>(child_), &information, WEXITED | WNOWAIT) != 0 &&
+           errno == EINTR) {
+    }
+    setUnfinishedChild(0);
     int status = 0;
     while (waitpid(child_, &status, 0) < 0 && errno == EINTR) {
     }
@@ -92,7 +93,8 @@ class FilmWriter final : public PictureWriter {
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
   }
 
-  std::string output_;
+  std::string name_;
+  std::unique_ptr<OutputFile> output_;
   int input_ = -1;
   pid_t child_ = 0;
 };
@@ -141,11 +143,28 @@ std::vector<std::string> ffmpegArguments(const std::string& output, PictureKind 
   return arguments;
 }
 
-bool endsWith(std::string_view name, std::string_view ending) {
-  return name.size() > ending.size() &&
-         std::equal(ending.begin(), ending.end(),
-                    name.end() - static_cast<std::ptrdiff_t>(ending.size()),
-                    [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b - 'A' + 'a' : b); });
+/// Starts ffmpeg; its process, or 0. Signals that this program ignores are none of its business.
+pid_t spawnFfmpeg(const std::string& program, std::vector<std::string> arguments, int input) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t ignored;
+  sigemptyset(&ignored);
+  sigaddset(&ignored, SIGPIPE);
+  sigaddset(&ignored, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &ignored);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+  std::vector<char*> words;
+  for (std::string& argument : arguments) words.push_back(argument.data());
+  words.push_back(nullptr);
+  pid_t child = 0;
+  if (posix_spawn(&child, program.c_str(), &actions, &attributes, words.data(), environ) != 0)
+    child = 0;
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return child;
 }
 
 }  // namespace
@@ -155,7 +174,7 @@ std::optional<PictureKind> pictureKind(std::string_view fileName) {
                                      {".mp4", PictureKind::mp4},
                                      {".gif", PictureKind::gif},
                                      {".apng", PictureKind::apng}}) {
-    if (endsWith(fileName, ending)) return kind;
+    if (hasEnding(fileName, ending)) return kind;
   }
   return std::nullopt;
 }
@@ -164,37 +183,34 @@ std::unique_ptr<PictureWriter> writePngs(const std::string& output) {
   return std::make_unique<PngWriter>(output);
 }
 
+Result<void> checkFilmProgram(const std::string& output) {
+  if (findProgram("ffmpeg")) return {};
+  return Error{ErrorCode::missingFeature,
+               fmt::format("{} takes the program ffmpeg, which is not in the PATH; numbered "
+                           "pictures need none: name them like frame%04d.png",
+                           output)};
+}
+
 Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, PictureKind kind,
                                                  std::uint32_t width, std::uint32_t height,
                                                  double framesPerSecond) {
-  const std::optional<std::string> program = findProgram("ffmpeg");
-  if (!program) {
-    return Error{ErrorCode::missingFeature,
-                 fmt::format("{} takes the program ffmpeg, which is not in the PATH; numbered "
-                             "pictures need none: name them like frame%04d.png",
-                             output)};
-  }
+  if (Result<void> checked = checkFilmProgram(output); !checked) return checked.error();
+  const std::string program = findProgram("ffmpeg").value_or("ffmpeg");
+  Result<std::unique_ptr<OutputFile>> file = OutputFile::create(output);
+  if (!file) return file.error();
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
     return Error{ErrorCode::ioError, "no socket can be made for ffmpeg"};
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
-  std::vector<std::string> arguments =
-      ffmpegArguments(output, kind, width, height, framesPerSecond);
-  std::vector<char*> words;
-  for (std::string& argument : arguments) words.push_back(argument.data());
-  words.push_back(nullptr);
-  pid_t child = 0;
-  const int result =
-      posix_spawn(&child, program->c_str(), &actions, nullptr, words.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
+  const pid_t child = spawnFfmpeg(
+      program, ffmpegArguments((*file)->temporaryName(), kind, width, height, framesPerSecond),
+      ends[1]);
   close(ends[1]);
-  if (result != 0) {
+  if (child == 0) {
     close(ends[0]);
-    return Error{ErrorCode::ioError, fmt::format("{} cannot be run", *program)};
+    return Error{ErrorCode::ioError, fmt::format("{} cannot be run", program)};
   }
-  return std::unique_ptr<PictureWriter>(std::make_unique<FilmWriter>(output, ends[0], child));
+  return std::unique_ptr<PictureWriter>(
+      std::make_unique<FilmWriter>(output, std::move(*file), ends[0], child));
 }
 
 }  // namespace dermis::samples

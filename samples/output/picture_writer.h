@@ -29,8 +29,11 @@ class PictureWriter {
 /// PNG files: OUT, or OUT with the number of each in the place for it.
 std::unique_ptr<PictureWriter> writePngs(const std::string& output);
 
-/// A film of pictures of one size. Fails with `missingFeature` where there is no ffmpeg in the
-/// PATH.
+/// Fails with `missingFeature` if there is no ffmpeg in the PATH, which films need.
+Result<void> checkFilmProgram(const std::string& output);
+
+/// A film of pictures of one size. It replaces what stands at OUT when it is finished, and not
+/// before. Fails like `checkFilmProgram`, and with `ioError`.
 Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, PictureKind kind,
                                                  std::uint32_t width, std::uint32_t height,
                                                  double framesPerSecond);

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <new>
+#include <string>
+#include <utility>
 
 #include "plain_text.h"
 
@@ -10,16 +13,27 @@ namespace dermis::samples {
 namespace {
 
 const char* name = "dermis";
+std::string subcommand;
 
+/// What cannot be written to standard error is lost; the exit status still tells.
 void print(std::string_view kind, std::string_view message) {
   std::fflush(stdout);
-  fmt::print(stderr, "{}: {}: {}\n", name, kind, plainLine(message));
+  try {
+    const std::string line = fmt::format("{}: {}: {}\n", name, kind, plainLine(message));
+    (void)std::fwrite(line.data(), 1, line.size(), stderr);
+  } catch (const std::bad_alloc&) {
+    (void)std::fputs("error: out of memory\n", stderr);
+  }
 }
 
 }  // namespace
 
 void setProgramName(const char* newName) {
   name = newName;
+}
+
+void setSubcommandName(std::string newName) {
+  subcommand = std::move(newName);
 }
 
 ExitStatus reportError(ExitStatus status, std::string_view message) {
@@ -37,7 +51,8 @@ void reportNote(std::string_view message) {
 
 ExitStatus reportWrongUsage(std::string_view message) {
   return reportError(ExitStatus::wrongUsage,
-                     fmt::format("{} ({} --help tells more)", message, name));
+                     fmt::format("{} ({}{}{} --help tells more)", message, name,
+                                 subcommand.empty() ? "" : " ", subcommand));
 }
 
 ExitStatus reportModelError(const Error& error) {

@@ -1,25 +1,100 @@
 #include "program.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <span>
+#include <string_view>
+
+#include "unfinished.h"
 
 namespace dermis::samples {
+namespace {
+
+bool isOption(std::string_view argument) {
+  return argument.size() > 1 && argument[0] == '-';
+}
+
+bool isFlag(std::string_view argument, const CLI::App& command) {
+  const CLI::Option* option =
+      isOption(argument) ? command.get_option_no_throw(std::string(argument)) : nullptr;
+  return option != nullptr && option->get_items_expected_max() == 0;
+}
+
+const CLI::App* findSubcommand(const CLI::App& app, std::string_view name) {
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == name) return command;
+  }
+  return nullptr;
+}
+
+/// What CLI11 would take for something else than was meant; empty if nothing is wrong.
+std::string complaintAbout(std::span<char* const> arguments, const CLI::App& command) {
+  std::string_view before;
+  for (const std::string_view argument : arguments) {
+    if (argument == "--") break;
+    const std::size_t equals = argument.find('=');
+    const std::string name(argument.substr(0, equals));
+    if (argument.empty()) {
+      return isOption(before) && !isFlag(before, command)
+                 ? fmt::format("{} has an empty value", before)
+                 : "an argument is empty";
+    }
+    if (isOption(argument) && equals != std::string_view::npos) {
+      if (isFlag(name, command)) return fmt::format("{} takes no value", name);
+      if (equals + 1 == argument.size()) return fmt::format("{} has an empty value", name);
+      if (equals == 2 && std::isalpha(static_cast<unsigned char>(name[1])) != 0)
+        return fmt::format("{} takes its value without '='", name);
+    }
+    before = argument;
+  }
+  return {};
+}
+
+/// Without this the next file that is opened would become standard output or error. Reading what
+/// is only written to, and the reverse, fails as it does for a stream that is closed.
+void fillClosedStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) == -1)
+      (void)open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+}  // namespace
 
 std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv) {
+  const CLI::App* command = findSubcommand(app, argc > 1 ? argv[1] : "");
+  if (command != nullptr) setSubcommandName(command->get_name());
+  const std::string complaint =
+      complaintAbout(std::span(argv, static_cast<std::size_t>(argc)).subspan(argc > 0 ? 1 : 0),
+                     command != nullptr ? *command : app);
+  if (!complaint.empty()) return reportWrongUsage(complaint);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
     app.exit(success);  // --help, --version
     return ExitStatus::done;
   } catch (const CLI::ParseError& error) {
-    return reportWrongUsage(error.what());
+    // An option that is not known may be the reason why another seems to be missing.
+    const std::vector<std::string> extras = app.remaining(true);
+    const auto unknown = std::ranges::find_if(extras, isOption);
+    if (unknown == extras.end()) return reportWrongUsage(error.what());
+    return reportWrongUsage(
+        fmt::format("there is no option {}", unknown->substr(0, unknown->find('='))));
   }
   return std::nullopt;
 }
 
 int runProgram(const char* name, const std::function<ExitStatus()>& run) {
+  fillClosedStreams();
+  handleSignals();
   setProgramName(name);
   ExitStatus status = ExitStatus::stopped;
   try {

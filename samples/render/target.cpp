@@ -1,7 +1,9 @@
 #include "target.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <string>
 #include <utility>
 
 namespace dermis::samples::render {
@@ -44,6 +46,59 @@ std::array<VkSubpassDependency, 2> pictureDependencies() {
   dependencies[1].srcAccessMask = VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT;
   dependencies[1].dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
   return dependencies;
+}
+
+/// The largest image of a picture: four samples of colour.
+constexpr std::uint64_t largestPerPixel = 4 * 4;
+/// All of it: as much of depth, the resolved image, and its copy.
+constexpr std::uint64_t bytesPerPixel = 2 * largestPerPixel + 4 + 4;
+
+Error tooLarge(const Device& device, std::uint32_t width, std::uint32_t height,
+               const std::string& reason) {
+  return {ErrorCode::limitExceeded, device.info().name + " cannot draw a picture of " +
+                                        std::to_string(width) + " x " + std::to_string(height) +
+                                        " pixels: " + reason};
+}
+
+std::string mebibytes(std::uint64_t bytes) {
+  return std::to_string(bytes >> 20) + " MiB";
+}
+
+/// The longest side that an image may have.
+std::uint32_t longestSide(const Device& device, VkFormat format, VkImageUsageFlags usage) {
+  VkImageFormatProperties properties{};
+  if (device.functions().GetPhysicalDeviceImageFormatProperties(
+          device.physicalDevice(), format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_OPTIMAL, usage, 0,
+          &properties) != VK_SUCCESS)
+    return 0;
+  return std::min(properties.maxExtent.width, properties.maxExtent.height);
+}
+
+/// What can be known before anything is made. The memory that is free is not.
+Result<void> checkSize(const Device& device, VkFormat depthFormat, std::uint32_t width,
+                       std::uint32_t height) {
+  VkPhysicalDeviceProperties properties{};
+  device.functions().GetPhysicalDeviceProperties(device.physicalDevice(), &properties);
+  const VkPhysicalDeviceLimits& limits = properties.limits;
+  const std::uint32_t longest =
+      std::min({limits.maxImageDimension2D, limits.maxFramebufferWidth, limits.maxFramebufferHeight,
+                longestSide(device, colorFormat, VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT),
+                longestSide(device, depthFormat, VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT)});
+  if (std::max(width, height) > longest)
+    return tooLarge(device, width, height,
+                    "its longest side is " + std::to_string(longest) + " pixels");
+  VkPhysicalDeviceMemoryProperties memory{};
+  device.functions().GetPhysicalDeviceMemoryProperties(device.physicalDevice(), &memory);
+  std::uint64_t largestHeap = 0;
+  for (std::uint32_t heap = 0; heap < memory.memoryHeapCount; ++heap)
+    largestHeap = std::max(largestHeap, memory.memoryHeaps[heap].size);
+  // Vulkan forbids an allocation larger than its heap. Several may fit all the same: lavapipe 22.3
+  // calls its heap 2 GiB and allocates as much as the machine has.
+  const std::uint64_t bytes = largestPerPixel * width * height;
+  if (bytes <= largestHeap) return {};
+  return tooLarge(device, width, height,
+                  "one of its images takes " + mebibytes(bytes) + ", and the device's memory has " +
+                      mebibytes(largestHeap));
 }
 
 }  // namespace
@@ -91,6 +146,20 @@ Result<Owned<VkRenderPass>> makePicturePass(const Device& device, VkFormat depth
 
 Result<RenderTarget> RenderTarget::create(Device& device, VkRenderPass pass, VkFormat depthFormat,
                                           std::uint32_t width, std::uint32_t height) {
+  if (Result<void> checked = checkSize(device, depthFormat, width, height); !checked)
+    return checked.error();
+  Result<RenderTarget> target = make(device, pass, depthFormat, width, height);
+  if (target || target.error().code == ErrorCode::missingFeature) return target;
+  // Drivers find different words, and different calls, for too little memory.
+  Error error = tooLarge(
+      device, width, height,
+      "it takes " + mebibytes(bytesPerPixel * width * height) + ", and " + target.error().message);
+  error.vulkanResult = target.error().vulkanResult;
+  return error;
+}
+
+Result<RenderTarget> RenderTarget::make(Device& device, VkRenderPass pass, VkFormat depthFormat,
+                                        std::uint32_t width, std::uint32_t height) {
   RenderTarget target;
   target.width_ = width;
   target.height_ = height;

@@ -21,6 +21,7 @@ VkFormat chooseDepthFormat(const Device& device);
 
 class RenderTarget {
  public:
+  /// Fails with `limitExceeded` if the device cannot draw so large a picture, or lacks the memory.
   static Result<RenderTarget> create(Device& device, VkRenderPass pass, VkFormat depthFormat,
                                      std::uint32_t width, std::uint32_t height);
 
@@ -36,6 +37,9 @@ class RenderTarget {
   std::vector<std::uint8_t> pixels() const;
 
  private:
+  static Result<RenderTarget> make(Device& device, VkRenderPass pass, VkFormat depthFormat,
+                                   std::uint32_t width, std::uint32_t height);
+
   std::uint32_t width_ = 0, height_ = 0;
   Image color_, depth_, resolved_;
   Owned<VkFramebuffer> framebuffer_;

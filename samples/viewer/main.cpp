@@ -27,8 +27,8 @@ ExitStatus run(int argc, char** argv) {
   ExitStatus status = ExitStatus::done;
   {
     viewer::Viewer program(options, **presenter);
-    if (Result<void> done = program.run(); !done)
-      status = samples::reportError(ExitStatus::stopped, done.error().message);
+    const Result<ExitStatus> done = program.run();
+    status = done ? *done : samples::reportError(ExitStatus::stopped, done.error().message);
   }
   return reportValidation(*(*presenter)->device().device, status);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "file_name.h"
 #include "program/program.h"
 
 namespace dermis::viewer {
@@ -20,13 +21,13 @@ std::string methodNames() {
   return names;
 }
 
-std::optional<samples::ExitStatus> readMethod(const std::string& name,
+std::optional<samples::ExitStatus> readMethod(const char* option, const std::string& name,
                                               std::optional<Method>& method) {
   if (name.empty()) return std::nullopt;
   method = methodFromName(name);
   if (method) return std::nullopt;
   return samples::reportWrongUsage(
-      fmt::format("there is no method '{}'; there are {}", name, methodNames()));
+      fmt::format("{}: there is no method '{}'; there are {}", option, name, methodNames()));
 }
 
 std::string sampleFigure() {
@@ -40,17 +41,19 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   CLI::App app("Shows skinned models, by every method of Dermis. F1 in its window shows the keys.",
                "dermis_viewer");
   app.footer(
-      "Exit status: 0 done, 2 wrong usage, 4 no usable device, 5 anything else that stopped it.");
+      "Exit status: 0 done, 2 wrong usage, 3 bad input, 4 no usable device, 5 anything else that\n"
+      "stopped it.");
   std::string method, comparison;
   bool isEmpty = false;
   CLI::Option* model =
       app.add_option("MODEL", options.model, "A .gltf or .glb file [the sample figure]");
-  app.add_flag("--empty", isEmpty, "Begin without a model")->excludes(model);
+  CLI::Option* empty = app.add_flag("--empty", isEmpty, "Begin without a model")->excludes(model);
   app.add_option("--method", method, methodNames() + " [dual_quaternion]");
   app.add_option("--compare", comparison, "Another method beside it");
   app.add_option("--animation", options.animation,
-                 "A clip's number or name, or none for the rest pose [the first]");
-  app.add_option("--time", options.time, "Seconds into the clip [0]");
+                 "A clip's number or name, or none for the rest pose [the first]")
+      ->excludes(empty);
+  app.add_option("--time", options.time, "Seconds into the clip [0]")->excludes(empty);
   app.add_flag("--paused", options.isPaused, "Begin with the clip stopped");
   app.add_option("--width", options.width, "Of the window [1280]")
       ->check(CLI::Range(64u, largestSide));
@@ -64,11 +67,19 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
                "Run with the Vulkan validation layer, and fail where it says anything");
   if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
   std::optional<Method> first;
-  if (const auto status = readMethod(method, first)) return status;
-  if (const auto status = readMethod(comparison, options.comparison)) return status;
+  if (const auto status = readMethod("--method", method, first)) return status;
+  if (const auto status = readMethod("--compare", comparison, options.comparison)) return status;
   options.method = first.value_or(options.method);
   if (!std::isfinite(options.time))
     return samples::reportWrongUsage("--time must be a number of seconds");
+  if (!options.screenshot.empty() && !samples::hasEnding(options.screenshot, ".png")) {
+    return samples::reportWrongUsage(
+        fmt::format("--screenshot must end in .png, not be '{}'", options.screenshot));
+  }
+  const samples::RequestedOutput screenshot{"--screenshot", options.screenshot};
+  const std::filesystem::path input = options.model;
+  if (Result<void> kept = samples::checkInputsAreKept({&screenshot, 1}, {&input, 1}); !kept)
+    return samples::reportWrongUsage(kept.error().message);
   if (options.model.empty() && !isEmpty) options.model = sampleFigure();
   return std::nullopt;
 }

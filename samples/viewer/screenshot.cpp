@@ -1,8 +1,9 @@
 #include "screenshot.h"
 
 #include <filesystem>
-#include <fstream>
 #include <system_error>
+
+#include "output_file.h"
 
 namespace dermis::viewer {
 
@@ -17,16 +18,7 @@ std::string nextScreenshotName() {
 Result<void> writeScreenshot(const samples::render::Picture& picture, const std::string& name) {
   const Result<std::vector<std::byte>> bytes = samples::render::encodePng(picture);
   if (!bytes) return bytes.error();
-  const std::string part = name + ".part";
-  std::ofstream file(part, std::ios::binary);
-  for (const std::byte byte : *bytes) file.put(static_cast<char>(byte));
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(part, name, error);
-  if (file && !error) return {};
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  return Error{ErrorCode::ioError, "'" + name + "' cannot be written"};
+  return samples::writeFile(name, *bytes);
 }
 
 }  // namespace dermis::viewer

@@ -51,17 +51,23 @@ Viewer::Viewer(const Options& options, Presenter& presenter)
   }
 }
 
-Result<void> Viewer::run() {
+Result<samples::ExitStatus> Viewer::run() {
   while (true) {
     waitForEvents();
     update();
-    const bool isOver = state_.quits || (options_.frames && shownFrames_ >= *options_.frames);
-    if (isOver && (options_.screenshot.empty() || isEnding_) && screenshotName_.empty()) return {};
+    if (status_ == samples::ExitStatus::wrongUsage) return status_;
+    if (status_ != samples::ExitStatus::done && options_.frames) return status_;
+    // A model that is still being read may be the error that they are to end with.
+    const bool hasShownAll = options_.frames && shownFrames_ >= *options_.frames && hasBegun_ &&
+                             loader_.current() == nullptr;
+    const bool isOver = state_.quits || hasShownAll;
+    if (isOver && (options_.screenshot.empty() || isEnding_) && screenshotName_.empty())
+      return status_;
     if (isOver && !isEnding_) {
       isEnding_ = true;
       screenshotName_ = options_.screenshot;
     }
-    if (Result<void> done = draw(); !done) return done;
+    if (Result<void> done = draw(); !done) return done.error();
   }
 }
 
@@ -212,8 +218,8 @@ void Viewer::adopt(LoadedScene loaded) {
   } else {
     state_.methods = methods_;  // What was asked for may have been wanted for another method.
     const std::string name = fileName(path), message = done.error().message;
-    state_.error = message.find(name) == std::string::npos ? name + ": " + message : message;
-    samples::reportError(samples::ExitStatus::badInput, state_.error);
+    fail(samples::ExitStatus::badInput,
+         message.find(name) == std::string::npos ? name + ": " + message : message);
   }
   hasBegun_ = true;
 }
@@ -249,7 +255,7 @@ void Viewer::beginWith(const std::string& path) {
       *view_->scene().model, isFirst ? options_.animation : std::optional<std::string>());
   chooseClip(*view_, clip ? *clip : gltf::none, state_);
   if (isFirst) state_.playback.seek(options_.time);
-  if (!clip) tell(clip.error().message);
+  if (!clip) fail(samples::ExitStatus::wrongUsage, clip.error().message);
   state_.joint = 0;
   state_.camera.resetDirection();
   state_.frames = true;
@@ -265,8 +271,9 @@ void Viewer::chooseMethods() {
       continue;
     }
     if (hasSoughtCenters_) {
-      state_.error = fmt::format("{} needs centres of rotation, which take too long to find for {}",
-                                 methodName(state_.methods[index]), fileName(path_));
+      fail(samples::ExitStatus::badInput,
+           fmt::format("{} needs centres of rotation, which take too long to find for {}",
+                       methodName(state_.methods[index]), fileName(path_)));
       state_.methods[index] = methods_[index];
       continue;
     }
@@ -284,7 +291,7 @@ float Viewer::aspect() const {
 void Viewer::placeCamera() {
   const Result<Box> box = view_->extent(state_.clip);
   if (!box) {
-    state_.error = box.error().message;
+    fail(samples::ExitStatus::badInput, box.error().message);
     chooseClip(*view_, framedClip_, state_);
     return;
   }
@@ -301,7 +308,7 @@ void Viewer::takeErrors() {
   if (!result) return;
   framesToDraw_ = framesAfterEvent;
   if (!*result) {
-    state_.error = (*result).error().message;
+    fail(samples::ExitStatus::stopped, (*result).error().message);
     state_.coloring = Coloring::surface;
     return;
   }
@@ -451,13 +458,26 @@ void Viewer::countPicture() {
 void Viewer::keepScreenshot() {
   const std::string name = std::exchange(screenshotName_, {});
   if (Result<void> written = writeScreenshot(presenter_->picture(), name); !written) {
-    state_.error = written.error().message;
-    samples::reportError(samples::ExitStatus::stopped, state_.error);
+    fail(samples::ExitStatus::stopped, written.error().message);
     return;
   }
   fmt::print("wrote {}\n", name);
   std::fflush(stdout);
   tell("wrote " + name);
+}
+
+/// In the window and on standard error. What follows from the command line decides how the program
+/// ends, and so does everything if nobody is there.
+void Viewer::fail(samples::ExitStatus status, std::string error) {
+  state_.error = std::move(error);
+  framesToDraw_ = framesAfterEvent;
+  if (status == samples::ExitStatus::wrongUsage) {
+    samples::reportWrongUsage(state_.error);
+  } else {
+    samples::reportError(status, state_.error);
+  }
+  const bool isAsked = !hasBegun_ || isEnding_ || options_.frames.has_value();
+  if (isAsked && status_ == samples::ExitStatus::done) status_ = status;
 }
 
 void Viewer::tell(std::string notice) {

@@ -18,8 +18,10 @@ class Viewer {
  public:
   Viewer(const Options& options, Presenter& presenter);
 
-  /// Until the user ends it. Fails with `vulkanError` where the device does.
-  Result<void> run();
+  /// Until the user ends it, or until it has shown the frames that were asked for; those end with
+  /// the first error, which nobody is there to read. Returns what the program ends with: not `done`
+  /// if it could not do what the command line asks. Fails with `vulkanError` where the device does.
+  Result<samples::ExitStatus> run();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -54,6 +56,7 @@ class Viewer {
   void countPicture();
   void keepScreenshot();
   void tell(std::string notice);
+  void fail(samples::ExitStatus status, std::string error);
   float aspect() const;
 
   const Options& options_;
@@ -79,6 +82,7 @@ class Viewer {
   std::uint32_t shownFrames_ = 0;
   std::string screenshotName_;  ///< of the one to be taken; empty: none
   bool isEnding_ = false;
+  samples::ExitStatus status_ = samples::ExitStatus::done;
   float framedAspect_ = 0;
   std::uint32_t framedClip_ = gltf::none;  ///< the last that could be shown
   int pressedX_ = 0, pressedY_ = 0;

@@ -134,9 +134,9 @@ TEST(CrowdFilmTest, LooksTheSameWhoeverCulls) {
 }
 
 TEST(CrowdFilmTest, NamesFfmpegWhereThereIsNone) {
-  REQUIRE_DEVICE();
   const CommandResult result =
-      film(outFile("film.mp4"), 24, {"--frames", "2", "--no-verify"}, {"PATH=/nowhere"});
+      film(outFile("film.mp4"), 24, {"--frames", "2", "--model", "no such model.glb"},
+           {"PATH=/nowhere"});
   EXPECT_EQ(result.status, 5);
   EXPECT_NE(result.errors.find("ffmpeg"), std::string::npos) << result.errors;
   EXPECT_NE(result.errors.find("%04d.png"), std::string::npos) << result.errors;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -109,6 +110,32 @@ TEST(CrowdCommandTest, EndsAsTheDermisCommandDoes) {
     EXPECT_TRUE(result.errors.starts_with("dermis_crowd: error: ")) << result.errors;
     EXPECT_EQ(std::ranges::count(result.errors, '\n'), 1) << result.errors;
     EXPECT_TRUE(result.output.empty());
+  }
+}
+
+TEST(CrowdReportTest, AFullDiskLeavesTheReportThatStoodThere) {
+  REQUIRE_DEVICE();
+  const std::string json = outFile("report.json");
+  std::ofstream(json) << "a good report";
+  const CommandResult result =
+      runCommand({"/bin/sh", "-c", "ulimit -f 1; exec \"$0\" \"$@\" >/dev/null", dermisCrowdProgram,
+                  "--figures", "2", "--frames", "2", "--no-verify", "--json", json});
+  EXPECT_EQ(result.status, 5);
+  EXPECT_EQ(result.errors, "dermis_crowd: error: " + json + " cannot be written: File too large\n");
+  std::ifstream file(json);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_EQ(text, "a good report");
+}
+
+TEST(CrowdReportTest, ItsModelIsNotOverwritten) {
+  for (const char* option : {"--json", "--film"}) {
+    const std::string model = outFile("model.png");
+    std::ofstream(model) << "a model";
+    const CommandResult result = runCommand({dermisCrowdProgram, "--model", model, option, model});
+    EXPECT_EQ(result.status, 2);
+    EXPECT_EQ(result.errors, "dermis_crowd: error: " + std::string(option) + " " + model +
+                                 " would overwrite a file that is read (dermis_crowd --help tells "
+                                 "more)\n");
   }
 }
 

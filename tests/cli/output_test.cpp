@@ -391,7 +391,8 @@ TEST(OutputTest, WhatCannotBeWrittenEndsWithFive) {
     std::filesystem::create_symlink("/dev/full", link);
     const CommandResult full = skin(bar, link);
     EXPECT_EQ(full.status, 5);
-    EXPECT_EQ(full.errors, "dermis: error: " + link + " cannot be written\n");
+    EXPECT_EQ(full.errors,
+              "dermis: error: " + link + " cannot be written: No space left on device\n");
     EXPECT_TRUE(std::filesystem::is_symlink(link)) << "what is not a regular file stays";
     const std::string folder = outFile("folder" + ending);
     std::filesystem::create_directory(folder);
@@ -405,7 +406,7 @@ TEST(OutputTest, OtherEndingsAreRefused) {
   for (const char* name : {"out.gltf", "out.stl", "out", "out.glb.zip", "out.fbx"}) {
     const CommandResult result = skin(bar, outFile(name));
     EXPECT_EQ(result.status, 2) << name;
-    EXPECT_NE(result.errors.find("OUT must end in .ply, .obj or .glb"), std::string::npos);
+    EXPECT_NE(result.errors.find("-o OUT must end in .ply, .obj or .glb"), std::string::npos);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -43,11 +44,12 @@ std::string readAll(std::FILE* file) {
   _exit(127);
 }
 
-/// The exit status, or -1.
-int wait(pid_t child) {
+/// Its exit status, or the signal.
+CommandResult wait(pid_t child) {
   int status = 0;
   waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  if (WIFEXITED(status)) return {WEXITSTATUS(status), 0};
+  return {-1, WIFSIGNALED(status) ? WTERMSIG(status) : 0};
 }
 
 }  // namespace
@@ -58,8 +60,29 @@ CommandResult runCommand(const std::vector<std::string>& command,
   std::FILE* errors = std::tmpfile();
   const pid_t child = fork();
   if (child == 0) execute(command, environment, fileno(output), fileno(errors));
-  const int status = wait(child);
-  return {status, readAll(output), readAll(errors)};
+  CommandResult result = wait(child);
+  result.output = readAll(output);
+  result.errors = readAll(errors);
+  return result;
+}
+
+CommandResult runAndSignal(const std::vector<std::string>& command,
+                           const std::vector<std::string>& environment,
+                           const std::function<bool()>& isTime, int signal) {
+  std::FILE* output = std::tmpfile();
+  std::FILE* errors = std::tmpfile();
+  const pid_t child = fork();
+  if (child == 0) execute(command, environment, fileno(output), fileno(errors));
+  siginfo_t ended{};
+  while (!isTime() && ended.si_pid == 0) {
+    waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT);
+    usleep(1000);
+  }
+  kill(child, signal);
+  CommandResult result = wait(child);
+  result.output = readAll(output);
+  result.errors = readAll(errors);
+  return result;
 }
 
 std::string whyNoTerminal() {
@@ -85,7 +108,9 @@ CommandResult runOnTerminal(const std::vector<std::string>& command) {
   for (ssize_t count = 0; (count = read(master, buffer, sizeof(buffer))) > 0;)
     result.errors.append(buffer, static_cast<std::size_t>(count));
   close(master);
-  result.status = wait(child);
+  const CommandResult ended = wait(child);
+  result.status = ended.status;
+  result.signal = ended.signal;
   result.output = readAll(output);
   return result;
 }

@@ -6,6 +6,7 @@ const char* const sourceFolder = DERMIS_SOURCE_DIR;
 const char* const sampleModels = DERMIS_SAMPLE_MODELS;
 const char* const dermisProgram = DERMIS_COMMAND;
 const char* const dermisCrowdProgram = DERMIS_CROWD;
+const char* const dermisModelsProgram = DERMIS_MODELS;
 const char* const dermisViewerProgram = DERMIS_VIEWER;
 
 }  // namespace dermis::test

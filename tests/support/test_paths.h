@@ -8,6 +8,7 @@ extern const char* const sourceFolder;         ///< the repository
 extern const char* const sampleModels;         ///< the folder of the generated models
 extern const char* const dermisProgram;        ///< the command
 extern const char* const dermisCrowdProgram;   ///< dermis_crowd
+extern const char* const dermisModelsProgram;  ///< dermis-models
 extern const char* const dermisViewerProgram;  ///< dermis_viewer; empty where it is not built
 
 }  // namespace dermis::test

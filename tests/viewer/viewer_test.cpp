@@ -10,6 +10,7 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "display.h"
@@ -344,11 +345,36 @@ TEST_F(ViewerTest, EndsByItselfAfterSomeFrames) {
 }
 
 TEST_F(ViewerTest, SaysWhatIsWrongWithItsOptions) {
-  start({"--method", "cubic"});
-  EXPECT_EQ(viewer_->wait(), 2);
-  EXPECT_NE(errors().find("there is no method 'cubic'"), std::string::npos) << errors();
+  const std::string model = folder_ + "/texture.png";
+  std::filesystem::copy_file(sampleModel("bar"), model);
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
+      {{"--method", "cubic"}, "--method: there is no method 'cubic'"},
+      {{"--compare", "cubic"}, "--compare: there is no method 'cubic'"},
+      {{"--time", ""}, "--time has an empty value"},
+      {{"--bogus"}, "there is no option --bogus"},
+      {{"--screenshot", "x.jpg"}, "--screenshot must end in .png, not be 'x.jpg'"},
+      {{model, "--screenshot", model}, "--screenshot " + model + " would overwrite"},
+      {{"--empty", "--animation", "walk"}, "--animation excludes --empty"},
+      {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no animation 'zzz'"},
+  };
+  for (const auto& [arguments, sentence] : wrong) {
+    start(arguments);
+    EXPECT_EQ(viewer_->wait(), 2) << sentence;
+    EXPECT_NE(errors().find("dermis_viewer: error: " + sentence), std::string::npos) << errors();
+  }
   start({"--device", "no such device"});
   EXPECT_NE(viewer_->wait(), 0);
+}
+
+// Nobody is there to read what stands in the window.
+TEST_F(ViewerTest, EndsWithTheFirstErrorAfterSomeFrames) {
+  start({folder_ + "/nope.glb", "--frames", "2", "--screenshot", "never.png"});
+  EXPECT_EQ(viewer_->wait(), 3) << errors();
+  EXPECT_NE(errors().find("dermis_viewer: error: "), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ + "/never.png"));
+  start({sampleModel("bar"), "--frames", "2", "--screenshot", "/nonexistent/x.png"});
+  EXPECT_EQ(viewer_->wait(), 5) << errors();
+  EXPECT_NE(errors().find("/nonexistent/x.png cannot be written"), std::string::npos) << errors();
 }
 
 }  // namespace

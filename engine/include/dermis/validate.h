@@ -53,6 +53,9 @@ struct MeshReport {
   /// Whether the views make sense, so that `repair` can mend what is wrong.
   bool repairable() const;
   const Finding* find(Problem problem) const;
+  /// What `pack` says: fails with `invalidMesh` unless `packable()`. The sentence is that of the
+  /// first finding that is refused, and names `repair` if that can mend the mesh.
+  Result<void> accepted() const;
 };
 
 /// True for the kinds that make `pack` refuse the mesh.

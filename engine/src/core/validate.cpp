@@ -385,6 +385,14 @@ bool MeshReport::packable() const {
                       [](const Finding& finding) { return refusedByPack(finding.problem); });
 }
 
+Result<void> MeshReport::accepted() const {
+  const auto refused = std::ranges::find_if(
+      findings, [](const Finding& finding) { return refusedByPack(finding.problem); });
+  if (refused == findings.end()) return {};
+  return Error{ErrorCode::invalidMesh,
+               refused->message + (repairable() ? "; repair() can mend it" : "")};
+}
+
 bool MeshReport::repairable() const {
   return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.problem <= Problem::morphVertices;

@@ -244,11 +244,7 @@ Result<void> checkArguments(const MeshView& mesh, std::uint32_t jointCount,
                      ": a range of morph weights is not finite, or its min is above its max");
     }
   }
-  const MeshReport report = validate(mesh, jointCount);
-  for (const Finding& finding : report.findings) {
-    if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
-  }
-  return {};
+  return validate(mesh, jointCount).accepted();
 }
 
 }  // namespace

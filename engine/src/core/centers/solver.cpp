@@ -51,10 +51,7 @@ Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
   // Centres that the mesh has already, good or bad, have no say.
   MeshView bare = mesh;
   bare.centersOfRotation = {};
-  const MeshReport report = validate(bare, jointCount);
-  for (const Finding& finding : report.findings) {
-    if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
-  }
+  if (Result<void> accepted = validate(bare, jointCount).accepted(); !accepted) return accepted;
   return checkTriangles(mesh, triangles);
 }
 

@@ -119,10 +119,8 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
                                                  std::to_string(maxPaletteJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
-  const MeshReport report = validate(mesh, jointCount);
-  for (const Finding& finding : report.findings) {
-    if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
-  }
+  if (const Result<void> accepted = validate(mesh, jointCount).accepted(); !accepted)
+    return accepted.error();
 
   if (wordsNeeded(mesh) > mostWords) {
     return Error{ErrorCode::limitExceeded,

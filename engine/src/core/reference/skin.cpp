@@ -70,11 +70,7 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
                          std::span<const MorphWeight> morphs) {
   const MeshReport report = validate(
       mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPaletteJoints)));
-  if (!report.packable()) {
-    for (const Finding& finding : report.findings) {
-      if (refusedByPack(finding.problem)) return Error{ErrorCode::invalidMesh, finding.message};
-    }
-  }
+  if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
     return Error{ErrorCode::invalidArgument, "mesh '" + std::string(mesh.name) +
                                                  "': " + std::string(methodName(method)) +

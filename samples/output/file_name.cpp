@@ -1,0 +1,84 @@
+#include "file_name.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace dermis::samples {
+namespace {
+
+/// A place for a number in a name: "%", flags and digits, "d".
+struct Place {
+  std::size_t begin = 0, end = 0;
+  std::string_view inside;  ///< what stands between "%" and "d"
+
+  bool isRight() const {
+    return inside.size() == 2 && inside[0] == '0' && inside[1] >= '1' && inside[1] <= '9';
+  }
+};
+
+std::optional<Place> nextPlace(std::string_view name, std::size_t from) {
+  while ((from = name.find('%', from)) != std::string_view::npos) {
+    const std::size_t end = name.find_first_not_of("0123456789+-#'.", ++from);
+    if (end != std::string_view::npos && name[end] == 'd')
+      return Place{from - 1, end + 1, name.substr(from, end - from)};
+  }
+  return std::nullopt;
+}
+
+using FileIdentity = std::pair<dev_t, ino_t>;
+
+/// Nothing if there is no file.
+std::optional<FileIdentity> identityOf(const std::filesystem::path& path) {
+  struct stat file {};
+  if (stat(path.c_str(), &file) != 0) return std::nullopt;
+  return std::pair(file.st_dev, file.st_ino);
+}
+
+}  // namespace
+
+bool hasEnding(std::string_view name, std::string_view ending) {
+  return name.size() > ending.size() &&
+         std::equal(ending.begin(), ending.end(),
+                    name.end() - static_cast<std::ptrdiff_t>(ending.size()), [](char a, char b) {
+                      return a == (b >= 'A' && b <= 'Z' ? static_cast<char>(b - 'A' + 'a') : b);
+                    });
+}
+
+std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
+  std::optional<Place> place = nextPlace(pattern, 0);
+  while (place && !place->isRight()) place = nextPlace(pattern, place->end);
+  if (!place) return std::nullopt;
+  return pattern.substr(0, place->begin) + fmt::format("{:0{}}", frame, place->inside[1] - '0') +
+         pattern.substr(place->end);
+}
+
+bool hasWrongPattern(std::string_view name) {
+  const std::optional<Place> place = nextPlace(name, 0);
+  return place && (!place->isRight() || nextPlace(name, place->end));
+}
+
+Result<void> checkInputsAreKept(std::span<const RequestedOutput> outputs,
+                                std::span<const std::filesystem::path> inputs) {
+  std::set<FileIdentity> files;
+  for (const std::filesystem::path& input : inputs) {
+    if (const std::optional<FileIdentity> file = identityOf(input)) files.insert(*file);
+  }
+  for (const auto& [option, output, frames] : outputs) {
+    if (output.empty()) continue;
+    const std::uint32_t names = frameName(output, 0) ? frames : 1;
+    for (std::uint32_t frame = 0; frame < names; ++frame) {
+      const std::string name = frameName(output, frame).value_or(output);
+      const std::optional<FileIdentity> file = identityOf(name);
+      if (!file || !files.contains(*file)) continue;
+      return Error{ErrorCode::invalidArgument,
+                   fmt::format("{} {} would overwrite a file that is read", option, name)};
+    }
+  }
+  return {};
+}
+
+}  // namespace dermis::samples
