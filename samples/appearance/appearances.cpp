@@ -53,19 +53,29 @@ gltf::TextureUse Appearances::textureUse(const gltf::Primitive& primitive) const
   return model_->materials[primitive.material].baseColorTexture;
 }
 
-Result<std::uint32_t> Appearances::texture(const gltf::TextureUse& use) {
-  if (use.image == gltf::none) return 0u;
-  const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
-  if (!isNew) return place->second;
-  const gltf::Image& image = model_->images[use.image];
-  const Result<render::TexturePixels> pixels = render::decodeImage(image.bytes);
+Result<std::uint32_t> Appearances::decode(std::uint32_t index,
+                                          const render::TextureOptions& options) {
+  const gltf::Image& image = model_->images[index];
+  const Result<render::TexturePixels> pixels = render::decodeImage(image.bytes, &budget_);
   if (!pixels) {
     notes_.push_back(image.name + ": " + pixels.error().message + "; it is left out");
     return 0u;
   }
+  return renderer_->addTexture(*pixels, options);
+}
+
+Result<std::uint32_t> Appearances::texture(const gltf::TextureUse& use) {
+  if (use.image == gltf::none) return 0u;
+  const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
+  if (!isNew) return place->second;
+  const render::TextureOptions options{wrapOf(use.wrapU), wrapOf(use.wrapV)};
+  const auto [first, isFirst] = firstTextures_.emplace(use.image, 0);
+  if (!isFirst && first->second == 0) return 0u;
   Result<std::uint32_t> texture =
-      renderer_->addTexture(*pixels, {wrapOf(use.wrapU), wrapOf(use.wrapV)});
-  if (texture) place->second = *texture;
+      isFirst ? decode(use.image, options) : renderer_->addTexture(first->second, options);
+  if (!texture) return texture;
+  if (isFirst) first->second = *texture;
+  place->second = *texture;
   return texture;
 }
 

@@ -11,6 +11,7 @@
 
 #include "commands.h"
 #include "comparison_subject.h"
+#include "dermis/text.h"
 #include "driver_version.h"
 #include "file_name.h"
 #include "open_device.h"
@@ -81,7 +82,7 @@ ExitStatus checkUsage(const CompareOptions& options) {
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
   if (clip == gltf::none) return "rest pose";
   const std::string& name = model.clips[clip].name;
-  return fmt::format("clip {}{} at {:.3f} s", clip, name.empty() ? "" : fmt::format(" '{}'", name),
+  return fmt::format("clip {}{} at {:.3f} s", clip, name.empty() ? "" : " " + inQuotes(name),
                      std::clamp(time, 0.0, model.clips[clip].duration));
 }
 
@@ -90,6 +91,10 @@ MeshPreparation preparationFor(const CompareOptions& options) {
   preparation.strict = options.strict;
   preparation.images = !options.output.empty();
   preparation.centersOfRotation = true;
+  const bool asked = std::ranges::any_of(options.methods, [](const std::string& name) {
+    return needsCentersOfRotation(*methodFromName(name));
+  });
+  if (asked) preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
   return preparation;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "dermis/text.h"
 #include "program/plain_text.h"
 #include "skinned_scene.h"
 
@@ -83,8 +84,9 @@ void printText(const Json& json) {
   }
   std::size_t number = 0;
   for (const Json& clip : json["clips"]) {
-    fmt::print("clip   {} '{}': {:.3f} s, {} channels\n", number++, text(clip["name"]),
-               clip["seconds"].get<double>(), clip["channels"].get<int>());
+    fmt::print("clip   {} {}: {:.3f} s, {} channels\n", number++,
+               inQuotes(clip["name"].get_ref<const std::string&>()), clip["seconds"].get<double>(),
+               clip["channels"].get<int>());
   }
   for (const Json& note : json["notes"]) fmt::print("note   {}\n", text(note));
 }

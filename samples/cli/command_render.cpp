@@ -377,6 +377,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   preparation.strict = options.strict;
   preparation.images = true;
   preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
+  preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
   const Result<Scene> scene = loadScene(options.model, preparation);

@@ -123,6 +123,7 @@ ExitStatus skin(const SkinOptions& options) {
   MeshPreparation preparation;
   preparation.strict = options.strict;
   preparation.centersOfRotation = needsCentersOfRotation(method);
+  preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
   const Result<Scene> scene = loadScene(options.model, preparation);

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstring>
 #include <span>
 
 #include "dermis/centers_of_rotation.h"
+#include "dermis/text.h"
 #include "dermis/validate.h"
 #include "progress.h"
 
@@ -17,6 +17,9 @@ namespace {
 /// More influences than this, the weakest, have no say in where a centre is: one vertex of very
 /// many must not make all others as wide.
 constexpr std::uint32_t mostSlots = 32;
+
+/// The solver's 20, and as many again while it is made.
+constexpr std::uint64_t bytesPerPair = 40;
 
 struct JointWeight {
   float weight;
@@ -53,6 +56,25 @@ class JoinedMesh {
   }
 
   std::span<const std::uint32_t> triangles() const { return triangles_; }
+
+  /// How many pairs of joints the triangles have, each counted by itself: what the solver stores.
+  std::uint64_t pairCount() const {
+    std::uint64_t pairs = 0;
+    std::vector<std::uint32_t> joints;
+    for (std::size_t corner = 0; corner < triangles_.size(); ++corner) {
+      const std::uint32_t vertex = triangles_[corner];
+      const std::size_t end = ends_[vertex];
+      for (std::size_t i = vertex == 0 ? 0 : ends_[vertex - 1]; i < end; ++i)
+        joints.push_back(influences_[i].joint);
+      if (corner % 3 != 2) continue;
+      std::ranges::sort(joints);
+      const auto count =
+          static_cast<std::uint64_t>(std::ranges::unique(joints).begin() - joints.begin());
+      if (count > 1) pairs += count * (count - 1) / 2;
+      joints.clear();
+    }
+    return pairs;
+  }
 
   /// Valid while this object lives and nothing is added.
   MeshView view(const std::string& name) {
@@ -102,28 +124,11 @@ Result<std::vector<float>> solve(const MeshView& mesh, std::uint32_t jointCount,
   return centersOfRotation(mesh, jointCount, triangles, options);
 }
 
-template <typename Joint>
-std::uint32_t largestOf(std::span<const std::byte> joints) {
-  Joint largest = 0;
-  for (std::size_t at = 0; at + sizeof(Joint) <= joints.size(); at += sizeof(Joint)) {
-    Joint joint;
-    std::memcpy(&joint, joints.data() + at, sizeof(Joint));
-    largest = std::max(largest, joint);
-  }
-  return largest;
-}
-
-/// How many joints a mesh may tell apart.
-std::uint32_t namedJoints(const gltf::Mesh& mesh) {
-  std::uint32_t named = 1;
-  for (const gltf::Primitive& primitive : mesh.primitives) {
-    for (const gltf::Influences& set : primitive.influences) {
-      named = std::max(named, 1 + (set.jointType == ComponentType::uint8
-                                       ? largestOf<std::uint8_t>(set.joints)
-                                       : largestOf<std::uint16_t>(set.joints)));
-    }
-  }
-  return named;
+Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
+  return Error{ErrorCode::limitExceeded,
+               fmt::format("the centres of rotation of mesh {} take {}: they are left out, and so "
+                           "are the methods that need them",
+                           inQuotes(mesh.name), what)};
 }
 
 }  // namespace
@@ -137,17 +142,14 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
     if (!repaired) return repaired.error();
     joined.add(repaired->view(), primitive.triangles);
   }
+  if (!budget_.spend(joined.pairCount(), bytesPerPair)) return tooMuch(mesh, "so much memory");
   const MeshView view = joined.view(mesh.name);
   const Result<CenterOfRotationSolver> solver =
       CenterOfRotationSolver::make(view, jointCount, joined.triangles());
   if (!solver) return solver.error();
   const std::uint64_t terms = solver->termCount();
-  if (terms > termsLeft_) {
-    return Error{ErrorCode::limitExceeded,
-                 fmt::format("mesh '{}': its centres of rotation are sums of {} terms together, "
-                             "more than this command takes",
-                             mesh.name, terms)};
-  }
+  if (terms > termsLeft_)
+    return tooMuch(mesh, fmt::format("{} terms, where {} are left", terms, termsLeft_));
   termsLeft_ -= terms;
   const Result<std::vector<float>> all = solve(view, jointCount, joined.triangles());
   if (!all) return all.error();
@@ -167,16 +169,13 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
 Result<std::vector<float>> MeshCenters::of(const gltf::Model& model,
                                            const gltf::SkinnedPrimitive& source,
                                            std::uint32_t jointCount) {
-  const gltf::Mesh& mesh = model.meshes[source.mesh];
-  // Joints that the mesh does not name make no difference.
-  jointCount = std::min(jointCount, namedJoints(mesh));
-  Centers& centers = found_[{source.mesh, jointCount}];
-  if (centers.empty()) {
-    Result<Centers> found = find(mesh, jointCount);
-    if (!found) return found.error();
-    centers = std::move(*found);
-  }
-  return centers[source.primitive];
+  const std::pair key(source.mesh, jointCount);
+  auto known = found_.find(key);
+  if (known == found_.end())
+    known = found_.emplace(key, find(model.meshes[source.mesh], jointCount)).first;
+  const Result<Centers>& centers = known->second;
+  if (!centers) return centers.error();
+  return (*centers)[source.primitive];
 }
 
 }  // namespace dermis::cli

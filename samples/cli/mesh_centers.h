@@ -14,9 +14,14 @@ namespace dermis::cli {
 /// Finds the centres of rotation of meshes of one file, each once.
 class MeshCenters {
  public:
+  /// `mostTerms`: of the sums of all meshes together, some 4 ns each. The budget, which must
+  /// outlive this object, is the file's.
+  MeshCenters(std::uint64_t mostTerms, gltf::MemoryBudget& budget)
+      : termsLeft_(mostTerms), budget_(budget) {}
+
   /// Those of a primitive, 3 floats a vertex. All primitives of a mesh count, so that they agree
-  /// where they meet. Shows progress. Fails with `limitExceeded` where the file takes more work
-  /// than a command should do unasked: dense meshes cost the square of their size.
+  /// where they meet. `jointCount` is at most `namedJoints` of the mesh. Shows progress. Fails with
+  /// `limitExceeded` where they are too much work: dense meshes cost the square of their size.
   Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                                 std::uint32_t jointCount);
 
@@ -24,8 +29,10 @@ class MeshCenters {
   using Centers = std::vector<std::vector<float>>;  ///< by primitive
   Result<Centers> find(const gltf::Mesh& mesh, std::uint32_t jointCount);
 
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Centers> found_;  ///< by mesh and joints
-  std::uint64_t termsLeft_ = 10'000'000'000;                          ///< some 40 s on one core
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Result<Centers>>
+      found_;  ///< by mesh and joints
+  std::uint64_t termsLeft_;
+  gltf::MemoryBudget& budget_;
 };
 
 }  // namespace dermis::cli

@@ -1,8 +1,56 @@
 #include "prepared_mesh.h"
 
+#include <algorithm>
+#include <cstring>
+#include <span>
 #include <utility>
 
 namespace dermis::cli {
+namespace {
+
+/// Of a packed mesh, and of a repaired one: positions, normals, tangents, centres.
+constexpr std::uint64_t bytesPerVertex = 2 * 4 * 16;
+/// Weight and joint, packed, repaired, and while one is made of the other.
+constexpr std::uint64_t bytesPerInfluence = 3 * 8;
+/// Packed and as views, once repaired.
+constexpr std::uint64_t bytesPerTarget = sizeof(MorphTargetView) + 48;
+
+template <typename Joint>
+std::uint32_t largestOf(std::span<const std::byte> joints) {
+  Joint largest = 0;
+  for (std::size_t at = 0; at + sizeof(Joint) <= joints.size(); at += sizeof(Joint)) {
+    Joint joint;
+    std::memcpy(&joint, joints.data() + at, sizeof(Joint));
+    largest = std::max(largest, joint);
+  }
+  return largest;
+}
+
+}  // namespace
+
+std::uint32_t namedJoints(const gltf::Mesh& mesh) {
+  std::uint32_t named = 1;
+  for (const gltf::Primitive& primitive : mesh.primitives) {
+    for (const gltf::Influences& set : primitive.influences) {
+      named = std::max(named, 1 + (set.jointType == ComponentType::uint8
+                                       ? largestOf<std::uint8_t>(set.joints)
+                                       : largestOf<std::uint16_t>(set.joints)));
+    }
+  }
+  return named;
+}
+
+bool PreparedMesh::spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
+  const std::uint64_t influences =
+      std::uint64_t{primitive.vertexCount} * primitive.influencesPerVertex();
+  std::uint64_t displacements = 0;
+  for (const gltf::MorphTarget& target : primitive.morphTargets)
+    displacements += target.positions.size() + target.normals.size() + target.tangents.size();
+  return budget.spend(primitive.vertexCount, bytesPerVertex) &&
+         budget.spend(influences, bytesPerInfluence) &&
+         budget.spend(primitive.morphTargets.size(), bytesPerTarget) &&
+         budget.spend(displacements, 3 * sizeof(float));
+}
 
 MeshView PreparedMesh::view() const {
   MeshView mesh = repaired_ ? repaired_->view() : original_;
@@ -12,12 +60,10 @@ MeshView PreparedMesh::view() const {
 }
 
 Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
-    const gltf::Primitive& primitive, std::string name, std::uint32_t jointCount,
-    const MeshPreparation& preparation, const CentersOfPrimitive& centers) {
+    const gltf::Primitive& primitive, std::uint32_t jointCount, const MeshPreparation& preparation,
+    const CentersOfPrimitive& centers) {
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
-  mesh->name_ = std::move(name);
   mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
-  mesh->original_.name = mesh->name_;
   mesh->original_.dualQuaternionWeight = preparation.dualQuaternionWeight;
   mesh->original_.bulgeStrength = preparation.bulgeStrength;
   mesh->report_ = validate(mesh->original_, jointCount);

@@ -20,10 +20,19 @@ struct MeshPreparation {
   bool strict = false;  ///< Refuse what could be repaired.
   /// Find the centres of rotation, for methods that need them. It takes its time.
   bool centersOfRotation = false;
+  /// More terms of their sums (`CenterOfRotationSolver::termCount`) are not added up for a file:
+  /// some 4 s on one core, or 40 s where a method that needs them was asked for by name.
+  std::uint64_t mostCenterTerms = 1'000'000'000;
   float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< of every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
   bool images = false;                                           ///< read what base colours show
 };
+
+/// The limit of a command that names a method which needs centres of rotation.
+inline constexpr std::uint64_t mostCenterTermsAsked = 10'000'000'000;
+
+/// How many joints the mesh may tell apart: from there on, more make no difference.
+std::uint32_t namedJoints(const gltf::Mesh& mesh);
 
 /// Gives the primitive's centres of rotation, 3 floats a vertex, or none.
 using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
@@ -31,11 +40,12 @@ using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 /// Not movable: its views point into it.
 class PreparedMesh {
  public:
-  /// `name` is what `validate` puts behind "mesh". The primitive has influences, and outlives this
-  /// object. Fails with `invalidMesh`, where `strict` also for what could be repaired, and where
-  /// `centers`, which is asked last, does.
+  /// Spends what `prepare` will take; false where that is more than there is.
+  static bool spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget);
+
+  /// The primitive has influences, and outlives this object. Fails with `invalidMesh`, where
+  /// `strict` also for what could be repaired, and where `centers`, which is asked last, does.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
-                                                             std::string name,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
                                                              const CentersOfPrimitive& centers);
@@ -55,7 +65,6 @@ class PreparedMesh {
  private:
   PreparedMesh() = default;
 
-  std::string name_;
   std::optional<gltf::PrimitiveView> primitive_;
   MeshView original_;
   MeshReport report_;

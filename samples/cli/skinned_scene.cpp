@@ -4,29 +4,31 @@
 
 #include <algorithm>
 #include <map>
-#include <tuple>
+#include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "dermis/text.h"
 #include "mesh_centers.h"
 
 namespace dermis::cli {
 namespace {
 
-/// A pose of all parts takes 24 bytes a vertex and more; a small file can name a mesh very often.
-constexpr std::uint64_t mostVertices = 100'000'000;
+/// What a part takes besides its vertices: itself, its names, what `info` says of it.
+constexpr std::uint64_t bytesPerPart = 1024;
+/// What a vertex of a pose takes: float32 positions and normals, as they are and in a file.
+constexpr std::uint64_t bytesPerPosedVertex = 48;
+/// The weight of a morph target: sampled, and in the list of those that are not 0.
+constexpr std::uint64_t bytesPerTarget = 2 * sizeof(MorphWeight);
+/// In several copies, where the part's name goes into a file.
+constexpr std::uint64_t copiesOfName = 8;
 
-std::string quoted(const std::string& name) {
-  return name.empty() ? std::string() : fmt::format(" '{}'", name);
-}
-
-/// What `validate` puts behind "mesh": the mesh's name, and which of its primitives it is where
-/// there are several.
-std::string meshName(const gltf::Model& model, const gltf::SkinnedPrimitive& source) {
-  const gltf::Mesh& mesh = model.meshes[source.mesh];
-  const std::string name = mesh.name.empty() ? fmt::format("number {}", source.mesh) : mesh.name;
-  return mesh.primitives.size() == 1 ? name
-                                     : fmt::format("{}' primitive '{}", name, source.primitive);
+std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
+                      const gltf::Primitive& primitive) {
+  const std::string& node = model.nodes[source.node].name;
+  return fmt::format("node {}{}, mesh '{}'", source.node, node.empty() ? "" : " " + inQuotes(node),
+                     primitive.name);
 }
 
 void addFindings(Scene& scene, const MeshReport& report) {
@@ -41,57 +43,99 @@ void addFindings(Scene& scene, const MeshReport& report) {
   }
 }
 
+/// Counts, before any is made, the parts: a few nodes and a few primitives make many of them.
+bool spendOnParts(gltf::Model& model) {
+  for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
+    const gltf::Mesh& mesh = model.meshes[source.mesh];
+    const gltf::Primitive& primitive = mesh.primitives[source.primitive];
+    const std::size_t name = std::max(model.nodes[source.node].name.size(), mesh.name.size());
+    if (!model.budget.spend(1, bytesPerPart) || !model.budget.spend(name, copiesOfName) ||
+        !model.budget.spend(mesh.morphTargetCount, bytesPerTarget) ||
+        !model.budget.spend(primitive.vertexCount, bytesPerPosedVertex)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Meshes of the scene, each made ready once for all skins that it cannot tell apart.
+class Preparer {
+ public:
+  Preparer(Scene& scene, const MeshPreparation& preparation)
+      : scene_(scene),
+        preparation_(preparation),
+        centers_(preparation.mostCenterTerms, scene.model->budget) {}
+
+  Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::SkinnedPrimitive& source) {
+    gltf::Model& model = *scene_.model;
+    const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
+    const auto [named, isNew] = namedJoints_.emplace(source.mesh, 0);
+    if (isNew) named->second = namedJoints(model.meshes[source.mesh]);
+    const auto joints =
+        std::min(static_cast<std::uint32_t>(model.skins[source.skin].joints.size()), named->second);
+    std::shared_ptr<const PreparedMesh>& mesh = prepared_[{&primitive, joints}];
+    if (mesh != nullptr) return mesh;
+    if (!PreparedMesh::spend(primitive, model.budget)) {
+      return Error{ErrorCode::limitExceeded,
+                   fmt::format("mesh '{}' for {} joints: more memory is wanted than a file of this "
+                               "size justifies",
+                               primitive.name, joints)};
+    }
+    const CentersOfPrimitive findCenters = [&]() -> Result<std::vector<float>> {
+      if (!preparation_.centersOfRotation) return std::vector<float>();
+      Result<std::vector<float>> found = centers_.of(model, source, joints);
+      if (found || found.error().code != ErrorCode::limitExceeded) return found;
+      if (refused_.insert(found.error().message).second)
+        scene_.warnings.push_back(found.error().message);
+      return std::vector<float>();
+    };
+    Result<std::shared_ptr<const PreparedMesh>> made =
+        PreparedMesh::prepare(primitive, joints, preparation_, findCenters);
+    if (!made) return made;
+    mesh = std::move(*made);
+    addFindings(scene_, mesh->report());
+    return mesh;
+  }
+
+ private:
+  Scene& scene_;
+  const MeshPreparation& preparation_;
+  MeshCenters centers_;
+  std::set<std::string> refused_;  ///< meshes that are too much work, each said once
+  std::map<std::uint32_t, std::uint32_t> namedJoints_;  ///< by mesh
+  std::map<std::pair<const gltf::Primitive*, std::uint32_t>, std::shared_ptr<const PreparedMesh>>
+      prepared_;
+};
+
 /// `file` is the file's name, for messages.
 Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
                            const MeshPreparation& preparation) {
   Scene scene;
   scene.model = std::make_unique<gltf::Model>(std::move(loaded));
-  const gltf::Model& model = *scene.model;
+  gltf::Model& model = *scene.model;
   scene.notes = model.notes;
-  std::uint64_t vertices = 0;
-  for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives)
-    vertices += model.meshes[source.mesh].primitives[source.primitive].vertexCount;
-  if (vertices > mostVertices) {
-    return Error{ErrorCode::limitExceeded,
-                 fmt::format("'{}': its scene has {} skinned vertices, more than the {} that this "
-                             "command takes",
-                             file, vertices, mostVertices)};
-  }
-  std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>,
-           std::shared_ptr<const PreparedMesh>>
-      prepared;
-  MeshCenters centers;
   const auto inFile = [&file](const Error& error) {
-    return Error{error.code, fmt::format("'{}': {}", file, error.message)};
+    return Error{error.code, fmt::format("{}: {}", inQuotes(file), error.message)};
   };
+  if (!spendOnParts(model)) {
+    return inFile({ErrorCode::limitExceeded,
+                   fmt::format("its nodes and primitives make {} parts, which take more memory "
+                               "than a file of this size justifies",
+                               model.skinnedPrimitives.size())});
+  }
+  Preparer preparer(scene, preparation);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     ScenePart part;
     part.source = source;
     part.primitive = &model.meshes[source.mesh].primitives[source.primitive];
-    part.name = fmt::format("node {}{}, {}", source.node, quoted(model.nodes[source.node].name),
-                            part.primitive->name);
+    part.name = partLabel(model, source, *part.primitive);
     if (part.primitive->influences.empty()) {
       scene.notes.push_back(fmt::format("{} has no JOINTS_0: its {} vertices stay in bind pose",
                                         part.name, part.primitive->vertexCount));
     } else {
-      const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
-      std::shared_ptr<const PreparedMesh>& mesh =
-          prepared[{source.mesh, source.primitive, jointCount}];
-      if (mesh == nullptr) {
-        const CentersOfPrimitive findCenters = [&]() -> Result<std::vector<float>> {
-          if (!preparation.centersOfRotation) return std::vector<float>();
-          Result<std::vector<float>> found = centers.of(model, source, jointCount);
-          if (found || found.error().code != ErrorCode::limitExceeded) return found;
-          scene.warnings.push_back(found.error().message);
-          return std::vector<float>();
-        };
-        Result<std::shared_ptr<const PreparedMesh>> made = PreparedMesh::prepare(
-            *part.primitive, meshName(model, source), jointCount, preparation, findCenters);
-        if (!made) return inFile(made.error());
-        mesh = std::move(*made);
-        addFindings(scene, mesh->report());
-      }
-      part.mesh = mesh;
+      Result<std::shared_ptr<const PreparedMesh>> mesh = preparer.prepare(source);
+      if (!mesh) return inFile(mesh.error());
+      part.mesh = std::move(*mesh);
     }
     scene.parts.push_back(std::move(part));
   }
@@ -125,8 +169,8 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
   if (*wanted == "none") return gltf::none;
   if (const std::optional<std::uint32_t> clip = gltf::findClip(model, *wanted)) return *clip;
   return Error{ErrorCode::invalidArgument,
-               fmt::format("--animation: there is no animation '{}' among the {} of the file",
-                           *wanted, model.clips.size())};
+               fmt::format("--animation: there is no animation {} among the {} of the file",
+                           inQuotes(*wanted), model.clips.size())};
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
@@ -137,10 +181,11 @@ ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
     std::vector<JointMatrix>& palette = pose.palettes[part.source.skin];
     if (palette.empty()) palette = gltf::palette(*scene.model, part.source.skin, globals);
     std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
-    const std::vector<float> weights =
-        gltf::morphWeights(*scene.model, part.source.node, clip, time);
     // A primitive may have fewer targets than its mesh names.
     const std::size_t targets = part.primitive->morphTargets.size();
+    if (targets == 0) continue;
+    const std::vector<float> weights =
+        gltf::morphWeights(*scene.model, part.source.node, clip, time);
     for (std::uint32_t target = 0; target < weights.size() && target < targets; ++target) {
       if (weights[target] != 0) morphs.push_back({target, weights[target]});
     }

@@ -20,7 +20,7 @@ namespace dermis::cli {
 struct ScenePart {
   gltf::SkinnedPrimitive source;
   const gltf::Primitive* primitive = nullptr;
-  std::string name;                          ///< "node 3 'Fox', mesh 'fox1' primitive 0"
+  std::string name;  ///< for messages: "node 3 'Fox', mesh 'fox1 primitive 0'"
   std::shared_ptr<const PreparedMesh> mesh;  ///< null without influences: it stays in bind pose
 };
 
@@ -36,7 +36,8 @@ struct Scene {
 bool allows(const Scene& scene, Method method);
 
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or
-/// refused where the preparation is strict.
+/// refused where the preparation is strict. Fails with `limitExceeded` where nodes, primitives and
+/// skins multiply to more memory than the file justifies.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
 /// The same for a binary glTF file in memory; `name` is what messages call it.
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dermis/text.h"
 #include "method_rotation.h"
 
 namespace dermis::cli {
@@ -232,7 +233,7 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
       const double time = share * model.clips[clip].duration;
       poses.push_back(
           {clip, time,
-           fmt::format("clip {} '{}' at {:.4g} s", clip, model.clips[clip].name, time)});
+           fmt::format("clip {} {} at {:.4g} s", clip, inQuotes(model.clips[clip].name), time)});
     }
   }
   return poses;

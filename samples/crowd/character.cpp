@@ -6,9 +6,25 @@
 #include <cmath>
 #include <utility>
 
+#include "dermis/text.h"
+
 using namespace dermis;
 
 namespace crowd {
+namespace {
+
+/// What a part takes: packed, with the views of it. A mesh may stand for many nodes.
+bool spendOnPart(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
+  std::uint64_t displacements = 0;
+  for (const gltf::MorphTarget& target : primitive.morphTargets)
+    displacements += target.positions.size() + target.normals.size() + target.tangents.size();
+  const std::uint64_t perVertex = 64 + std::uint64_t{16} * primitive.influencesPerVertex();
+  return budget.spend(1, sizeof(Part)) && budget.spend(primitive.vertexCount, perVertex) &&
+         budget.spend(primitive.morphTargets.size(), sizeof(MorphTargetView) + 16) &&
+         budget.spend(displacements, 2 * sizeof(float));
+}
+
+}  // namespace
 
 Result<Character> Character::load(const std::filesystem::path& path,
                                   const CharacterOptions& options) {
@@ -20,14 +36,18 @@ Result<Character> Character::load(const std::filesystem::path& path,
   character.model_ = std::make_unique<gltf::Model>(std::move(*loaded));
   const gltf::Model& model = *character.model_;
 
-  std::vector<std::uint32_t> skins;
+  const Error tooMuch{ErrorCode::limitExceeded,
+                      fmt::format("{}: more memory is wanted than a file of this size justifies",
+                                  inQuotes(path.filename().string()))};
+  std::vector<std::uint32_t> skins, numbers(model.skins.size(), gltf::none);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     if (primitive.influences.empty()) continue;
-    const auto found = std::ranges::find(skins, source.skin);
-    const auto skin = static_cast<std::uint32_t>(found - skins.begin());
+    if (!spendOnPart(primitive, character.model_->budget)) return tooMuch;
     const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
-    if (found == skins.end()) {
+    std::uint32_t& skin = numbers[source.skin];
+    if (skin == gltf::none) {
+      skin = static_cast<std::uint32_t>(skins.size());
       skins.push_back(source.skin);
       character.jointCounts_.push_back(jointCount);
     }
@@ -42,24 +62,31 @@ Result<Character> Character::load(const std::filesystem::path& path,
                              path.filename().string())};
   }
   character.clips_.resize(std::max<std::size_t>(model.clips.size(), 1));
-  for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip)
-    character.sampleClip(clip, skins, options);
+  for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip) {
+    if (!character.sampleClip(clip, skins, options)) return tooMuch;
+  }
   return character;
 }
 
-void Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
+bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
                            const CharacterOptions& options) {
   const bool isRest = model_->clips.empty();
   const double duration = isRest ? 0 : model_->clips[clip].duration;
   Clip& sampled = clips_[clip];
   sampled.tickCount = static_cast<std::uint32_t>(std::clamp(
       std::round(duration * options.ticksPerSecond), 1.0, static_cast<double>(options.mostTicks)));
+  std::uint64_t joints = 0;
+  for (const std::uint32_t count : jointCounts_) joints += count;
+  // For each tick all nodes are placed, too, but not kept.
+  if (!model_->budget.spend(sampled.tickCount, joints * sizeof(JointMatrix) + model_->nodes.size()))
+    return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
     const std::vector<gltf::GlobalTransform> globals =
         gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);
     for (const std::uint32_t skin : skins)
       sampled.poses.push_back(gltf::palette(*model_, skin, globals));
   }
+  return true;
 }
 
 std::uint64_t Character::vertexCount() const {

@@ -42,7 +42,9 @@ struct CharacterOptions {
 
 class Character {
  public:
-  /// Fails as `gltf::load` and `pack` do, and with `invalidData` where nothing is skinned.
+  /// Fails as `gltf::load` and `pack` do, with `invalidData` where nothing is skinned, and with
+  /// `limitExceeded` where what its nodes, primitives, skins and clips multiply to is more memory
+  /// than the file justifies.
   static dermis::Result<Character> load(const std::filesystem::path& path,
                                         const CharacterOptions& options = {});
 
@@ -64,7 +66,8 @@ class Character {
   };
 
   Character() = default;
-  void sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
+  /// False where its poses take more memory than the file justifies.
+  bool sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
                   const CharacterOptions& options);
 
   std::unique_ptr<dermis::gltf::Model> model_;  ///< parts point into it

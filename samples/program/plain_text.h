@@ -6,8 +6,7 @@
 
 namespace dermis::samples {
 
-/// The text as one line: every control character, those of ISO 6429's upper half in UTF-8 too, is a
-/// space.
+/// The text as one line, whatever a terminal obeys in it escaped (dermis/text.h).
 std::string plainLine(std::string_view text);
 
 }  // namespace dermis::samples

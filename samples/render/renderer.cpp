@@ -174,16 +174,26 @@ Result<std::uint32_t> Renderer::addTexture(const TexturePixels& pixels,
                                            const TextureOptions& options) {
   Result<Texture> texture = Texture::create(*device_, pixels, options);
   if (!texture) return texture.error();
+  return addTexture(std::move(*texture));
+}
+
+Result<std::uint32_t> Renderer::addTexture(std::uint32_t pixelsOf, const TextureOptions& options) {
+  Result<Texture> texture = Texture::create(*device_, textures_[pixelsOf].texture, options);
+  if (!texture) return texture.error();
+  return addTexture(std::move(*texture));
+}
+
+Result<std::uint32_t> Renderer::addTexture(Texture texture) {
   const std::array sizes{VkDescriptorPoolSize{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1}};
   Result<Owned<VkDescriptorPool>> pool = makePool(*device_, 1, sizes);
   if (!pool) return pool.error();
   Result<VkDescriptorSet> set = allocateSet(*device_, pool->get(), pipelines_->textureLayout());
   if (!set) return set.error();
-  const VkDescriptorImageInfo info{texture->sampler(), texture->view(),
+  const VkDescriptorImageInfo info{texture.sampler(), texture.view(),
                                    VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
   const VkWriteDescriptorSet write = imageWrite(*set, 0, info);
   device_->functions().UpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
-  textures_.push_back({std::move(*texture), std::move(*pool), *set});
+  textures_.push_back({std::move(texture), std::move(*pool), *set});
   return static_cast<std::uint32_t>(textures_.size() - 1);
 }
 

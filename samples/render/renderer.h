@@ -72,6 +72,8 @@ class Renderer {
 
   /// For `Surface::texture`.
   Result<std::uint32_t> addTexture(const TexturePixels& pixels, const TextureOptions& options);
+  /// The pixels of a texture that was added, wrapped in another way. They are not stored again.
+  Result<std::uint32_t> addTexture(std::uint32_t pixelsOf, const TextureOptions& options);
 
   Result<RenderFrame> createFrame(const FrameDescription& description);
 
@@ -92,6 +94,7 @@ class Renderer {
   };
 
   Result<void> makeSamplers();
+  Result<std::uint32_t> addTexture(Texture texture);
   void writeViewSet(RenderFrame::ViewResources& view) const;
   Result<void> recordShadows(VkCommandBuffer commandBuffer, const RenderFrame::ViewResources& frame,
                              const View& view, const std::function<void()>& afterPass);

@@ -114,7 +114,7 @@ Result<void> upload(Device& device, const TexturePixels& pixels, const Image& im
 
 }  // namespace
 
-Result<TexturePixels> decodeImage(std::span<const std::byte> encoded) {
+Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, gltf::MemoryBudget* budget) {
   const auto* bytes = reinterpret_cast<const stbi_uc*>(encoded.data());
   const Error broken{ErrorCode::invalidData, "it is neither a PNG nor a JPEG, or broken"};
   if (encoded.empty() || !std::in_range<int>(encoded.size())) return broken;
@@ -125,6 +125,13 @@ Result<TexturePixels> decodeImage(std::span<const std::byte> encoded) {
     return Error{ErrorCode::limitExceeded, "it has " + std::to_string(width) + " x " +
                                                std::to_string(height) + " pixels, and at most " +
                                                std::to_string(largestSide) + " a side are read"};
+  }
+  const auto pixels =
+      std::uint64_t{4} * static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height);
+  if (budget != nullptr && !budget->spend(pixels)) {
+    return Error{ErrorCode::limitExceeded,
+                 "its " + std::to_string(width) + " x " + std::to_string(height) +
+                     " pixels take more memory than a file of this size justifies"};
   }
   const std::unique_ptr<stbi_uc, void (*)(void*)> decoded(
       stbi_load_from_memory(bytes, size, &width, &height, &channels, 4), stbi_image_free);
@@ -148,11 +155,21 @@ Result<Texture> Texture::create(Device& device, const TexturePixels& pixels,
                       VK_IMAGE_USAGE_TRANSFER_DST_BIT;
   Result<Image> image = Image::create(device, description);
   if (!image) return image.error();
-  texture.image_ = std::move(*image);
+  texture.image_ = std::make_shared<const Image>(std::move(*image));
   Result<Owned<VkSampler>> sampler = makeSampler(device, options);
   if (!sampler) return sampler.error();
   texture.sampler_ = std::move(*sampler);
-  if (Result<void> done = upload(device, pixels, texture.image_); !done) return done.error();
+  if (Result<void> done = upload(device, pixels, *texture.image_); !done) return done.error();
+  return texture;
+}
+
+Result<Texture> Texture::create(Device& device, const Texture& other,
+                                const TextureOptions& options) {
+  Texture texture;
+  texture.image_ = other.image_;
+  Result<Owned<VkSampler>> sampler = makeSampler(device, options);
+  if (!sampler) return sampler.error();
+  texture.sampler_ = std::move(*sampler);
   return texture;
 }
 

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "dermis/memory_budget.h"
 #include "image.h"
 
 namespace dermis::samples::render {
@@ -23,20 +25,25 @@ struct TextureOptions {
 };
 
 /// Decodes a PNG or JPEG. Fails with `invalidData` where it is broken or something else, and with
-/// `limitExceeded` where it is larger than 8192 pixels a side: before memory is taken for it.
-Result<TexturePixels> decodeImage(std::span<const std::byte> encoded);
+/// `limitExceeded` where it is larger than 8192 pixels a side, or than the budget, if there is one:
+/// before memory is taken for it.
+Result<TexturePixels> decodeImage(std::span<const std::byte> encoded,
+                                  gltf::MemoryBudget* budget = nullptr);
 
 class Texture {
  public:
   /// Uploads it with all its levels, and waits.
   static Result<Texture> create(Device& device, const TexturePixels& pixels,
                                 const TextureOptions& options);
+  /// The same image, wrapped in another way.
+  static Result<Texture> create(Device& device, const Texture& other,
+                                const TextureOptions& options);
 
-  VkImageView view() const { return image_.view(); }
+  VkImageView view() const { return image_->view(); }
   VkSampler sampler() const { return sampler_.get(); }
 
  private:
-  Image image_;
+  std::shared_ptr<const Image> image_;
   Owned<VkSampler> sampler_;
 };
 

@@ -5,6 +5,7 @@
 #include <imgui.h>
 #include <imgui_stdlib.h>
 
+#include "dermis/text.h"
 #include "gui_style.h"
 #include "keys.h"
 #include "legend.h"
@@ -172,7 +173,7 @@ void drawPanel(const Facts& facts, float height, State& state) {
 std::string clipName(const SceneView& view, std::uint32_t clip) {
   if (clip == gltf::none) return "rest pose";
   const std::string& name = view.scene().model->clips[clip].name;
-  return name.empty() ? fmt::format("clip {}", clip) : name;
+  return name.empty() ? fmt::format("clip {}", clip) : shortName(name);
 }
 
 void drawClipChoice(const SceneView& view, State& state) {

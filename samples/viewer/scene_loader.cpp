@@ -10,6 +10,7 @@ Result<cli::Scene> read(const LoadRequest& request) {
   cli::MeshPreparation preparation;
   preparation.images = true;
   preparation.centersOfRotation = request.findsCenters;
+  preparation.mostCenterTerms = cli::mostCenterTermsAsked;
   try {
     return cli::loadScene(request.path, preparation);
   } catch (const std::exception& error) {

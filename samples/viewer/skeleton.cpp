@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "dermis/text.h"
+
 namespace dermis::viewer {
 namespace {
 
@@ -69,7 +71,7 @@ std::vector<Joint> jointsOf(const cli::Scene& scene) {
     Joint joint;
     joint.node = node;
     joint.parent = place[node];
-    joint.name = model.nodes[node].name;
+    joint.name = shortName(model.nodes[node].name);
     if (joint.name.empty()) joint.name = "node " + std::to_string(node);
     place[node] = static_cast<std::uint32_t>(joints.size());
     joints.push_back(std::move(joint));

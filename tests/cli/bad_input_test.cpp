@@ -546,6 +546,97 @@ TEST_F(BadInput, TruncatedOrHostileGltfEndsWithAClearErrorAndNeverWithMore) {
   expectRefusedSoon(deep, "deep.gltf");
 }
 
+/// `nodes` nodes of one mesh with skins of 2, 3, … joints. Its accessors have no data.
+FileBuilder copies(std::size_t nodes, std::size_t primitives, std::size_t vertices) {
+  FileBuilder file = skinnedTriangle();
+  for (const char* attribute : {"POSITION", "JOINTS_0", "WEIGHTS_0"}) {
+    file.accessor(attribute).erase("bufferView");
+    file.accessor(attribute)["count"] = vertices;
+  }
+  const Json primitive = file.primitive();
+  file.json["meshes"][0]["primitives"] = std::vector<Json>(primitives, primitive);
+  for (std::size_t node = 1; node < nodes; ++node) {
+    file.json["scenes"][0]["nodes"].push_back(file.json["nodes"].size());
+    file.json["nodes"].push_back({{"mesh", 0}, {"skin", 0}});
+  }
+  return file;
+}
+
+// 64 MiB and 64 times the file; and what has no end in memory has none in time.
+TEST_F(BadInput, NothingThatAFileMultipliesIsMadeBeyondItsBudget) {
+  const std::string justifies = "than a file of this size justifies";
+  expectRefusedSoon(writeModel("parts.gltf", copies(5000, 5000, 3)), justifies);
+  expectRefusedSoon(writeModel("vertices.gltf", copies(400, 1, 100'000)), justifies);
+  FileBuilder name = copies(1, 20'000, 3);
+  name.json["nodes"][0]["name"] = std::string(1'000'000, 'N');
+  expectRefusedSoon(writeModel("name.gltf", name), justifies);
+  FileBuilder targets = copies(20'000, 1, 3);
+  targets.primitive()["targets"] = std::vector<Json>(100'000, Json::object());
+  expectRefusedSoon(writeModel("targets.gltf", targets), justifies);
+}
+
+TEST_F(BadInput, FilesThatAreNoModelsAreRefusedBeforeTheyAreRead) {
+  const std::string sparse = outFile("sparse.glb");
+  std::ofstream(sparse, std::ios::binary) << std::string("glTF\x02\0\0\0\x00\x10\0\0", 12);
+  std::error_code error;
+  std::filesystem::resize_file(sparse, std::uint64_t{1} << 40, error);
+  if (error) GTEST_SKIP() << "no sparse files here";
+  expectRefusedSoon(sparse, "the GLB header says 4096 bytes");
+  std::filesystem::remove(sparse);
+}
+
+TEST_F(BadInput, MorphTargetsOfNothingAreRefused) {
+  FileBuilder file = fox();
+  file.primitive()["targets"] = {{{"POSITION", file.attributes()["POSITION"]}}};
+  file.attributes() = Json::object();
+  expectRefusedSoon(writeModel("nothing.gltf", file), "morph targets, but no attribute");
+}
+
+// Skins that a mesh cannot tell apart share what is made of it; its clip has a channel a node.
+TEST_F(BadInput, ManyNodesAreSkinnedInATimeThatGrowsWithTheirNumber) {
+  constexpr std::size_t count = 20'000;
+  FileBuilder file = copies(count, 1, 3);
+  file.primitive()["targets"] = {{{"POSITION", file.attributes()["POSITION"]}}};
+  const std::size_t keys = file.addFloats({0}, "SCALAR");
+  Json channels = Json::array();
+  for (const Json& node : file.json["scenes"][0]["nodes"]) {
+    if (!file.json["nodes"][node.get<std::size_t>()].contains("mesh")) continue;
+    channels.push_back({{"sampler", 0}, {"target", {{"node", node}, {"path", "weights"}}}});
+  }
+  file.json["animations"] = {
+      {{"samplers", {{{"input", keys}, {"output", keys}}}}, {"channels", channels}}};
+  EXPECT_EQ(skinned(writeModel("nodes.gltf", file), {"--device", "cpu"}).positions.size(),
+            3 * count);
+}
+
+// What a terminal would obey, and what fills it, is not printed.
+TEST_F(BadInput, NamesArePrintedShortAndOnOneLine) {
+  const std::string hostile = "\n\x1b[31m\xe2\x80\xae";
+  FileBuilder file = rotating({0, 1}, {0, 0, 0, 1, 0, 0, 0, 1}, "LINEAR");
+  const std::string name = hostile + std::string(3'000'000, 'A');
+  file.json["meshes"][0]["name"] = name;
+  file.json["nodes"][0]["name"] = name;
+  file.json["animations"][0]["name"] = name;
+  file.json["skins"][0]["name"] = name;
+  file.attributes()["WEIGHTS_0"] =
+      file.addFloats({1, 0, 0, 0, nan, 0, 0, 0, 0.5f, 0, 0, 0}, "VEC4");
+  const std::string model = writeModel("names.gltf", file);
+  const auto expectTame = [&](const std::string& text) {
+    EXPECT_LT(text.size(), 3000u);
+    EXPECT_NE(text.find("'\\n\\u001b[31m\\u202eAAA"), std::string::npos) << text.substr(0, 3000);
+    EXPECT_EQ(text.find('\x1b'), std::string::npos);
+    EXPECT_EQ(text.find("\xe2\x80\xae"), std::string::npos);
+  };
+  expectTame(dermis({"info", model}).output);
+  const std::string out = outFile("names.ply");
+  expectTame(dermis({"skin", model, "-o", out, "--device", "cpu"}).errors);
+  expectTame(dermis({"skin", model, "-o", out, "--device", "cpu", "--strict"}).errors);
+  expectTame(dermis({"compare", model, "--device", "cpu"}).output);
+  const Json info = Json::parse(dermis({"info", model, "--json"}).output);
+  EXPECT_EQ(info.at("clips").at(0).at("name"), name) << "JSON has its own way to write them";
+  EXPECT_EQ(info.at("skins").at(0).at("name"), name);
+}
+
 /// All vertices weighted to the same two joints, no two alike: centres of rotation cost the square.
 FileBuilder denseMesh(std::uint32_t vertexCount) {
   FileBuilder file = skinnedTriangle();
@@ -566,6 +657,22 @@ FileBuilder denseMesh(std::uint32_t vertexCount) {
   file.attributes()["WEIGHTS_0"] = file.addFloats(weights, "VEC4");
   file.primitive()["indices"] = file.add(triangles, "SCALAR", unsignedIntType);
   return file;
+}
+
+// Nobody waits for centres of rotation unless a method that needs them was named.
+TEST_F(BadInput, CentresOfRotationTakeLongOnlyIfTheyAreAskedFor) {
+  const std::string model = writeModel("dense.gltf", denseMesh(34'000));
+  const std::string report = outFile("dense.json");
+  const CommandResult compared =
+      dermis({"compare", model, "--device", "cpu", "--json", report, "--repetitions", "1"});
+  EXPECT_EQ(compared.status, 0) << compared.errors;
+  EXPECT_NE(compared.errors.find("the centres of rotation of mesh "), std::string::npos)
+      << compared.errors;
+  std::ifstream file(report);
+  EXPECT_EQ(Json::parse(file).at("methods").size(), allMethods.size() - 2);
+  const CommandResult asked = dermis({"skin", model, "-o", outFile("dense.ply"), "--device", "cpu",
+                                      "--method", "center_of_rotation"});
+  EXPECT_EQ(asked.status, 0) << asked.errors;
 }
 
 TEST_F(BadInput, AMeshTooDenseForCentresOfRotationIsSkinnedWithoutThem) {

@@ -1,4 +1,5 @@
 // Where the bytes come from: data URIs, and files beside the glTF file and nowhere else.
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -66,11 +67,71 @@ TEST_F(GltfBuffer, OpensNothingOutsideTheFolder) {
   }
 }
 
+// A link that stays in the folder is as good as the file.
+TEST_F(GltfBuffer, FollowsLinksInsideTheFolderAlone) {
+  const auto bytes = skinnedTriangle().binary;
+  write("outside.bin", bytes);
+  write("inside/plain.bin", bytes);
+  write("inside/deeper/below.bin", bytes);
+  const auto link = [this](const char* target, const char* name) {
+    std::filesystem::create_symlink(target, folder_ / "inside" / name);
+  };
+  link("plain.bin", "good.bin");
+  link("deeper", "good");
+  link("../inside/deeper/below.bin", "around.bin");
+  link("../outside.bin", "bad.bin");
+  link("..", "up");
+  link("/proc/self", "self");
+  link("bad.bin", "twice.bin");
+  for (const char* uri : {"good.bin", "good/below.bin", "around.bin"})
+    EXPECT_EQ(loaded(withUri(uri).load(folder_ / "inside")).skinnedPrimitives.size(), 1u) << uri;
+  for (const char* uri : {"bad.bin", "up/outside.bin", "twice.bin", "self/environ"}) {
+    expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
+                "leads outside the file's folder by a symbolic link");
+  }
+  // An absolute link into the folder stays inside too.
+  std::filesystem::create_symlink(std::filesystem::canonical(folder_) / "inside" / "plain.bin",
+                                  folder_ / "inside" / "absolute.bin");
+  loaded(withUri("absolute.bin").load(folder_ / "inside"));
+  // A folder that is reached by a link is the folder.
+  std::filesystem::create_directory_symlink("inside", folder_ / "linked");
+  loaded(withUri("plain.bin").load(folder_ / "linked"));
+}
+
+// A model that is a link: its folder is where the link stands, as the user named it.
+TEST_F(GltfBuffer, TheFolderIsThatOfThePathAsGiven) {
+  const FileBuilder file = withUri("side.bin");
+  write("inside/deeper/side.bin", file.binary);
+  write("inside/deeper/model.gltf", bytesOf(file.text()));
+  std::filesystem::create_symlink("deeper/model.gltf", folder_ / "inside" / "link.gltf");
+  expectError(gltf::load(folder_ / "inside" / "link.gltf"), ErrorCode::ioError, "there is no file");
+  write("inside/side.bin", file.binary);
+  loaded(gltf::load(folder_ / "inside" / "link.gltf"));
+}
+
+TEST_F(GltfBuffer, SaysWhatStandsWhereAFileShould) {
+  const std::filesystem::path pipe = folder_ / "pipe.bin";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::filesystem::create_symlink("loop.bin", folder_ / "loop.bin");
+  const auto refused = [&](const std::string& name, const std::string& text) {
+    expectError(withUri(name).load(folder_), ErrorCode::ioError, text);
+    expectError(gltf::load(folder_ / name), ErrorCode::ioError, text);
+  };
+  refused("pipe.bin", "pipe.bin' is a pipe, a socket or a device, and not a file");
+  refused("inside", "inside' is a folder");
+  refused("loop.bin", "loop.bin' cannot be opened: Too many levels of symbolic links");
+  refused("absent.bin", "there is no file '");
+  if (geteuid() == 0) return;  // who may read everything
+  write("secret.bin", skinnedTriangle().binary);
+  std::filesystem::permissions(folder_ / "secret.bin", std::filesystem::perms::none);
+  refused("secret.bin", "secret.bin' cannot be opened: Permission denied");
+}
+
 TEST_F(GltfBuffer, NamesAFileThatIsMissing) {
   expectError(withUri("missing.bin").load(folder_), ErrorCode::ioError,
               "buffer 0: there is no file");
   expectError(withUri("missing.bin").load(folder_), ErrorCode::ioError, "missing.bin");
-  expectError(withUri("inside").load(folder_), ErrorCode::ioError, "buffer 0: there is no file");
+  expectError(withUri("inside").load(folder_), ErrorCode::ioError, "inside' is a folder");
   expectError(withUri("missing.bin").load(), ErrorCode::ioError, "without a folder");
   expectError(withUri("a%2").load(folder_), ErrorCode::invalidData, "a '%' without two digits");
 }
@@ -98,7 +159,7 @@ TEST_F(GltfBuffer, LoadsAPathAndItsSideFiles) {
   std::filesystem::current_path(before);
 
   expectError(gltf::load(folder_ / "absent.gltf"), ErrorCode::ioError, "absent.gltf");
-  expectError(gltf::load(folder_), ErrorCode::ioError, "is not a file");
+  expectError(gltf::load(folder_), ErrorCode::ioError, "is a folder");
   write("broken.gltf", bytesOf("{"));
   expectError(gltf::load(folder_ / "broken.gltf"), ErrorCode::invalidData, "'broken.gltf': ");
 }

@@ -175,7 +175,7 @@ TEST(GltfContainer, ReadsPastImages) {
 TEST(GltfContainer, KeepsNamesInMessagesOnOneLine) {
   FileBuilder file = skinnedTriangle();
   file.json["extensionsRequired"] = {"A\nB" + std::string(300, 'x')};
-  expectError(file.load(), ErrorCode::unsupportedFeature, "'A?Bxxx");
+  expectError(file.load(), ErrorCode::unsupportedFeature, "'A\\nBxxx");
   EXPECT_LT(file.load().error().message.size(), 200u);
 }
 
@@ -215,7 +215,7 @@ TEST(GltfContainer, RefusesCountlessEmptyThings) {
   std::string text = R"({"asset": {"version": "2.0"}, "materials": [{})";
   for (int i = 0; i < 300'000; ++i) text += ",{}";
   expectError(loadFromMemory(bytesOf(text + "]}"), {}), ErrorCode::limitExceeded,
-              "the file has 300001 materials");
+              "300001 materials: more memory is wanted than a file of this size justifies");
 }
 
 }  // namespace

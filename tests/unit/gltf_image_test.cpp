@@ -67,8 +67,10 @@ TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
   const gltf::Model found = loadedWithImages(textured({{"uri", "skin.png"}}), folder / "inside");
   EXPECT_EQ(imageText(found), "picture");
   const std::string absolute = (folder / "secret.png").string();
-  for (const std::string& uri : std::vector<std::string>{"../secret.png", absolute, "absent.png",
-                                                         "https://example.org/a.png", "%"}) {
+  std::filesystem::remove(folder / "inside" / "link.png");
+  std::filesystem::create_symlink("../secret.png", folder / "inside" / "link.png");
+  for (const std::string& uri : std::vector<std::string>{
+           "../secret.png", absolute, "link.png", "absent.png", "https://example.org/a.png", "%"}) {
     SCOPED_TRACE(uri);
     const gltf::Model model = loadedWithImages(textured({{"uri", uri}}), folder / "inside");
     EXPECT_TRUE(model.images.at(0).bytes.empty());

@@ -20,13 +20,61 @@ TEST(GltfPrimitive, ReadsInfluences) {
   EXPECT_EQ(componentsOf<std::uint8_t>(set.joints), (Bytes{0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}));
   EXPECT_EQ(set.weightType, ComponentType::float32);
   EXPECT_EQ(componentsOf<float>(set.weights), (Floats{1, 0, 0, 0, 1, 0, 0, 0, 0.25f, 0.75f, 0, 0}));
-  EXPECT_EQ(primitive.name, "mesh 0 primitive 0");
+  EXPECT_EQ(primitive.name, "number 0");
 }
 
 TEST(GltfPrimitive, NamesItselfByItsMesh) {
   FileBuilder file = skinnedTriangle();
   file.json["meshes"][0]["name"] = "Fox";
-  EXPECT_EQ(firstPrimitive(loaded(file)).name, "mesh 'Fox' primitive 0");
+  EXPECT_EQ(firstPrimitive(loaded(file)).name, "Fox");
+  const Json one = file.primitive();
+  file.json["meshes"][0]["primitives"].push_back(one);
+  EXPECT_EQ(loaded(file).meshes[0].primitives[1].name, "Fox primitive 1");
+  // What is too long is cut, not the number; and no quotes within quotes.
+  file.json["meshes"][0]["name"] = "Fox\n" + std::string(3'000'000, 'x');
+  const gltf::Model model = loaded(file);
+  const gltf::Primitive& second = model.meshes[0].primitives[1];
+  EXPECT_TRUE(second.name.starts_with("Fox\\nxx")) << second.name;
+  EXPECT_TRUE(second.name.ends_with("x... primitive 1")) << second.name;
+  EXPECT_LE(second.name.size(), 80u);
+}
+
+// There is no count of vertices that targets could agree with: this used to read out of bounds.
+TEST(GltfPrimitive, RefusesMorphTargetsOfNothing) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["targets"] = {{{"POSITION", file.attributes()["POSITION"]}}};
+  FileBuilder bare = file;
+  bare.attributes() = Json::object();
+  expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
+  bare.primitive()["indices"] = bare.add<std::uint16_t>({0, 1, 2}, "SCALAR", unsignedShortType);
+  expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
+  bare.primitive()["targets"] = {Json::object()};
+  expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
+  bare.attributes() = {{"_ANY", file.attributes()["POSITION"]}};
+  EXPECT_EQ(loaded(bare).skinnedPrimitives.size(), 0u) << "no positions: left out, with a note";
+  // As a file that a fuzzer found nothing wrong with: no node shows the mesh.
+  const std::string smallest =
+      R"({"asset":{"version":"2.0"},"accessors":[{"componentType":5126,"type":"VEC3","count":1}],)"
+      R"("meshes":[{"primitives":[{"attributes":{},"targets":[{"POSITION":0}]}]}]})";
+  expectError(gltf::loadFromMemory(bytesOf(smallest), {}), ErrorCode::invalidData,
+              "it has morph targets, but no attribute");
+}
+
+TEST(GltfPrimitive, AttributeNamesInMessagesAreShortAndOnOneLine) {
+  for (const bool inTarget : {false, true}) {
+    FileBuilder file = skinnedTriangle();
+    const std::string name = "\n\x1b[31m" + std::string(3'000'000, 'A');
+    const std::size_t two = file.addFloats({1, 2, 3, 4, 5, 6}, "VEC3");
+    if (inTarget) {
+      file.primitive()["targets"] = {{{name, two}}};
+    } else {
+      file.attributes()[name] = two;
+    }
+    const Result<gltf::Model> result = file.load();
+    ASSERT_FALSE(result.ok());
+    EXPECT_NE(result.error().message.find("\\n\\u001b[31mAAA"), std::string::npos);
+    EXPECT_LT(result.error().message.size(), 250u);
+  }
 }
 
 // Which weights are equal is a matter of the integers, not of their quotients.

@@ -14,6 +14,7 @@
 #include "dermis/plan.h"
 #include "dermis/reference.h"
 #include "dermis/result.h"
+#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "dermis/version.h"

@@ -2,7 +2,7 @@
 //
 // What the specification forbids and the parser underneath lets through is caught here, with one
 // sentence that names the accessor, node or skin at fault. A file can cause an error, never a
-// crash, a hang, or an allocation larger than its own bytes justify.
+// crash, a hang, or more memory than its own bytes justify (memory_budget.h).
 //
 // Threads: every function may be called from any thread; a `Model` that nobody changes may be read
 // by many at once.
@@ -18,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dermis/memory_budget.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 #include "dermis/types.h"
@@ -100,7 +101,10 @@ struct Influences {
 /// the accessors. Values are as the file has them, NaN included, and joint indices may lie outside
 /// the skin: `validate` looks at both.
 struct Primitive {
-  std::string name;  ///< "mesh 'Fox' primitive 0", for messages
+  /// For messages, which say "mesh" and put it in quotes: "Fox" if its mesh has no other primitive,
+  /// otherwise "Fox primitive 1"; "number 3" instead of "Fox" if mesh 3 has no name. Short, and on
+  /// one line (text.h).
+  std::string name;
   std::uint32_t vertexCount = 0;
   std::vector<float> positions;               ///< 3 a vertex
   std::vector<float> normals;                 ///< 3 a vertex, or empty
@@ -163,8 +167,8 @@ struct Channel {
 
 struct Clip {
   std::string name;
-  double duration = 0;  ///< Seconds: the latest key.
-  std::vector<Channel> channels;
+  double duration = 0;            ///< Seconds: the latest key.
+  std::vector<Channel> channels;  ///< By rising node, then path.
 };
 
 /// One skinned primitive of the default scene, in the order in which `dermis skin` writes them: by
@@ -184,11 +188,15 @@ struct Model {
   std::vector<Mesh> meshes;
   std::vector<Skin> skins;
   std::vector<Material> materials;
-  std::vector<Image> images;  ///< Those that no base colour shows are empty.
+  /// Those that no base colour shows are empty, and so are those that equal another one.
+  std::vector<Image> images;
   std::vector<Clip> clips;
   std::vector<SkinnedPrimitive> skinnedPrimitives;
   /// What was mended or left out, a sentence each ("12 rotation keys … have been normalised").
   std::vector<std::string> notes;
+  /// What the file may still make a program take: spend on it what is made for each node, primitive
+  /// or skin, and the pixels of images, before it is made.
+  MemoryBudget budget;
 };
 
 struct LoadOptions {
@@ -198,7 +206,9 @@ struct LoadOptions {
 };
 
 /// Reads a .gltf or .glb file (told apart by their first bytes) and every buffer that it names:
-/// data URIs and files beside it; nothing outside the file's folder is opened.
+/// data URIs and files beside it. Nothing outside the folder is opened, not by a symbolic link
+/// either; the folder is that of `path` as given, even if the file there is a link to another. Each
+/// side file is read once, as far as it is needed. No file may be larger than 4 GiB.
 /// Meshes that no skinned node of the default scene uses are left undecoded (no primitives). The
 /// default scene is `scene`; scene 0 where the file does not say; all root nodes where it has no
 /// scenes. Fails with
@@ -206,7 +216,7 @@ struct LoadOptions {
 /// - `invalidData`: a broken file; the sentence names the accessor, node, skin … at fault;
 /// - `unsupportedFeature`: a required extension that is not known (mesh compression, for one), or
 ///   glTF 1.0;
-/// - `limitExceeded`: it asks for more memory than a file of its size justifies.
+/// - `limitExceeded`: it asks for more memory than a file of its size justifies (memory_budget.h).
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The same from memory; `folder` is where the file's relative URIs are looked up, empty for

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "attribute.h"
+#include "dermis/text.h"
 #include "dermis/types.h"
 
 namespace dermis {
@@ -18,7 +19,7 @@ constexpr std::size_t problemCount = static_cast<std::size_t>(Problem::vertexWit
 /// Collects at most one finding a kind; the sentence is made for its first place only.
 class Findings {
  public:
-  explicit Findings(std::string_view meshName) : prefix_("mesh '" + std::string(meshName) + "'") {}
+  explicit Findings(std::string_view meshName) : prefix_("mesh " + inQuotes(meshName)) {}
 
   void addView(Problem problem, const std::string& text) {
     Finding& finding = findings_[static_cast<std::size_t>(problem)];

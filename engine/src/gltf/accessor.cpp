@@ -147,16 +147,8 @@ std::string formatName(Format format) {
   return format.normalized ? join("normalized ", name) : std::string(name);
 }
 
-Source::Source(Document document, std::vector<Buffer> buffers, std::size_t fileBytes)
-    : document_(std::move(document)), buffers_(std::move(buffers)) {
-  // Primitives may share accessors, and shared data is decoded once for each: 64 times the file is
-  // ample for real files, and stops one that would multiply itself. What has no bytes in the file
-  // gets less.
-  std::uint64_t total = fileBytes;
-  for (const Buffer& buffer : buffers_) total += buffer.storage.size();
-  constexpr std::uint64_t base = std::uint64_t{1} << 20;
-  budget_ = base + 64 * total;
-  zeroBudget_ = base + 16 * total;
+Source::Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget)
+    : document_(std::move(document)), buffers_(std::move(buffers)), budget_(budget) {
   checkViews();
   checkAccessors();
 }
@@ -307,27 +299,10 @@ bool Source::hasNoData(int accessor) const {
   return found.bufferView < 0 && !found.sparse.isSparse;
 }
 
-void Source::spend(std::uint64_t bytes, const std::string& where) {
-  if (bytes > budget_) {
-    fail(ErrorCode::limitExceeded,
-         join(where, ": ", bytes, " bytes more are wanted than a file of this size justifies"));
-  }
-  budget_ -= bytes;
-}
-
+// Primitives may share accessors, and shared data is decoded, and spent, once for each.
 void Source::spendOnAccessor(int index) {
-  const std::uint64_t bytes = std::uint64_t{4} * count(index) * components(index);
-  const std::string where = join("accessor ", index, " of ", count(index), " elements");
-  if (content().accessors[static_cast<std::size_t>(index)].bufferView >= 0) {
-    spend(bytes, where);
-    return;
-  }
-  if (bytes > zeroBudget_) {
-    fail(ErrorCode::limitExceeded,
-         join(where, ": it has no bufferView, and its ", bytes,
-              " bytes of zeros are more than a file of this size justifies"));
-  }
-  zeroBudget_ -= bytes;
+  spend(std::uint64_t{count(index)} * components(index), sizeof(float),
+        join("accessor ", index, " of ", count(index), " elements"));
 }
 
 std::vector<std::uint32_t> Source::sparseIndices(int index) {
@@ -336,7 +311,7 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
   const auto sparseCount = static_cast<std::size_t>(accessor.sparse.count);
   const std::size_t size = sizeOfComponent(indices.componentType);
   const std::byte* data = viewData(indices.bufferView) + indices.byteOffset;
-  spend(sparseCount * sizeof(std::uint32_t), join("accessor ", index, " sparse indices"));
+  spend(sparseCount, sizeof(std::uint32_t), join("accessor ", index, " sparse indices"));
   std::vector<std::uint32_t> elements(sparseCount);
   for (std::size_t i = 0; i < sparseCount; ++i) {
     elements[i] = loadInteger(data + i * size, indices.componentType);

@@ -8,6 +8,7 @@
 
 #include "gltf/buffers.h"
 #include "gltf/document.h"
+#include "gltf/failure.h"
 
 namespace dermis::gltf {
 
@@ -18,12 +19,12 @@ struct Format {
   bool operator==(const Format&) const = default;
 };
 
-/// A file opened for reading: its structure, its bytes, and what it has cost so far.
+/// A file opened for reading: its structure and its bytes.
 class Source {
  public:
-  /// Checks every bufferView and accessor against the buffers. `fileBytes`: how large the file
-  /// itself is, which with its buffers bounds what may be allocated. Throws `Failure`.
-  Source(Document document, std::vector<Buffer> buffers, std::size_t fileBytes);
+  /// Checks every bufferView and accessor against the buffers. What is decoded is spent on the
+  /// budget, which must outlive this object. Throws `Failure`.
+  Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget);
 
   const tinygltf::Model& content() const { return document_.content; }
   bool quantized() const { return document_.quantized; }
@@ -61,9 +62,10 @@ class Source {
   /// is no such view, or it has no bytes.
   std::span<const std::byte> viewBytes(std::uint64_t view, const std::string& where) const;
 
-  /// Counts an allocation against what the file's size justifies. Throws `Failure` with
-  /// `limitExceeded`.
-  void spend(std::uint64_t bytes, const std::string& where);
+  /// Spends what is about to be made. Throws `Failure` with `limitExceeded`.
+  void spend(std::uint64_t elements, std::uint64_t bytesEach, const std::string& where) {
+    gltf::spend(budget_, elements, bytesEach, where);
+  }
 
  private:
   void checkViews() const;
@@ -82,8 +84,7 @@ class Source {
 
   Document document_;
   std::vector<Buffer> buffers_;
-  std::uint64_t budget_ = 0;      ///< Bytes that may still be allocated for what stands in the file
-  std::uint64_t zeroBudget_ = 0;  ///< and for accessors that have no bytes in it.
+  MemoryBudget& budget_;
 };
 
 /// The name of a component type and normalisation: "normalized unsigned byte".

@@ -251,6 +251,8 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
     clip.duration = std::max(clip.duration, static_cast<double>(channel->times.back()));
     clip.channels.push_back(std::move(*channel));
   }
+  std::ranges::sort(clip.channels, {},
+                    [](const Channel& channel) { return std::pair(channel.node, channel.path); });
   return clip;
 }
 

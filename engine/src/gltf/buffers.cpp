@@ -1,10 +1,9 @@
 #include "gltf/buffers.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <fstream>
-#include <system_error>
+#include <map>
+#include <utility>
 
 #include "gltf/failure.h"
 
@@ -12,13 +11,6 @@ namespace dermis::gltf {
 namespace {
 
 constexpr std::uint8_t notADigit = 0xff;
-
-std::uint8_t hexadecimalDigit(char character) {
-  if (character >= '0' && character <= '9') return static_cast<std::uint8_t>(character - '0');
-  if (character >= 'a' && character <= 'f') return static_cast<std::uint8_t>(character - 'a' + 10);
-  if (character >= 'A' && character <= 'F') return static_cast<std::uint8_t>(character - 'A' + 10);
-  return notADigit;
-}
 
 std::uint8_t base64Digit(char character) {
   if (character >= 'A' && character <= 'Z') return static_cast<std::uint8_t>(character - 'A');
@@ -51,87 +43,40 @@ std::vector<std::byte> decodeBase64(std::string_view text, const std::string& wh
   return bytes;
 }
 
-// RFC 3986: a scheme is a letter and then letters, digits, '+', '-' or '.', up to a colon.
-bool hasScheme(std::string_view uri) {
-  const std::size_t colon = uri.find(':');
-  return colon != std::string_view::npos && uri.find('/') > colon;
+void checkLength(const std::string& where, std::uint64_t wanted, std::uint64_t there) {
+  if (there >= wanted) return;
+  failInvalid(where, ": byteLength says ", wanted, " bytes, ", there, " are there");
 }
 
-// The path of a side file inside the folder, or a failure.
-std::filesystem::path sidePath(std::string_view uri, const std::filesystem::path& folder,
-                               const std::string& where) {
-  if (hasScheme(uri)) {
-    fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a file beside this one"));
-  }
-  const std::string text = decodePercent(uri, where);
-  const bool hostile = text.empty() || text.find('\0') != std::string::npos ||
-                       text.find('\\') != std::string::npos || hasScheme(text);
-  const std::filesystem::path relative(std::u8string(text.begin(), text.end()));
-  const bool outside = hostile || relative.is_absolute() || relative.has_root_path() ||
-                       std::find(relative.begin(), relative.end(), "..") != relative.end();
-  if (outside) {
-    fail(ErrorCode::ioError,
-         join(where, ": ", inQuotes(text), " is outside the file's folder and is not opened"));
-  }
-  if (folder.empty()) {
-    fail(ErrorCode::ioError, join(where, ": ", inQuotes(text), " cannot be read without a folder"));
-  }
-  return folder / relative;
-}
+// Buffers in side files: each file is read once, as far as the longest buffer in it goes.
+class SideBuffers {
+ public:
+  explicit SideBuffers(SideFiles& files) : files_(files) {}
 
-Buffer loadBuffer(const BufferDescription& description,
-                  const std::optional<std::span<const std::byte>>& binaryChunk,
-                  const std::filesystem::path& folder, const std::string& where) {
-  Buffer buffer;
-  buffer.byteLength = description.byteLength;
-  if (!description.uri) {
-    if (!binaryChunk) return buffer;
-    buffer.bytes = *binaryChunk;
-  } else {
-    buffer.storage = description.uri->starts_with("data:")
-                         ? decodeDataUri(*description.uri, where)
-                         : loadSideFile(*description.uri, description.byteLength, folder, where);
-    buffer.bytes = buffer.storage;
+  void find(std::size_t buffer, const BufferDescription& description, const std::string& where) {
+    FileToRead file = files_.find(*description.uri, where);
+    checkLength(where, description.byteLength, file.size);
+    std::uint64_t& needed = needed_[file.path];
+    needed = std::max(needed, description.byteLength);
+    found_.emplace(buffer, std::move(file));
   }
-  if (buffer.bytes.size() < description.byteLength) {
-    failInvalid(where, ": byteLength says ", description.byteLength, " bytes, ",
-                buffer.bytes.size(), " are there");
+
+  Bytes read(std::size_t buffer, const std::string& where) {
+    const FileToRead& file = found_.at(buffer);
+    return files_.read(file, needed_.at(file.path), where);
   }
-  buffer.bytes = buffer.bytes.first(static_cast<std::size_t>(description.byteLength));
-  return buffer;
+
+ private:
+  SideFiles& files_;
+  std::map<std::size_t, FileToRead> found_;  // by buffer
+  std::map<std::filesystem::path, std::uint64_t> needed_;
+};
+
+bool isDataUri(const std::string& uri) {
+  return uri.starts_with("data:");
 }
 
 }  // namespace
-
-std::vector<std::byte> loadSideFile(std::string_view uri, std::uint64_t limit,
-                                    const std::filesystem::path& folder, const std::string& where) {
-  const std::filesystem::path path = sidePath(uri, folder, where);
-  std::error_code error;
-  // Not a device or a pipe, which might never end.
-  if (!std::filesystem::is_regular_file(path, error)) {
-    fail(ErrorCode::ioError, join(where, ": there is no file ", inQuotes(path.string())));
-  }
-  return readFile(path, limit, where);
-}
-
-std::string decodePercent(std::string_view text, const std::string& where) {
-  std::string decoded;
-  decoded.reserve(text.size());
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      decoded.push_back(text[i]);
-      continue;
-    }
-    const std::uint8_t high = i + 2 < text.size() ? hexadecimalDigit(text[i + 1]) : notADigit;
-    const std::uint8_t low = i + 2 < text.size() ? hexadecimalDigit(text[i + 2]) : notADigit;
-    if (high == notADigit || low == notADigit) {
-      failInvalid(where, ": character ", i, " of its uri is a '%' without two digits");
-    }
-    decoded.push_back(static_cast<char>(high << 4 | low));
-    i += 2;
-  }
-  return decoded;
-}
 
 std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& where) {
   const std::size_t comma = uri.find(',');
@@ -147,41 +92,36 @@ std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& wh
   return bytes;
 }
 
-std::vector<std::byte> readFile(const std::filesystem::path& path, std::uint64_t limit,
-                                const std::string& where) {
-  std::ifstream stream(path, std::ios::binary);
-  std::error_code error;
-  if (!stream || std::filesystem::is_directory(path, error)) {
-    fail(ErrorCode::ioError, join(where, ": ", inQuotes(path.string()), " cannot be opened"));
-  }
-  // Read in pieces: the number of bytes that a file claims is not to be trusted, and a pipe claims
-  // none.
-  constexpr std::size_t pieceSize = std::size_t{1} << 20;
-  std::vector<std::byte> bytes;
-  while (stream && bytes.size() < limit) {
-    const std::size_t wanted =
-        static_cast<std::size_t>(std::min<std::uint64_t>(pieceSize, limit - bytes.size()));
-    const std::size_t start = bytes.size();
-    bytes.resize(start + wanted);
-    stream.read(reinterpret_cast<char*>(bytes.data() + start),
-                static_cast<std::streamsize>(wanted));
-    bytes.resize(start + static_cast<std::size_t>(stream.gcount()));
-  }
-  if (stream.bad()) {
-    fail(ErrorCode::ioError, join(where, ": reading ", inQuotes(path.string()), " failed"));
-  }
-  return bytes;
-}
-
 std::vector<Buffer> loadBuffers(const std::vector<BufferDescription>& descriptions,
                                 std::optional<std::span<const std::byte>> binaryChunk,
-                                const std::filesystem::path& folder) {
-  std::vector<Buffer> buffers;
-  buffers.reserve(descriptions.size());
+                                SideFiles& files, MemoryBudget& budget) {
+  SideBuffers side(files);
   for (std::size_t i = 0; i < descriptions.size(); ++i) {
-    // Only the first buffer may be the binary chunk.
-    buffers.push_back(loadBuffer(descriptions[i], i == 0 ? binaryChunk : std::nullopt, folder,
-                                 join("buffer ", i)));
+    const std::optional<std::string>& uri = descriptions[i].uri;
+    if (uri && !isDataUri(*uri)) side.find(i, descriptions[i], join("buffer ", i));
+  }
+  std::vector<Buffer> buffers(descriptions.size());
+  for (std::size_t i = 0; i < descriptions.size(); ++i) {
+    const BufferDescription& description = descriptions[i];
+    const std::string where = join("buffer ", i);
+    Buffer& buffer = buffers[i];
+    buffer.byteLength = description.byteLength;
+    if (description.uri && isDataUri(*description.uri)) {
+      spend(budget, description.uri->size(), 1, where);
+      buffer.storage =
+          std::make_shared<const std::vector<std::byte>>(decodeDataUri(*description.uri, where));
+    } else if (description.uri) {
+      buffer.storage = side.read(i, where);
+    }
+    if (buffer.storage != nullptr) {
+      buffer.bytes = *buffer.storage;
+    } else if (i == 0 && binaryChunk) {
+      buffer.bytes = *binaryChunk;  // Only the first buffer may be that.
+    } else {
+      continue;
+    }
+    checkLength(where, description.byteLength, buffer.bytes.size());
+    buffer.bytes = buffer.bytes.first(static_cast<std::size_t>(description.byteLength));
   }
   return buffers;
 }

@@ -8,7 +8,7 @@
 namespace dermis::gltf {
 namespace {
 
-constexpr std::size_t headerSize = 12;
+constexpr std::size_t headerSize = containerStart;
 constexpr std::size_t chunkHeaderSize = 8;
 constexpr std::uint32_t magicNumber = 0x46546c67;  // "glTF"
 constexpr std::uint32_t jsonChunk = 0x4e4f534a;    // "JSON"
@@ -26,7 +26,11 @@ std::string_view asText(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-void checkHeader(std::span<const std::byte> bytes) {
+bool isGlb(std::span<const std::byte> bytes) {
+  return bytes.size() >= 4 && readWord(bytes, 0) == magicNumber;
+}
+
+void checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
   if (bytes.size() < headerSize) {
     failInvalid("the GLB header is cut off: ", bytes.size(), " bytes where it has ", headerSize);
   }
@@ -36,18 +40,27 @@ void checkHeader(std::span<const std::byte> bytes) {
          join("the GLB header says version ", version, ", and only version 2 is known"));
   }
   const std::uint32_t length = readWord(bytes, 8);
-  if (length != bytes.size()) {
-    failInvalid("the GLB header says ", length, " bytes, the file has ", bytes.size());
+  if (length != size) {
+    failInvalid("the GLB header says ", length, " bytes, the file has ", size);
   }
 }
 
 }  // namespace
 
+void checkStart(std::span<const std::byte> start, std::uint64_t size) {
+  if (isGlb(start)) return checkHeader(start, size);
+  std::string_view text = asText(start);
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos || text[first] == '{') return;
+  failInvalid("the JSON text is broken at byte ", text.data() + first - asText(start).data() + 1);
+}
+
 Container openContainer(std::span<const std::byte> bytes) {
   if (bytes.empty()) failInvalid("the file is empty");
-  if (bytes.size() < 4 || readWord(bytes, 0) != magicNumber) return {asText(bytes), std::nullopt};
+  if (!isGlb(bytes)) return {asText(bytes), std::nullopt};
 
-  checkHeader(bytes);
+  checkHeader(bytes, bytes.size());
   Container container;
   std::size_t offset = headerSize;
   for (std::size_t chunk = 0; offset < bytes.size(); ++chunk) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -13,6 +14,13 @@ struct Container {
   std::string_view json;
   std::optional<std::span<const std::byte>> binaryChunk;  ///< Of a GLB file that has one.
 };
+
+/// So many bytes of a file show whether it can be one.
+inline constexpr std::size_t containerStart = 12;
+
+/// Throws `Failure` where a file of `size` bytes that begins with these cannot be read whatever
+/// follows: the header of a GLB file disagrees with its size, or a text is no JSON object.
+void checkStart(std::span<const std::byte> start, std::uint64_t size);
 
 /// Takes the file apart: GLB where it begins with the magic, otherwise all of it is JSON. Throws
 /// `Failure` where a GLB header or chunk disagrees with the number of bytes there are.

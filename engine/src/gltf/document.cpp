@@ -13,8 +13,18 @@ namespace {
 
 using nlohmann::json;
 
-// Looks at brackets alone, outside strings: whether they match is the parser's business.
-void checkNesting(std::string_view text) {
+// What a parsed text takes, at most: for each array or object, with what holds it; for each element
+// or member, in a vector that grows or a tree; and for characters, of strings or of numbers written
+// out. Parsed twice, by tinygltf again, but never at the same time.
+constexpr std::uint64_t bytesPerBracket = 96;
+constexpr std::uint64_t bytesPerComma = 48;
+constexpr std::uint64_t bytesPerMember = 112;
+constexpr std::uint64_t bytesPerCharacter = 4;
+
+// Looks at brackets, commas and colons alone, outside strings: whether they match is the parser's
+// business. Spends what the parsed text will take.
+void checkNesting(std::string_view text, MemoryBudget& budget) {
+  std::uint64_t bytes = bytesPerCharacter * text.size();
   std::uint32_t depth = 0;
   bool inString = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -24,7 +34,12 @@ void checkNesting(std::string_view text) {
       if (character == '"') inString = false;
     } else if (character == '"') {
       inString = true;
+    } else if (character == ',') {
+      bytes += bytesPerComma;
+    } else if (character == ':') {
+      bytes += bytesPerMember;
     } else if (character == '[' || character == '{') {
+      bytes += bytesPerBracket;
       if (++depth > deepestNesting) {
         failInvalid("the JSON text is nested deeper than ", deepestNesting, " levels at byte ", i);
       }
@@ -32,6 +47,7 @@ void checkNesting(std::string_view text) {
       --depth;
     }
   }
+  spend(budget, bytes, 1, "the JSON text");
 }
 
 json parseJson(std::string_view text) {
@@ -60,7 +76,7 @@ void checkVersion(const json& root) {
   if (least != asset->end() && *least != "2.0") {
     fail(ErrorCode::unsupportedFeature,
          join("the file needs glTF version ",
-              least->is_string() ? inQuotes(least->get_ref<const std::string&>()) : "?",
+              inQuotes(least->is_string() ? least->get_ref<const std::string&>() : least->dump()),
               ": only version 2.0 is supported"));
   }
 }
@@ -152,6 +168,8 @@ tinygltf::Model parseContent(json root) {
   moveIndices(lean);
 
   const std::string text = lean.dump();
+  root = nullptr;
+  lean = nullptr;
   if (text.size() > std::numeric_limits<unsigned int>::max()) {
     fail(ErrorCode::limitExceeded, "the JSON text is longer than 4 GiB");
   }
@@ -160,16 +178,15 @@ tinygltf::Model parseContent(json root) {
   std::string error, warning;
   if (!parser.LoadASCIIFromString(&content, &error, &warning, text.data(),
                                   static_cast<unsigned int>(text.size()), "")) {
-    std::replace(error.begin(), error.end(), '\n', ' ');
-    failInvalid("the file cannot be read: ", error);
+    failInvalid("the file cannot be read: ", shortName(error, 400));
   }
   return content;
 }
 
 }  // namespace
 
-Document parseDocument(std::string_view text, Appearance* appearance) {
-  checkNesting(text);
+Document parseDocument(std::string_view text, MemoryBudget& budget, Appearance* appearance) {
+  checkNesting(text, budget);
   json root = parseJson(text);
   if (!root.is_object()) failInvalid("the JSON text is not an object");
   checkVersion(root);
@@ -177,8 +194,8 @@ Document parseDocument(std::string_view text, Appearance* appearance) {
   Document document;
   document.quantized = usesQuantization(root);
   // What is checked has lost its textures.
-  if (appearance != nullptr) *appearance = findAppearance(root);
-  checkReferences(root);
+  if (appearance != nullptr) *appearance = findAppearance(root, budget);
+  checkReferences(root, budget);
   document.buffers = takeBuffers(root);
   document.content = parseContent(std::move(root));
   return document;

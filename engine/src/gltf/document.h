@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dermis/memory_budget.h"
 #include "gltf/tinygltf.h"
 
 namespace dermis::gltf {
@@ -34,11 +35,14 @@ struct Document {
 
 struct Appearance;
 
-/// Parses and checks. `appearance` is filled in where it is wanted. Throws `Failure`.
-Document parseDocument(std::string_view text, Appearance* appearance = nullptr);
+/// Parses and checks. What is made of the text is spent first. `appearance` is filled in where it
+/// is wanted. Throws `Failure`.
+Document parseDocument(std::string_view text, MemoryBudget& budget,
+                       Appearance* appearance = nullptr);
 
 /// Checks every index and every type in `root`, as `parseDocument` needs it; whole numbers written
-/// with a fraction of zero become integers. Throws `Failure`.
-void checkReferences(nlohmann::json& root);
+/// with a fraction of zero become integers. Spends what the things that it lists will take. Throws
+/// `Failure`.
+void checkReferences(nlohmann::json& root, MemoryBudget& budget);
 
 }  // namespace dermis::gltf

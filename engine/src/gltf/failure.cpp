@@ -10,24 +10,15 @@ std::string textOf(double number) {
   return text;
 }
 
-std::string inQuotes(std::string_view name) {
-  constexpr std::size_t longest = 80;
-  std::string text = "'";
-  for (const char character : name.substr(0, longest)) {
-    const bool printable = static_cast<unsigned char>(character) >= 0x20 && character != 0x7f;
-    text.push_back(printable ? character : '?');
-  }
-  if (name.size() > longest) {
-    // Not in the middle of a UTF-8 sequence.
-    while ((static_cast<unsigned char>(text.back()) & 0xc0) == 0x80) text.pop_back();
-    if (static_cast<unsigned char>(text.back()) >= 0xc0) text.pop_back();
-    text += "...";
-  }
-  return text + "'";
-}
-
 void fail(ErrorCode code, std::string message) {
   throw Failure{Error{code, std::move(message), 0}};
+}
+
+void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
+           std::string_view where) {
+  if (budget.spend(count, bytesEach)) return;
+  fail(ErrorCode::limitExceeded,
+       join(where, ": more memory is wanted than a file of this size justifies"));
 }
 
 }  // namespace dermis::gltf

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <concepts>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "dermis/memory_budget.h"
 #include "dermis/result.h"
+#include "dermis/text.h"
 
 namespace dermis::gltf {
 
@@ -37,9 +40,6 @@ inline std::string counted(std::size_t count, std::string_view what) {
   return join(count, " ", what, count == 1 ? "" : "s");
 }
 
-/// A name from a file for a message: in quotes, shortened, on one line whatever the file holds.
-std::string inQuotes(std::string_view name);
-
 [[noreturn]] void fail(ErrorCode code, std::string message);
 
 /// Fails with `invalidData` and the sentence made of the parts.
@@ -47,5 +47,9 @@ template <typename... Parts>
 [[noreturn]] void failInvalid(const Parts&... parts) {
   fail(ErrorCode::invalidData, join(parts...));
 }
+
+/// Spends, or fails with `limitExceeded`. `where` names what is wanted.
+void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
+           std::string_view where);
 
 }  // namespace dermis::gltf

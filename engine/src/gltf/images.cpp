@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <string_view>
 #include <utility>
 
 #include "gltf/buffers.h"
@@ -11,10 +13,6 @@ namespace dermis::gltf {
 namespace {
 
 using nlohmann::json;
-
-/// A small file can name a large one very often.
-constexpr std::uint64_t mostImageBytes = std::uint64_t{1} << 29;
-constexpr std::size_t mostImages = 16'384;
 
 /// A member of an object, or null where there is no such member or no object.
 const json& member(const json& value, const char* name) {
@@ -66,59 +64,101 @@ TextureUse textureOf(const json& root, const json& material) {
   return use;
 }
 
-std::vector<std::byte> bytesOf(const ImageDescription& image, const Source& source,
-                               const std::filesystem::path& folder, std::uint64_t limit,
-                               const std::string& where) {
-  if (image.bufferView) {
-    const std::span<const std::byte> view = source.viewBytes(*image.bufferView, where);
-    if (view.size() > limit) fail(ErrorCode::limitExceeded, join(where, ": it is too large"));
-    return {view.begin(), view.end()};
+/// Reads each image when it is first asked for.
+class ImageReader {
+ public:
+  ImageReader(const Appearance& appearance, const Source& source, SideFiles& files, Model& model)
+      : appearance_(appearance), source_(source), files_(files), model_(model) {
+    model.images.resize(appearance.images.size());
+    same_.resize(model.images.size());
   }
-  if (!image.uri) failInvalid(where, ": it has neither a uri nor a bufferView");
-  std::vector<std::byte> bytes = image.uri->starts_with("data:")
-                                     ? decodeDataUri(*image.uri, where)
-                                     : loadSideFile(*image.uri, limit, folder, where);
-  if (bytes.size() >= limit) fail(ErrorCode::limitExceeded, join(where, ": it is too large"));
-  return bytes;
-}
+
+  /// The first image that equals this one; `none` where it cannot be had.
+  std::uint32_t find(std::uint32_t index) {
+    if (index >= same_.size()) return none;
+    if (!same_[index]) same_[index] = read(index);
+    return *same_[index];
+  }
+
+ private:
+  std::uint32_t read(std::uint32_t index) {
+    const ImageDescription& description = appearance_.images[index];
+    const std::uint32_t named = firstNamed(description, index);
+    if (named != index) return *same_[named];
+    Image& image = model_.images[index];
+    const std::string where = join("image ", index);
+    image.name = description.name.empty() ? where : join(where, " ", inQuotes(description.name));
+    try {
+      image.bytes = bytesOf(description, where);
+    } catch (const Failure& failure) {
+      model_.notes.push_back(join(failure.error.message, "; it is left out"));
+    }
+    if (image.bytes.empty()) return none;
+    const std::string_view content(reinterpret_cast<const char*>(image.bytes.data()),
+                                   image.bytes.size());
+    const auto [place, isNew] = byContent_.emplace(content, index);
+    if (!isNew) image.bytes = {};
+    return place->second;
+  }
+
+  /// The first image of the same uri or bufferView, which may be this one.
+  std::uint32_t firstNamed(const ImageDescription& description, std::uint32_t index) {
+    if (description.bufferView)
+      return byView_.emplace(*description.bufferView, index).first->second;
+    return description.uri ? byUri_.emplace(*description.uri, index).first->second : index;
+  }
+
+  std::vector<std::byte> bytesOf(const ImageDescription& image, const std::string& where) {
+    if (image.bufferView) {
+      const std::span<const std::byte> view = source_.viewBytes(*image.bufferView, where);
+      spend(model_.budget, view.size(), 1, where);
+      return {view.begin(), view.end()};
+    }
+    if (!image.uri) failInvalid(where, ": it has neither a uri nor a bufferView");
+    if (image.uri->starts_with("data:")) {
+      spend(model_.budget, image.uri->size(), 1, where);
+      return decodeDataUri(*image.uri, where);
+    }
+    const FileToRead file = files_.find(*image.uri, where);
+    const Bytes bytes = files_.read(file, file.size, where);
+    spend(model_.budget, bytes->size(), 1, where);
+    return *bytes;
+  }
+
+  const Appearance& appearance_;
+  const Source& source_;
+  SideFiles& files_;
+  Model& model_;
+  std::vector<std::optional<std::uint32_t>> same_;  // what `find` has returned
+  std::map<std::uint64_t, std::uint32_t> byView_;
+  std::map<std::string_view, std::uint32_t> byUri_, byContent_;
+};
 
 }  // namespace
 
-Appearance findAppearance(const json& root) {
+Appearance findAppearance(const json& root, MemoryBudget& budget) {
   Appearance appearance;
-  for (const json& image : member(root, "images")) {
-    if (appearance.images.size() == mostImages) break;
+  const json& images = member(root, "images");
+  const json& materials = member(root, "materials");
+  spend(budget, images.size(), 2 * (sizeof(ImageDescription) + sizeof(Image)), "the images");
+  spend(budget, materials.size(), 2 * sizeof(TextureUse), "the materials");
+  for (const json& image : images) {
     appearance.images.push_back({textIn(member(image, "name")).value_or(""),
                                  textIn(member(image, "uri")),
                                  wholeNumber(member(image, "bufferView"))});
   }
-  for (const json& material : member(root, "materials"))
+  for (const json& material : materials)
     appearance.baseColorTextures.push_back(textureOf(root, material));
   return appearance;
 }
 
-void readImages(const Appearance& appearance, const Source& source,
-                const std::filesystem::path& folder, Model& model) {
-  model.images.resize(appearance.images.size());
-  std::vector<bool> isTried(model.images.size());
-  std::uint64_t left = mostImageBytes;
+void readImages(const Appearance& appearance, const Source& source, SideFiles& files,
+                Model& model) {
+  ImageReader images(appearance, source, files, model);
   for (std::size_t i = 0; i < model.materials.size(); ++i) {
     TextureUse use = appearance.baseColorTextures[i];
-    if (use.image >= model.images.size()) continue;
-    Image& image = model.images[use.image];
-    if (!isTried[use.image]) {
-      isTried[use.image] = true;
-      const ImageDescription& description = appearance.images[use.image];
-      const std::string where = join("image ", use.image);
-      image.name = description.name.empty() ? where : join(where, " ", inQuotes(description.name));
-      try {
-        image.bytes = bytesOf(description, source, folder, left, where);
-        left -= image.bytes.size();
-      } catch (const Failure& failure) {
-        model.notes.push_back(join(failure.error.message, "; it is left out"));
-      }
-    }
-    if (!image.bytes.empty()) model.materials[i].baseColorTexture = use;
+    use.image = images.find(use.image);
+    if (use.image != none) model.materials[i].baseColorTexture = use;
   }
 }
 

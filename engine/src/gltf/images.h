@@ -3,13 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "dermis/gltf.h"
 #include "gltf/accessor.h"
+#include "gltf/files.h"
 #include "gltf/tinygltf.h"
 
 namespace dermis::gltf {
@@ -26,12 +26,12 @@ struct Appearance {
   std::vector<TextureUse> baseColorTextures;  ///< by material
 };
 
-/// Takes out of the JSON what it understands; leaves the rest as it is.
-Appearance findAppearance(const nlohmann::json& root);
+/// Takes out of the JSON what it understands; leaves the rest as it is. Spends what that takes.
+/// Throws `Failure` with `limitExceeded`.
+Appearance findAppearance(const nlohmann::json& root, MemoryBudget& budget);
 
-/// images, and the textures of the materials: those images that one shows. Side files are read by
-/// the rules of buffers. What cannot be had is said in a note.
-void readImages(const Appearance& appearance, const Source& source,
-                const std::filesystem::path& folder, Model& model);
+/// images, and the textures of the materials: those images that one shows, equal ones once. Side
+/// files are read by the rules of buffers. What cannot be had is said in a note.
+void readImages(const Appearance& appearance, const Source& source, SideFiles& files, Model& model);
 
 }  // namespace dermis::gltf

@@ -1,7 +1,5 @@
 #include <exception>
-#include <limits>
 #include <new>
-#include <system_error>
 #include <utility>
 
 #include "dermis/gltf.h"
@@ -10,6 +8,7 @@
 #include "gltf/container.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
+#include "gltf/files.h"
 #include "gltf/images.h"
 #include "gltf/reader.h"
 
@@ -18,20 +17,25 @@ namespace {
 
 Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& folder,
                 const LoadOptions& options) {
+  Model model;
+  model.budget.addFile(bytes.size());
+  spend(model.budget, bytes.size(), 1, "the file");
   const Container container = openContainer(bytes);
   Appearance appearance;
-  Document document = parseDocument(container.json, options.images ? &appearance : nullptr);
-  std::vector<Buffer> buffers = loadBuffers(document.buffers, container.binaryChunk, folder);
-  Source source(std::move(document), std::move(buffers), bytes.size());
+  Document document =
+      parseDocument(container.json, model.budget, options.images ? &appearance : nullptr);
+  SideFiles files(folder, model.budget);
+  std::vector<Buffer> buffers =
+      loadBuffers(document.buffers, container.binaryChunk, files, model.budget);
+  Source source(std::move(document), std::move(buffers), model.budget);
 
-  Model model;
   readNodes(source, model);
   readSkins(source, model);
   readMaterials(source, model);
   checkPrimitives(source);
   readScene(source, model);
   readAnimations(source, model);
-  if (options.images) readImages(appearance, source, folder, model);
+  if (options.images) readImages(appearance, source, files, model);
   return model;
 }
 
@@ -45,7 +49,8 @@ Result<Model> guarded(Function function) {
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::limitExceeded, "there is not enough memory for the file"};
   } catch (const std::exception& exception) {
-    return Error{ErrorCode::invalidData, join("the file cannot be read: ", exception.what())};
+    return Error{ErrorCode::invalidData,
+                 join("the file cannot be read: ", shortName(exception.what(), 400))};
   }
 }
 
@@ -58,17 +63,12 @@ Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesy
 
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
   return guarded([&] {
-    std::error_code error;
-    // Not a device or a pipe, which might never end. What does not exist is left to readFile.
-    if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
-      fail(ErrorCode::ioError, join(inQuotes(path.string()), " is not a file"));
-    }
-    const auto bytes = readFile(path, std::numeric_limits<std::uint64_t>::max(), "glTF file");
+    const FileToRead file = findFile(path);
     // A name without a folder stands in the current one; an empty folder would mean that there is
     // none.
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     try {
-      return readModel(bytes, folder, options);
+      return readModel(readModelFile(file), folder, options);
     } catch (Failure& failure) {
       failure.error.message = join(inQuotes(path.filename().string()), ": ", failure.error.message);
       throw;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "dermis/gltf.h"
 #include "gltf/interpolate.h"
@@ -10,10 +11,10 @@ namespace {
 const Channel* findWeights(const Model& model, std::uint32_t node, std::uint32_t clip) {
   if (clip >= model.clips.size()) return nullptr;
   const std::vector<Channel>& channels = model.clips[clip].channels;
-  const auto found = std::find_if(channels.begin(), channels.end(), [node](const Channel& channel) {
-    return channel.node == node && channel.path == ChannelPath::weights;
-  });
-  return found == channels.end() ? nullptr : &*found;
+  const std::pair wanted(node, ChannelPath::weights);
+  const auto placeOf = [](const Channel& channel) { return std::pair(channel.node, channel.path); };
+  const auto found = std::ranges::lower_bound(channels, wanted, {}, placeOf);
+  return found == channels.end() || placeOf(*found) != wanted ? nullptr : &*found;
 }
 
 // A spline may leave the range of its keys, and with it that of a float.

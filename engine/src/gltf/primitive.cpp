@@ -74,14 +74,21 @@ std::uint32_t countSets(const std::map<std::string, int>& attributes, std::strin
 class PrimitiveCheck {
  public:
   PrimitiveCheck(const Source& source, const tinygltf::Primitive& primitive, std::string where)
-      : source_(source), primitive_(primitive), where_(std::move(where)) {}
+      : source_(source), primitive_(primitive), where_(std::move(where)) {
+    for (const auto& attribute : primitive.attributes) {
+      if (first_ == nullptr && attribute.first != indicesAttribute) first_ = &attribute;
+    }
+  }
 
   void run() const {
     checkInfluences();
+    if (!primitive_.targets.empty() && first_ == nullptr) {
+      failInvalid(where_, ": it has morph targets, but no attribute that they could change");
+    }
     for (const auto& [name, accessor] : primitive_.attributes) checkAttribute(name, accessor);
     for (std::size_t i = 0; i < primitive_.targets.size(); ++i) {
       for (const auto& [name, accessor] : primitive_.targets[i]) {
-        checkTarget(name, accessor, join(where_, " morph target ", i, " ", name));
+        checkTarget(name, accessor, join(where_, " morph target ", i, " ", shortName(name)));
       }
     }
   }
@@ -95,7 +102,8 @@ class PrimitiveCheck {
   }
 
   void checkAttribute(const std::string& name, int accessor) const {
-    const std::string place = join(where_, " ", name == indicesAttribute ? "indices" : name);
+    const std::string place =
+        join(where_, " ", name == indicesAttribute ? "indices" : shortName(name));
     if (name == indicesAttribute) {
       source_.require(accessor, TINYGLTF_TYPE_SCALAR, indexFormats, place);
       source_.requireNoStride(accessor, place);
@@ -135,12 +143,10 @@ class PrimitiveCheck {
 
   // All attributes of a primitive have one count; which of them gives it does not matter.
   void checkCount(int accessor, const std::string& place) const {
-    const auto& [name, first] =
-        *std::find_if(primitive_.attributes.begin(), primitive_.attributes.end(),
-                      [](const auto& attribute) { return attribute.first != indicesAttribute; });
+    const auto& [name, first] = *first_;
     if (source_.count(accessor) == source_.count(first)) return;
     failInvalid(place, ": accessor ", accessor, " has ", source_.count(accessor),
-                " elements where ", name, " has ", source_.count(first));
+                " elements where ", shortName(name), " has ", source_.count(first));
   }
 
   std::span<const Format> either(std::span<const Format> plain,
@@ -151,6 +157,7 @@ class PrimitiveCheck {
   const Source& source_;
   const tinygltf::Primitive& primitive_;
   std::string where_;
+  const std::pair<const std::string, int>* first_ = nullptr;  // null: it has indices at most
 };
 
 ComponentType storedType(Format format) {
@@ -182,7 +189,7 @@ std::vector<float> readColors(Source& source, int accessor, const std::string& w
   if (accessor < 0) return {};
   std::vector<float> colors = source.floats(accessor);
   if (source.components(accessor) == 4) return colors;
-  source.spend(std::uint64_t{16} * source.count(accessor), where);
+  source.spend(source.count(accessor), 16, where);
   std::vector<float> opaque(colors.size() / 3 * 4, 1.0f);
   for (std::size_t i = 0; i < colors.size(); ++i) opaque[i / 3 * 4 + i % 3] = colors[i];
   return opaque;
@@ -222,7 +229,7 @@ std::vector<std::uint32_t> readIndices(Source& source, int accessor, std::uint32
     }
     return indices;
   }
-  source.spend(std::uint64_t{4} * vertexCount, where);
+  source.spend(vertexCount, 4, where);
   std::vector<std::uint32_t> indices(vertexCount);
   for (std::uint32_t i = 0; i < vertexCount; ++i) indices[i] = i;
   return indices;
@@ -261,7 +268,7 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
       return indices;
     case TINYGLTF_MODE_TRIANGLE_STRIP:
     case TINYGLTF_MODE_TRIANGLE_FAN:
-      source.spend(std::uint64_t{12} * indices.size(), where);
+      source.spend(indices.size(), 12, where);
       return unroll(indices, from.mode);
     default:
       return {};
@@ -270,8 +277,10 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
 
 std::string primitiveName(const tinygltf::Mesh& mesh, std::size_t meshIndex,
                           std::size_t primitive) {
-  return mesh.name.empty() ? primitivePlace(meshIndex, primitive)
-                           : join("mesh ", inQuotes(mesh.name), " primitive ", primitive);
+  // Short enough that its number is not cut off by whoever puts it in quotes.
+  const std::string name =
+      mesh.name.empty() ? join("number ", meshIndex) : shortName(mesh.name, 56);
+  return mesh.primitives.size() == 1 ? name : join(name, " primitive ", primitive);
 }
 
 }  // namespace

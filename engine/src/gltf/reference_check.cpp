@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 #include <unordered_set>
 
+#include "dermis/gltf.h"
+#include "gltf/buffers.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
 
@@ -22,17 +25,34 @@ using nlohmann::json;
 // Beyond this a JSON number need not be the integer that was written.
 constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
 
-// "{}," is three bytes in a file, and hundreds in the structs that are made of it: so the number of
-// things has a limit, far beyond real files. tinygltf's materials are the largest.
-constexpr std::size_t mostOfAKind = 262'144;
-constexpr std::size_t mostMaterials = 16'384;
+// "{}," is three bytes in a file, and hundreds in the structs that are made of it, tinygltf's and
+// Dermis' own, in vectors that grow.
+struct Section {
+  const char* name;
+  std::uint64_t bytesEach;
+};
+constexpr std::array sections{Section{"buffers", sizeof(BufferDescription) + sizeof(Buffer)},
+                              Section{"bufferViews", 2 * sizeof(tinygltf::BufferView)},
+                              Section{"accessors", 2 * sizeof(tinygltf::Accessor)},
+                              Section{"materials", sizeof(tinygltf::Material) + sizeof(Material)},
+                              Section{"meshes", sizeof(tinygltf::Mesh) + sizeof(Mesh)},
+                              Section{"skins", sizeof(tinygltf::Skin) + sizeof(Skin)},
+                              Section{"nodes", sizeof(tinygltf::Node) + sizeof(Node)},
+                              Section{"animations", sizeof(tinygltf::Animation) + sizeof(Clip)},
+                              Section{"scenes", 2 * sizeof(tinygltf::Scene)},
+                              Section{"cameras", 0}};
+constexpr std::uint64_t bytesPerPrimitive = sizeof(tinygltf::Primitive) + sizeof(Primitive);
+constexpr std::uint64_t bytesPerTarget = sizeof(std::map<std::string, int>) + sizeof(MorphTarget);
+constexpr std::uint64_t bytesPerAttribute = 128;  // in a map, with its name
+constexpr std::uint64_t bytesPerSampler = 2 * sizeof(tinygltf::AnimationSampler);
+constexpr std::uint64_t bytesPerChannel = sizeof(tinygltf::AnimationChannel) + sizeof(Channel);
 
 class ReferenceCheck {
  public:
-  explicit ReferenceCheck(json& root) : root_(root) {}
+  ReferenceCheck(json& root, MemoryBudget& budget) : root_(root), budget_(budget) {}
 
   void run() {
-    sections();
+    checkSections();
     forEach("buffers", [&](json& buffer, const std::string& where) { checkBuffer(buffer, where); });
     forEach("bufferViews", [&](json& view, const std::string& where) { checkView(view, where); });
     forEach("accessors",
@@ -56,17 +76,12 @@ class ReferenceCheck {
     return std::string(section == "meshes" ? "mesh" : section.substr(0, section.size() - 1));
   }
 
-  void sections() {
-    for (const char* name : {"buffers", "bufferViews", "accessors", "materials", "meshes", "skins",
-                             "nodes", "animations", "scenes", "cameras"}) {
+  void checkSections() {
+    for (const auto& [name, bytesEach] : sections) {
       const auto section = root_.find(name);
       if (section == root_.end()) continue;
       if (!section->is_array()) failInvalid(inQuotes(name), " is not an array");
-      const std::size_t most = std::string_view(name) == "materials" ? mostMaterials : mostOfAKind;
-      if (section->size() > most) {
-        fail(ErrorCode::limitExceeded, join("the file has ", section->size(), " ", name,
-                                            ", and at most ", most, " are read"));
-      }
+      spend(budget_, section->size(), bytesEach, join(section->size(), " ", name));
       for (std::size_t i = 0; i < section->size(); ++i) {
         if (!(*section)[i].is_object()) failInvalid(kindOf(name), " ", i, " is not an object");
       }
@@ -180,6 +195,7 @@ class ReferenceCheck {
   // Attributes or morph targets: a name to an accessor.
   void attributes(json& object, const std::string& where) const {
     if (!object.is_object()) failInvalid(where, " is not an object");
+    spend(budget_, object.size(), bytesPerAttribute, where);
     for (const auto& entry : object.items()) {
       inRange(entry.value(), "accessors", join(where, ": ", inQuotes(entry.key())));
     }
@@ -313,6 +329,7 @@ class ReferenceCheck {
   void checkMesh(json& mesh, const std::string& where) const {
     json& primitives = requireArray(mesh, "primitives", where);
     if (primitives.empty()) failInvalid(where, ": primitives is an empty array");
+    spend(budget_, primitives.size(), bytesPerPrimitive, where);
     std::size_t index = 0;
     for (json& primitive : primitives) {
       const std::string place = join(where, " primitive ", index++);
@@ -324,7 +341,9 @@ class ReferenceCheck {
         failInvalid(place, ": mode is none of 0 to 6");
       }
       if (primitive.contains("targets")) {
-        for (json& target : requireArray(primitive, "targets", place)) {
+        json& targets = requireArray(primitive, "targets", place);
+        spend(budget_, targets.size(), bytesPerTarget, place);
+        for (json& target : targets) {
           attributes(target, place + " targets");
         }
       }
@@ -386,6 +405,7 @@ class ReferenceCheck {
 
   void checkAnimation(json& animation, const std::string& where) const {
     json& samplers = requireArray(animation, "samplers", where);
+    spend(budget_, samplers.size(), bytesPerSampler, where);
     std::size_t index = 0;
     for (json& sampler : samplers) {
       const std::string place = join(where, " sampler ", index++);
@@ -398,6 +418,7 @@ class ReferenceCheck {
       }
     }
     json& channels = requireArray(animation, "channels", where);
+    spend(budget_, channels.size(), bytesPerChannel, where);
     index = 0;
     for (json& channel : channels) {
       checkChannel(channel, samplers.size(), join(where, " channel ", index++));
@@ -426,12 +447,13 @@ class ReferenceCheck {
   static constexpr const char* unknownPath = "";
 
   json& root_;
+  MemoryBudget& budget_;
 };
 
 }  // namespace
 
-void checkReferences(json& root) {
-  ReferenceCheck(root).run();
+void checkReferences(json& root, MemoryBudget& budget) {
+  ReferenceCheck(root, budget).run();
 }
 
 }  // namespace dermis::gltf

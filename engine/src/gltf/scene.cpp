@@ -80,6 +80,9 @@ void readScene(Source& source, Model& model) {
     if (!reachable[i] || node.skin == none) continue;
     readMesh(source, model, node.mesh);
     const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
+    // A few nodes and a few primitives make many pairs of them.
+    source.spend(primitives.size(), 2 * sizeof(SkinnedPrimitive),
+                 join("node ", i, " and the primitives of mesh ", node.mesh));
     for (std::uint32_t j = 0; j < primitives.size(); ++j) {
       if (primitives[j].vertexCount == 0) continue;
       if (primitives[j].influences.empty()) ++inBindPose;

@@ -31,10 +31,8 @@ JointMatrix toJointMatrix(const float* columns, const std::string& where) {
 
 std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, std::size_t joints,
                                                  const std::string& where) {
-  if (accessor < 0) {
-    source.spend(joints * sizeof(JointMatrix), where);
-    return std::vector<JointMatrix>(joints);
-  }
+  source.spend(joints, sizeof(JointMatrix), where);
+  if (accessor < 0) return std::vector<JointMatrix>(joints);
   const std::string place = where + " inverseBindMatrices";
   source.require(accessor, TINYGLTF_TYPE_MAT4, matrixFormat, place);
   source.requireNoStride(accessor, place);
@@ -45,7 +43,6 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
   // An accessor of zeros: no matrix in it would pass.
   if (source.hasNoData(accessor)) return std::vector<JointMatrix>(joints);
   const std::vector<float> floats = source.floats(accessor);
-  source.spend(joints * sizeof(JointMatrix), where);
   std::vector<JointMatrix> matrices(joints);
   for (std::size_t i = 0; i < joints; ++i) {
     matrices[i] = toJointMatrix(floats.data() + i * 16, join(where, ": inverse bind matrix ", i));

@@ -13,6 +13,7 @@
 #include "bounds/box.h"
 #include "bounds/extent.h"
 #include "dermis/bounds.h"
+#include "dermis/text.h"
 #include "dermis/validate.h"
 
 namespace dermis {
@@ -65,7 +66,7 @@ void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
 }
 
 Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
-  return {code, "mesh '" + std::string(mesh.name) + "'" + what};
+  return {code, "mesh " + inQuotes(mesh.name) + what};
 }
 
 /// Where each vertex may be, relative to its bind position; empty where nothing displaces it.

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <thread>
 
+#include "dermis/text.h"
+
 namespace dermis {
 namespace {
 
@@ -82,7 +84,7 @@ Result<std::vector<float>> centersOfRotation(const MeshView& mesh, std::uint32_t
                                              std::span<const std::uint32_t> triangles,
                                              const CentersOfRotationOptions& options) {
   const Error cancelled{ErrorCode::cancelled,
-                        "mesh '" + std::string(mesh.name) + "': its centres were cancelled"};
+                        "mesh " + inQuotes(mesh.name) + ": its centres were cancelled"};
   const Result<CenterOfRotationSolver> solver =
       CenterOfRotationSolver::make(mesh, jointCount, triangles);
   if (!solver) return solver.error();

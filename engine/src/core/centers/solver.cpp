@@ -4,6 +4,7 @@
 
 #include "centers/gather.h"
 #include "dermis/centers_of_rotation.h"
+#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 
@@ -16,7 +17,7 @@ using centers::PairIndex;
 using centers::Vertices;
 
 Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
-  return {code, "mesh '" + std::string(mesh.name) + "'" + what};
+  return {code, "mesh " + inQuotes(mesh.name) + what};
 }
 
 Result<void> checkTriangles(const MeshView& mesh, std::span<const std::uint32_t> triangles) {

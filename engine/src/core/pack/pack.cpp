@@ -7,6 +7,7 @@
 
 #include "abi.h"
 #include "attribute.h"
+#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "pack/check.h"
@@ -114,8 +115,8 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
 
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   if (jointCount == 0 || jointCount > maxPaletteJoints) {
-    return Error{ErrorCode::invalidArgument, "mesh '" + std::string(mesh.name) +
-                                                 "': a palette has 1 to " +
+    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) +
+                                                 ": a palette has 1 to " +
                                                  std::to_string(maxPaletteJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
@@ -124,7 +125,7 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
 
   if (wordsNeeded(mesh) > mostWords) {
     return Error{ErrorCode::limitExceeded,
-                 "mesh '" + std::string(mesh.name) + "': packed, it might be larger than 16 GiB"};
+                 "mesh " + inQuotes(mesh.name) + ": packed, it might be larger than 16 GiB"};
   }
 
   PackedMesh packed;

@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "dermis/text.h"
 #include "read.h"
 
 namespace dermis::reference {
@@ -53,7 +54,7 @@ std::optional<std::size_t> elementOf(const MorphTargetView& target, std::size_t 
 
 Error morphError(const MeshView& mesh, std::uint32_t target, const std::string& what) {
   return {ErrorCode::invalidArgument,
-          "mesh '" + std::string(mesh.name) + "': morph target " + std::to_string(target) + what};
+          "mesh " + inQuotes(mesh.name) + ": morph target " + std::to_string(target) + what};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "dermis/text.h"
 #include "dermis/validate.h"
 #include "directions.h"
 #include "methods.h"
@@ -72,8 +73,8 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
       mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPaletteJoints)));
   if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
-    return Error{ErrorCode::invalidArgument, "mesh '" + std::string(mesh.name) +
-                                                 "': " + std::string(methodName(method)) +
+    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": " +
+                                                 std::string(methodName(method)) +
                                                  " needs centres of rotation, it has none"};
   }
   const Result<std::vector<ActiveMorph>> active = activeMorphs(mesh, morphs);

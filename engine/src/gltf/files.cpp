@@ -1,0 +1,169 @@
+#include "gltf/files.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include "gltf/container.h"
+#include "gltf/failure.h"
+
+namespace dermis::gltf {
+namespace {
+
+constexpr std::uint8_t notADigit = 0xff;
+
+std::uint8_t hexadecimalDigit(char character) {
+  if (character >= '0' && character <= '9') return static_cast<std::uint8_t>(character - '0');
+  if (character >= 'a' && character <= 'f') return static_cast<std::uint8_t>(character - 'a' + 10);
+  if (character >= 'A' && character <= 'F') return static_cast<std::uint8_t>(character - 'A' + 10);
+  return notADigit;
+}
+
+// RFC 3986: a scheme is a letter and then letters, digits, '+', '-' or '.', up to a colon.
+bool hasScheme(std::string_view uri) {
+  const std::size_t colon = uri.find(':');
+  return colon != std::string_view::npos && uri.find('/') > colon;
+}
+
+// The path of a side file below the folder as its URI spells it, or a failure.
+std::filesystem::path relativePath(std::string_view uri, const std::string& where) {
+  if (hasScheme(uri)) {
+    fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a file beside this one"));
+  }
+  const std::string text = decodePercent(uri, where);
+  const bool hostile = text.empty() || text.find('\0') != std::string::npos ||
+                       text.find('\\') != std::string::npos || hasScheme(text);
+  const std::filesystem::path relative(std::u8string(text.begin(), text.end()));
+  const bool outside = hostile || relative.is_absolute() || relative.has_root_path() ||
+                       std::find(relative.begin(), relative.end(), "..") != relative.end();
+  if (outside) {
+    fail(ErrorCode::ioError,
+         join(where, ": ", inQuotes(text), " is outside the file's folder and is not opened"));
+  }
+  return relative;
+}
+
+bool isInside(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), file.begin(), file.end()).first ==
+         folder.end();
+}
+
+std::string inFull(const std::filesystem::path& path) {
+  return "'" + oneLine(path.string()) + "'";
+}
+
+std::ifstream open(const FileToRead& file, const std::string& where) {
+  errno = 0;
+  std::ifstream stream(file.path, std::ios::binary);
+  if (stream) return stream;
+  const std::string reason =
+      errno == 0 ? std::string() : ": " + std::generic_category().message(errno);
+  fail(ErrorCode::ioError, join(where, ": ", inFull(file.path), " cannot be opened", reason));
+}
+
+// As many bytes as there are, at most `count`.
+std::vector<std::byte> readBytes(std::ifstream& stream, std::uint64_t count,
+                                 const std::filesystem::path& path, const std::string& where) {
+  std::vector<std::byte> bytes(static_cast<std::size_t>(count));
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count));
+  if (stream.bad()) fail(ErrorCode::ioError, join(where, ": reading ", inFull(path), " failed"));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
+void checkSize(std::uint64_t size, const std::string& where) {
+  if (size <= largestFile) return;
+  fail(ErrorCode::limitExceeded,
+       join(where, ": ", size, " bytes, and at most ", largestFile, " of a file are read"));
+}
+
+}  // namespace
+
+FileToRead findFile(const std::filesystem::path& path, const std::string& where) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  const auto refuse = [&](const auto&... what) { fail(ErrorCode::ioError, join(where, what...)); };
+  const std::string name = inFull(path);
+  if (status.type() == std::filesystem::file_type::not_found) refuse("there is no file ", name);
+  if (error) refuse(name, " cannot be opened: ", error.message());
+  if (status.type() == std::filesystem::file_type::directory) refuse(name, " is a folder");
+  if (status.type() != std::filesystem::file_type::regular)
+    refuse(name, " is a pipe, a socket or a device, and not a file");
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error) refuse(name, " cannot be opened: ", error.message());
+  return {path, size};
+}
+
+std::vector<std::byte> readModelFile(const FileToRead& file) {
+  const std::string where = "the file";
+  std::ifstream stream = open(file, where);
+  const std::vector<std::byte> start =
+      readBytes(stream, std::min<std::uint64_t>(file.size, containerStart), file.path, where);
+  checkStart(start, file.size);
+  checkSize(file.size, where);
+  stream.clear();
+  stream.seekg(0);
+  return readBytes(stream, file.size, file.path, where);
+}
+
+SideFiles::SideFiles(std::filesystem::path folder, MemoryBudget& budget)
+    : folder_(std::move(folder)), budget_(budget) {}
+
+FileToRead SideFiles::find(std::string_view uri, const std::string& where) const {
+  const std::filesystem::path relative = relativePath(uri, where);
+  const std::string name = inQuotes(relative.string());
+  if (folder_.empty())
+    fail(ErrorCode::ioError, join(where, ": ", name, " cannot be read without a folder"));
+  const FileToRead named = findFile(folder_ / relative, where + ": ");
+  // Links are followed here, once, and what is opened has none: it must still be in the folder.
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::canonical(folder_, error);
+  const std::filesystem::path real =
+      error ? std::filesystem::path() : std::filesystem::canonical(named.path, error);
+  if (error) {
+    fail(ErrorCode::ioError, join(where, ": ", name, " cannot be opened: ", error.message()));
+  }
+  if (!isInside(real, folder)) {
+    fail(ErrorCode::ioError,
+         join(where, ": ", name,
+              " leads outside the file's folder by a symbolic link and is not opened"));
+  }
+  return {real, named.size};
+}
+
+Bytes SideFiles::read(const FileToRead& file, std::uint64_t needed, const std::string& where) {
+  const std::uint64_t count = std::min(needed, file.size);
+  Bytes& known = read_[file.path];
+  const std::uint64_t before = known == nullptr ? 0 : known->size();
+  if (known != nullptr && before >= count) return known;
+  checkSize(count, where);
+  budget_.addFile(count - before);
+  spend(budget_, count, 1, where);
+  std::ifstream stream = open(file, where);
+  known =
+      std::make_shared<const std::vector<std::byte>>(readBytes(stream, count, file.path, where));
+  return known;
+}
+
+std::string decodePercent(std::string_view text, const std::string& where) {
+  std::string decoded;
+  decoded.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      decoded.push_back(text[i]);
+      continue;
+    }
+    const std::uint8_t high = i + 2 < text.size() ? hexadecimalDigit(text[i + 1]) : notADigit;
+    const std::uint8_t low = i + 2 < text.size() ? hexadecimalDigit(text[i + 2]) : notADigit;
+    if (high == notADigit || low == notADigit) {
+      failInvalid(where, ": character ", i, " of its uri is a '%' without two digits");
+    }
+    decoded.push_back(static_cast<char>(high << 4 | low));
+    i += 2;
+  }
+  return decoded;
+}
+
+}  // namespace dermis::gltf
