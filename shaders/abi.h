@@ -222,8 +222,7 @@ DERMIS_CONSTANT RESULT_WORDS = 8u;
 DERMIS_CONSTANT CANDIDATE_SLOT = 0u;  // its place in the visibility and history buffers
 DERMIS_CONSTANT CANDIDATE_VERSION =
     1u;  // of what it should show; different for all instances and poses
-DERMIS_CONSTANT CANDIDATE_OWNER = 2u;  // who has the slot
-DERMIS_CONSTANT CANDIDATE_WORDS = 4u;
+DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
 // … for each of their dispatches its groups …
 DERMIS_CONSTANT CULLED_DISPATCH_GROUPS = 0u;  // word offset of the first group record
 DERMIS_CONSTANT CULLED_DISPATCH_GROUP_COUNT = 1u;
@@ -234,11 +233,10 @@ DERMIS_CONSTANT CULLED_DISPATCH_WORDS = 4u;
 DERMIS_CONSTANT INDIRECT_WORDS = 4u;
 
 // What the GPU remembers of a slot.
-DERMIS_CONSTANT HISTORY_OWNER = 0u;
-DERMIS_CONSTANT HISTORY_VERSION = 1u;       // that was last skinned
-DERMIS_CONSTANT HISTORY_LAST_VISIBLE = 2u;  // frame
-DERMIS_CONSTANT HISTORY_MOVES = 3u;  // 1: its previous positions are not its positions
-DERMIS_CONSTANT HISTORY_WORDS = 4u;
+DERMIS_CONSTANT HISTORY_VERSION = 0u;       // that was last skinned
+DERMIS_CONSTANT HISTORY_LAST_VISIBLE = 1u;  // frame
+DERMIS_CONSTANT HISTORY_MOVES = 2u;         // 1: its previous positions are not its positions
+DERMIS_CONSTANT HISTORY_WORDS = 3u;
 
 // What the visibility kernel counts, for the engine's statistics.
 DERMIS_CONSTANT COUNTER_VISIBLE = 0u;

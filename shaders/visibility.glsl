@@ -40,18 +40,20 @@ void clearResult(uint record) {
 }
 
 // Whether an instance has to be looked at by the skin kernel; `flags` are those of its record.
+//
+// The history of a slot that another instance had before does no harm: no two instances share a version, so that what is new is
+// skinned; and a new instance restarts its motion in the first frame that asks for it here. Where it is not visible in that frame,
+// the slot's last visible frame lies before it, and motion restarts when it is seen.
 bool choose(uint candidate, uint record, inout uint flags) {
   uint slot = tables[candidate + CANDIDATE_SLOT];
   if (visibility[slot] == 0u) return false;
   atomicAdd(counters[COUNTER_VISIBLE], 1u);
   uint frame = push[PUSH_CULLED_FRAME];
   uint remembered = slot * HISTORY_WORDS;
-  bool isNew = history[remembered + HISTORY_OWNER] != tables[candidate + CANDIDATE_OWNER];
-  bool wasVisible = !isNew && history[remembered + HISTORY_LAST_VISIBLE] == frame - 1u;
-  history[remembered + HISTORY_OWNER] = tables[candidate + CANDIDATE_OWNER];
+  bool wasVisible = history[remembered + HISTORY_LAST_VISIBLE] == frame - 1u;
   history[remembered + HISTORY_LAST_VISIBLE] = frame;
   uint version = tables[candidate + CANDIDATE_VERSION];
-  if (isNew || history[remembered + HISTORY_VERSION] != version) {
+  if (history[remembered + HISTORY_VERSION] != version) {
     history[remembered + HISTORY_VERSION] = version;
     atomicAdd(counters[COUNTER_SKINNED], 1u);
     clearResult(record);

@@ -96,6 +96,7 @@ TEST_F(SystemTablesTest, OldTablesStayUntilTheirFramesAreComplete) {
       const PackedMesh packed = systemMesh(1, 20);
       engine.begin();
       InstanceDescription instance;
+      instance.method = Method::linear;
       instance.layout = plainLayout();
       instance.mesh = engine.addMesh(packed);
       instance.palette = engine.addPalette(systemPose(0));

@@ -251,26 +251,43 @@ TEST_F(SystemVisibilityTest, CullingOnTheGpuNeedsTheWords) {
   submit();
 }
 
-// An instance that comes in the place of one that went must be skinned, whatever the GPU remembers
-// of the old one.
+// An instance that comes in the place of one that went must be skinned, and have no motion,
+// whatever the GPU remembers of the old one: which was visible and moved in the frame before, and
+// had as many poses. `away`: so many frames in which the new one is posed, but not seen.
 TEST_F(SystemVisibilityTest, ANewInstanceIsNotTakenForTheOneBefore) {
   open(true, motionLayout());
   submit();
-  for (std::uint32_t round = 1; round < 4; ++round) {
+  for (std::uint32_t away = 0; away < 3; ++away) {
+    SCOPED_TRACE(away);
+    show(0, instanceCount);
+    moveAllInFrame(100 * away + 50);  // the old ones move
     engine_->begin();
     for (std::uint32_t i = 0; i < 10; ++i) {
       must((*engine_)->removeInstance(instances_[i]));
       instance_.palette = palettes_[i + 20];
       instances_[i] = engine_->addInstance(instance_);
     }
+    std::uint32_t by = 100 * away + 60;
+    for (std::uint32_t frame = 0; frame < away; ++frame) {
+      show(10, 10);
+      moveAll(++by);
+      submit();
+      engine_->begin();
+    }
     show(0, instanceCount);
+    moveAll(++by);
     submit();
-    const std::vector<std::byte> bytes = engine_->readOutput();
+    std::vector<std::byte> bytes = engine_->readOutput();
     for (std::uint32_t i = 0; i < 10; ++i) {
       const Streams streams = engine_->read(bytes, instances_[i]);
-      EXPECT_TRUE(streams[positionStream] == positionsIn(i + 20)) << i;
-      EXPECT_TRUE(streams[previousStream] == positionsIn(i + 20)) << i;
+      EXPECT_TRUE(streams[positionStream] == positionsIn(i + 20 + by)) << i;
+      EXPECT_TRUE(streams[previousStream] == positionsIn(i + 20 + by)) << i;
     }
+    // Nor does it settle what the old one left to settle.
+    engine_->begin();
+    submit();
+    EXPECT_EQ(completed().settledInstances, away == 0 ? 50u : 10u);
+    submit();
   }
 }
 

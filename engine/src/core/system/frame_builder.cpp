@@ -136,7 +136,6 @@ void FrameBuilder::appendCandidates() {
                 std::size_t{culledPlaces_[index] - culled_.firstInstance} * abi::CANDIDATE_WORDS];
     record[abi::CANDIDATE_SLOT] = candidate.slot;
     record[abi::CANDIDATE_VERSION] = candidate.version;
-    record[abi::CANDIDATE_OWNER] = candidate.owner;
   }
 }
 

@@ -36,7 +36,6 @@ struct InstanceExtras {
 struct Candidate {
   std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
   std::uint32_t version = 0;  ///< of what it should show; different for all instances and poses
-  std::uint32_t owner = 0;    ///< who has the slot
 };
 
 /// Groups live as long as instances are in them.

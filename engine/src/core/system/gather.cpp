@@ -132,7 +132,7 @@ void Scene::gatherCulled() {
     if (instance.extras.result != notUsed && instance.firstFrame == 0)
       builder_.clearResult(instance.extras.result);
     convertPalette(instance);
-    const Candidate candidate{index, instance.version, instance.owner};
+    const Candidate candidate{index, instance.version};
     addRuns(instance, culledFlags(instance), &candidate);
   }
 }

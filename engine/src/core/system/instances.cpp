@@ -38,7 +38,6 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   SceneInstance& added = instances_.at(handle.index);
   link(handle.index);
   if (added.isCulled) {
-    added.owner = ++nextOwner_;
     added.culledIndex = static_cast<std::uint32_t>(culled_.size());
     culled_.push_back(handle.index);
   }

@@ -105,7 +105,6 @@ struct SceneInstance {
   // Of those culled on the GPU.
   std::uint32_t version = 0;         ///< of what it should show
   std::uint32_t restartVersion = 0;  ///< the one that restarts its motion
-  std::uint32_t owner = 0;           ///< names it on the GPU
   std::uint32_t culledIndex = notUsed;
 
   // Seldom looked at.
@@ -231,14 +230,14 @@ class Scene {
   std::uint64_t record_ = 0;         ///< the last that was committed
   std::uint64_t recordedFrame_ = 0;  ///< its frame
   bool hasBegun_ = false;
-  std::uint32_t nextVersion_ = 0, nextOwner_ = 0;
+  std::uint32_t nextVersion_ = 0;
   std::vector<VertexRun> runsScratch_;
 
-  std::vector<PaletteHandle> posed_;       ///< written since the last plan
-  std::vector<InstanceHandle> pending_;    ///< stale, visible, and not culled
-  std::vector<InstanceHandle> shifting_;   ///< `target` is not `shown`
-  std::vector<std::uint32_t> culled_;      ///< all that are culled on the GPU
-  std::vector<InstanceHandle> moving_;     ///< to settle if they are not skinned: in view
+  std::vector<PaletteHandle> posed_;      ///< written since the last plan
+  std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
+  std::vector<InstanceHandle> shifting_;  ///< `target` is not `shown`
+  std::vector<std::uint32_t> culled_;     ///< all that are culled on the GPU
+  std::vector<InstanceHandle> moving_;    ///< to settle if they are not skinned: in view
 
   // Of the plan.
   std::uint64_t planNumber_ = 0;
