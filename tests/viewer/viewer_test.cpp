@@ -354,7 +354,7 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithItsOptions) {
       {{"--bogus"}, "there is no option --bogus"},
       {{"--screenshot", "x.jpg"}, "--screenshot must end in .png, not be 'x.jpg'"},
       {{model, "--screenshot", model}, "--screenshot " + model + " would overwrite"},
-      {{"--empty", "--animation", "walk"}, "--animation excludes --empty"},
+      {{"--empty", "--animation", "walk"}, "--empty excludes --animation"},
       {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no animation 'zzz'"},
   };
   for (const auto& [arguments, sentence] : wrong) {
