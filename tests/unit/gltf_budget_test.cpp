@@ -144,9 +144,6 @@ TEST_F(GltfBudget, CountsWhatIsMadeOfAText) {
     ASSERT_FALSE(result.ok()) << section;
     EXPECT_EQ(result.error().code, ErrorCode::limitExceeded) << result.error().message;
   }
-  FileBuilder targets = skinnedTriangle();
-  targets.primitive()["targets"] = std::vector<Json>(600'000, Json::object());
-  expectError(targets.load(), ErrorCode::limitExceeded, "mesh 0 primitive 0");
 }
 
 FileBuilder texturedBy(std::size_t images) {
@@ -181,7 +178,7 @@ TEST_F(GltfBudget, EqualImagesAreOne) {
 TEST_F(GltfBudget, LeavesImagesOutThatAreTooMuch) {
   constexpr std::size_t count = 300, size = 1'000'000;
   FileBuilder file = texturedBy(count);
-  const std::size_t view = file.addView(std::vector<std::byte>(size + 4 * count));
+  const std::size_t view = file.addView(std::vector<std::byte>(size + 5 * count));
   for (std::size_t i = 0; i < count; ++i) {
     Json part = file.json["bufferViews"][view];
     part["byteOffset"] = part["byteOffset"].get<std::size_t>() + 4 * i;
