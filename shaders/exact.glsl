@@ -40,6 +40,34 @@ float powerScale(float largest) {
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);
 }
 
+// The inverse of that power, exactly.
+float inversePowerScale(float largest) {
+  uint exponent = floatBitsToUint(largest) >> 23u;
+  return uintBitsToFloat((1u + min(exponent, 252u)) << 23u);
+}
+
+// Vulkan allows a division to be 2.5 units in the last place off, an inverse square root 2, and a
+// square root what those two make together. A step of Newton's method leaves about one rounding of
+// each, on any device. Zero and infinity give NaN.
+
+float quotient(float a, float b) {
+  precise float guess = a / b;
+  precise float better = guess + (a - guess * b) / b;
+  return better;
+}
+
+float inverseRoot(float square) {
+  float guess = inversesqrt(square);
+  precise float better = guess + 0.5 * guess * (1.0 - square * guess * guess);
+  return better;
+}
+
+float squareRoot(float square) {
+  float guess = sqrt(square);
+  precise float better = guess + 0.5 * (square - guess * guess) / guess;
+  return square == 0.0 ? 0.0 : better;
+}
+
 // v with length 1, at any scale of a joint, or `fallback` where v vanished.
 vec3 unitOr(vec3 v, vec3 fallback) {
   precise vec3 scaled = v * powerScale(largestComponent(v));
