@@ -24,7 +24,7 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
     vec3 row1;
     vec3 row2;
     jointRows(real, pose, joint, row0, row1, row2);
-    vec3 translation = translationOf(real, paletteDual(pose.palette, joint), 1.0);
+    vec3 translation = translationOf(real, paletteDual(pose.palette, joint), 2.0);
     r0 += weight * vec4(row0, translation.x);
     r1 += weight * vec4(row1, translation.y);
     r2 += weight * vec4(row2, translation.z);

@@ -5,7 +5,7 @@
 vec3 throughJoint(Pose pose, uint joint, vec3 point) {
   if (pose.scales) point = scalePosition(paletteScaleShear(pose, joint), point);
   vec4 real = paletteRotation(pose.palette, joint);
-  precise vec3 moved = rotateBy(real, 1.0, point) + translationOf(real, paletteDual(pose.palette, joint), 1.0);
+  precise vec3 moved = rotateBy(real, 2.0, point) + translationOf(real, paletteDual(pose.palette, joint), 2.0);
   return moved;
 }
 
@@ -24,7 +24,7 @@ Vertex skinCenterOfRotation(Vertex vertex, Influences influences, Pose pose, vec
   precise vec3 lever = vertex.position - center;
   vertex.position = lever;
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, dot4(blend.real, blend.real), linearPoint(influences, pose, center), withNormal,
+  return turnVertex(scaled, blend.real, turningFactor(blend.real), linearPoint(influences, pose, center), withNormal,
                     withTangent);
 }
 
@@ -32,12 +32,12 @@ Vertex skinCenterOfRotation(Vertex vertex, Influences influences, Pose pose, vec
 Vertex skinBulgeControlled(Vertex vertex, Influences influences, Pose pose, vec3 center, float strength, bool withNormal,
                            bool withTangent) {
   Blend blend = blendJoints(influences, pose);
-  float squaredLength = dot4(blend.real, blend.real);
-  vec3 translation = translationOf(blend.real, blend.dual, squaredLength);
+  float factor = turningFactor(blend.real);
+  vec3 translation = translationOf(blend.real, blend.dual, factor);
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   vec3 scaledCenter = scalePosition(scaled.part, center);
-  precise vec3 bulged = rotateBy(blend.real, squaredLength, scaledCenter) + translation;
+  precise vec3 bulged = rotateBy(blend.real, factor, scaledCenter) + translation;
   precise vec3 drawn =
       translation + strength * (linearPoint(influences, pose, center) - bulged);
-  return turnVertex(scaled, blend.real, squaredLength, drawn, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, factor, drawn, withNormal, withTangent);
 }

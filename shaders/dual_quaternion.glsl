@@ -76,28 +76,33 @@ Scaled scaleVertex(Vertex vertex, Influences influences, Pose pose, bool withNor
   return scaled;
 }
 
-// The second phase: turned by a quaternion of any length but 0, then moved. Directions stay of unit length.
-Vertex turnVertex(Scaled scaled, vec4 real, float squaredLength, vec3 translation, bool withNormal, bool withTangent) {
+// 2 / |q|².
+float turningFactor(vec4 q) {
+  precise float factor = 2.0 / dot4(q, q);
+  return factor;
+}
+
+// The second phase: turned by a quaternion q of any length but 0, `factor` being 2 / |q|², then moved. Directions stay of unit length.
+Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation, bool withNormal, bool withTangent) {
   Vertex skinned = scaled.vertex;
-  precise vec3 position = rotateBy(real, squaredLength, scaled.vertex.position) + translation;
+  precise vec3 position = rotateBy(real, factor, scaled.vertex.position) + translation;
   skinned.position = position;
-  if (withNormal) skinned.normal = rotateBy(real, squaredLength, scaled.vertex.normal);
+  if (withNormal) skinned.normal = rotateBy(real, factor, scaled.vertex.normal);
   if (withTangent) {
-    skinned.tangent = tangentOf(rotateBy(real, squaredLength, scaled.vertex.tangent.xyz), scaled.vertex.tangent.w, scaled.side);
+    skinned.tangent = tangentOf(rotateBy(real, factor, scaled.vertex.tangent.xyz), scaled.vertex.tangent.w, scaled.side);
   }
   return skinned;
 }
 
 // The translation of a dual quaternion of any length but 0. Dividing by the squared length replaces normalising.
-vec3 translationOf(vec4 real, vec4 dual, float squaredLength) {
-  precise vec3 translation = (real.w * dual.xyz - dual.w * real.xyz + cross3(real.xyz, dual.xyz)) * (2.0 / squaredLength);
+vec3 translationOf(vec4 real, vec4 dual, float factor) {
+  precise vec3 translation = (real.w * dual.xyz - dual.w * real.xyz + cross3(real.xyz, dual.xyz)) * factor;
   return translation;
 }
 
 Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
   Blend blend = blendJoints(influences, pose);
-  float squaredLength = dot4(blend.real, blend.real);
+  float factor = turningFactor(blend.real);
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, squaredLength, translationOf(blend.real, blend.dual, squaredLength), withNormal,
-                    withTangent);
+  return turnVertex(scaled, blend.real, factor, translationOf(blend.real, blend.dual, factor), withNormal, withTangent);
 }

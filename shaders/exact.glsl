@@ -1,5 +1,6 @@
-// Arithmetic that a compiler may not reorder. Built-in dot, cross and normalize may be computed in any order and differ
-// between specialisations of one kernel, so every sum that reaches an output is spelled out here.
+// Arithmetic that a compiler may not reorder. Built-in dot, cross and normalize may be computed in
+// any order and differ between specialisations of one kernel, so every sum that reaches an output
+// is spelled out here.
 
 float dot3(vec3 a, vec3 b) {
   precise float sum = a.x * b.x + a.y * b.y + a.z * b.z;
@@ -12,18 +13,59 @@ float dot4(vec4 a, vec4 b) {
 }
 
 vec3 cross3(vec3 a, vec3 b) {
-  precise vec3 product =
-      vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+  precise vec3 product = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
   return product;
 }
 
-float largestComponent(vec3 v) { return max(abs(v.x), max(abs(v.y), abs(v.z))); }
+float largestComponent(vec3 v) {
+  return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}
 
-// The power of two that brings a normal number to between a half and 4, and a subnormal one to at least 2^-23, so that its square
-// neither overflows nor vanishes: multiplying by it rounds nothing, and takes less time than a division.
+// NaN and infinity are told by their bits: without SignedZeroInfNanPreserve a driver may take isnan
+// and isinf for false, and a comparison with NaN for anything.
+bool isNan(float value) {
+  return (floatBitsToUint(value) & 0x7fffffffu) > 0x7f800000u;
+}
+
+bool isFinite(vec4 v) {
+  const uvec4 exponent = uvec4(0x7f800000u);
+  return all(notEqual(floatBitsToUint(v) & exponent, exponent));
+}
+
+// The power of two that brings a normal number to between a half and 4, and a subnormal one to at
+// least 2^-23, so that its square neither overflows nor vanishes: multiplying by it rounds nothing,
+// and takes less time than a division.
 float powerScale(float largest) {
   uint exponent = floatBitsToUint(largest) >> 23u;
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);
+}
+
+// The inverse of that power, exactly.
+float inversePowerScale(float largest) {
+  uint exponent = floatBitsToUint(largest) >> 23u;
+  return uintBitsToFloat((1u + min(exponent, 252u)) << 23u);
+}
+
+// Vulkan allows a division to be 2.5 units in the last place off, an inverse square root 2, and a
+// square root what those two make together. A step of Newton's method leaves about one rounding of
+// each, on any device. Zero and infinity give NaN.
+
+float quotient(float a, float b) {
+  precise float guess = a / b;
+  precise float better = guess + (a - guess * b) / b;
+  return better;
+}
+
+float inverseRoot(float square) {
+  float guess = inversesqrt(square);
+  precise float better = guess + 0.5 * guess * (1.0 - square * guess * guess);
+  return better;
+}
+
+float squareRoot(float square) {
+  float guess = sqrt(square);
+  precise float better = guess + 0.5 * (square - guess * guess) / guess;
+  return square == 0.0 ? 0.0 : better;
 }
 
 // v with length 1, at any scale of a joint, or `fallback` where v vanished.

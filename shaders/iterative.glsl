@@ -1,11 +1,11 @@
-// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean screw from it to the
-// joints', until that is nothing. Needs dual_quaternion and dual_exponential.
+// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean
+// screw from it to the joints', until that is nothing. Needs dual_quaternion and dual_exponential.
 
 // Reached where joints all but contradict each other; elsewhere a handful are enough.
 const uint MOST_STEPS = 20u;
 
 void makeUnit(inout vec4 real, inout vec4 dual) {
-  precise float inverse = inversesqrt(dot4(real, real));
+  float inverse = inverseRoot(dot4(real, real));
   precise vec4 unit = inverse * real;
   precise vec4 scaled = inverse * dual;
   precise vec4 orthogonal = scaled - dot4(unit, scaled) * unit;
@@ -13,7 +13,7 @@ void makeUnit(inout vec4 real, inout vec4 dual) {
   dual = orthogonal;
 }
 
-// The mean screw from a transform to the joints', and the square of how far their dual parts reach.
+// The mean screw from a transform to the joints', and how far their dual parts reach.
 Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 pivot, out float reach) {
   precise vec3 turn = vec3(0.0);
   precise vec3 shift = vec3(0.0);
@@ -25,7 +25,7 @@ Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 piv
     uint joint = influenceJoint(influences, slot);
     vec4 jointReal = paletteRotation(pose.palette, joint);
     vec4 jointDual = paletteDual(pose.palette, joint);
-    reach = max(reach, dot4(jointDual, jointDual));
+    reach = max(reach, max(largestComponent(jointDual.xyz), abs(jointDual.w)));
     if (dot4(pivot, jointReal) < 0.0) {
       jointReal = -jointReal;
       jointDual = -jointDual;
@@ -52,10 +52,14 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
     blend.real = quaternionProduct(blend.real, real);
     blend.dual = movedDual;
     makeUnit(blend.real, blend.dual);
-    // Five roundings.
-    precise float near = 9e-14 * reach;
-    if (dot3(screw.real, screw.real) <= 9e-14 && dot3(screw.dual, screw.dual) <= near) break;
+    // Five roundings. Joints may be so far away that the square of it is infinite, or so near that
+    // it is 0.
+    float scale = powerScale(reach);
+    precise float scaledReach = scale * reach;
+    precise vec3 shift = scale * screw.dual;
+    precise float near = 9e-14 * scaledReach * scaledReach;
+    if (dot3(screw.real, screw.real) <= 9e-14 && dot3(shift, shift) <= near) break;
   }
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, 1.0, translationOf(blend.real, blend.dual, 1.0), withNormal, withTangent);
+  return turnVertex(scaled, blend.real, 2.0, translationOf(blend.real, blend.dual, 2.0), withNormal, withTangent);
 }

@@ -1,5 +1,6 @@
-// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): the joints' logarithms, 3×4 matrices that the palette kernel made, are
-// blended, and the exponential is taken as Alexa 2002 does, by scaling and squaring. Needs dual_quaternion.
+// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): the joints' logarithms, 3×4 matrices
+// that the palette kernel made, are blended, and the exponential is taken as Alexa 2002 does, by
+// scaling and squaring. Needs dual_quaternion.
 
 struct Affine {  // rows; the fourth is 0 0 0 1, or 0 0 0 0 of a logarithm
   vec4 r0;
@@ -17,6 +18,8 @@ float rowSum(vec4 row) {
   return sum;
 }
 
+const float INVERSES[8] = float[8](1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0);
+
 Affine exponentialOf(Affine logarithm) {
   // Halved until its norm is at most a half: then eight terms are exact to 2e-9.
   precise float norm = max(rowSum(logarithm.r0), max(rowSum(logarithm.r1), rowSum(logarithm.r2)));
@@ -33,7 +36,7 @@ Affine exponentialOf(Affine logarithm) {
   Affine l = Affine(l0, l1, l2);
   Affine power = Affine(vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
   for (uint term = 8u; term > 0u; --term) {
-    float inverse = 1.0 / float(term);
+    float inverse = INVERSES[term - 1u];
     precise vec4 r0 = vec4(1.0, 0.0, 0.0, 0.0) + inverse * (rowTimes(l.r0, power) + vec4(0.0, 0.0, 0.0, l.r0.w));
     precise vec4 r1 = vec4(0.0, 1.0, 0.0, 0.0) + inverse * (rowTimes(l.r1, power) + vec4(0.0, 0.0, 0.0, l.r1.w));
     precise vec4 r2 = vec4(0.0, 0.0, 1.0, 0.0) + inverse * (rowTimes(l.r2, power) + vec4(0.0, 0.0, 0.0, l.r2.w));
@@ -48,7 +51,9 @@ Affine exponentialOf(Affine logarithm) {
   return power;
 }
 
-vec3 direct(Affine m, vec3 v) { return vec3(dot3(m.r0.xyz, v), dot3(m.r1.xyz, v), dot3(m.r2.xyz, v)); }
+vec3 direct(Affine m, vec3 v) {
+  return vec3(dot3(m.r0.xyz, v), dot3(m.r1.xyz, v), dot3(m.r2.xyz, v));
+}
 
 Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
   precise vec4 r0 = vec4(0.0);

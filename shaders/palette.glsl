@@ -20,8 +20,6 @@ layout(set = 0, binding = BINDING_RESULTS, std430) writeonly buffer Results { ui
 shared uint nonRigidJoints;
 shared uint nonFiniteJoints;
 
-bool isFinite(vec4 v) { return !any(isnan(v)) && !any(isinf(v)); }
-
 // A joint is rigid when det > 0 and no row of CᵀC − 1 sums, by absolute values, to more than 8e-6: then no singular value is
 // further than 4e-6 from 1, and no decomposition is needed to know it. (Single entries would not do: nine of 8e-6 make a
 // stretch of 12e-6.)

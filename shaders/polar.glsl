@@ -1,13 +1,14 @@
 // Polar decomposition of a 3×3 matrix. Needs exact.glsl and quaternion.glsl.
 
-// One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are the other two indices, vp and vq
-// the eigenvectors so far. In scalars, since drivers keep an array that is indexed in memory.
+// One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are
+// the other two indices, vp and vq the eigenvectors so far. In scalars, since drivers keep an array
+// that is indexed in memory.
 void turnJacobi(inout float app, inout float aqq, inout float apq, inout float ajp, inout float ajq, inout float akp,
                 inout float akq, inout vec4 vp, inout vec4 vq) {
   precise float theta = (aqq - app) / (2.0 * apq);
   precise float tangent = (theta < 0.0 ? -1.0 : 1.0) / (abs(theta) + sqrt(1.0 + theta * theta));
   if (apq == 0.0 || abs(theta) > 1e18) tangent = 0.0;
-  precise float cosine = inversesqrt(1.0 + tangent * tangent);
+  float cosine = inverseRoot(1.0 + tangent * tangent);
   precise float sine = tangent * cosine;
   precise float p = app - tangent * apq;
   precise float q = aqq + tangent * apq;
@@ -26,9 +27,10 @@ void turnJacobi(inout float app, inout float aqq, inout float apq, inout float a
   vq = turnedQ;
 }
 
-// The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue of a symmetric 4×4
-// matrix (Horn 1987, "Closed-form solution of absolute orientation using unit quaternions"). It also is the right rotation
-// for a matrix of rank 2, and finite for any. Cyclic Jacobi, which is as exact as float32 allows.
+// The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue
+// of a symmetric 4×4 matrix (Horn 1987, "Closed-form solution of absolute orientation using unit
+// quaternions"). It also is the right rotation for a matrix of rank 2, and finite for any. Cyclic
+// Jacobi; `refineRotation` does the rest.
 vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   precise float xx = r0.x - r1.y - r2.z;
   precise float yy = -r0.x + r1.y - r2.z;
@@ -61,8 +63,7 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
 
   float largest = max(max(xx, yy), max(zz, ww));
   vec4 q = xx == largest ? vx : (yy == largest ? vy : (zz == largest ? vz : vw));
-  precise vec4 unit = q * inversesqrt(dot4(q, q));
-  return unit;
+  return unitQuaternion(q);
 }
 
 // A scale/shear part: the symmetric matrix S of C = R S.
@@ -71,8 +72,89 @@ struct ScaleShear {
   vec3 mixed;     // xy xz yz
 };
 
-// The determinant of a matrix given by its rows, and how large it would be if no product in it cancelled: what its rounding
-// error is measured by.
+// Adds a b to a sum of two floats each, without a rounding: the product is taken apart as Dekker
+// does (1971, "A floating-point technique for extending the available precision"), the sum as Knuth
+// does.
+void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
+  precise vec4 product = a * b;
+  precise float wideA = 4097.0 * a;
+  precise float highA = wideA - (wideA - a);
+  precise float lowA = a - highA;
+  precise vec4 wideB = 4097.0 * b;
+  precise vec4 highB = wideB - (wideB - b);
+  precise vec4 lowB = b - highB;
+  precise vec4 lost = ((highA * highB - product) + highA * lowB + lowA * highB) + lowA * lowB;
+  precise vec4 total = sum + product;
+  precise vec4 part = total - sum;
+  precise vec4 lostToo = (sum - (total - part)) + (product - part);
+  precise vec4 restSoFar = rest + (lost + lostToo);
+  sum = total;
+  rest = restSoFar;
+}
+
+// Horn's matrix of C, the one that `nearestRotation` takes the eigenvector of, times q, less q
+// times what that is along q. Where C stretches by 1000 the rest is a millionth of the terms, and
+// is wanted to more than a digit.
+vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
+  vec4 sum = vec4(0.0);
+  vec4 rest = vec4(0.0);
+  addExactly(sum, rest, r0.x, vec4(q.x, -q.y, -q.z, q.w));
+  addExactly(sum, rest, r1.y, vec4(-q.x, q.y, -q.z, q.w));
+  addExactly(sum, rest, r2.z, vec4(-q.x, -q.y, q.z, q.w));
+  addExactly(sum, rest, r0.y, vec4(q.y, q.x, -q.w, -q.z));
+  addExactly(sum, rest, r1.x, vec4(q.y, q.x, q.w, q.z));
+  addExactly(sum, rest, r0.z, vec4(q.z, q.w, q.x, q.y));
+  addExactly(sum, rest, r2.x, vec4(q.z, -q.w, q.x, -q.y));
+  addExactly(sum, rest, r1.z, vec4(-q.w, q.z, q.y, -q.x));
+  addExactly(sum, rest, r2.y, vec4(q.w, q.z, q.y, q.x));
+  addExactly(sum, rest, -dot4(q, sum), q);
+  precise vec4 residual = sum + rest;
+  return residual;
+}
+
+// Rᵀ C made symmetric: its columns are those of C turned back. q is of length 1 but for roundings,
+// and 2 / |q|² nearly 2 (2 − |q|²).
+ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
+  vec4 back = vec4(-q.xyz, q.w);
+  precise float factor = 2.0 * (2.0 - dot4(q, q));
+  vec3 s0 = rotateBy(back, factor, vec3(r0.x, r1.x, r2.x));
+  vec3 s1 = rotateBy(back, factor, vec3(r0.y, r1.y, r2.y));
+  vec3 s2 = rotateBy(back, factor, vec3(r0.z, r1.z, r2.z));
+  precise vec3 mixed = 0.5 * vec3(s1.x + s0.y, s2.x + s0.z, s2.y + s1.z);
+  return ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
+}
+
+// Newton's method for the polar decomposition. Rᵀ C is symmetric for the right R; for R' = R (1 −
+// [ω]×) it is not, by a vector that is (tr S − S) ω. The residual, turned back, has that vector.
+// Without this the rotation would be known only to a few roundings times σ₁ / (σ₂ + σ₃), its
+// condition, and for vertices that are also moved by other joints that counts.
+vec4 refineRotation(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
+  for (uint step = 0u; step < 3u; ++step) {
+    vec4 residual = eigenvectorResidual(q, r0, r1, r2);
+    vec3 asymmetry = quaternionProduct(vec4(-q.xyz, q.w), residual).xyz;
+    ScaleShear s = scaleShearOf(q, r0, r1, r2);
+    precise float trace = s.diagonal.x + s.diagonal.y + s.diagonal.z;
+    vec3 h0 = vec3(s.diagonal.y + s.diagonal.z, -s.mixed.x, -s.mixed.y);
+    vec3 h1 = vec3(-s.mixed.x, s.diagonal.x + s.diagonal.z, -s.mixed.z);
+    vec3 h2 = vec3(-s.mixed.y, -s.mixed.z, s.diagonal.x + s.diagonal.y);
+    vec3 c0 = cross3(h1, h2);
+    vec3 c1 = cross3(h2, h0);
+    vec3 c2 = cross3(h0, h1);
+    precise float determinant = dot3(h0, c0);
+    precise float negligible = 1e-6 * trace * trace * trace;
+    if (determinant <= negligible) break;  // of rank 1
+    precise vec3 turn = vec3(dot3(c0, asymmetry), dot3(c1, asymmetry), dot3(c2, asymmetry)) / determinant;
+    float square = dot3(turn, turn);
+    if (square > 0.01) break;
+    precise vec3 halfTurn = 0.5 * turn;
+    q = unitQuaternion(quaternionProduct(q, vec4(halfTurn, 1.0)));
+    if (square <= 1e-9) break;
+  }
+  return q;
+}
+
+// The determinant of a matrix given by its rows, and how large it would be if no product in it
+// cancelled: what its rounding error is measured by.
 float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   vec3 c = cross3(r1, r2);
   precise vec3 uncancelled = abs(r1.yzx * r2.zxy) + abs(r1.zxy * r2.yzx);
@@ -80,8 +162,9 @@ float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   return dot3(r0, c);
 }
 
-// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the sign goes into S; one that
-// rounding may have made negative (24 roundings of 2^-24) counts as 0: a flat matrix has one of either sign.
+// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the
+// sign goes into S; one that rounding may have made negative (24 roundings of 2^-24) counts as 0: a
+// flat matrix has one of either sign.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
   if (largest == 0.0) {
@@ -89,20 +172,18 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
     scaleShear = ScaleShear(vec3(0.0), vec3(0.0));
     return;
   }
-  precise vec3 n0 = r0 / largest;
-  precise vec3 n1 = r1 / largest;
-  precise vec3 n2 = r2 / largest;
+  float scale = powerScale(largest);
+  precise vec3 n0 = r0 * scale;
+  precise vec3 n1 = r1 * scale;
+  precise vec3 n2 = r2 * scale;
   float magnitude;
   float determinant = determinantOf(n0, n1, n2, magnitude);
   float side = determinant < -1.43e-6 * magnitude ? -1.0 : 1.0;
-  rotation = nearestRotation(side * n0, side * n1, side * n2);
-
-  // Columns of S: each column of C turned back, averaged with its transpose.
-  vec4 back = vec4(-rotation.xyz, rotation.w);
-  float squared = dot4(rotation, rotation);
-  precise vec3 s0 = rotateBy(back, squared, vec3(r0.x, r1.x, r2.x));
-  precise vec3 s1 = rotateBy(back, squared, vec3(r0.y, r1.y, r2.y));
-  precise vec3 s2 = rotateBy(back, squared, vec3(r0.z, r1.z, r2.z));
-  precise vec3 mixed = 0.5 * vec3(s1.x + s0.y, s2.x + s0.z, s2.y + s1.z);
-  scaleShear = ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
+  vec4 nearest = nearestRotation(side * n0, side * n1, side * n2);
+  rotation = refineRotation(nearest, side * n0, side * n1, side * n2);
+  ScaleShear scaled = scaleShearOf(rotation, n0, n1, n2);
+  float back = inversePowerScale(largest);
+  precise vec3 diagonal = scaled.diagonal * back;
+  precise vec3 mixed = scaled.mixed * back;
+  scaleShear = ScaleShear(diagonal, mixed);
 }

@@ -1,29 +1,44 @@
 // Quaternions are x y z w, Hamilton's. Needs exact.glsl.
 
-// The unit quaternion of a rotation given by its rows, by the largest of the four squared components (Shepperd 1978).
+vec4 unitQuaternion(vec4 q) {
+  precise vec4 unit = q * inverseRoot(dot4(q, q));
+  return unit;
+}
+
+// The unit quaternion of a matrix C that is all but a rotation, given by its rows: the first guess
+// by the largest of the four squared components (Shepperd 1978), which is a column of the symmetric
+// matrix below. For a rotation all its columns are multiples of the quaternion. Of a matrix that is
+// not quite orthogonal the guess is turned by up to 1.25 times the largest row sum of CᵀC − 1: a
+// step of the power method squares that, so that what is left is the rotation of the polar
+// decomposition.
 vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
   precise float x = 1.0 + r0.x - r1.y - r2.z;
   precise float y = 1.0 - r0.x + r1.y - r2.z;
   precise float z = 1.0 - r0.x - r1.y + r2.z;
   precise float w = 1.0 + r0.x + r1.y + r2.z;
-  precise vec4 q;
+  precise vec3 sums = vec3(r1.z + r2.y, r0.z + r2.x, r0.y + r1.x);
+  precise vec3 differences = vec3(r2.y - r1.z, r0.z - r2.x, r1.x - r0.y);
+  vec4 ofX = vec4(x, sums.z, sums.y, differences.x);
+  vec4 ofY = vec4(sums.z, y, sums.x, differences.y);
+  vec4 ofZ = vec4(sums.y, sums.x, z, differences.z);
+  vec4 ofW = vec4(differences, w);
+  vec4 guess = ofZ;
   if (w >= x && w >= y && w >= z) {
-    q = vec4(r2.y - r1.z, r0.z - r2.x, r1.x - r0.y, w);
+    guess = ofW;
   } else if (x >= y && x >= z) {
-    q = vec4(x, r0.y + r1.x, r0.z + r2.x, r2.y - r1.z);
+    guess = ofX;
   } else if (y >= z) {
-    q = vec4(r0.y + r1.x, y, r1.z + r2.y, r0.z - r2.x);
-  } else {
-    q = vec4(r0.z + r2.x, r1.z + r2.y, z, r1.x - r0.y);
+    guess = ofY;
   }
-  precise vec4 unit = q * inversesqrt(dot4(q, q));
-  return unit;
+  precise vec4 q = guess.x * ofX + guess.y * ofY + guess.z * ofZ + guess.w * ofW;
+  return unitQuaternion(q);
 }
 
-// v turned by a quaternion of any length but 0, whose squared length is given: v + 2 r × (r × v + w v) / |q|².
-vec3 rotateBy(vec4 q, float squaredLength, vec3 v) {
+// v turned by a quaternion of any length but 0, `factor` being 2 / |q|²: v + factor r × (r × v + w
+// v).
+vec3 rotateBy(vec4 q, float factor, vec3 v) {
   precise vec3 inner = cross3(q.xyz, v) + q.w * v;
-  precise vec3 turned = v + cross3(q.xyz, inner) * (2.0 / squaredLength);
+  precise vec3 turned = v + cross3(q.xyz, inner) * factor;
   return turned;
 }
 
@@ -41,7 +56,9 @@ vec4 quaternionProduct(vec4 a, vec4 b) {
   return vec4(vector, scalar);
 }
 
-vec4 conjugateOf(vec4 q) { return vec4(-q.xyz, q.w); }
+vec4 conjugateOf(vec4 q) {
+  return vec4(-q.xyz, q.w);
+}
 
 // The rows of the rotation of a unit quaternion.
 void rowsOfQuaternion(vec4 q, out vec3 r0, out vec3 r1, out vec3 r2) {

@@ -1,7 +1,7 @@
 // Quaternions and translations, each blended on its own (Hejl 2004). Needs dual_quaternion.
 
 vec3 jointTranslation(Pose pose, uint joint) {
-  return translationOf(paletteRotation(pose.palette, joint), paletteDual(pose.palette, joint), 1.0);
+  return translationOf(paletteRotation(pose.palette, joint), paletteDual(pose.palette, joint), 2.0);
 }
 
 Vertex skinQuaternionTranslation(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
@@ -11,5 +11,5 @@ Vertex skinQuaternionTranslation(Vertex vertex, Influences influences, Pose pose
     translation += influenceWeight(influences, slot) * jointTranslation(pose, influenceJoint(influences, slot));
   }
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, dot4(blend.real, blend.real), translation, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, turningFactor(blend.real), translation, withNormal, withTangent);
 }

@@ -1,19 +1,20 @@
-// What is found out about an instance besides its vertices: the box of its positions, and how many were clamped. Needs abi.h.
+// What is found out about an instance besides its vertices: the box of its positions, and how many were clamped. Needs abi.h and exact.glsl.
 
 #ifdef EXTRAS
 
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { uint results[]; };
 
-// As unsigned numbers these have the order of the floats.
+// As unsigned numbers these have the order of the floats; -0 counts as 0.
 uint orderedBits(float value) {
   uint bits = floatBitsToUint(value);
+  if (bits == 0x80000000u) bits = 0u;
   return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 
 // Most positions are no extreme: it is cheaper to look first. What is read may be old; it is only ever farther in.
 void addExtreme(uint result, uint axis, float value) {
-  if (isnan(value)) return;
-  uint bits = orderedBits(value == 0.0 ? 0.0 : value);
+  if (isNan(value)) return;
+  uint bits = orderedBits(value);
   if (bits < results[result + RESULT_MIN + axis]) atomicMin(results[result + RESULT_MIN + axis], bits);
   if (bits > results[result + RESULT_MAX + axis]) atomicMax(results[result + RESULT_MAX + axis], bits);
 }

@@ -17,7 +17,7 @@ struct System {
 void eliminate(inout vec4 upper, inout vec4 row, uint component) {
   precise float square = upper[component] * upper[component] + row[component] * row[component];
   if (square == 0.0) return;
-  precise float inverse = 1.0 / sqrt(square);
+  precise float inverse = inverseRoot(square);
   precise float cosine = upper[component] * inverse;
   precise float sine = row[component] * inverse;
   precise vec4 first = cosine * upper + sine * row;
@@ -42,7 +42,7 @@ bool orthogonalize(inout vec3 a, inout vec3 b, inout vec3 va, inout vec3 vb) {
   if (abs(gamma) <= negligible) return false;
   precise float zeta = (beta - alpha) / (2.0 * gamma);
   precise float tangent = (zeta < 0.0 ? -1.0 : 1.0) / (abs(zeta) + sqrt(1.0 + zeta * zeta));
-  precise float cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+  precise float cosine = inverseRoot(1.0 + tangent * tangent);
   precise float sine = cosine * tangent;
   precise vec3 first = cosine * a - sine * b;
   precise vec3 second = sine * a + cosine * b;
@@ -58,7 +58,7 @@ bool orthogonalize(inout vec3 a, inout vec3 b, inout vec3 va, inout vec3 vb) {
 vec3 along(vec3 column, vec3 direction, vec3 right) {
   precise float square = dot3(column, column);
   if (square <= LEAST_SINGULAR_VALUE * LEAST_SINGULAR_VALUE) return vec3(0.0);
-  precise vec3 part = (dot3(column, right) / square) * direction;
+  precise vec3 part = quotient(dot3(column, right), square) * direction;
   return part;
 }
 
@@ -87,7 +87,7 @@ System jointSystem(Pose pose, uint joint) {
   vec3 r1;
   vec3 r2;
   rowsOfQuaternion(real, r0, r1, r2);
-  vec3 t = translationOf(real, paletteDual(pose.palette, joint), 1.0);
+  vec3 t = translationOf(real, paletteDual(pose.palette, joint), 2.0);
   return System(vec4(r0, t.x), vec4(r1, t.y), vec4(r2, t.z));
 }
 
@@ -100,7 +100,7 @@ Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withN
   precise vec4 w0 = vec4(0.0);
   precise vec4 w1 = vec4(0.0);
   precise vec4 w2 = vec4(0.0);
-  float share = 1.0 / float(influences.count);
+  float share = quotient(1.0, float(influences.count));
   for (uint slot = 0u; slot < influences.count; ++slot) {
     float weight = influenceWeight(influences, slot);
     System joint = jointSystem(pose, influenceJoint(influences, slot));
@@ -128,5 +128,5 @@ Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withN
   scaled.vertex.position = lever;
   precise vec3 moved =
       vec3(dot3(w0.xyz, center) + w0.w, dot3(w1.xyz, center) + w1.w, dot3(w2.xyz, center) + w2.w);
-  return turnVertex(scaled, blend.real, dot4(blend.real, blend.real), moved, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, turningFactor(blend.real), moved, withNormal, withTangent);
 }

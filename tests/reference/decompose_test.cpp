@@ -111,7 +111,8 @@ TEST(Decompose, PolarPartsOfKnownProductsAtAnyScale) {
       EXPECT_LE(largestEntry(parts.rotation - rotation), 2e-14);
       EXPECT_LE(largestEntry(parts.scaleShear - scaleShear), 4e-14 * scale);
       EXPECT_NEAR(parts.largest / scale, std::max({values.x, values.y, values.z}), 2e-14);
-      EXPECT_FALSE(parts.degenerate);
+      // Where a GPU may take what is stored for 0, nobody can say how it turns.
+      EXPECT_EQ(parts.degenerate, scale < 0x1p-100);
     }
   }
 }

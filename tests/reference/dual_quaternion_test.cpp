@@ -281,6 +281,24 @@ TEST(ReferenceDualQuaternion, ConditioningIsWhatItsCommentSays) {
   }
 }
 
+// Half the angle between two quaternions of equal weight is a quarter of that between their
+// rotations.
+TEST(ReferenceDualQuaternion, SaysHowLongTheBlendIs) {
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = 2;
+  addVertex(mesh, {1, 0, 0}, {{0, 0.5f}, {1, 0.5f}});
+  for (const double angle : {0.0, 1.0, 3.0}) {
+    const std::array pose{jointOf(glm::dmat3(1.0)),
+                          jointOf(rotationAbout(glm::dvec3(0, 0, 1), angle))};
+    for (const Method method : {Method::dualQuaternion, Method::sphericalBlend, Method::blended}) {
+      EXPECT_NEAR(skinned(mesh, pose, method).conditioning[0].blendLength, std::cos(angle / 4),
+                  1e-7);
+    }
+    EXPECT_EQ(skinned(mesh, pose, Method::linear).conditioning[0].blendLength, 1);
+    EXPECT_EQ(skinned(mesh, pose, Method::logMatrix).conditioning[0].blendLength, 1);
+  }
+}
+
 // A joint of which |CᵀC − 1| ≤ 8e-6 is not decomposed by kernels; the reference decomposes it, and
 // says how much that may matter.
 TEST(ReferenceDualQuaternion, TakesNoShortCutForNearlyRigidJoints) {

@@ -17,22 +17,28 @@ namespace dermis {
 inline constexpr double floatRounding = 5.9604644775390625e-8;
 
 /// The largest distance a float32 position may have from the reference's: 6 u · scale for `linear`,
-/// 24 u · (scale + `leverage`) for the others, u = `floatRounding`. A joint that is rigid but for
-/// rounding (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is not decomposed by the kernels: `rigidShortcut` (at most
-/// 4e-6) · (`distance` + `leverage`) more. Inputs that are no float32, and morph targets: u ·
-/// `positionRounding` · `stretch` more.
+/// 24 u · A² · (scale + `leverage`) for the others, u = `floatRounding`, A = max(1, 1 / (4 |b|)),
+/// |b| = `blendLength`. A joint that is rigid but for rounding (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is
+/// not decomposed by the kernels: `rigidShortcut` · `distance` more. Inputs that are no float32,
+/// and morph targets: u · `positionRounding` · `stretch` more. As a GPU may flush denormals to 0:
+/// 2^-120 (1 + `distance`) more.
+///
+/// Holds for every device that computes as Vulkan demands, division, `sqrt` and `inversesqrt` as
+/// inexact as it allows; docs/accuracy.md says what of it is derived and what is fitted.
 double positionBound(Method method, const reference::Conditioning& conditioning);
 
 /// The largest distance between a float32 unit normal and the reference's. Turned by a blended
-/// rotation: (1.5e-6 + `rigidShortcut`) · `turning`. Through a blended 3×3 M: 6 u
-/// / a, a = `normalAlignment`. In two phases a normal goes through M and then is turned, so that
-/// both errors add up; those of `blended` are divided by `normalLength`. What the bind pose is off
-/// by, u · `normalRounding`, is divided by a as well. Negative where a normal is only asked to be
-/// finite and of unit length: a · `normalLength` < 1e-3, or a bind pose off by more than 0.05 a, so
-/// that displacements all but cancel.
+/// rotation: 1.5e-6 · `turning` · A + `rigidShortcut`. Through the blended 3×3 M of `linear`: 6 u
+/// / a + 2 u, a = `normalAlignment`. In two phases a normal goes through M, (6 u + 2
+/// `rigidShortcut`) / a, and then is turned, so that both errors add up; those of `blended` are
+/// divided by `normalLength`. What the bind pose is off by, u · `normalRounding`, is divided by a
+/// as well, and so is what flushed denormals change in M, 2^-120 / `stretch`. Negative where a
+/// normal is only asked to be finite and of unit length: a · `normalLength` < 1e-3, or a bind pose
+/// off by more than 0.05 a, so that displacements all but cancel.
 double normalBound(Method method, const reference::Conditioning& conditioning);
 
-/// The same for tangents, with `tangentAlignment`, `tangentRounding` and `tangentLength`.
+/// The same for tangents, with `tangentAlignment`, `tangentRounding`, `tangentLength` and
+/// `rigidShortcut` once instead of twice.
 double tangentBound(Method method, const reference::Conditioning& conditioning);
 
 /// The largest distance between a position in float32 and what a format keeps of it; 0 for float32

@@ -45,6 +45,9 @@ struct Conditioning {
   /// singular value that is made use of), and what is left of the errors of earlier steps
   /// (`dualQuaternionIterative`: scale · (`turning` − 1)).
   double leverage = 0;
+  /// |b|, the length of the blended quaternion before it is normalised: at least the greatest
+  /// weight, and so at least 1/4 for up to four influences. 1 for `linear` and `logMatrix`.
+  double blendLength = 1;
   double turning = 1;  ///< `dualQuaternionIterative`: 1 / (1 − ρ), ρ the factor by which steps
                        ///< shrink
   double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalised
@@ -57,8 +60,8 @@ struct Conditioning {
   /// `logMatrix`: a joint turned by 180° within 2e-5, `dualQuaternionIterative`: one nearly
   /// opposite to the blend, `sphericalBlend`: a singular value within 1e-5 of the least.
   bool signAmbiguous = false;
-  bool degenerate =
-      false;  ///< a joint of rank ≤ 1, or not finite: a result is only asked to be finite
+  bool degenerate = false;  ///< a joint of rank ≤ 1, or of σ₂ + σ₃ < 2^-100, or not finite: a
+                            ///< result is only asked to be finite
   bool undefined = false;  ///< a joint is not finite: there is no answer
 };
 

@@ -130,7 +130,8 @@ Parts partsOf(const glm::dmat3& matrix) {
   const double size = std::sqrt(squares / 3);
   const glm::dmat3 unit = matrix / size;
   const Sense sense = senseOf(unit);
-  parts.ambiguous = sense == Sense::ambiguous;
+  // Entries below 2^-126 may be flushed to 0; `reference::PolarParts` has the same line.
+  parts.ambiguous = sense == Sense::ambiguous || size < 0x1p-98;
   if (parts.ambiguous) return parts;
   const glm::dmat3 upright = sense == Sense::mirrored ? -unit : unit;
   const double unitDeviation = deviationFromRotation(upright);

@@ -264,12 +264,15 @@ class PoseBounds {
   /// By how much a float32 position may be off, over its scale: `positionBound`.
   double contract() const { return (exactJoints_ ? 6 : 24) * floatRounding; }
 
-  /// What float32 may add: the more where quaternions all but cancel. 1e-5 is for kernels and the
-  /// reference that take joints for rigid which are not quite.
+  /// What float32 may add: the more where quaternions all but cancel, and as the square of that, as
+  /// `positionBound` does, where they do so by more than a quarter. 1e-5 is for joints that are not
+  /// decomposed although they are not quite rigid: the kernels leave up to 4.3e-6 of stretch out,
+  /// `partsOf` up to 5e-6.
   double rounding() const {
     const double reach = bind_.empty() ? 0 : largest_ * bounds::reachOf(bind_);
     const double exactly = contract() * (furthest_ + reach);
-    return exactJoints_ ? exactly : amplification_ * (exactly + 1e-5 * reach);
+    const double amplified = std::max(amplification_, amplification_ * amplification_ / 16);
+    return exactJoints_ ? exactly : amplified * (exactly + 1e-5 * reach);
   }
 
   const JointBounds& bounds_;

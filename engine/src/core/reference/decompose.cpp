@@ -85,6 +85,8 @@ PolarParts polarParts(const glm::dmat3& matrix) {
   parts.largest = svd.values[0];
   parts.distanceFromRotation = std::max(std::abs(svd.values[0] - 1), std::abs(svd.values[2] - 1));
   parts.degenerate = svd.values[1] <= 1e-5 * svd.values[0] || svd.values[0] == 0;
+  // A GPU may take entries below 2^-126 for 0.
+  parts.degenerate |= svd.values[1] + svd.values[2] < 0x1p-100;
 
   // A determinant within 16 roundings of 0 counts as 0; a kernel, whose own determinant is rounded
   // as well, draws the line somewhere between that and twice as much.

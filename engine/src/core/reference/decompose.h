@@ -24,7 +24,8 @@ struct PolarParts {
   double distanceFromRotation =
       0;  ///< the largest |singular value - 1|: how far it moves a point at distance 1
   bool degenerate =
-      false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of rounding
+      false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of
+              ///< rounding, or σ₂ + σ₃ < 2^-100, where that a GPU may flush denormals to 0 turns it
 };
 
 /// With a negative determinant the rotation is that of −matrix, and the sign goes into the scale

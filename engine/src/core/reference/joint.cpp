@@ -70,8 +70,9 @@ Joint takeApart(const JointMatrix& matrix) {
     deviation = std::max(deviation,
                          std::abs(gram[0][row]) + std::abs(gram[1][row]) + std::abs(gram[2][row]));
   }
-  // The kernels decide on float sums, so that a joint near the threshold of 8e-6 may go either way.
-  joint.rigidForKernels = glm::determinant(joint.linear) > 0 && deviation <= 1e-5;
+  // The kernels compare float sums with 8e-6. An entry of CᵀC is a sum of three products, off by at
+  // most 3 u, and a row has three of them: joints up to 9 u beyond may go either way.
+  joint.rigidForKernels = glm::determinant(joint.linear) > 0 && deviation <= 8e-6 + 9 * 0x1p-24;
   joint.distanceFromRotation = parts.distanceFromRotation;
   return joint;
 }

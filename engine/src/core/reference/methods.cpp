@@ -46,6 +46,7 @@ BindVertex skinLogMatrix(const VertexToSkin& vertex, Conditioning& conditioning)
   const bool signs = conditioning.signAmbiguous;  // no pivot here
   const RigidBlend blend = blendRigid(vertex, conditioning);
   conditioning.signAmbiguous = signs;
+  conditioning.blendLength = 1;
   const Rigid rigid = blendLogarithms(vertex, conditioning);
   return moveRigidly(vertex, blend.scaleShear, rigid.real, translationOf(rigid), conditioning);
 }
@@ -154,6 +155,7 @@ RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning) {
   const double norm = std::sqrt(glm::dot(blend.rigid.real, blend.rigid.real));
   // No summand points away from the pivot: dot(real, pivot) ≥ its weight. NaN is let through.
   assert(!(norm < strongest.weight * (1 - 1e-9)));
+  conditioning.blendLength = norm;
   blend.rigid = blend.rigid * (1 / norm);
   conditioning.normalRotatedOnly = !kernelsScale;
   return blend;
