@@ -258,7 +258,7 @@ Run addCompare(CLI::App& app) {
   command->add_option("--instances", options->instances,
                       "How often a run skins the model [as often as makes some million vertices]");
   addShares(*command, options->shares);
-  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return compare(*options); };
 }
 

@@ -16,6 +16,7 @@ using Json = nlohmann::ordered_json;
 struct InfoOptions {
   std::string model;
   bool json = false;
+  bool strict = false;
 };
 
 Json describePart(const Scene& scene, const ScenePart& part) {
@@ -92,7 +93,7 @@ void printText(const Json& json) {
 }
 
 ExitStatus info(const InfoOptions& options) {
-  const Result<Scene> scene = loadScene(options.model, {});
+  const Result<Scene> scene = loadScene(options.model, {.strict = options.strict});
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene);
   if (options.json) {
@@ -112,6 +113,7 @@ Run addInfo(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
   command->add_flag("--json", options->json, "As JSON");
+  command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return info(*options); };
 }
 

@@ -437,7 +437,7 @@ Run addRender(CLI::App& app) {
                       "Degrees that the camera stands above the ground [12; a crowd: 18]");
   command->add_option("--device", options->device,
                       "auto, a number of 'dermis devices', or part of a name");
-  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return renderModel(*options); };
 }
 

@@ -174,7 +174,7 @@ Run addSkin(CLI::App& app) {
   addShares(*command, options->shares);
   command->add_option("--device", options->device,
                       "auto, cpu (the reference), a number of 'dermis devices', or part of a name");
-  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return skin(*options); };
 }
 

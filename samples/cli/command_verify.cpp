@@ -153,7 +153,7 @@ Run addVerify(CLI::App& app) {
                       "auto, a number of 'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write every case with its errors");
   command->add_option("--junit", options->junit, "Write the same as JUnit XML, for CI");
-  command->add_flag("--strict", options->strict, "Refuse a mesh that would have to be repaired");
+  command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return verify(*options); };
 }
 

@@ -17,7 +17,8 @@ namespace dermis::cli {
 
 /// What a mesh is made ready for.
 struct MeshPreparation {
-  bool strict = false;  ///< Refuse what could be repaired.
+  /// Refuse what could be repaired, and files that break a rule though their meaning is clear.
+  bool strict = false;
   /// Find the centres of rotation, for methods that need them. It takes its time.
   bool centersOfRotation = false;
   /// More terms of their sums (`CenterOfRotationSolver::termCount`) are not added up for a file:
@@ -33,6 +34,10 @@ inline constexpr std::uint64_t mostCenterTermsAsked = 10'000'000'000;
 
 /// How many joints the mesh may tell apart: from there on, more make no difference.
 std::uint32_t namedJoints(const gltf::Mesh& mesh);
+
+/// What `--strict` does, for its help.
+inline constexpr const char* strictHelp =
+    "Refuse a file that breaks a rule of glTF, or a mesh that would have to be repaired";
 
 /// Gives the primitive's centres of rotation, 3 floats a vertex, or none.
 using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;

@@ -145,14 +145,16 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
-  Result<gltf::Model> loaded = gltf::load(path, {.images = preparation.images});
+  Result<gltf::Model> loaded =
+      gltf::load(path, {.images = preparation.images, .strict = preparation.strict});
   if (!loaded) return loaded.error();
   return prepareScene(std::move(*loaded), path.filename().string(), preparation);
 }
 
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
                         const MeshPreparation& preparation) {
-  Result<gltf::Model> loaded = gltf::loadFromMemory(file, {}, {.images = preparation.images});
+  Result<gltf::Model> loaded =
+      gltf::loadFromMemory(file, {}, {.images = preparation.images, .strict = preparation.strict});
   if (!loaded) return loaded.error();
   return prepareScene(std::move(*loaded), name, preparation);
 }

@@ -35,9 +35,9 @@ struct Scene {
 /// Whether every part has what the method needs.
 bool allows(const Scene& scene, Method method);
 
-/// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, or
-/// refused where the preparation is strict. Fails with `limitExceeded` where nodes, primitives and
-/// skins multiply to more memory than the file justifies.
+/// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, and
+/// broken rules noted; both are refused where the preparation is strict. Fails with `limitExceeded`
+/// where nodes, primitives and skins multiply to more memory than the file justifies.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
 /// The same for a binary glTF file in memory; `name` is what messages call it.
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,

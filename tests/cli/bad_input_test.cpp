@@ -235,6 +235,45 @@ void expectWarning(const FileBuilder& file, const std::string& sentence,
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
+// A rule of glTF is broken, and what is meant is clear all the same.
+TEST_F(BadInput, ABrokenRuleIsNotedAndRefusedWhereStrict) {
+  FileBuilder file = skinnedTriangle();
+  const std::string whole = writeModel("whole.gltf", file);
+  file.json["skins"][0]["inverseBindMatrices"] =
+      file.addFloats({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1,
+                      1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+                     "MAT4");
+  file.json["bufferViews"].back()["byteStride"] = 64;
+  const std::string broken = writeModel("rule.gltf", file);
+  const std::string sentence =
+      "skin 0 inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of 64, which only "
+      "vertex attributes may have";
+  EXPECT_NE(dermis({"info", broken}).output.find("note   " + sentence + "\n"), std::string::npos);
+  const Json info = Json::parse(dermis({"info", broken, "--json"}).output);
+  EXPECT_EQ(info.at("notes"), Json::array({sentence}));
+
+  const std::string out = outFile("rule.ply"), expected = outFile("whole.ply");
+  const CommandResult lenient = dermis({"skin", broken, "-o", out, "--device", "cpu"});
+  EXPECT_EQ(lenient.status, 0) << lenient.errors;
+  EXPECT_EQ(lenient.errors, "dermis: note: " + sentence + "\n");
+  EXPECT_EQ(dermis({"skin", whole, "-o", expected, "--device", "cpu"}).status, 0);
+  ASSERT_TRUE(readPly(out) && readPly(expected));
+  EXPECT_EQ(readPly(out)->positions, readPly(expected)->positions);
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"info", broken},
+                                                  {"skin", broken, "-o", out, "--device", "cpu"},
+                                                  {"render", broken, "-o", outFile("rule.png")},
+                                                  {"verify", broken},
+                                                  {"compare", broken}}) {
+    std::vector<std::string> arguments = command;
+    arguments.push_back("--strict");
+    const CommandResult strict = dermis(arguments);
+    EXPECT_EQ(strict.status, 3) << command[0] << ": " << strict.errors;
+    expectOneErrorLine(strict);
+    EXPECT_NE(strict.errors.find(sentence), std::string::npos) << strict.errors;
+  }
+  EXPECT_EQ(dermis({"info", whole, "--strict"}).status, 0);
+}
+
 TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndRepaired) {
   for (const BrokenMesh& broken : brokenMeshes()) {
     LineMesh mesh;

@@ -46,6 +46,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   const gltf::Model& model = *result;
+  // Notes are sentences, too, and there are some fifty kinds of them.
+  require(model.notes.size() < 64);
+  for (const std::string& note : model.notes)
+    require(!note.empty() && note.size() < 1000 && note.find('\n') == std::string::npos);
   // A hostile file may have very many primitives, clips and skins: a few of them will do.
   for (std::size_t i = 0; i < std::min<std::size_t>(model.skinnedPrimitives.size(), 4); ++i) {
     const gltf::SkinnedPrimitive& skinned = model.skinnedPrimitives[i];

@@ -96,8 +96,8 @@ TEST_F(GltfBudget, LooksAtTheHeaderBeforeItReadsTheRest) {
   constexpr std::uint64_t size = std::uint64_t{1} << 40;
   const auto glb = writeSparse("sparse.glb", std::string("glTF\x02\0\0\0\x00\x10\0\0", 12), size);
   if (glb.empty()) GTEST_SKIP() << "not sparse";
-  expectError(gltf::load(glb), ErrorCode::invalidData,
-              "'sparse.glb': the GLB header says 4096 bytes, the file has 1099511627776");
+  // What stands behind the container is not read: but so much is no glTF file.
+  expectError(gltf::load(glb), ErrorCode::limitExceeded, "at most 4294967295 of a file are read");
   expectError(gltf::load(writeSparse("sparse.gltf", " {", size)), ErrorCode::limitExceeded,
               "at most 4294967295 of a file are read");
   expectError(gltf::load(writeSparse("zeros.gltf", "", size)), ErrorCode::invalidData,
@@ -191,8 +191,9 @@ TEST_F(GltfBudget, LeavesImagesOutThatAreTooMuch) {
   for (const gltf::Image& image : model.images) shown += image.bytes.empty() ? 0u : 1u;
   EXPECT_GT(shown, 50u);
   EXPECT_LT(shown, 150u) << "a budget of 64 MiB and 64 times 1 MB";
-  EXPECT_EQ(model.notes.size(), count - shown);
-  EXPECT_NE(model.notes.at(0).find("justifies; it is left out"), std::string::npos);
+  EXPECT_TRUE(hasNote(model, "justifies; it is left out (and " + std::to_string(count - shown - 1) +
+                                 " more of this kind)"))
+      << testing::PrintToString(model.notes);
 }
 
 }  // namespace

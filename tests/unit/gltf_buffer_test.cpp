@@ -140,7 +140,18 @@ TEST_F(GltfBuffer, RefusesAFileThatIsTooShort) {
   auto bytes = skinnedTriangle().binary;
   bytes.pop_back();
   write("short.bin", bytes);
-  expectError(withUri("short.bin").load(folder_), ErrorCode::invalidData, "buffer 0: byteLength");
+  expectError(withUri("short.bin").load(folder_), ErrorCode::invalidData,
+              "accessor 2: bytes 0 to 48 are outside bufferView 2 of 47 bytes");
+  // Unless what is missing is not needed.
+  FileBuilder file = withUri("short.bin");
+  file.json["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 1}});
+  file.json["buffers"][0]["byteLength"] = file.binary.size() + 3;
+  write("short.bin", file.binary);
+  const gltf::Model model = loaded(file.load(folder_));
+  EXPECT_TRUE(hasNote(model, "buffer 0: byteLength says 99 bytes, 96 are there"))
+      << testing::PrintToString(model.notes);
+  expectError(file.load(folder_, {.strict = true}), ErrorCode::invalidData,
+              "buffer 0: byteLength says 99 bytes, 96 are there");
   // One that is longer is read as far as the byteLength goes.
   bytes.resize(bytes.size() + 1000);
   write("long.bin", bytes);
@@ -186,7 +197,7 @@ TEST_F(GltfBuffer, RefusesBrokenDataUris) {
   expectInvalid(withUri("data:;base64,AAAA*AAA"), "character 4 of its data URI is not base64");
   expectInvalid(withUri("data:;base64,AAAA==AA"), "is not base64");
   expectInvalid(withUri("data:;base64,AAAAA"), "is cut off");
-  expectInvalid(withUri("data:;base64,AAAA"), "bytes, 3 are there");
+  expectInvalid(withUri("data:;base64,AAAA"), "are outside bufferView 0 of 3 bytes");
   expectInvalid(withUri("data:,%zz"), "a '%' without two digits");
 }
 
@@ -196,7 +207,7 @@ TEST_F(GltfBuffer, TellsWhenABufferIsNowhere) {
   expectInvalid(file, "buffer 0: it has no uri, and the file has no binary chunk for it");
 }
 
-TEST_F(GltfBuffer, RefusesABinaryChunkThatIsTooShort) {
+TEST_F(GltfBuffer, NotesABinaryChunkThatIsTooShort) {
   FileBuilder file = skinnedTriangle();
   auto bytes = file.glb();
   const std::string length = "\"byteLength\":" + std::to_string(file.binary.size()) + "}]";
@@ -208,7 +219,28 @@ TEST_F(GltfBuffer, RefusesABinaryChunkThatIsTooShort) {
   ASSERT_NE(found, bytes.end());
   std::transform(longer.begin(), longer.end(), found,
                  [](char character) { return static_cast<std::byte>(character); });
-  expectError(gltf::loadFromMemory(bytes, {}), ErrorCode::invalidData, "buffer 0: byteLength");
+  EXPECT_EQ(expectNoted(bytes, "buffer 0: byteLength says 99 bytes, 96 are there")
+                .skinnedPrimitives.size(),
+            1u);
+}
+
+// A buffer that only static meshes, images or nothing at all use need not be there.
+TEST_F(GltfBuffer, ReadsPastABufferThatNothingSkinnedUses) {
+  FileBuilder file = skinnedTriangle();
+  file.json["buffers"] = {
+      {{"byteLength", file.binary.size()}, {"uri", "data:;base64," + encodeBase64(file.binary)}},
+      {{"byteLength", 100}, {"uri", "missing.bin"}}};
+  file.json["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 24}});
+  file.attributes()["TEXCOORD_0"] = file.addAccessor(
+      {{"bufferView", 3}, {"componentType", floatType}, {"count", 3}, {"type", "VEC2"}});
+  const gltf::Model model = loaded(file.load(folder_));
+  EXPECT_TRUE(firstPrimitive(model).texcoords.empty());
+  EXPECT_TRUE(hasNote(model, "buffer 1: there is no file")) << testing::PrintToString(model.notes);
+  EXPECT_TRUE(
+      hasNote(model, "accessor 3: it is broken, or its bytes are not there; it is left out"));
+  expectError(file.load(folder_, {.strict = true}), ErrorCode::ioError, "buffer 1: there is no");
+  file.attributes()["POSITION"] = 3;
+  expectError(file.load(folder_), ErrorCode::ioError, "buffer 1: there is no file");
 }
 
 TEST_F(GltfBuffer, RefusesBadDescriptions) {
@@ -217,8 +249,8 @@ TEST_F(GltfBuffer, RefusesBadDescriptions) {
   expectInvalid(file, "buffer 0: uri is not a text");
   file.json["buffers"][0].erase("byteLength");
   expectInvalid(file, "buffer 0: it has no byteLength");
-  file.json["buffers"][0]["byteLength"] = 0;
-  expectInvalid(file, "buffer 0: byteLength is 0");
+  file.json["buffers"][0] = {{"byteLength", 0}, {"uri", "data:,"}};
+  expectInvalid(file, "accessor 0: bytes 0 to 36 are outside bufferView 0 of 0 bytes");
 }
 
 }  // namespace

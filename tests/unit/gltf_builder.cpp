@@ -92,8 +92,9 @@ std::vector<std::byte> FileBuilder::glb() const {
   return bytes;
 }
 
-Result<gltf::Model> FileBuilder::load(const std::filesystem::path& folder) const {
-  return gltf::loadFromMemory(bytesOf(text()), folder);
+Result<gltf::Model> FileBuilder::load(const std::filesystem::path& folder,
+                                      const gltf::LoadOptions& options) const {
+  return gltf::loadFromMemory(bytesOf(text()), folder, options);
 }
 
 FileBuilder skinnedTriangle() {
@@ -144,6 +145,25 @@ void expectError(const Result<gltf::Model>& result, ErrorCode code, const std::s
 
 void expectInvalid(const FileBuilder& file, const std::string& text) {
   expectError(file.load(), ErrorCode::invalidData, text);
+}
+
+bool hasNote(const gltf::Model& model, const std::string& text) {
+  for (const std::string& note : model.notes) {
+    if (note.find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
+gltf::Model expectNoted(const std::vector<std::byte>& bytes, const std::string& text) {
+  gltf::Model model = loaded(gltf::loadFromMemory(bytes, {}));
+  EXPECT_TRUE(hasNote(model, text))
+      << "the notes are: " << testing::PrintToString(model.notes) << "\nwithout: " << text;
+  expectError(gltf::loadFromMemory(bytes, {}, {.strict = true}), ErrorCode::invalidData, text);
+  return model;
+}
+
+gltf::Model expectNoted(const FileBuilder& file, const std::string& text) {
+  return expectNoted(bytesOf(file.text()), text);
 }
 
 }  // namespace dermis::test

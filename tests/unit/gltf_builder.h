@@ -64,7 +64,8 @@ class FileBuilder {
   /// A GLB file with the buffer as its binary chunk.
   std::vector<std::byte> glb() const;
 
-  Result<gltf::Model> load(const std::filesystem::path& folder = {}) const;
+  Result<gltf::Model> load(const std::filesystem::path& folder = {},
+                           const gltf::LoadOptions& options = {}) const;
 
  private:
   std::size_t addStored(const std::vector<std::byte>& bytes, std::size_t components,
@@ -97,5 +98,13 @@ gltf::Influences onlySet(const gltf::Primitive& primitive);
 void expectError(const Result<gltf::Model>& result, ErrorCode code, const std::string& text);
 
 void expectInvalid(const FileBuilder& file, const std::string& text);
+
+/// Expects that the file is used with a note that contains the text, and refused with that sentence
+/// where strict. Returns the model.
+gltf::Model expectNoted(const FileBuilder& file, const std::string& text);
+gltf::Model expectNoted(const std::vector<std::byte>& bytes, const std::string& text);
+
+/// Whether one of the notes contains the text.
+bool hasNote(const gltf::Model& model, const std::string& text);
 
 }  // namespace dermis::test

@@ -83,15 +83,12 @@ TEST(GltfContainer, RefusesBadGlbNumbers) {
 
   bytes = good;
   setWord(bytes, 16, 0x004e4942);
-  expectInvalidBytes(bytes, "the first GLB chunk is not JSON");
+  setWord(bytes, binaryChunk + 4, 0x12345678);
+  expectInvalidBytes(bytes, "no JSON chunk");
 
   bytes = good;
   setWord(bytes, binaryChunk + 4, 0x4e4f534a);
   expectInvalidBytes(bytes, "GLB chunk 1 is a second JSON chunk");
-
-  bytes = good;
-  setWord(bytes, binaryChunk, 3);
-  expectInvalidBytes(bytes, "is not a multiple of 4");
 
   bytes = good;
   bytes.resize(good.size() + 4);
@@ -107,6 +104,30 @@ TEST(GltfContainer, RefusesBadGlbNumbers) {
   bytes.assign(good.begin(), good.begin() + 12);
   setWord(bytes, 8, 12);
   expectInvalidBytes(bytes, "no JSON chunk");
+  setWord(bytes, 8, 11);
+  expectInvalidBytes(bytes, "the GLB header says 11 bytes");
+}
+
+TEST(GltfContainer, ReadsChunksThatBreakRules) {
+  const auto good = skinnedTriangle().glb();
+  // Another chunk in front, and the binary data behind it.
+  auto bytes = good;
+  const std::vector<std::byte> other(12);
+  bytes.insert(bytes.begin() + 12, other.begin(), other.end());
+  setWord(bytes, 12, 4);
+  setWord(bytes, 16, 0x12345678);
+  setWord(bytes, 8, bytes.size());
+  const gltf::Model model = expectNoted(bytes, "the first GLB chunk is not JSON");
+  EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
+  ASSERT_EQ(model.notes.size(), 1u);
+  EXPECT_TRUE(model.notes[0].ends_with(" (and 1 more of this kind)")) << model.notes[0];
+}
+
+TEST(GltfContainer, RefusesZeroBytesInTheText) {
+  const std::string text = skinnedTriangle().text();
+  expectNoted(bytesOf(text + std::string(5, '\0')), "padded with zero bytes");
+  expectInvalidBytes(bytesOf(text + std::string("\0x", 2)),
+                     "the JSON text is broken at byte " + std::to_string(text.size()));
 }
 
 TEST(GltfContainer, RefusesBrokenJson) {

@@ -84,8 +84,6 @@ TEST(GltfNode, RefusesWhatIsNoTree) {
   expectInvalid(withNodes({Json::object(), {{"children", {1}}}}), "node 1: it is part of");
   expectInvalid(withNodes({{{"children", {2}}}, {{"children", {2}}}, Json::object()}),
                 "node 2: it is a child of both node 0 and node 1");
-  expectInvalid(withNodes({{{"children", {1, 1}}}, Json::object()}),
-                "node 0: children lists 1 twice");
 }
 
 TEST(GltfNode, RefusesBadProperties) {
@@ -93,9 +91,6 @@ TEST(GltfNode, RefusesBadProperties) {
                 "node 0: an entry of children is 5, and the file has 1 nodes");
   expectInvalid(withNodes({{{"children", 5}}}), "node 0: children is not an array");
   expectInvalid(withNodes({{{"mesh", 0}}}), "node 0: mesh is 0, and the file has 0 meshes");
-  expectInvalid(withNodes({{{"skin", 0}}}), "node 0: skin is 0, and the file has 0 skins");
-  expectInvalid(withNodes({{{"camera", 2}}}), "node 0: camera is 2");
-  expectInvalid(withNodes({{{"weights", {1}}}}), "node 0: it has weights but no mesh");
   expectInvalid(withNodes({{{"translation", {1, 2}}}}),
                 "node 0: translation is not an array of 3 numbers");
   expectInvalid(withNodes({{{"rotation", {1, 2, 3, "x"}}}}),
@@ -104,14 +99,26 @@ TEST(GltfNode, RefusesBadProperties) {
                 "node 0: scale holds a number that float32 cannot hold");
   expectInvalid(withNodes({{{"matrix", {1, 0, 0, 0}}}}),
                 "node 0: matrix is not an array of 16 numbers");
-  expectInvalid(withNodes({{{"matrix", {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}}),
-                "node 0: the fourth row of its matrix is not 0 0 0 1");
-  expectInvalid(withNodes({{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}},
-                            {"scale", {1, 1, 1}}}}),
-                "node 0: it has both matrix and scale");
+}
+
+TEST(GltfNode, NotesPropertiesThatHaveNoEffect) {
+  EXPECT_EQ(expectNoted(withNodes({{{"children", {1, 1}}}, Json::object()}),
+                        "node 0: children lists 1 twice")
+                .nodeOrder,
+            (std::vector<std::uint32_t>{0, 1}));
+  expectNoted(withNodes({{{"skin", 0}}}), "node 0: it has skin but no mesh");
+  expectNoted(withNodes({{{"camera", 2}}}), "node 0: camera is 2");
+  expectNoted(withNodes({{{"weights", {1}}}}), "node 0: it has weights but no mesh");
+  expectNoted(withNodes({{{"matrix", {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}}),
+              "node 0: the fourth row of its matrix is not 0 0 0 1");
+  const gltf::Model model = expectNoted(
+      withNodes(
+          {{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}, {"scale", {2, 2, 2}}}}),
+      "node 0: it has both matrix and scale");
+  EXPECT_EQ(nodeGlobals(model, none, 0)[0][0][0], 1);
   FileBuilder file = skinnedTriangle();
   file.json["nodes"][0].erase("mesh");
-  expectInvalid(file, "node 0: it has skin but no mesh");
+  EXPECT_TRUE(expectNoted(file, "node 0: it has skin but no mesh").skinnedPrimitives.empty());
 }
 
 TEST(GltfScene, ListsSkinnedPrimitivesByNodeThenPrimitive) {
@@ -185,6 +192,11 @@ TEST(GltfScene, RefusesBadScenes) {
   expectInvalid(file, "scene 0: an entry of nodes is 7, and the file has 3 nodes");
   file.json["scenes"][0]["nodes"] = {0, 2};
   expectInvalid(file, "scene 0: node 2 is not a root, but a child of node 1");
+  // It is there anyway.
+  file.json["scenes"][0]["nodes"] = {2, 0, 1};
+  EXPECT_EQ(expectNoted(file, "scene 0: node 2 is not a root, but a child of node 1")
+                .skinnedPrimitives.size(),
+            1u);
 }
 
 TEST(GltfSkin, TakesIdentitiesWhereThereAreNoMatrices) {
@@ -245,7 +257,8 @@ TEST(GltfSkin, FollowsNodesThatAreNoJoints) {
 TEST(GltfSkin, NotesJointsWithoutACommonRoot) {
   FileBuilder file = skinnedTriangle();
   file.json["skins"][0]["joints"] = {1, 0};
-  EXPECT_EQ(loaded(file).notes.at(0), "skin 0: its joints have no common root");
+  EXPECT_EQ(expectNoted(file, "skin 0: its joints have no").notes.at(0),
+            "skin 0: its joints have no common root");
 }
 
 TEST(GltfSkin, RefusesBadSkins) {
@@ -254,14 +267,16 @@ TEST(GltfSkin, RefusesBadSkins) {
   skin["joints"] = {1, 9};
   expectInvalid(file, "skin 0: an entry of joints is 9, and the file has 3 nodes");
   skin["joints"] = {1, 1};
-  expectInvalid(file, "skin 0: joints lists 1 twice");
+  EXPECT_EQ(expectNoted(file, "skin 0: joints lists 1 twice").skins[0].joints,
+            (std::vector<std::uint32_t>{1, 1}))
+      << "each place in the list has its own matrix";
   skin["joints"] = Json::array();
   expectInvalid(file, "skin 0: joints is an empty array");
   skin.erase("joints");
   expectInvalid(file, "skin 0: it has no joints");
   skin["joints"] = {1, 2};
   skin["skeleton"] = 3;
-  expectInvalid(file, "skin 0: skeleton is 3, and the file has 3 nodes");
+  expectNoted(file, "skin 0: skeleton is 3, and the file has 3 nodes");
   skin.erase("skeleton");
   skin["inverseBindMatrices"] = 8;
   expectInvalid(file, "skin 0: inverseBindMatrices is 8, and the file has 3 accessors");
@@ -271,7 +286,26 @@ TEST(GltfSkin, RefusesBadSkins) {
   file.json["nodes"][0]["skin"] = 1;
   expectInvalid(file, "node 0: skin is 1, and the file has 1 skins");
   file.json["skins"] = Json::array();
-  expectInvalid(file, "'skins' is an empty array");
+  expectInvalid(file, "node 0: skin is 1, and the file has 0 skins");
+  file.json["nodes"][0].erase("skin");
+  expectNoted(file, "'skins' is an empty array");
+}
+
+// Its place in the list remains, so that others keep their numbers.
+TEST(GltfSkin, LeavesOutABrokenSkinThatNoNodeUses) {
+  FileBuilder file = skinnedTriangle();
+  file.json["skins"].insert(file.json["skins"].begin(),
+                            Json{{"joints", {1, 9}}, {"name", "broken"}});
+  file.json["nodes"][0]["skin"] = 1;
+  gltf::Model model = expectNoted(file, "skin 0: an entry of joints is 9");
+  ASSERT_EQ(model.skins.size(), 2u);
+  EXPECT_TRUE(model.skins[0].joints.empty());
+  EXPECT_TRUE(palette(model, 0, none, 0).empty());
+  EXPECT_EQ(model.skinnedPrimitives.at(0).skin, 1u);
+  file.json["skins"][0] = {{"joints", {1, 2}}, {"inverseBindMatrices", 0}};
+  model = expectNoted(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float where MAT4");
+  EXPECT_TRUE(model.skins[0].joints.empty());
+  EXPECT_EQ(palette(model, 1, none, 0).size(), 2u);
 }
 
 TEST(GltfSkin, RefusesBadMatrices) {
@@ -295,9 +329,27 @@ TEST(GltfSkin, RefusesBadMatrices) {
   expectInvalid(withMatrices(two(19, 0.5f)),
                 "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1");
   loaded(withMatrices(two(19, 1e-7f)));
-  FileBuilder file = withMatrices(two(0, 1));
-  file.json["bufferViews"].back()["byteStride"] = 64;
-  expectInvalid(file, "inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of 64");
+}
+
+TEST(GltfSkin, UsesAStrideWhereNoneMayStand) {
+  for (const std::size_t stride : {64u, 80u, 252u}) {
+    FileBuilder file = skinnedTriangle();
+    const std::vector<float> first = matrixByColumns(1, 2, 3, 4),
+                             second = matrixByColumns(5, 6, 7, 8);
+    std::vector<float> stored(stride / 4 + 16, 99.0f);
+    std::copy(first.begin(), first.end(), stored.begin());
+    std::copy(second.begin(), second.end(), stored.end() - 16);
+    file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(stored, "MAT4");
+    file.json["accessors"].back()["count"] = 2;
+    file.json["bufferViews"].back()["byteStride"] = stride;
+    const gltf::Model model =
+        expectNoted(file, "inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of " +
+                              std::to_string(stride));
+    ASSERT_EQ(model.skins[0].inverseBindMatrices.size(), 2u);
+    EXPECT_EQ(model.skins[0].inverseBindMatrices[0].m[2][3], 4.0f);
+    EXPECT_EQ(model.skins[0].inverseBindMatrices[1].m[1][1], 5.0f);
+    EXPECT_EQ(model.skins[0].inverseBindMatrices[1].m[0][3], 6.0f);
+  }
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 // glTF 2.0 files as meshes, skeletons and clips, and the sampling of poses.
 //
-// What the specification forbids and the parser underneath lets through is caught here, with one
-// sentence that names the accessor, node or skin at fault. A file can cause an error, never a
-// crash, a hang, or more memory than its own bytes justify (memory_budget.h).
+// What the specification forbids is caught here, with one sentence that names the accessor, node or
+// skin at fault. Where it leaves the meaning clear, as with a byteStride where none may stand, the
+// file is used and the sentence is a note; otherwise it is an error. A file can cause an error,
+// never a crash, a hang, or more memory than its own bytes justify (memory_budget.h).
 //
 // Threads: every function may be called from any thread; a `Model` that nobody changes may be read
 // by many at once.
@@ -39,14 +40,14 @@ struct Node {
   /// Column-major, as in the file; used instead of the three above. A node that a clip moves has
   /// none: it has been taken apart into the three, with a note.
   std::optional<std::array<double, 16>> matrix;
-  /// One a morph target where the node overrides its mesh's, or empty.
+  /// One a morph target where the node overrides its mesh's, or empty; those missing are 0.
   std::vector<float> morphWeights;
 };
 
 struct Skin {
   std::string name;
-  /// Node indices, none twice, at most `maxPaletteJoints`; a vertex's joint index counts in this
-  /// list.
+  /// Node indices, at most `maxPaletteJoints`; a vertex's joint index counts in this list. Empty
+  /// where the skin is broken and no node uses it.
   std::vector<std::uint32_t> joints;
   /// One a joint, finite; identities where the file has none.
   std::vector<JointMatrix> inverseBindMatrices;
@@ -146,8 +147,9 @@ class PrimitiveView {
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;
-  std::uint32_t morphTargetCount = 0;  ///< Of each primitive, decoded or not.
-  std::vector<float> morphWeights;     ///< One a morph target, or empty: all 0.
+  /// Of the primitive that has the most, decoded or not; others move with the first of them.
+  std::uint32_t morphTargetCount = 0;
+  std::vector<float> morphWeights;  ///< One a morph target; those missing are 0.
 };
 
 enum class Interpolation : std::uint8_t { step, linear, cubicSpline };
@@ -159,7 +161,7 @@ struct Channel {
   ChannelPath path = ChannelPath::translation;
   Interpolation interpolation = Interpolation::linear;
   std::uint32_t components = 3;  ///< Values a key: 3, 4, or the number of morph targets.
-  std::vector<float> times;      ///< Seconds: strictly rising, finite, not negative, not empty.
+  std::vector<float> times;      ///< Seconds: not falling, finite, not empty; equal ones: a jump.
   /// `components` a key, finite; for cubicSpline in-tangent, value, out-tangent: 3 × components.
   /// Rotations are of unit length (the values; tangents are as in the file).
   std::vector<float> values;
@@ -167,7 +169,7 @@ struct Channel {
 
 struct Clip {
   std::string name;
-  double duration = 0;            ///< Seconds: the latest key.
+  double duration = 0;            ///< Seconds: the latest key, or 0 where that is earlier.
   std::vector<Channel> channels;  ///< By rising node, then path.
 };
 
@@ -192,7 +194,9 @@ struct Model {
   std::vector<Image> images;
   std::vector<Clip> clips;
   std::vector<SkinnedPrimitive> skinnedPrimitives;
-  /// What was mended or left out, a sentence each ("12 rotation keys … have been normalised").
+  /// What was mended or left out, and which rules of glTF the file breaks without losing its
+  /// meaning: a sentence for each kind, with its first place and how often it was found. At most
+  /// some fifty, however large the file.
   std::vector<std::string> notes;
   /// What the file may still make a program take: spend on it what is made for each node, primitive
   /// or skin, and the pixels of images, before it is made.
@@ -203,6 +207,9 @@ struct LoadOptions {
   /// Read the images that base colours show, by the same rules as buffers. One that cannot be had
   /// is left out, with a note.
   bool images = false;
+  /// Broken rules that leave the meaning clear are errors (`invalidData`), too. This looks at what
+  /// `load` reads anyway; it is no validator.
+  bool strict = false;
 };
 
 /// Reads a .gltf or .glb file (told apart by their first bytes) and every buffer that it names:
@@ -213,7 +220,8 @@ struct LoadOptions {
 /// default scene is `scene`; scene 0 where the file does not say; all root nodes where it has no
 /// scenes. Fails with
 /// - `ioError`: the file, or one that it names, cannot be read or lies outside the folder;
-/// - `invalidData`: a broken file; the sentence names the accessor, node, skin … at fault;
+/// - `invalidData`: a broken file; the sentence names the accessor, node, skin … at fault. What
+///   nothing skinned or animated uses may be broken, with a note;
 /// - `unsupportedFeature`: a required extension that is not known (mesh compression, for one), or
 ///   glTF 1.0;
 /// - `limitExceeded`: it asks for more memory than a file of its size justifies (memory_budget.h).

@@ -147,61 +147,103 @@ std::string formatName(Format format) {
   return format.normalized ? join("normalized ", name) : std::string(name);
 }
 
-Source::Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget)
-    : document_(std::move(document)), buffers_(std::move(buffers)), budget_(budget) {
+Source::Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget, Notes& notes)
+    : document_(std::move(document)), buffers_(std::move(buffers)), budget_(budget), notes_(notes) {
   checkViews();
   checkAccessors();
 }
 
+void Source::checkView(std::size_t index) const {
+  const tinygltf::BufferView& view = content().bufferViews[index];
+  const auto buffer = static_cast<std::size_t>(view.buffer);
+  if (buffer >= buffers_.size()) failInvalid("bufferView ", index, ": it cannot be used");
+  // The structural check has bounded every number here by 2^53, so that no sum overflows.
+  const std::uint64_t size = buffers_[buffer].byteLength;
+  if (view.byteOffset + view.byteLength <= size) return;
+  // Others cut it off, too. What an accessor needs of it must be there.
+  notes_.broken(NoteKind::viewLength, "bufferView ", index, ": bytes ", view.byteOffset, " to ",
+                view.byteOffset + view.byteLength, " are outside buffer ", view.buffer, " of ",
+                size, " bytes");
+}
+
 void Source::checkViews() const {
-  const auto& views = content().bufferViews;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const tinygltf::BufferView& view = views[i];
-    // The structural check has bounded every number here by 2^53, so that no sum overflows.
-    const std::uint64_t size = buffers_[static_cast<std::size_t>(view.buffer)].byteLength;
-    if (view.byteOffset + view.byteLength > size) {
-      failInvalid("bufferView ", i, ": bytes ", view.byteOffset, " to ",
-                  view.byteOffset + view.byteLength, " are outside buffer ", view.buffer, " of ",
-                  size, " bytes");
+  for (std::size_t i = 0; i < content().bufferViews.size(); ++i) {
+    if (usage().views[i]) {
+      checkView(i);
+    } else {
+      notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", [&] { checkView(i); });
     }
   }
+}
+
+std::uint64_t Source::sizeOf(int view) const {
+  const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
+  const auto buffer = static_cast<std::size_t>(range.buffer);
+  if (buffer >= buffers_.size() || range.byteOffset > buffers_[buffer].byteLength) return 0;
+  return std::min<std::uint64_t>(range.byteLength, buffers_[buffer].byteLength - range.byteOffset);
+}
+
+std::uint32_t Source::strideOf(int view) const {
+  return usage().strides[static_cast<std::size_t>(view)];
 }
 
 void Source::checkRange(int view, std::uint64_t byteOffset, std::uint64_t bytes,
                         std::uint64_t alignment, const std::string& where) const {
   const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
-  if (byteOffset + bytes > range.byteLength) {
+  if (byteOffset + bytes > sizeOf(view)) {
     failInvalid(where, ": bytes ", byteOffset, " to ", byteOffset + bytes,
-                " are outside bufferView ", view, " of ", range.byteLength, " bytes");
+                " are outside bufferView ", view, " of ", sizeOf(view), " bytes");
   }
   if (byteOffset % alignment != 0 || (range.byteOffset + byteOffset) % alignment != 0) {
-    failInvalid(where, ": byte ", range.byteOffset + byteOffset,
-                " of the buffer is not aligned to its components of ", alignment, " bytes");
+    notes_.broken(NoteKind::alignment, where, ": byte ", range.byteOffset + byteOffset,
+                  " of the buffer is not aligned to its components of ", alignment, " bytes");
   }
 }
 
-void Source::checkAccessors() const {
-  const auto& accessors = content().accessors;
-  for (std::size_t i = 0; i < accessors.size(); ++i) {
-    const tinygltf::Accessor& accessor = accessors[i];
-    const std::string where = join("accessor ", i);
-    const bool wide = accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT ||
-                      accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-    if (accessor.normalized && wide) {
-      failInvalid(where, ": ", formatName({accessor.componentType}), " may not be normalized");
+void Source::checkAccessors() {
+  isFaulty_.resize(content().accessors.size());
+  for (std::size_t i = 0; i < isFaulty_.size(); ++i) {
+    if (usage().accessors[i]) {
+      checkAccessor(i);
+      continue;
     }
-    if (accessor.bufferView >= 0) {
-      const std::uint64_t size = elementSize(accessor);
-      const std::uint64_t stride = strideOf(accessor);
-      if (stride < size) {
-        failInvalid(where, ": its elements of ", size, " bytes do not fit the byteStride ", stride,
-                    " of bufferView ", accessor.bufferView);
-      }
-      checkRange(accessor.bufferView, accessor.byteOffset, stride * (accessor.count - 1) + size,
-                 sizeOfComponent(accessor.componentType), where);
-    }
-    if (accessor.sparse.isSparse) checkSparse(i);
+    const bool good =
+        notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", [&] { checkAccessor(i); });
+    isFaulty_[i] = !good || !hasBytes(content().accessors[i]);
   }
+}
+
+// Buffers that nothing skinned uses may be nowhere.
+bool Source::hasBytes(const tinygltf::Accessor& accessor) const {
+  const auto there = [&](int view) {
+    if (view < 0) return true;
+    const auto& range = content().bufferViews[static_cast<std::size_t>(view)];
+    const auto buffer = static_cast<std::size_t>(range.buffer);
+    return buffer < buffers_.size() && !buffers_[buffer].bytes.empty();
+  };
+  if (!accessor.sparse.isSparse) return there(accessor.bufferView);
+  return there(accessor.bufferView) && there(accessor.sparse.indices.bufferView) &&
+         there(accessor.sparse.values.bufferView);
+}
+
+void Source::checkAccessor(std::size_t index) const {
+  const tinygltf::Accessor& accessor = content().accessors[index];
+  const std::string where = join("accessor ", index);
+  if (accessor.normalized && accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+    failInvalid(where, ": ", formatName({accessor.componentType}), " may not be normalized");
+  if (accessor.bufferView >= 0) {
+    const std::uint64_t size = elementSize(accessor);
+    const std::uint64_t stride = strideOf(accessor);
+    if (stride < size) {
+      failInvalid(where, ": its elements of ", size, " bytes do not fit the byteStride ", stride,
+                  " of bufferView ", accessor.bufferView);
+    }
+    // Strides are below 2^31 and counts below 2^32.
+    const std::uint64_t bytes = accessor.count == 0 ? 0 : stride * (accessor.count - 1) + size;
+    checkRange(accessor.bufferView, accessor.byteOffset, bytes,
+               sizeOfComponent(accessor.componentType), where);
+  }
+  if (accessor.sparse.isSparse) checkSparse(index);
 }
 
 void Source::checkSparse(std::size_t index) const {
@@ -210,75 +252,91 @@ void Source::checkSparse(std::size_t index) const {
   const auto count = static_cast<std::uint64_t>(accessor.sparse.count);
   const auto& indices = accessor.sparse.indices;
   const auto& values = accessor.sparse.values;
-  for (const int view : {indices.bufferView, values.bufferView}) {
-    if (content().bufferViews[static_cast<std::size_t>(view)].byteStride != 0) {
-      failInvalid(where, ": bufferView ", view,
-                  " has a byteStride, which sparse data may not have");
-    }
-  }
   const std::uint64_t indexSize = sizeOfComponent(indices.componentType);
+  const std::uint64_t valueSize = elementSize(accessor);
+  for (const auto& [view, size] :
+       {std::pair(indices.bufferView, indexSize), std::pair(values.bufferView, valueSize)}) {
+    if (strideOf(view) == 0) continue;
+    // Some programs use a stride, some do not: it must not matter.
+    const std::string sentence =
+        join(where, ": bufferView ", view, " has a byteStride, which sparse data may not have");
+    if (strideOf(view) != size) failInvalid(sentence);
+    notes_.broken(NoteKind::stride, sentence);
+  }
   checkRange(indices.bufferView, static_cast<std::uint64_t>(indices.byteOffset), count * indexSize,
              indexSize, where + " indices");
-  checkRange(values.bufferView, static_cast<std::uint64_t>(values.byteOffset),
-             count * elementSize(accessor), sizeOfComponent(accessor.componentType),
-             where + " values");
+  checkRange(values.bufferView, static_cast<std::uint64_t>(values.byteOffset), count * valueSize,
+             sizeOfComponent(accessor.componentType), where + " values");
 }
 
 std::uint64_t Source::strideOf(const tinygltf::Accessor& accessor) const {
-  if (accessor.bufferView < 0) return elementSize(accessor);
-  const auto& view = content().bufferViews[static_cast<std::size_t>(accessor.bufferView)];
-  return view.byteStride != 0 ? view.byteStride : elementSize(accessor);
+  const std::uint32_t stride = accessor.bufferView < 0 ? 0 : strideOf(accessor.bufferView);
+  return stride != 0 ? stride : elementSize(accessor);
 }
 
 const std::byte* Source::viewData(int view) const {
   const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
-  const Buffer& buffer = buffers_[static_cast<std::size_t>(range.buffer)];
-  if (buffer.bytes.empty()) {
+  const auto index = static_cast<std::size_t>(range.buffer);
+  if (index >= buffers_.size()) failInvalid("bufferView ", view, ": it cannot be used");
+  const Buffer& buffer = buffers_[index];
+  if (buffer.bytes.empty() && buffer.byteLength != 0) {
     failInvalid("buffer ", range.buffer,
                 ": it has no uri, and the file has no binary chunk for it");
   }
-  return buffer.bytes.data() + range.byteOffset;
+  return buffer.bytes.data() + std::min<std::size_t>(range.byteOffset, buffer.bytes.size());
 }
 
 std::span<const std::byte> Source::viewBytes(std::uint64_t view, const std::string& where) const {
   if (view >= content().bufferViews.size()) failInvalid(where, ": there is no bufferView ", view);
-  const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
-  if (buffers_[static_cast<std::size_t>(range.buffer)].bytes.empty())
-    failInvalid(where, ": its buffer has no bytes");
-  return {viewData(static_cast<int>(view)), range.byteLength};
+  const auto size = sizeOf(static_cast<int>(view));
+  if (size == 0) failInvalid(where, ": bufferView ", view, " has no bytes");
+  return {viewData(static_cast<int>(view)), size};
 }
 
-void Source::require(int index, int type, std::span<const Format> formats,
-                     const std::string& where) const {
+void Source::leaveOut(std::size_t mesh, std::size_t primitive, const std::string& attribute) {
+  document_.content.meshes[mesh].primitives[primitive].attributes.erase(attribute);
+}
+
+void Source::refuseFaulty(int index) const {
+  if (isFaulty_[static_cast<std::size_t>(index)])
+    failInvalid("accessor ", index, ": it is broken, or its bytes are not there");
+}
+
+void Source::require(int index, int type, std::span<const Format> formats, const std::string& where,
+                     std::span<const Format> tolerated) const {
+  refuseFaulty(index);
   const tinygltf::Accessor& accessor = content().accessors[static_cast<std::size_t>(index)];
   const Format format{accessor.componentType, accessor.normalized};
-  const bool known = std::find(formats.begin(), formats.end(), format) != formats.end();
-  if (accessor.type == type && known) return;
+  const auto isIn = [&](std::span<const Format> list) {
+    return std::find(list.begin(), list.end(), format) != list.end();
+  };
+  if (accessor.type == type && isIn(formats)) return;
   std::string allowed;
   for (const Format& candidate : formats) {
     if (!allowed.empty()) allowed += " or ";
     allowed += formatName(candidate);
   }
-  failInvalid(where, ": accessor ", index, " is ", typeName(accessor.type), " of ",
-              formatName(format), " where ", typeName(type), " of ", allowed, " must be");
+  const std::string sentence =
+      join(where, ": accessor ", index, " is ", typeName(accessor.type), " of ", formatName(format),
+           " where ", typeName(type), " of ", allowed, " must be");
+  if (accessor.type != type || !isIn(tolerated)) failInvalid(sentence);
+  notes_.broken(NoteKind::format, sentence);
 }
 
-void Source::requireAttributeAlignment(int index, const std::string& where) const {
+void Source::noteAttributeAlignment(int index, const std::string& where) const {
   const tinygltf::Accessor& accessor = content().accessors[static_cast<std::size_t>(index)];
   if (accessor.bufferView < 0) return;
   if (accessor.byteOffset % 4 == 0 && strideOf(accessor) % 4 == 0) return;
-  failInvalid(where, ": accessor ", index, " starts at byte ", accessor.byteOffset,
-              " with a stride of ", strideOf(accessor),
-              ": vertex attributes must be aligned to 4 bytes");
+  notes_.broken(NoteKind::alignment, where, ": accessor ", index, " starts at byte ",
+                accessor.byteOffset, " with a stride of ", strideOf(accessor),
+                ": vertex attributes must be aligned to 4 bytes");
 }
 
-void Source::requireNoStride(int index, const std::string& where) const {
+void Source::noteStride(int index, const std::string& where) const {
   const int view = content().accessors[static_cast<std::size_t>(index)].bufferView;
-  if (view < 0) return;
-  const auto stride = content().bufferViews[static_cast<std::size_t>(view)].byteStride;
-  if (stride == 0) return;
-  failInvalid(where, ": bufferView ", view, " of accessor ", index, " has a byteStride of ", stride,
-              ", which only vertex attributes may have");
+  if (view < 0 || strideOf(view) == 0) return;
+  notes_.broken(NoteKind::stride, where, ": bufferView ", view, " of accessor ", index,
+                " has a byteStride of ", strideOf(view), ", which only vertex attributes may have");
 }
 
 Format Source::format(int accessor) const {
@@ -301,6 +359,7 @@ bool Source::hasNoData(int accessor) const {
 
 // Primitives may share accessors, and shared data is decoded, and spent, once for each.
 void Source::spendOnAccessor(int index) {
+  refuseFaulty(index);
   spend(std::uint64_t{count(index)} * components(index), sizeof(float),
         join("accessor ", index, " of ", count(index), " elements"));
 }
@@ -320,8 +379,9 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
                   ", and the accessor has ", accessor.count, " elements");
     }
     if (i > 0 && elements[i] <= elements[i - 1]) {
-      failInvalid("accessor ", index, ": sparse index ", i, " is ", elements[i], " after ",
-                  elements[i - 1], ": they must rise");
+      // Each is written in its turn: of two for one element, the last counts.
+      notes_.broken(NoteKind::sparse, "accessor ", index, ": sparse index ", i, " is ", elements[i],
+                    " after ", elements[i - 1], ": they must rise");
     }
   }
   return elements;

@@ -9,6 +9,7 @@
 #include "gltf/buffers.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
+#include "gltf/notes.h"
 
 namespace dermis::gltf {
 
@@ -23,22 +24,29 @@ struct Format {
 class Source {
  public:
   /// Checks every bufferView and accessor against the buffers. What is decoded is spent on the
-  /// budget, which must outlive this object. Throws `Failure`.
-  Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget);
+  /// budget. Budget and notes must outlive this object. Throws `Failure`.
+  Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget, Notes& notes);
 
   const tinygltf::Model& content() const { return document_.content; }
+  const Usage& usage() const { return document_.usage; }
   bool quantized() const { return document_.quantized; }
+  Notes& notes() const { return notes_; }
+
+  /// Takes an attribute out of a primitive, so that it is not read.
+  void leaveOut(std::size_t mesh, std::size_t primitive, const std::string& attribute);
 
   /// Fails unless the accessor has this type (TINYGLTF_TYPE_*) and one of these formats. `where`
-  /// says what it is for: "mesh 2 primitive 0 POSITION".
-  void require(int accessor, int type, std::span<const Format> formats,
-               const std::string& where) const;
+  /// says what it is for: "mesh 2 primitive 0 POSITION". `tolerated` are formats that may not stand
+  /// there and yet have one meaning only: they are noted.
+  void require(int accessor, int type, std::span<const Format> formats, const std::string& where,
+               std::span<const Format> tolerated = {}) const;
 
-  /// Fails unless elements begin at multiples of 4 bytes, as vertex attributes must.
-  void requireAttributeAlignment(int accessor, const std::string& where) const;
+  /// Notes where elements do not begin at multiples of 4 bytes, as those of vertex attributes must.
+  void noteAttributeAlignment(int accessor, const std::string& where) const;
 
-  /// Fails where the accessor's bufferView has a byteStride, which only vertex attributes may have.
-  void requireNoStride(int accessor, const std::string& where) const;
+  /// Notes where the accessor's bufferView has a byteStride, which only vertex attributes may have.
+  /// It is used nevertheless.
+  void noteStride(int accessor, const std::string& where) const;
 
   /// How the accessor stores its components.
   Format format(int accessor) const;
@@ -68,11 +76,17 @@ class Source {
   }
 
  private:
+  void checkView(std::size_t index) const;
   void checkViews() const;
-  void checkAccessors() const;
+  void checkAccessor(std::size_t index) const;
+  void checkAccessors();
   void checkSparse(std::size_t index) const;
   void checkRange(int view, std::uint64_t byteOffset, std::uint64_t bytes, std::uint64_t alignment,
                   const std::string& where) const;
+  bool hasBytes(const tinygltf::Accessor& accessor) const;
+  void refuseFaulty(int accessor) const;
+  std::uint64_t sizeOf(int view) const;
+  std::uint32_t strideOf(int view) const;
   const std::byte* viewData(int view) const;
   std::uint64_t strideOf(const tinygltf::Accessor& accessor) const;
   void spendOnAccessor(int accessor);
@@ -85,6 +99,8 @@ class Source {
   Document document_;
   std::vector<Buffer> buffers_;
   MemoryBudget& budget_;
+  Notes& notes_;
+  std::vector<bool> isFaulty_;  ///< Accessors that may not be read; nothing skinned uses them.
 };
 
 /// The name of a component type and normalisation: "normalized unsigned byte".

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <set>
+#include <map>
 #include <utility>
 
 #include "gltf/failure.h"
@@ -13,6 +13,12 @@ namespace {
 constexpr Format float32{TINYGLTF_COMPONENT_TYPE_FLOAT, false};
 constexpr Format timeFormats[] = {float32};
 constexpr Format vectorFormats[] = {float32};
+// Not allowed, but there is no other way to read them.
+constexpr Format clearVectors[] = {
+    {TINYGLTF_COMPONENT_TYPE_BYTE, true},   {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, true},
+    {TINYGLTF_COMPONENT_TYPE_SHORT, true},  {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, true},
+    {TINYGLTF_COMPONENT_TYPE_BYTE, false},  {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, false},
+    {TINYGLTF_COMPONENT_TYPE_SHORT, false}, {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, false}};
 constexpr Format rotationFormats[] = {float32,
                                       {TINYGLTF_COMPONENT_TYPE_BYTE, true},
                                       {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, true},
@@ -38,6 +44,7 @@ struct Tally {
   std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
 };
 
+// 0 where a channel has no effect: there are no weights to move.
 std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
   switch (channel.path) {
     case ChannelPath::translation:
@@ -49,33 +56,42 @@ std::uint32_t componentsOf(const Source& source, const Channel& channel, const s
       break;
   }
   const int mesh = source.content().nodes[channel.node].mesh;
-  if (mesh < 0)
-    failInvalid(where, ": node ", channel.node, " has no mesh whose weights could move");
-  const auto& primitives = source.content().meshes[static_cast<std::size_t>(mesh)].primitives;
-  if (primitives[0].targets.empty()) {
-    failInvalid(where, ": mesh ", mesh, " of node ", channel.node, " has no morph targets");
+  if (mesh < 0) {
+    source.notes().broken(NoteKind::channel, where, ": node ", channel.node,
+                          " has no mesh whose weights could move");
+    return 0;
   }
-  return static_cast<std::uint32_t>(primitives[0].targets.size());
+  const auto count = morphTargetCount(source.content().meshes[static_cast<std::size_t>(mesh)]);
+  if (count == 0) {
+    source.notes().broken(NoteKind::channel, where, ": mesh ", mesh, " of node ", channel.node,
+                          " has no morph targets");
+  }
+  return count;
 }
 
-void checkTimes(const std::vector<float>& times, int accessor, const std::string& where) {
+// Equal times are a jump, negative ones lie before the beginning. What times that fall mean,
+// programs do not agree about.
+void checkTimes(const std::vector<float>& times, int accessor, const std::string& where,
+                Notes& notes) {
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const float before = i > 0 ? times[i - 1] : -1;
-    if (std::isfinite(times[i]) && times[i] >= 0 && times[i] > before) continue;
+    const float before = i > 0 ? times[i - 1] : times[i];
+    if (times[i] >= 0 && std::isfinite(times[i]) && (i == 0 || times[i] > before)) continue;
     const std::string key =
         join(where, ": key ", i, " of accessor ", accessor, " is at ", times[i]);
     if (!std::isfinite(times[i])) failInvalid(key, ", which is not finite");
-    if (times[i] < 0) failInvalid(key, " seconds, which is negative");
-    failInvalid(key, " seconds after ", before, ": times must rise");
+    if (times[i] < before) failInvalid(key, " seconds after ", before, ": times must rise");
+    if (times[i] < 0) notes.broken(NoteKind::keys, key, " seconds, which is negative");
+    if (i > 0 && times[i] == before)
+      notes.broken(NoteKind::keys, key, " seconds after ", before, ": times must rise");
   }
 }
 
 std::vector<float> readTimes(Source& source, int accessor, const std::string& where) {
   const std::string place = where + " input";
   source.require(accessor, TINYGLTF_TYPE_SCALAR, timeFormats, place);
-  source.requireNoStride(accessor, place);
+  source.noteStride(accessor, place);
   std::vector<float> times = source.floats(accessor);
-  checkTimes(times, accessor, place);
+  checkTimes(times, accessor, place, source.notes());
   return times;
 }
 
@@ -85,7 +101,7 @@ std::vector<float> readValues(Source& source, int accessor, const Channel& chann
   switch (channel.path) {
     case ChannelPath::translation:
     case ChannelPath::scale:
-      source.require(accessor, TINYGLTF_TYPE_VEC3, vectorFormats, place);
+      source.require(accessor, TINYGLTF_TYPE_VEC3, vectorFormats, place, clearVectors);
       break;
     case ChannelPath::rotation:
       source.require(accessor, TINYGLTF_TYPE_VEC4, rotationFormats, place);
@@ -94,7 +110,7 @@ std::vector<float> readValues(Source& source, int accessor, const Channel& chann
       source.require(accessor, TINYGLTF_TYPE_SCALAR, rotationFormats, place);
       break;
   }
-  source.requireNoStride(accessor, place);
+  source.noteStride(accessor, place);
   const std::uint64_t perKey = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
   const std::uint64_t perElement = channel.path == ChannelPath::weights ? channel.components : 1;
   const std::uint64_t wanted = channel.times.size() * perKey * perElement;
@@ -144,7 +160,7 @@ std::size_t normalizeRotations(Channel& channel, double tolerance) {
 // The channel, or nothing where it is left out.
 std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
                                    const tinygltf::AnimationChannel& from, const std::string& where,
-                                   Model& model, Tally& tally) {
+                                   Tally& tally) {
   const std::optional<ChannelPath> path = pathOf(from.target_path);
   if (!path) {
     ++tally.unknownPaths;
@@ -157,15 +173,18 @@ std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& an
   channel.path = *path;
   channel.interpolation = interpolationOf(sampler.interpolation);
   channel.components = componentsOf(source, channel, where);
+  if (channel.components == 0) return std::nullopt;
   if (source.hasNoData(sampler.input) && source.count(sampler.input) > 1) {
-    model.notes.push_back(
-        join(where, ": its times, accessor ", sampler.input, ", have no data; it is left out"));
+    source.notes().remark(NoteKind::noTimes, where, ": its times, accessor ", sampler.input,
+                          ", have no data; it is left out");
     return std::nullopt;
   }
   channel.times = readTimes(source, sampler.input, where);
   if (channel.interpolation == Interpolation::cubicSpline && channel.times.size() < 2) {
-    failInvalid(where, ": a CUBICSPLINE needs at least two keys");
+    source.notes().broken(NoteKind::keys, where, ": a CUBICSPLINE needs at least two keys");
   }
+  // An accessor of no elements has been noted.
+  if (channel.times.empty()) return std::nullopt;
   channel.values = readValues(source, sampler.output, channel, where);
   if (channel.path == ChannelPath::rotation) {
     const double tolerance = unitLengthTolerance(source, sampler.output);
@@ -226,28 +245,34 @@ void decompose(Node& node) {
   node.rotation = rotationOf(matrix, node.scale);
 }
 
-void decomposeTarget(Model& model, const Channel& channel, const std::string& where) {
+void decomposeTarget(Model& model, const Channel& channel, const std::string& where, Notes& notes) {
   Node& node = model.nodes[channel.node];
   if (!node.matrix || channel.path == ChannelPath::weights) return;
   decompose(node);
-  model.notes.push_back(join(where, ": node ", channel.node,
-                             " has a matrix, which has been taken apart for the animation"));
+  notes.broken(NoteKind::animatedMatrix, where, ": node ", channel.node,
+               " has a matrix, which has been taken apart for the animation");
 }
 
 Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t index, Model& model,
               Tally& tally) {
   Clip clip;
   clip.name = animation.name;
-  std::set<std::pair<std::uint32_t, ChannelPath>> targets;
+  std::map<std::pair<std::uint32_t, ChannelPath>, int> samplers;  // by target
   for (std::size_t i = 0; i < animation.channels.size(); ++i) {
     const std::string where = join("animation ", index, " channel ", i);
-    auto channel = readChannel(source, animation, animation.channels[i], where, model, tally);
+    auto channel = readChannel(source, animation, animation.channels[i], where, tally);
     if (!channel) continue;
-    if (!targets.emplace(channel->node, channel->path).second) {
-      failInvalid(where, ": it moves what another channel moves, the ",
-                  animation.channels[i].target_path, " of node ", channel->node);
+    const int sampler = animation.channels[i].sampler;
+    const auto [first, isNew] = samplers.emplace(std::pair(channel->node, channel->path), sampler);
+    if (!isNew) {
+      const std::string sentence =
+          join(where, ": it moves what another channel moves, the ",
+               animation.channels[i].target_path, " of node ", channel->node);
+      if (first->second != sampler) failInvalid(sentence);
+      source.notes().broken(NoteKind::channel, sentence, ", in the same way");
+      continue;
     }
-    decomposeTarget(model, *channel, where);
+    decomposeTarget(model, *channel, where, source.notes());
     clip.duration = std::max(clip.duration, static_cast<double>(channel->times.back()));
     clip.channels.push_back(std::move(*channel));
   }

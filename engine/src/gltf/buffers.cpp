@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gltf/failure.h"
+#include "gltf/notes.h"
 
 namespace dermis::gltf {
 namespace {
@@ -43,9 +44,13 @@ std::vector<std::byte> decodeBase64(std::string_view text, const std::string& wh
   return bytes;
 }
 
-void checkLength(const std::string& where, std::uint64_t wanted, std::uint64_t there) {
-  if (there >= wanted) return;
-  failInvalid(where, ": byteLength says ", wanted, " bytes, ", there, " are there");
+// A buffer may be shorter than it says: what an accessor needs of it must be there.
+std::uint64_t lengthOf(const BufferDescription& description, std::uint64_t there,
+                       const std::string& where, Notes& notes) {
+  if (there >= description.byteLength) return description.byteLength;
+  notes.broken(NoteKind::bufferLength, where, ": byteLength says ", description.byteLength,
+               " bytes, ", there, " are there");
+  return there;
 }
 
 // Buffers in side files: each file is read once, as far as the longest buffer in it goes.
@@ -55,9 +60,8 @@ class SideBuffers {
 
   void find(std::size_t buffer, const BufferDescription& description, const std::string& where) {
     FileToRead file = files_.find(*description.uri, where);
-    checkLength(where, description.byteLength, file.size);
     std::uint64_t& needed = needed_[file.path];
-    needed = std::max(needed, description.byteLength);
+    needed = std::max(needed, std::min(description.byteLength, file.size));
     found_.emplace(buffer, std::move(file));
   }
 
@@ -92,13 +96,21 @@ std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& wh
   return bytes;
 }
 
-std::vector<Buffer> loadBuffers(const std::vector<BufferDescription>& descriptions,
+std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
-                                SideFiles& files, MemoryBudget& budget) {
+                                SideFiles& files, MemoryBudget& budget, Notes& notes) {
+  const std::vector<BufferDescription>& descriptions = document.buffers;
+  std::vector<bool> isLost(descriptions.size());
+  // One that nothing skinned uses may fail.
+  const auto attempt = [&](std::size_t i, auto function) {
+    if (document.usage.buffers[i]) return function();
+    if (!notes.tolerate(NoteKind::unused, "; nothing skinned uses it", function)) isLost[i] = true;
+  };
   SideBuffers side(files);
   for (std::size_t i = 0; i < descriptions.size(); ++i) {
     const std::optional<std::string>& uri = descriptions[i].uri;
-    if (uri && !isDataUri(*uri)) side.find(i, descriptions[i], join("buffer ", i));
+    if (uri && !isDataUri(*uri))
+      attempt(i, [&] { side.find(i, descriptions[i], join("buffer ", i)); });
   }
   std::vector<Buffer> buffers(descriptions.size());
   for (std::size_t i = 0; i < descriptions.size(); ++i) {
@@ -106,22 +118,25 @@ std::vector<Buffer> loadBuffers(const std::vector<BufferDescription>& descriptio
     const std::string where = join("buffer ", i);
     Buffer& buffer = buffers[i];
     buffer.byteLength = description.byteLength;
-    if (description.uri && isDataUri(*description.uri)) {
-      spend(budget, description.uri->size(), 1, where);
-      buffer.storage =
-          std::make_shared<const std::vector<std::byte>>(decodeDataUri(*description.uri, where));
-    } else if (description.uri) {
-      buffer.storage = side.read(i, where);
-    }
-    if (buffer.storage != nullptr) {
-      buffer.bytes = *buffer.storage;
-    } else if (i == 0 && binaryChunk) {
-      buffer.bytes = *binaryChunk;  // Only the first buffer may be that.
-    } else {
-      continue;
-    }
-    checkLength(where, description.byteLength, buffer.bytes.size());
-    buffer.bytes = buffer.bytes.first(static_cast<std::size_t>(description.byteLength));
+    if (isLost[i]) continue;
+    attempt(i, [&] {
+      if (description.uri && isDataUri(*description.uri)) {
+        spend(budget, description.uri->size(), 1, where);
+        buffer.storage =
+            std::make_shared<const std::vector<std::byte>>(decodeDataUri(*description.uri, where));
+      } else if (description.uri) {
+        buffer.storage = side.read(i, where);
+      }
+      if (buffer.storage != nullptr) {
+        buffer.bytes = *buffer.storage;
+      } else if (i == 0 && binaryChunk) {
+        buffer.bytes = *binaryChunk;  // Only the first buffer may be that.
+      } else {
+        return;
+      }
+      buffer.byteLength = lengthOf(description, buffer.bytes.size(), where, notes);
+      buffer.bytes = buffer.bytes.first(static_cast<std::size_t>(buffer.byteLength));
+    });
   }
   return buffers;
 }

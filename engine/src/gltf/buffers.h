@@ -18,17 +18,18 @@ namespace dermis::gltf {
 /// One buffer. `bytes` points into `storage` or into the file itself.
 struct Buffer {
   std::uint64_t byteLength = 0;
-  /// As many as `byteLength` says, or none: a file may name a buffer without saying where it is, as
-  /// long as nobody reads it.
+  /// `byteLength` of them, or none: a file may name a buffer without saying where it is, as long as
+  /// nobody reads it.
   std::span<const std::byte> bytes;
   Bytes storage;  ///< shared by the buffers of one side file; null in the binary chunk
 };
 
 /// Fetches them all. Throws `Failure`: `ioError` where a file cannot be read or lies outside the
-/// folder, `invalidData` where a buffer has fewer bytes than it says, `limitExceeded`.
-std::vector<Buffer> loadBuffers(const std::vector<BufferDescription>& descriptions,
+/// folder, `limitExceeded`. One that nothing skinned uses may fail, and one may be shorter than it
+/// says, with a note.
+std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
-                                SideFiles& files, MemoryBudget& budget);
+                                SideFiles& files, MemoryBudget& budget, Notes& notes);
 
 /// The bytes of a data URI (RFC 2397), base64 or percent-encoded. `where` names it in messages.
 std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& where);

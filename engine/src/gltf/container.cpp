@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "gltf/failure.h"
+#include "gltf/notes.h"
 
 namespace dermis::gltf {
 namespace {
@@ -30,7 +31,8 @@ bool isGlb(std::span<const std::byte> bytes) {
   return bytes.size() >= 4 && readWord(bytes, 0) == magicNumber;
 }
 
-void checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
+// Returns how many of the file's bytes, of which there are `size`, belong to the container.
+std::uint32_t checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
   if (bytes.size() < headerSize) {
     failInvalid("the GLB header is cut off: ", bytes.size(), " bytes where it has ", headerSize);
   }
@@ -40,15 +42,39 @@ void checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
          join("the GLB header says version ", version, ", and only version 2 is known"));
   }
   const std::uint32_t length = readWord(bytes, 8);
-  if (length != size) {
+  if (length > size || length < headerSize)
     failInvalid("the GLB header says ", length, " bytes, the file has ", size);
+  return length;
+}
+
+void takeChunk(std::size_t chunk, std::uint32_t type, std::span<const std::byte> content,
+               Container& container, Notes& notes) {
+  const bool hasJson = container.json.data() != nullptr;
+  if (type == jsonChunk) {
+    if (hasJson) failInvalid("GLB chunk ", chunk, " is a second JSON chunk");
+    container.json = asText(content);
+  } else if (type == binaryChunk) {
+    if (container.binaryChunk) {
+      failInvalid("GLB chunk ", chunk, " is binary data, which only the second chunk may be");
+    }
+    if (chunk != 1) {
+      notes.broken(NoteKind::container, "GLB chunk ", chunk,
+                   " is binary data, which only the second chunk may be");
+    }
+    container.binaryChunk = content;
+  } else if (chunk == 0) {
+    notes.broken(NoteKind::container, "the first GLB chunk is not JSON");
   }
+  // Chunks of other types belong to extensions and are passed over, as the specification asks.
 }
 
 }  // namespace
 
 void checkStart(std::span<const std::byte> start, std::uint64_t size) {
-  if (isGlb(start)) return checkHeader(start, size);
+  if (isGlb(start)) {
+    checkHeader(start, size);
+    return;
+  }
   std::string_view text = asText(start);
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -56,11 +82,16 @@ void checkStart(std::span<const std::byte> start, std::uint64_t size) {
   failInvalid("the JSON text is broken at byte ", text.data() + first - asText(start).data() + 1);
 }
 
-Container openContainer(std::span<const std::byte> bytes) {
+Container openContainer(std::span<const std::byte> bytes, Notes& notes) {
   if (bytes.empty()) failInvalid("the file is empty");
   if (!isGlb(bytes)) return {asText(bytes), std::nullopt};
 
-  checkHeader(bytes, bytes.size());
+  const std::uint32_t size = checkHeader(bytes, bytes.size());
+  if (size < bytes.size()) {
+    notes.broken(NoteKind::container, "the GLB header says ", size, " bytes, the file has ",
+                 bytes.size());
+    bytes = bytes.first(size);
+  }
   Container container;
   std::size_t offset = headerSize;
   for (std::size_t chunk = 0; offset < bytes.size(); ++chunk) {
@@ -75,18 +106,10 @@ Container openContainer(std::span<const std::byte> bytes) {
                   " bytes, ", bytes.size() - offset, " are left in the file");
     }
     if (length % 4 != 0) {
-      failInvalid("the length of GLB chunk ", chunk, ", ", length, ", is not a multiple of 4");
+      notes.broken(NoteKind::container, "the length of GLB chunk ", chunk, ", ", length,
+                   ", is not a multiple of 4");
     }
-    const auto content = bytes.subspan(offset, length);
-    if (chunk == 0 && type != jsonChunk) failInvalid("the first GLB chunk is not JSON");
-    if (chunk != 0 && type == jsonChunk)
-      failInvalid("GLB chunk ", chunk, " is a second JSON chunk");
-    if (chunk > 1 && type == binaryChunk) {
-      failInvalid("GLB chunk ", chunk, " is binary data, which only the second chunk may be");
-    }
-    if (chunk == 0) container.json = asText(content);
-    if (chunk == 1 && type == binaryChunk) container.binaryChunk = content;
-    // Chunks of other types belong to extensions and are passed over, as the specification asks.
+    takeChunk(chunk, type, bytes.subspan(offset, length), container, notes);
     offset += length;
   }
   if (container.json.data() == nullptr) failInvalid("the GLB file has no JSON chunk");

@@ -9,6 +9,8 @@
 
 namespace dermis::gltf {
 
+class Notes;
+
 /// Views of the file's bytes.
 struct Container {
   std::string_view json;
@@ -23,7 +25,7 @@ inline constexpr std::size_t containerStart = 12;
 void checkStart(std::span<const std::byte> start, std::uint64_t size);
 
 /// Takes the file apart: GLB where it begins with the magic, otherwise all of it is JSON. Throws
-/// `Failure` where a GLB header or chunk disagrees with the number of bytes there are.
-Container openContainer(std::span<const std::byte> bytes);
+/// `Failure` where a GLB header or chunk needs more bytes than there are.
+Container openContainer(std::span<const std::byte> bytes, Notes& notes);
 
 }  // namespace dermis::gltf

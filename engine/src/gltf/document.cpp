@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include "gltf/failure.h"
 #include "gltf/images.h"
+#include "gltf/notes.h"
 
 namespace dermis::gltf {
 namespace {
@@ -60,14 +62,42 @@ json parseJson(std::string_view text) {
   }
 }
 
-void checkVersion(const json& root) {
+// The parser takes a zero byte for the end of the text.
+std::string_view trimText(std::string_view text, Notes& notes) {
+  constexpr std::string_view byteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(byteOrderMark)) {
+    notes.broken(NoteKind::text, "the JSON text begins with a byte order mark");
+    text.remove_prefix(byteOrderMark.size());
+  }
+  if (text.ends_with('\0')) {
+    notes.broken(NoteKind::text, "the JSON text is padded with zero bytes, not with spaces");
+    text = text.substr(0, text.find_last_not_of('\0') + 1);
+  }
+  const std::size_t zero = text.find('\0');
+  if (zero != std::string_view::npos) failInvalid("the JSON text is broken at byte ", zero);
+  return text;
+}
+
+// "2" and the number 2 mean what "2.0" means.
+std::string versionOf(const json& version, Notes& notes) {
+  const bool isText = version.is_string();
+  if (isText && version != "2") return version.get<std::string>();
+  if (!isText && !version.is_number()) failInvalid("asset: version is not a text");
+  const double number = isText ? 2 : version.get<double>();
+  notes.broken(NoteKind::version, "asset: version is not written as '2.0'");
+  return number == 2 ? "2.0" : textOf(number);
+}
+
+void checkVersion(json& root, Notes& notes) {
   const auto asset = root.find("asset");
   if (asset == root.end() || !asset->is_object()) {
     failInvalid("the JSON text has no object 'asset': this is not a glTF 2.0 file");
   }
   const auto version = asset->find("version");
-  if (version == asset->end() || !version->is_string()) failInvalid("asset: no version is given");
-  const auto& text = version->get_ref<const std::string&>();
+  if (version == asset->end()) failInvalid("asset: no version is given");
+  const std::string text = versionOf(*version, notes);
+  // tinygltf wants a text.
+  *version = text;
   if (text.substr(0, 2) != "2.") {
     fail(ErrorCode::unsupportedFeature,
          join("glTF version ", inQuotes(text), " is not supported: only version 2.0 is"));
@@ -91,10 +121,12 @@ bool concernsOnlyAppearance(std::string_view extension) {
                      [&](std::string_view prefix) { return extension.starts_with(prefix); });
 }
 
-std::vector<std::string> extensionNames(const json& root, const char* property) {
+std::vector<std::string> extensionNames(const json& root, const char* property, Notes& notes) {
   std::vector<std::string> names;
   const auto list = root.find(property);
   if (list == root.end()) return names;
+  if (list->is_array() && list->empty())
+    notes.broken(NoteKind::emptyArray, inQuotes(property), " is an empty array");
   if (!list->is_array()) failInvalid(property, " is not an array");
   for (const json& name : *list) {
     if (!name.is_string()) failInvalid(property, " holds something that is not a name");
@@ -103,11 +135,20 @@ std::vector<std::string> extensionNames(const json& root, const char* property) 
   return names;
 }
 
-bool usesQuantization(const json& root) {
+bool usesQuantization(const json& root, Notes& notes) {
   constexpr std::string_view quantization = "KHR_mesh_quantization";
-  const auto used = extensionNames(root, "extensionsUsed");
-  const auto required = extensionNames(root, "extensionsRequired");
+  std::vector<std::string> used;
+  notes.tolerate(NoteKind::extensions, "; it is not looked at",
+                 [&] { used = extensionNames(root, "extensionsUsed", notes); });
+  const auto required = extensionNames(root, "extensionsRequired", notes);
+  const std::unordered_set<std::string> usedNames(used.begin(), used.end());
+  if (usedNames.size() < used.size())
+    notes.broken(NoteKind::extensions, "extensionsUsed names an extension twice");
   for (const std::string& name : required) {
+    if (!usedNames.contains(name)) {
+      notes.broken(NoteKind::extensions, "extensionsRequired names ", inQuotes(name),
+                   ", which extensionsUsed does not");
+    }
     if (name == quantization || concernsOnlyAppearance(name)) continue;
     fail(ErrorCode::unsupportedFeature,
          join("the file requires the extension ", inQuotes(name), ", which is not supported"));
@@ -185,17 +226,19 @@ tinygltf::Model parseContent(json root) {
 
 }  // namespace
 
-Document parseDocument(std::string_view text, MemoryBudget& budget, Appearance* appearance) {
+Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes,
+                       Appearance* appearance) {
+  text = trimText(text, notes);
   checkNesting(text, budget);
   json root = parseJson(text);
   if (!root.is_object()) failInvalid("the JSON text is not an object");
-  checkVersion(root);
+  checkVersion(root, notes);
 
   Document document;
-  document.quantized = usesQuantization(root);
+  document.quantized = usesQuantization(root, notes);
   // What is checked has lost its textures.
   if (appearance != nullptr) *appearance = findAppearance(root, budget);
-  checkReferences(root, budget);
+  document.usage = checkReferences(root, budget, notes);
   document.buffers = takeBuffers(root);
   document.content = parseContent(std::move(root));
   return document;

@@ -26,23 +26,33 @@ struct BufferDescription {
   std::optional<std::string> uri;
 };
 
+/// What of a file is read for the sake of what is skinned or animated: by index, whether.
+struct Usage {
+  std::vector<bool> meshes;  ///< of nodes that have a skin
+  std::vector<bool> skins;   ///< of nodes that have a mesh
+  std::vector<bool> accessors, views, buffers;
+  std::vector<std::uint32_t> strides;  ///< byteStride by bufferView; 0: none
+};
+
 /// A file's structure: every index in it is in range, every property that is read has its type.
 struct Document {
   tinygltf::Model content;  ///< Without buffers, images, textures, cameras, extensions and extras.
   std::vector<BufferDescription> buffers;
+  Usage usage;
   bool quantized = false;  ///< KHR_mesh_quantization is in use.
 };
 
 struct Appearance;
+class Notes;
 
 /// Parses and checks. What is made of the text is spent first. `appearance` is filled in where it
 /// is wanted. Throws `Failure`.
-Document parseDocument(std::string_view text, MemoryBudget& budget,
+Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes,
                        Appearance* appearance = nullptr);
 
 /// Checks every index and every type in `root`, as `parseDocument` needs it; whole numbers written
-/// with a fraction of zero become integers. Spends what the things that it lists will take. Throws
-/// `Failure`.
-void checkReferences(nlohmann::json& root, MemoryBudget& budget);
+/// with a fraction of zero become integers. What is broken but clear is mended in place. Spends
+/// what the things that it lists will take. Throws `Failure`.
+Usage checkReferences(nlohmann::json& root, MemoryBudget& budget, Notes& notes);
 
 }  // namespace dermis::gltf

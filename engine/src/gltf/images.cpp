@@ -91,7 +91,7 @@ class ImageReader {
     try {
       image.bytes = bytesOf(description, where);
     } catch (const Failure& failure) {
-      model_.notes.push_back(join(failure.error.message, "; it is left out"));
+      source_.notes().remark(NoteKind::image, failure.error.message, "; it is left out");
     }
     if (image.bytes.empty()) return none;
     const std::string_view content(reinterpret_cast<const char*>(image.bytes.data()),

@@ -10,6 +10,7 @@
 #include "gltf/failure.h"
 #include "gltf/files.h"
 #include "gltf/images.h"
+#include "gltf/notes.h"
 #include "gltf/reader.h"
 
 namespace dermis::gltf {
@@ -20,14 +21,15 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   Model model;
   model.budget.addFile(bytes.size());
   spend(model.budget, bytes.size(), 1, "the file");
-  const Container container = openContainer(bytes);
+  Notes notes(options.strict);
+  const Container container = openContainer(bytes, notes);
   Appearance appearance;
   Document document =
-      parseDocument(container.json, model.budget, options.images ? &appearance : nullptr);
+      parseDocument(container.json, model.budget, notes, options.images ? &appearance : nullptr);
   SideFiles files(folder, model.budget);
   std::vector<Buffer> buffers =
-      loadBuffers(document.buffers, container.binaryChunk, files, model.budget);
-  Source source(std::move(document), std::move(buffers), model.budget);
+      loadBuffers(document, container.binaryChunk, files, model.budget, notes);
+  Source source(std::move(document), std::move(buffers), model.budget, notes);
 
   readNodes(source, model);
   readSkins(source, model);
@@ -36,6 +38,7 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   readScene(source, model);
   readAnimations(source, model);
   if (options.images) readImages(appearance, source, files, model);
+  notes.appendTo(model.notes);
   return model;
 }
 

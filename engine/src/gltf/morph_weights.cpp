@@ -36,9 +36,9 @@ std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uin
     interpolate(*channel, time, sampled);
     std::transform(sampled.begin(), sampled.end(), weights.begin(), toFloat);
   } else if (!from.morphWeights.empty()) {
-    weights = from.morphWeights;
+    std::copy(from.morphWeights.begin(), from.morphWeights.end(), weights.begin());
   } else if (!mesh.morphWeights.empty()) {
-    weights = mesh.morphWeights;
+    std::copy(mesh.morphWeights.begin(), mesh.morphWeights.end(), weights.begin());
   }
   return weights;
 }

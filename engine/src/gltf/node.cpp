@@ -11,18 +11,20 @@ namespace {
 // worth a note.
 constexpr double unitLengthTolerance = 1e-5;
 
-void checkMatrix(const std::array<double, 16>& matrix, std::size_t index) {
+// The fourth row is not used, here as in other programs.
+void checkMatrix(const std::array<double, 16>& matrix, std::size_t index, Notes& notes) {
   constexpr double tolerance = 1e-5;
   const bool affine = std::abs(matrix[3]) <= tolerance && std::abs(matrix[7]) <= tolerance &&
                       std::abs(matrix[11]) <= tolerance && std::abs(matrix[15] - 1) <= tolerance;
-  if (!affine) failInvalid("node ", index, ": the fourth row of its matrix is not 0 0 0 1");
+  if (affine) return;
+  notes.broken(NoteKind::matrix, "node ", index, ": the fourth row of its matrix is not 0 0 0 1");
 }
 
 // Returns whether the rotation had to be normalised.
-bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node) {
+bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node, Notes& notes) {
   if (!source.matrix.empty()) {
     std::copy(source.matrix.begin(), source.matrix.end(), node.matrix.emplace().begin());
-    checkMatrix(*node.matrix, index);
+    checkMatrix(*node.matrix, index, notes);
     return false;
   }
   std::copy(source.translation.begin(), source.translation.end(), node.translation.begin());
@@ -90,7 +92,7 @@ void readNodes(const Source& source, Model& model) {
     node.morphWeights.assign(from.weights.size(), 0);
     std::transform(from.weights.begin(), from.weights.end(), node.morphWeights.begin(),
                    [](double weight) { return static_cast<float>(weight); });
-    if (readTransform(from, i, node)) ++normalized;
+    if (readTransform(from, i, node, source.notes())) ++normalized;
   }
   readParents(content, model);
   orderNodes(content, model);

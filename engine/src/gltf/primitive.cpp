@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -33,6 +36,12 @@ constexpr Format quantizedDirections[] = {float32, snorm8, snorm16};
 constexpr Format quantizedTexcoords[] = {float32, int8,    snorm8, uint8,  unorm8,
                                          int16,   snorm16, uint16, unorm16};
 constexpr Format quantizedTargets[] = {float32, int8, snorm8, int16, snorm16};
+
+// What may not stand there and yet has one meaning only. A joint is an integer whatever stores it;
+// weights are from 0 to 1.
+constexpr Format clearJoints[] = {unorm8, unorm16, uint32, int8, int16, float32};
+constexpr Format clearWeights[] = {uint8, uint16, snorm8, snorm16};
+constexpr Format clearIndices[] = {unorm8, unorm16};
 
 // The number in "JOINTS_3" if the name begins with the prefix "JOINTS_".
 struct SetName {
@@ -73,114 +82,182 @@ std::uint32_t countSets(const std::map<std::string, int>& attributes, std::strin
 
 class PrimitiveCheck {
  public:
-  PrimitiveCheck(const Source& source, const tinygltf::Primitive& primitive, std::string where)
-      : source_(source), primitive_(primitive), where_(std::move(where)) {
-    for (const auto& attribute : primitive.attributes) {
-      if (first_ == nullptr && attribute.first != indicesAttribute) first_ = &attribute;
-    }
-  }
+  PrimitiveCheck(Source& source, std::size_t mesh, std::size_t primitive)
+      : source_(source),
+        mesh_(mesh),
+        index_(primitive),
+        primitive_(source.content().meshes[mesh].primitives[primitive]),
+        where_(primitivePlace(mesh, primitive)) {}
 
-  void run() const {
-    checkInfluences();
-    if (!primitive_.targets.empty() && first_ == nullptr) {
+  void run() {
+    if (!primitive_.targets.empty() && hasNoAttribute()) {
       failInvalid(where_, ": it has morph targets, but no attribute that they could change");
     }
-    for (const auto& [name, accessor] : primitive_.attributes) checkAttribute(name, accessor);
+    // It is left out.
+    if (!primitive_.attributes.contains("POSITION")) return;
+    checkInfluences();
+    // A copy, because some may be left out.
+    for (const auto& [name, accessor] : std::map(primitive_.attributes)) {
+      const auto check = [&] { checkAttribute(name, accessor); };
+      if (!concernsOnlyAppearance(name)) {
+        check();
+      } else if (!source_.notes().tolerate(NoteKind::attribute, "; it is left out", check)) {
+        source_.leaveOut(mesh_, index_, name);
+      }
+    }
     for (std::size_t i = 0; i < primitive_.targets.size(); ++i) {
       for (const auto& [name, accessor] : primitive_.targets[i]) {
-        checkTarget(name, accessor, join(where_, " morph target ", i, " ", shortName(name)));
+        checkTarget(name, accessor, join(where_, " morph target ", i, " ", placeName(name)));
       }
     }
   }
 
  private:
-  void checkInfluences() const {
-    const std::uint32_t joints = countSets(primitive_.attributes, "JOINTS_", where_);
+  bool hasNoAttribute() const {
+    return primitive_.attributes.size() == primitive_.attributes.count(indicesAttribute);
+  }
+
+  // Everything but positions, directions, triangles and what moves them.
+  static bool concernsOnlyAppearance(std::string_view name) {
+    return name != indicesAttribute && name != "POSITION" && name != "NORMAL" &&
+           name != "TANGENT" && !name.starts_with("JOINTS_") && !name.starts_with("WEIGHTS_");
+  }
+
+  void checkInfluences() {
+    std::uint32_t joints = countSets(primitive_.attributes, "JOINTS_", where_);
     const std::uint32_t weights = countSets(primitive_.attributes, "WEIGHTS_", where_);
-    if (joints > weights) failInvalid(where_, ": JOINTS_", weights, " has no WEIGHTS_", weights);
+    // Joints without weights move nothing; but a vertex needs some that do.
+    for (; joints > weights; --joints) {
+      const std::string sentence =
+          join(where_, ": JOINTS_", joints - 1, " has no WEIGHTS_", joints - 1);
+      if (weights == 0) failInvalid(sentence);
+      source_.notes().broken(NoteKind::influenceSet, sentence, "; it is left out");
+      source_.leaveOut(mesh_, index_, join("JOINTS_", joints - 1));
+    }
     if (weights > joints) failInvalid(where_, ": WEIGHTS_", joints, " has no JOINTS_", joints);
   }
 
   void checkAttribute(const std::string& name, int accessor) const {
-    const std::string place =
-        join(where_, " ", name == indicesAttribute ? "indices" : shortName(name));
+    const std::string place = join(where_, " ", placeName(name));
     if (name == indicesAttribute) {
-      source_.require(accessor, TINYGLTF_TYPE_SCALAR, indexFormats, place);
-      source_.requireNoStride(accessor, place);
+      source_.require(accessor, TINYGLTF_TYPE_SCALAR, indexFormats, place, clearIndices);
+      source_.noteStride(accessor, place);
       return;
     }
     if (name == "POSITION") {
-      source_.require(accessor, TINYGLTF_TYPE_VEC3, either(floatOnly, quantizedPositions), place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC3, floatOnly, quantizedPositions, place);
     } else if (name == "NORMAL") {
-      source_.require(accessor, TINYGLTF_TYPE_VEC3, either(floatOnly, quantizedDirections), place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC3, floatOnly, quantizedDirections, place);
     } else if (name == "TANGENT") {
-      source_.require(accessor, TINYGLTF_TYPE_VEC4, either(floatOnly, quantizedDirections), place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC4, floatOnly, quantizedDirections, place);
     } else if (name.starts_with("TEXCOORD_")) {
-      source_.require(accessor, TINYGLTF_TYPE_VEC2, either(texcoordFormats, quantizedTexcoords),
-                      place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC2, texcoordFormats, quantizedTexcoords, place);
     } else if (name.starts_with("COLOR_")) {
       const bool three = source_.components(accessor) == 3;
       source_.require(accessor, three ? TINYGLTF_TYPE_VEC3 : TINYGLTF_TYPE_VEC4, colorFormats,
                       place);
     } else if (name.starts_with("JOINTS_")) {
-      source_.require(accessor, TINYGLTF_TYPE_VEC4, jointFormats, place);
+      source_.require(accessor, TINYGLTF_TYPE_VEC4, jointFormats, place, clearJoints);
     } else if (name.starts_with("WEIGHTS_")) {
-      source_.require(accessor, TINYGLTF_TYPE_VEC4, weightFormats, place);
+      source_.require(accessor, TINYGLTF_TYPE_VEC4, weightFormats, place, clearWeights);
     }
     checkCount(accessor, place);
-    source_.requireAttributeAlignment(accessor, place);
+    source_.noteAttributeAlignment(accessor, place);
   }
 
   void checkTarget(const std::string& name, int accessor, const std::string& place) const {
     if (name == "POSITION") {
-      source_.require(accessor, TINYGLTF_TYPE_VEC3, either(floatOnly, quantizedTargets), place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC3, floatOnly, quantizedTargets, place);
     } else if (name == "NORMAL" || name == "TANGENT") {
-      source_.require(accessor, TINYGLTF_TYPE_VEC3, either(floatOnly, quantizedDirections), place);
+      requireQuantized(accessor, TINYGLTF_TYPE_VEC3, floatOnly, quantizedDirections, place);
+    } else {
+      return;
     }
     checkCount(accessor, place);
-    source_.requireAttributeAlignment(accessor, place);
+    source_.noteAttributeAlignment(accessor, place);
   }
 
-  // All attributes of a primitive have one count; which of them gives it does not matter.
+  // The name of an attribute, which an application may have made up, for a message.
+  static std::string placeName(const std::string& name) {
+    if (name == indicesAttribute) return "indices";
+    return name.starts_with("_") || name.size() > 20 ? inQuotes(name) : name;
+  }
+
+  // There are as many of all attributes as there are positions.
   void checkCount(int accessor, const std::string& place) const {
-    const auto& [name, first] = *first_;
-    if (source_.count(accessor) == source_.count(first)) return;
+    const std::uint32_t vertices = source_.count(primitive_.attributes.at("POSITION"));
+    if (source_.count(accessor) == vertices) return;
     failInvalid(place, ": accessor ", accessor, " has ", source_.count(accessor),
-                " elements where ", shortName(name), " has ", source_.count(first));
+                " elements where POSITION has ", vertices);
   }
 
-  std::span<const Format> either(std::span<const Format> plain,
-                                 std::span<const Format> quantized) const {
-    return source_.quantized() ? quantized : plain;
+  // A file may use the formats of KHR_mesh_quantization without saying so.
+  void requireQuantized(int accessor, int type, std::span<const Format> plain,
+                        std::span<const Format> quantized, const std::string& place) const {
+    if (source_.quantized()) return source_.require(accessor, type, quantized, place);
+    source_.require(accessor, type, plain, place, quantized);
   }
 
-  const Source& source_;
+  Source& source_;
+  std::size_t mesh_, index_;
   const tinygltf::Primitive& primitive_;
   std::string where_;
-  const std::pair<const std::string, int>* first_ = nullptr;  // null: it has indices at most
 };
 
-ComponentType storedType(Format format) {
-  switch (format.componentType) {
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return format.normalized ? ComponentType::unorm8 : ComponentType::uint8;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return format.normalized ? ComponentType::unorm16 : ComponentType::uint16;
-    default:
-      return ComponentType::float32;
+// Unsigned bytes and shorts are joints whether or not they are called normalized. The rest is made
+// shorts of.
+void readJoints(Source& source, int accessor, const std::string& where, Influences& set) {
+  const int type = source.format(accessor).componentType;
+  if (type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
+      type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT) {
+    const bool bytes = type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
+    set.jointType = bytes ? ComponentType::uint8 : ComponentType::uint16;
+    set.joints = source.stored(accessor);
+    return;
   }
+  // Exact up to 2^24, and more than 2^16 is refused.
+  const std::vector<float> values = source.floats(accessor);
+  source.spend(values.size(), sizeof(std::uint16_t), where);
+  set.jointType = ComponentType::uint16;
+  set.joints.resize(values.size() * sizeof(std::uint16_t));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!(values[i] >= 0 && values[i] <= 65535 && values[i] == std::floor(values[i]))) {
+      failInvalid(where, ": component ", i % 4, " of vertex ", i / 4, " is ", values[i],
+                  ", which is no joint");
+    }
+    const auto joint = static_cast<std::uint16_t>(values[i]);
+    std::memcpy(&set.joints[i * sizeof joint], &joint, sizeof joint);
+  }
+}
+
+// Unsigned bytes and shorts are weights from 0 to 1 whether or not they are called normalized.
+void readWeights(Source& source, int accessor, const std::string& where, Influences& set) {
+  switch (source.format(accessor).componentType) {
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      set.weightType = ComponentType::unorm8;
+      set.weights = source.stored(accessor);
+      return;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      set.weightType = ComponentType::unorm16;
+      set.weights = source.stored(accessor);
+      return;
+    default:
+      break;
+  }
+  const std::vector<float> values = source.floats(accessor);
+  source.spend(values.size(), sizeof(float), where);
+  set.weightType = ComponentType::float32;
+  set.weights.resize(values.size() * sizeof(float));
+  if (!values.empty()) std::memcpy(set.weights.data(), values.data(), set.weights.size());
 }
 
 std::vector<Influences> readInfluences(Source& source, const std::map<std::string, int>& attributes,
                                        const std::string& where) {
   std::vector<Influences> sets(countSets(attributes, "JOINTS_", where));
   for (std::size_t i = 0; i < sets.size(); ++i) {
-    const int joints = attributes.at(join("JOINTS_", i));
-    const int weights = attributes.at(join("WEIGHTS_", i));
-    sets[i].jointType = storedType(source.format(joints));
-    sets[i].weightType = storedType(source.format(weights));
-    sets[i].joints = source.stored(joints);
-    sets[i].weights = source.stored(weights);
+    const std::string joints = join("JOINTS_", i), weights = join("WEIGHTS_", i);
+    readJoints(source, attributes.at(joints), join(where, " ", joints), sets[i]);
+    readWeights(source, attributes.at(weights), join(where, " ", weights), sets[i]);
   }
   return sets;
 }
@@ -253,16 +330,15 @@ std::vector<std::uint32_t> unroll(const std::vector<std::uint32_t>& indices, int
 }
 
 std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primitive& from,
-                                         std::uint32_t vertexCount, const std::string& where,
-                                         std::vector<std::string>& notes) {
+                                         std::uint32_t vertexCount, const std::string& where) {
   const int accessor = findAttribute(from.attributes, indicesAttribute);
   // Points and lines: their indices are looked at, but make no triangle.
   std::vector<std::uint32_t> indices = readIndices(source, accessor, vertexCount, where);
   switch (from.mode) {
     case TINYGLTF_MODE_TRIANGLES:
       if (indices.size() % 3 != 0) {
-        notes.push_back(join(where, ": the last ", indices.size() % 3,
-                             " indices make no triangle and are left out"));
+        source.notes().broken(NoteKind::restOfTriangles, where, ": the last ", indices.size() % 3,
+                              " indices make no triangle and are left out");
         indices.resize(indices.size() - indices.size() % 3);
       }
       return indices;
@@ -289,17 +365,28 @@ std::string primitivePlace(std::size_t mesh, std::size_t primitive) {
   return join("mesh ", mesh, " primitive ", primitive);
 }
 
-void checkPrimitives(const Source& source) {
+void checkPrimitives(Source& source) {
   const auto& meshes = source.content().meshes;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     for (std::size_t j = 0; j < meshes[i].primitives.size(); ++j) {
-      PrimitiveCheck(source, meshes[i].primitives[j], primitivePlace(i, j)).run();
+      const auto check = [&] { PrimitiveCheck(source, i, j).run(); };
+      if (source.usage().meshes[i]) {
+        check();
+      } else {
+        source.notes().tolerate(NoteKind::unused, "; nothing skinned uses it", check);
+      }
     }
   }
 }
 
-Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t primitiveIndex,
-                        std::vector<std::string>& notes) {
+std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh) {
+  std::size_t most = 0;
+  for (const tinygltf::Primitive& primitive : mesh.primitives)
+    most = std::max(most, primitive.targets.size());
+  return static_cast<std::uint32_t>(most);
+}
+
+Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t primitiveIndex) {
   const tinygltf::Mesh& mesh = source.content().meshes[meshIndex];
   const tinygltf::Primitive& from = mesh.primitives[primitiveIndex];
   const std::string where = primitivePlace(meshIndex, primitiveIndex);
@@ -308,7 +395,7 @@ Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t p
   primitive.material = indexOf(from.material);
   const int positions = findAttribute(from.attributes, "POSITION");
   if (positions < 0) {
-    notes.push_back(join(where, ": it has no positions and is left out"));
+    source.notes().remark(NoteKind::noPositions, where, ": it has no positions and is left out");
     return primitive;
   }
   primitive.vertexCount = source.count(positions);
@@ -318,7 +405,7 @@ Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t p
   primitive.texcoords = readTexcoords(source, from.attributes);
   primitive.colors = readColors(source, findAttribute(from.attributes, "COLOR_0"), where);
   primitive.influences = readInfluences(source, from.attributes, where);
-  primitive.triangles = readTriangles(source, from, primitive.vertexCount, where, notes);
+  primitive.triangles = readTriangles(source, from, primitive.vertexCount, where);
   for (const auto& target : from.targets) {
     primitive.morphTargets.push_back(readTarget(source, target));
   }

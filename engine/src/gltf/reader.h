@@ -26,16 +26,19 @@ void readMaterials(const Source& source, Model& model);
 /// clips: channels with their keys. May take a node's matrix apart.
 void readAnimations(Source& source, Model& model);
 
-/// Looks at the accessors of every primitive of every mesh, not at their bytes.
-void checkPrimitives(const Source& source);
+/// Looks at the accessors of every primitive of every mesh, not at their bytes. Attributes that do
+/// not concern skinning are taken out where they are wrong.
+void checkPrimitives(Source& source);
 
 /// meshes, and skinnedPrimitives: what the default scene skins. Reads the primitives of those
 /// meshes alone.
 void readScene(Source& source, Model& model);
 
 /// One primitive with all its bytes.
-Primitive readPrimitive(Source& source, std::uint32_t mesh, std::uint32_t primitive,
-                        std::vector<std::string>& notes);
+Primitive readPrimitive(Source& source, std::uint32_t mesh, std::uint32_t primitive);
+
+/// Of the primitive that has the most.
+std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh);
 
 /// "mesh 3 primitive 0", for the sentence about what is wrong with it.
 std::string primitivePlace(std::size_t mesh, std::size_t primitive);

@@ -1,6 +1,10 @@
 // Everything that can be wrong with a file's JSON without looking at a buffer: missing or mistyped
 // properties, and indices of things that do not exist. tinygltf takes most of these for defaults,
 // or wraps them to another number.
+//
+// What is wrong and yet of one meaning is mended with a note. What is wrong with something that
+// nothing skinned or animated uses is noted, and a placeholder stands in its place: so the check
+// goes from what uses to what is used.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,11 +15,14 @@
 #include <string>
 #include <string_view>
 #include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include "dermis/gltf.h"
 #include "gltf/buffers.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
+#include "gltf/notes.h"
 
 namespace dermis::gltf {
 namespace {
@@ -49,28 +56,70 @@ constexpr std::uint64_t bytesPerChannel = sizeof(tinygltf::AnimationChannel) + s
 
 class ReferenceCheck {
  public:
-  ReferenceCheck(json& root, MemoryBudget& budget) : root_(root), budget_(budget) {}
+  ReferenceCheck(json& root, MemoryBudget& budget, Notes& notes)
+      : root_(root), budget_(budget), notes_(notes) {}
 
-  void run() {
+  Usage run() {
     checkSections();
-    forEach("buffers", [&](json& buffer, const std::string& where) { checkBuffer(buffer, where); });
-    forEach("bufferViews", [&](json& view, const std::string& where) { checkView(view, where); });
-    forEach("accessors",
-            [&](json& accessor, const std::string& where) { checkAccessor(accessor, where); });
-    forEach("materials",
-            [&](json& material, const std::string& where) { checkMaterial(material, where); });
-    forEach("meshes", [&](json& mesh, const std::string& where) { checkMesh(mesh, where); });
-    forEach("skins", [&](json& skin, const std::string& where) { checkSkin(skin, where); });
-    forEach("nodes", [&](json& node, const std::string& where) { checkNode(node, where); });
-    forEach("animations",
-            [&](json& animation, const std::string& where) { checkAnimation(animation, where); });
-    forEach("scenes", [&](json& scene, const std::string& where) {
+    usage_.meshes.resize(sizeOf("meshes"));
+    usage_.skins.resize(sizeOf("skins"));
+    usage_.accessors.resize(sizeOf("accessors"));
+    usage_.views.resize(sizeOf("bufferViews"));
+    usage_.buffers.resize(sizeOf("buffers"));
+    usage_.strides.resize(sizeOf("bufferViews"));
+    forEach("scenes", [&](json& scene, const std::string& where, std::size_t) {
       references(scene, "nodes", "nodes", where);
     });
     reference(root_, "scene", "scenes", "the file");
+    forEach("nodes",
+            [&](json& node, const std::string& where, std::size_t) { checkNode(node, where); });
+    forEach("materials", [&](json& material, const std::string& where, std::size_t) {
+      checkMaterial(material, where);
+    });
+    checkUsed("meshes", usage_.meshes, {{"primitives", json::array()}},
+              [&](json& mesh, const std::string& where, std::size_t i) {
+                checkMesh(mesh, where, usage_.meshes[i]);
+              });
+    forEach("nodes", [&](json& node, const std::string& where, std::size_t) {
+      checkNodeWeights(node, where);
+    });
+    checkUsed("skins", usage_.skins, {{"joints", json::array()}},
+              [&](json& skin, const std::string& where, std::size_t i) {
+                checkSkin(skin, where, usage_.skins[i]);
+              });
+    forEach("animations", [&](json& animation, const std::string& where, std::size_t) {
+      checkAnimation(animation, where);
+    });
+    checkUsed("accessors", usage_.accessors,
+              {{"componentType", 5121}, {"type", "SCALAR"}, {"count", 1}},
+              [&](json& accessor, const std::string& where, std::size_t i) {
+                checkAccessor(accessor, where, usage_.accessors[i]);
+              });
+    // A buffer that no file has: whoever reads the view is told so.
+    checkUsed(
+        "bufferViews", usage_.views,
+        {{"buffer", std::numeric_limits<std::int32_t>::max()}, {"byteLength", 0}},
+        [&](json& view, const std::string& where, std::size_t i) { checkView(view, where, i); });
+    checkUsed(
+        "buffers", usage_.buffers, {{"byteLength", 0}},
+        [&](json& buffer, const std::string& where, std::size_t) { checkBuffer(buffer, where); });
+    return std::move(usage_);
   }
 
  private:
+  // Calls `check` for each item of a section. A fault of one that is not used is noted, and the
+  // placeholder takes its place.
+  template <typename Check>
+  void checkUsed(const char* section, const std::vector<bool>& used, const json& placeholder,
+                 Check check) {
+    forEach(section, [&](json& item, const std::string& where, std::size_t i) {
+      if (used[i]) return check(item, where, i);
+      const bool good = notes_.tolerate(NoteKind::unused, "; nothing skinned uses it",
+                                        [&] { check(item, where, i); });
+      if (!good) item = placeholder;
+    });
+  }
+
   // The kind of thing that a section lists: "mesh" for "meshes".
   static std::string kindOf(std::string_view section) {
     return std::string(section == "meshes" ? "mesh" : section.substr(0, section.size() - 1));
@@ -80,14 +129,50 @@ class ReferenceCheck {
     for (const auto& [name, bytesEach] : sections) {
       const auto section = root_.find(name);
       if (section == root_.end()) continue;
+      if (section->is_null() || (section->is_array() && section->empty())) {
+        notes_.broken(section->is_null() ? NoteKind::nullProperty : NoteKind::emptyArray,
+                      inQuotes(name), " is ", section->is_null() ? "null" : "an empty array",
+                      ", which the specification forbids");
+        root_.erase(section);
+        continue;
+      }
       if (!section->is_array()) failInvalid(inQuotes(name), " is not an array");
       spend(budget_, section->size(), bytesEach, join(section->size(), " ", name));
       for (std::size_t i = 0; i < section->size(); ++i) {
-        if (!(*section)[i].is_object()) failInvalid(kindOf(name), " ", i, " is not an object");
+        const std::string where = join(kindOf(name), " ", i);
+        if (!(*section)[i].is_object()) failInvalid(where, " is not an object");
+        tidy((*section)[i], where);
       }
     }
-    if (root_.contains("skins") && root_["skins"].empty()) {
-      failInvalid("'skins' is an empty array, which the specification forbids");
+    const auto scene = root_.find("scene");
+    if (scene != root_.end() && scene->is_null()) {
+      notes_.broken(NoteKind::nullProperty, "the file: 'scene' is null");
+      root_.erase(scene);
+    }
+  }
+
+  // Takes out what stands for nothing: null, and lists that may be left out but not be empty. The
+  // nesting is bounded by `deepestNesting`.
+  void tidy(json& value, const std::string& where) {
+    if (value.is_array()) {
+      for (json& child : value) tidy(child, where);
+    }
+    if (!value.is_object()) return;
+    for (auto member = value.begin(); member != value.end();) {
+      const std::string& key = member.key();
+      const bool isList =
+          key == "children" || key == "nodes" || key == "weights" || key == "targets";
+      if (key == "extensions" || key == "extras") {
+        ++member;
+      } else if (member->is_null()) {
+        notes_.broken(NoteKind::nullProperty, where, ": ", inQuotes(key), " is null");
+        member = value.erase(member);
+      } else if (isList && member->is_array() && member->empty()) {
+        notes_.broken(NoteKind::emptyArray, where, ": ", key, " is an empty array");
+        member = value.erase(member);
+      } else {
+        tidy(*member++, where);
+      }
     }
   }
 
@@ -95,17 +180,19 @@ class ReferenceCheck {
   void forEach(const char* section, Function function) {
     const auto list = root_.find(section);
     if (list == root_.end()) return;
-    std::size_t index = 0;
-    for (json& item : *list) {
-      const std::string where = join(kindOf(section), " ", index++);
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      json& item = (*list)[i];
+      const std::string where = join(kindOf(section), " ", i);
       name(item, where);
-      function(item, where);
+      function(item, where, i);
     }
   }
 
-  static void name(const json& item, const std::string& where) {
+  void name(json& item, const std::string& where) const {
     const auto found = item.find("name");
-    if (found != item.end() && !found->is_string()) failInvalid(where, ": its name is not a text");
+    if (found == item.end() || found->is_string()) return;
+    notes_.broken(NoteKind::name, where, ": its name is not a text");
+    item.erase(found);
   }
 
   static const json& require(const json& object, const char* property, const std::string& where) {
@@ -178,27 +265,58 @@ class ReferenceCheck {
     reference(object, property, section, where);
   }
 
-  // A list of indices in which none may stand twice.
+  // The same for what is not read: taken out where it is wrong.
+  void idleReference(json& object, const char* property, const char* section,
+                     const std::string& where) const {
+    const bool good = notes_.tolerate(NoteKind::reference, "; it is left out",
+                                      [&] { reference(object, property, section, where); });
+    if (!good) object.erase(property);
+  }
+
+  // A list of indices, none of them twice when this returns.
   void references(json& object, const char* property, const char* section,
                   const std::string& where) const {
     if (!object.contains(property)) return;
     json& list = requireArray(object, property, where);
     std::unordered_set<std::uint64_t> seen;
-    for (json& item : list) {
+    const auto isAgain = [&](json& item) {
       const std::uint64_t index = inRange(item, section, join(where, ": an entry of ", property));
-      if (!seen.insert(index).second) {
-        failInvalid(where, ": ", property, " lists ", index, " twice");
+      if (seen.insert(index).second) return false;
+      notes_.broken(NoteKind::duplicate, where, ": ", property, " lists ", index, " twice");
+      return true;
+    };
+    json::array_t& items = list.get_ref<json::array_t&>();
+    items.erase(std::remove_if(items.begin(), items.end(), isAgain), items.end());
+  }
+
+  // Whether an attribute is one that tells where vertices and triangles are, and what moves them.
+  static bool isEssential(std::string_view name) {
+    return name == "POSITION" || name == "NORMAL" || name == "TANGENT" ||
+           name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
+  }
+
+  // Attributes or morph targets: a name to an accessor. `used`: whether what they hold is read.
+  void attributes(json& object, const std::string& where, bool used) {
+    if (!object.is_object()) failInvalid(where, " is not an object");
+    spend(budget_, object.size(), bytesPerAttribute, where);
+    for (auto entry = object.begin(); entry != object.end();) {
+      const auto check = [&] {
+        inRange(entry.value(), "accessors", join(where, ": ", inQuotes(entry.key())));
+      };
+      if (isEssential(entry.key())) {
+        check();
+        if (used) usage_.accessors[entry->get<std::size_t>()] = true;
+      } else if (!notes_.tolerate(NoteKind::attribute, "; it is left out", check)) {
+        entry = object.erase(entry);
+        continue;
       }
+      ++entry;
     }
   }
 
-  // Attributes or morph targets: a name to an accessor.
-  void attributes(json& object, const std::string& where) const {
-    if (!object.is_object()) failInvalid(where, " is not an object");
-    spend(budget_, object.size(), bytesPerAttribute, where);
-    for (const auto& entry : object.items()) {
-      inRange(entry.value(), "accessors", join(where, ": ", inQuotes(entry.key())));
-    }
+  // Marks the accessor that a property names, which has been found to be there.
+  void use(const json& object, const char* property) {
+    if (object.contains(property)) usage_.accessors[object[property].get<std::size_t>()] = true;
   }
 
   static void numbers(const json& object, const char* property, std::size_t count,
@@ -242,27 +360,36 @@ class ReferenceCheck {
   }
 
   void checkBuffer(json& buffer, const std::string& where) const {
-    if (requireInteger(buffer, "byteLength", where) == 0) failInvalid(where, ": byteLength is 0");
+    if (requireInteger(buffer, "byteLength", where) == 0)
+      notes_.broken(NoteKind::bufferLength, where, ": byteLength is 0");
     const auto uri = buffer.find("uri");
     if (uri != buffer.end() && !uri->is_string()) failInvalid(where, ": uri is not a text");
   }
 
-  void checkView(json& view, const std::string& where) const {
+  void checkView(json& view, const std::string& where, std::size_t index) {
     requireReference(view, "buffer", "buffers", where);
     integer(view, "byteOffset", where, 0);
-    if (requireInteger(view, "byteLength", where) == 0) failInvalid(where, ": byteLength is 0");
-    if (!view.contains("byteStride")) return;
-    const std::uint64_t stride = integer(view, "byteStride", where, 0);
+    if (requireInteger(view, "byteLength", where) == 0)
+      notes_.broken(NoteKind::viewLength, where, ": byteLength is 0");
+    if (usage_.views[index]) usage_.buffers[view["buffer"].get<std::size_t>()] = true;
+    const std::uint64_t stride = integer(view, "byteStride", where, 4);
+    if (stride > std::numeric_limits<std::int32_t>::max())
+      failInvalid(where, ": byteStride is ", stride, ", more than 2 GiB");
     if (stride < 4 || stride > 252 || stride % 4 != 0) {
-      failInvalid(where, ": byteStride ", stride, " is not a multiple of 4 from 4 to 252");
+      notes_.broken(NoteKind::stride, where, ": byteStride ", stride,
+                    " is not a multiple of 4 from 4 to 252");
     }
+    // tinygltf refuses those that break the rule.
+    if (view.contains("byteStride")) usage_.strides[index] = static_cast<std::uint32_t>(stride);
+    view.erase("byteStride");
   }
 
-  void checkAccessor(json& accessor, const std::string& where) const {
+  void checkAccessor(json& accessor, const std::string& where, bool used) {
     reference(accessor, "bufferView", "bufferViews", where);
     const std::uint64_t byteOffset = integer(accessor, "byteOffset", where, 0);
     if (byteOffset != 0 && !accessor.contains("bufferView")) {
-      failInvalid(where, ": it has a byteOffset but no bufferView");
+      notes_.broken(NoteKind::accessor, where, ": it has a byteOffset but no bufferView");
+      accessor.erase("byteOffset");
     }
     requireInteger(accessor, "componentType", where);
     oneOf(accessor["componentType"], {5120, 5121, 5122, 5123, 5125, 5126},
@@ -270,19 +397,30 @@ class ReferenceCheck {
     oneOf(require(accessor, "type", where),
           {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"}, join(where, ": type"));
     boolean(accessor, "normalized", where);
+    if (accessor["componentType"] == 5126 && accessor.value("normalized", false)) {
+      notes_.broken(NoteKind::accessor, where, ": float may not be normalized");
+      accessor.erase("normalized");
+    }
     const std::uint64_t count = requireInteger(accessor, "count", where);
-    if (count == 0) failInvalid(where, ": count is 0");
+    if (count == 0) notes_.broken(NoteKind::accessor, where, ": count is 0");
     if (count > std::numeric_limits<std::uint32_t>::max()) {
       fail(ErrorCode::limitExceeded, join(where, ": a count of ", count, " is beyond 32 bits"));
     }
-    if (accessor.contains("sparse")) checkSparse(accessor, count, where);
+    if (accessor.contains("sparse")) checkSparse(accessor, count, where, used);
+    if (used && accessor.contains("bufferView"))
+      usage_.views[accessor["bufferView"].get<std::size_t>()] = true;
   }
 
-  void checkSparse(json& accessor, std::uint64_t count, const std::string& where) const {
+  void checkSparse(json& accessor, std::uint64_t count, const std::string& where, bool used) {
     json& sparse = requireObject(accessor, "sparse", where);
     const std::string inside = where + ": sparse";
     const std::uint64_t sparseCount = requireInteger(sparse, "count", inside);
-    if (sparseCount == 0 || sparseCount > count) {
+    if (sparseCount == 0) {
+      notes_.broken(NoteKind::sparse, inside, ": count is 0");
+      accessor.erase("sparse");
+      return;
+    }
+    if (sparseCount > count) {
       failInvalid(inside, ": count ", sparseCount, " is not from 1 to the accessor's count ",
                   count);
     }
@@ -298,45 +436,52 @@ class ReferenceCheck {
       if (std::max(offset, sparseCount) > std::numeric_limits<std::int32_t>::max()) {
         fail(ErrorCode::limitExceeded, join(name, ": more than 2 GiB"));
       }
+      if (used) usage_.views[(*part)["bufferView"].get<std::size_t>()] = true;
     }
   }
 
-  static void checkMaterial(json& material, const std::string& where) {
+  // Keeps what Dermis reads of a material. Nothing that is wrong with it concerns skinning.
+  void checkMaterial(json& material, const std::string& where) const {
     json lean = json::object();
-    for (const char* property :
-         {"name", "emissiveFactor", "alphaMode", "alphaCutoff", "doubleSided"}) {
-      if (material.contains(property)) lean[property] = material[property];
+    const auto keep = [&](const json& from, json& to, const char* property, auto check) {
+      if (!from.contains(property)) return;
+      if (notes_.tolerate(NoteKind::material, "; the default is taken", check))
+        to[property] = from[property];
+    };
+    keep(material, lean, "name", [] {});
+    keep(material, lean, "emissiveFactor", [&] { numbers(material, "emissiveFactor", 3, where); });
+    keep(material, lean, "alphaCutoff", [&] { number(material, "alphaCutoff", where); });
+    keep(material, lean, "doubleSided", [&] { boolean(material, "doubleSided", where); });
+    keep(material, lean, "alphaMode", [&] {
+      oneOf(material["alphaMode"], {"OPAQUE", "MASK", "BLEND"}, join(where, ": alphaMode"));
+    });
+    const char* group = "pbrMetallicRoughness";
+    keep(material, lean, group, [&] { requireObject(material, group, where); });
+    if (lean.contains(group)) {
+      const json& from = material[group];
+      json factors = json::object();
+      keep(from, factors, "baseColorFactor", [&] { numbers(from, "baseColorFactor", 4, where); });
+      keep(from, factors, "metallicFactor", [&] { number(from, "metallicFactor", where); });
+      keep(from, factors, "roughnessFactor", [&] { number(from, "roughnessFactor", where); });
+      lean[group] = std::move(factors);
     }
-    numbers(lean, "emissiveFactor", 3, where);
-    number(lean, "alphaCutoff", where);
-    boolean(lean, "doubleSided", where);
-    if (lean.contains("alphaMode")) {
-      oneOf(lean["alphaMode"], {"OPAQUE", "MASK", "BLEND"}, join(where, ": alphaMode"));
-    }
-    if (material.contains("pbrMetallicRoughness")) {
-      const json& factors = requireObject(material, "pbrMetallicRoughness", where);
-      for (const char* property : {"baseColorFactor", "metallicFactor", "roughnessFactor"}) {
-        if (factors.contains(property)) lean["pbrMetallicRoughness"][property] = factors[property];
-      }
-      numbers(factors, "baseColorFactor", 4, where);
-      number(factors, "metallicFactor", where);
-      number(factors, "roughnessFactor", where);
-    }
-    // What stays is what Dermis keeps: textures and extensions are none of its business.
+    // Textures and extensions are none of this check's business.
     material = std::move(lean);
   }
 
-  void checkMesh(json& mesh, const std::string& where) const {
+  void checkMesh(json& mesh, const std::string& where, bool used) {
     json& primitives = requireArray(mesh, "primitives", where);
-    if (primitives.empty()) failInvalid(where, ": primitives is an empty array");
+    if (primitives.empty())
+      notes_.broken(NoteKind::emptyArray, where, ": primitives is an empty array");
     spend(budget_, primitives.size(), bytesPerPrimitive, where);
-    std::size_t index = 0;
-    for (json& primitive : primitives) {
-      const std::string place = join(where, " primitive ", index++);
+    for (std::size_t i = 0; i < primitives.size(); ++i) {
+      json& primitive = primitives[i];
+      const std::string place = join(where, " primitive ", i);
       if (!primitive.is_object()) failInvalid(place, " is not an object");
-      attributes(requireObject(primitive, "attributes", place), place + " attributes");
+      attributes(requireObject(primitive, "attributes", place), place + " attributes", used);
       reference(primitive, "indices", "accessors", place);
-      reference(primitive, "material", "materials", place);
+      if (used) use(primitive, "indices");
+      idleReference(primitive, "material", "materials", place);
       if (integer(primitive, "mode", place, 4) > 6) {
         failInvalid(place, ": mode is none of 0 to 6");
       }
@@ -344,15 +489,15 @@ class ReferenceCheck {
         json& targets = requireArray(primitive, "targets", place);
         spend(budget_, targets.size(), bytesPerTarget, place);
         for (json& target : targets) {
-          attributes(target, place + " targets");
+          attributes(target, place + " targets", used);
         }
       }
       if (targetCount(primitive) != targetCount(primitives[0])) {
-        failInvalid(place, ": it has ", targetCount(primitive), " morph targets, primitive 0 has ",
-                    targetCount(primitives[0]));
+        notes_.broken(NoteKind::targetCount, place, ": it has ", targetCount(primitive),
+                      " morph targets, primitive 0 has ", targetCount(primitives[0]));
       }
     }
-    checkWeights(mesh, mesh, where);
+    checkWeights(mesh, targetsOf(mesh), where);
   }
 
   static std::size_t targetCount(const json& primitive) {
@@ -360,76 +505,137 @@ class ReferenceCheck {
     return targets == primitive.end() ? 0 : targets->size();
   }
 
-  static void checkWeights(const json& object, const json& mesh, const std::string& where) {
+  // Of the primitive that has the most.
+  static std::size_t targetsOf(const json& mesh) {
+    std::size_t most = 0;
+    for (const json& primitive : mesh["primitives"]) most = std::max(most, targetCount(primitive));
+    return most;
+  }
+
+  // Weights beyond the targets have no effect and are cut off. Targets beyond the weights have
+  // weight 0, as all have where there are no weights.
+  void checkWeights(json& object, std::size_t targets, const std::string& where) const {
     if (!object.contains("weights")) return;
     numbers(object, "weights", 0, where);
-    const std::size_t targets = targetCount(mesh["primitives"][0]);
-    if (object["weights"].size() != targets) {
-      failInvalid(where, ": it has ", object["weights"].size(), " weights for ", targets,
-                  " morph targets");
-    }
+    json::array_t& weights = object["weights"].get_ref<json::array_t&>();
+    if (weights.size() == targets) return;
+    notes_.broken(NoteKind::weightCount, where, ": it has ", weights.size(), " weights for ",
+                  targets, " morph targets");
+    if (weights.size() > targets) weights.resize(targets);
   }
 
-  void checkSkin(json& skin, const std::string& where) const {
-    if (requireArray(skin, "joints", where).empty()) {
-      failInvalid(where, ": joints is an empty array");
+  void checkSkin(json& skin, const std::string& where, bool used) {
+    json& joints = requireArray(skin, "joints", where);
+    if (joints.empty()) failInvalid(where, ": joints is an empty array");
+    std::unordered_set<std::uint64_t> seen;
+    for (json& joint : joints) {
+      const std::uint64_t node = inRange(joint, "nodes", where + ": an entry of joints");
+      // Each place in the list has its own inverse bind matrix.
+      if (!seen.insert(node).second)
+        notes_.broken(NoteKind::duplicate, where, ": joints lists ", node, " twice");
     }
-    references(skin, "joints", "nodes", where);
     reference(skin, "inverseBindMatrices", "accessors", where);
-    reference(skin, "skeleton", "nodes", where);
+    if (used) use(skin, "inverseBindMatrices");
+    idleReference(skin, "skeleton", "nodes", where);
   }
 
-  void checkNode(json& node, const std::string& where) const {
+  void checkNode(json& node, const std::string& where) {
     references(node, "children", "nodes", where);
     reference(node, "mesh", "meshes", where);
-    reference(node, "skin", "skins", where);
-    reference(node, "camera", "cameras", where);
     for (const char* property : {"skin", "weights"}) {
-      if (node.contains(property) && !node.contains("mesh")) {
-        failInvalid(where, ": it has ", property, " but no mesh");
-      }
+      if (!node.contains(property) || node.contains("mesh")) continue;
+      notes_.broken(NoteKind::withoutMesh, where, ": it has ", property, " but no mesh");
+      node.erase(property);
     }
+    reference(node, "skin", "skins", where);
+    idleReference(node, "camera", "cameras", where);
     numbers(node, "matrix", 16, where);
     numbers(node, "translation", 3, where);
     numbers(node, "rotation", 4, where);
     numbers(node, "scale", 3, where);
-    if (node.contains("matrix")) {
-      for (const char* property : {"translation", "rotation", "scale"}) {
-        if (node.contains(property)) failInvalid(where, ": it has both matrix and ", property);
-      }
+    for (const char* property : {"translation", "rotation", "scale"}) {
+      if (!node.contains("matrix") || !node.contains(property)) continue;
+      notes_.broken(NoteKind::matrix, where, ": it has both matrix and ", property,
+                    "; the matrix is taken");
+      node.erase(property);
     }
-    if (node.contains("weights")) {
-      checkWeights(node, root_["meshes"][node["mesh"].get<std::size_t>()], where);
+    if (!node.contains("skin")) return;
+    usage_.meshes[node["mesh"].get<std::size_t>()] = true;
+    usage_.skins[node["skin"].get<std::size_t>()] = true;
+  }
+
+  void checkNodeWeights(json& node, const std::string& where) {
+    if (!node.contains("weights")) return;
+    const std::size_t index = node["mesh"].get<std::size_t>();
+    const json& mesh = root_["meshes"][index];
+    const MorphFacts& facts = morphFacts(index, mesh);
+    checkWeights(node, facts.targets, where);
+    // Whether the rest is 0 or the mesh's own, programs do not agree about.
+    if (node["weights"].size() < facts.weights) {
+      failInvalid(where, ": it has ", node["weights"].size(), " weights for ", facts.targets,
+                  " morph targets, and its mesh has others");
     }
   }
 
-  void checkAnimation(json& animation, const std::string& where) const {
+  struct MorphFacts {
+    bool known = false;
+    std::size_t targets = 0;
+    std::size_t weights = 0;  // up to the last that is not 0
+  };
+
+  // Many nodes may name one mesh of many targets.
+  const MorphFacts& morphFacts(std::size_t index, const json& mesh) {
+    morphFacts_.resize(sizeOf("meshes"));
+    MorphFacts& facts = morphFacts_[index];
+    if (facts.known) return facts;
+    facts.known = true;
+    facts.targets = targetsOf(mesh);
+    if (!mesh.contains("weights")) return facts;
+    const json& weights = mesh["weights"];
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      if (weights[i].get<double>() != 0) facts.weights = i + 1;
+    }
+    return facts;
+  }
+
+  void checkAnimation(json& animation, const std::string& where) {
     json& samplers = requireArray(animation, "samplers", where);
-    spend(budget_, samplers.size(), bytesPerSampler, where);
-    std::size_t index = 0;
-    for (json& sampler : samplers) {
-      const std::string place = join(where, " sampler ", index++);
-      if (!sampler.is_object()) failInvalid(place, " is not an object");
-      requireReference(sampler, "input", "accessors", place);
-      requireReference(sampler, "output", "accessors", place);
-      if (sampler.contains("interpolation")) {
-        oneOf(sampler["interpolation"], {"LINEAR", "STEP", "CUBICSPLINE"},
-              place + ": interpolation");
-      }
-    }
     json& channels = requireArray(animation, "channels", where);
+    spend(budget_, samplers.size(), bytesPerSampler, where);
     spend(budget_, channels.size(), bytesPerChannel, where);
-    index = 0;
-    for (json& channel : channels) {
-      checkChannel(channel, samplers.size(), join(where, " channel ", index++));
+    for (const auto& [property, list] : {std::pair("samplers", &samplers), {"channels", &channels}})
+      if (list->empty())
+        notes_.broken(NoteKind::emptyArray, where, ": ", property, " is an empty array");
+    std::vector<bool> used(samplers.size());
+    for (std::size_t i = 0; i < channels.size(); ++i)
+      checkChannel(channels[i], used, join(where, " channel ", i));
+    for (std::size_t i = 0; i < samplers.size(); ++i) {
+      const auto check = [&] { checkSampler(samplers[i], used[i], join(where, " sampler ", i)); };
+      if (used[i]) {
+        check();
+      } else if (!notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", check)) {
+        samplers[i] = {{"input", 0}, {"output", 0}};
+      }
     }
   }
 
-  void checkChannel(json& channel, std::size_t samplerCount, const std::string& where) const {
+  void checkSampler(json& sampler, bool used, const std::string& where) {
+    if (!sampler.is_object()) failInvalid(where, " is not an object");
+    for (const char* property : {"input", "output"}) {
+      requireReference(sampler, property, "accessors", where);
+      if (used) use(sampler, property);
+    }
+    if (sampler.contains("interpolation")) {
+      oneOf(sampler["interpolation"], {"LINEAR", "STEP", "CUBICSPLINE"}, where + ": interpolation");
+    }
+  }
+
+  void checkChannel(json& channel, std::vector<bool>& usedSamplers,
+                    const std::string& where) const {
     if (!channel.is_object()) failInvalid(where, " is not an object");
     const std::uint64_t sampler = requireInteger(channel, "sampler", where);
-    if (sampler >= samplerCount) {
-      failInvalid(where, ": sampler is ", sampler, ", and the animation has ", samplerCount,
+    if (sampler >= usedSamplers.size()) {
+      failInvalid(where, ": sampler is ", sampler, ", and the animation has ", usedSamplers.size(),
                   " samplers");
     }
     json& target = requireObject(channel, "target", where);
@@ -442,18 +648,24 @@ class ReferenceCheck {
       target["node"] = 0;
       target["path"] = unknownPath;
     }
+    const std::string& path = target["path"].get_ref<const std::string&>();
+    if (path == "translation" || path == "rotation" || path == "scale" || path == "weights")
+      usedSamplers[sampler] = true;
   }
 
   static constexpr const char* unknownPath = "";
 
   json& root_;
   MemoryBudget& budget_;
+  Notes& notes_;
+  Usage usage_;
+  std::vector<MorphFacts> morphFacts_;
 };
 
 }  // namespace
 
-void checkReferences(json& root, MemoryBudget& budget) {
-  ReferenceCheck(root, budget).run();
+Usage checkReferences(json& root, MemoryBudget& budget, Notes& notes) {
+  return ReferenceCheck(root, budget, notes).run();
 }
 
 }  // namespace dermis::gltf

@@ -6,33 +6,7 @@
 namespace dermis::gltf {
 namespace {
 
-// The roots of the default scene: `scene`, or scene 0 where the file does not say (as three.js
-// does), or all root nodes where it has no scenes.
-std::vector<std::uint32_t> sceneRoots(const tinygltf::Model& content, Model& model) {
-  std::vector<std::uint32_t> roots;
-  if (content.scenes.empty()) {
-    for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
-      if (model.nodes[i].parent == none) roots.push_back(i);
-    }
-    if (!roots.empty()) model.notes.push_back("the file has no scene: all its nodes are taken");
-    return roots;
-  }
-  const auto scene = static_cast<std::size_t>(std::max(content.defaultScene, 0));
-  for (const int root : content.scenes[scene].nodes) roots.push_back(indexOf(root));
-  return roots;
-}
-
-void checkScenes(const tinygltf::Model& content, const Model& model) {
-  for (std::size_t i = 0; i < content.scenes.size(); ++i) {
-    for (const int node : content.scenes[i].nodes) {
-      const std::uint32_t parent = model.nodes[static_cast<std::size_t>(node)].parent;
-      if (parent == none) continue;
-      failInvalid("scene ", i, ": node ", node, " is not a root, but a child of node ", parent);
-    }
-  }
-}
-
-std::vector<bool> reachableNodes(const Model& model, const std::vector<std::uint32_t>& roots) {
+std::vector<bool> nodesBelow(const Model& model, const std::vector<std::uint32_t>& roots) {
   std::vector<bool> reachable(model.nodes.size(), false);
   for (const std::uint32_t root : roots) reachable[root] = true;
   for (const std::uint32_t node : model.nodeOrder) {
@@ -42,12 +16,38 @@ std::vector<bool> reachableNodes(const Model& model, const std::vector<std::uint
   return reachable;
 }
 
+// The nodes of a scene. A node that it lists without being a root must be there through its parents
+// as well: otherwise it is not clear whether their transforms apply.
+std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::size_t scene) {
+  std::vector<std::uint32_t> roots, others;
+  for (const int node : source.content().scenes[scene].nodes)
+    (model.nodes[indexOf(node)].parent == none ? roots : others).push_back(indexOf(node));
+  std::vector<bool> reachable = nodesBelow(model, roots);
+  for (const std::uint32_t node : others) {
+    const std::string sentence = join("scene ", scene, ": node ", node, " is not a root, but a ",
+                                      "child of node ", model.nodes[node].parent);
+    if (!reachable[node]) failInvalid(sentence);
+    source.notes().broken(NoteKind::sceneNode, sentence);
+  }
+  return reachable;
+}
+
+// What the default scene holds: `scene`, or scene 0 where the file does not say (as three.js does),
+// or all nodes where it has no scenes.
+std::vector<bool> findReachable(const Source& source, Model& model) {
+  const tinygltf::Model& content = source.content();
+  if (!content.scenes.empty())
+    return nodesOfScene(source, model, static_cast<std::size_t>(std::max(content.defaultScene, 0)));
+  if (!model.nodes.empty()) model.notes.push_back("the file has no scene: all its nodes are taken");
+  return std::vector<bool>(model.nodes.size(), true);
+}
+
 void readMesh(Source& source, Model& model, std::uint32_t index) {
   Mesh& mesh = model.meshes[index];
   if (!mesh.primitives.empty()) return;
   const auto count = source.content().meshes[index].primitives.size();
   for (std::uint32_t i = 0; i < count; ++i) {
-    mesh.primitives.push_back(readPrimitive(source, index, i, model.notes));
+    mesh.primitives.push_back(readPrimitive(source, index, i));
   }
 }
 
@@ -62,15 +62,13 @@ void readScene(Source& source, Model& model) {
   for (const tinygltf::Mesh& from : content.meshes) {
     Mesh& mesh = model.meshes.emplace_back();
     mesh.name = from.name;
-    // All primitives of a mesh have as many targets: the structural check has seen to it.
-    mesh.morphTargetCount = static_cast<std::uint32_t>(from.primitives[0].targets.size());
+    mesh.morphTargetCount = morphTargetCount(from);
     for (const double weight : from.weights) {
       mesh.morphWeights.push_back(static_cast<float>(weight));
     }
   }
 
-  checkScenes(content, model);
-  const std::vector<bool> reachable = reachableNodes(model, sceneRoots(content, model));
+  const std::vector<bool> reachable = findReachable(source, model);
   std::size_t outside = 0, notSkinned = 0, inBindPose = 0;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];

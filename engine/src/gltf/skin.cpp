@@ -35,7 +35,7 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
   if (accessor < 0) return std::vector<JointMatrix>(joints);
   const std::string place = where + " inverseBindMatrices";
   source.require(accessor, TINYGLTF_TYPE_MAT4, matrixFormat, place);
-  source.requireNoStride(accessor, place);
+  source.noteStride(accessor, place);
   if (source.count(accessor) < joints) {
     failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor), " matrices for ",
                 joints, " joints");
@@ -60,6 +60,18 @@ std::vector<std::uint32_t> findRoots(const Model& model) {
   return roots;
 }
 
+Skin readSkin(Source& source, const tinygltf::Skin& from, const std::string& where) {
+  if (from.joints.size() > maxPaletteJoints) {
+    fail(ErrorCode::limitExceeded, join(where, ": it has ", from.joints.size(),
+                                        " joints, and a palette holds ", maxPaletteJoints));
+  }
+  Skin skin;
+  std::transform(from.joints.begin(), from.joints.end(), std::back_inserter(skin.joints), indexOf);
+  skin.inverseBindMatrices =
+      readInverseBindMatrices(source, from.inverseBindMatrices, skin.joints.size(), where);
+  return skin;
+}
+
 }  // namespace
 
 void readSkins(Source& source, Model& model) {
@@ -68,20 +80,19 @@ void readSkins(Source& source, Model& model) {
   for (std::size_t i = 0; i < content.skins.size(); ++i) {
     const tinygltf::Skin& from = content.skins[i];
     const std::string where = join("skin ", i);
-    if (from.joints.size() > maxPaletteJoints) {
-      fail(ErrorCode::limitExceeded, join(where, ": it has ", from.joints.size(),
-                                          " joints, and a palette holds ", maxPaletteJoints));
-    }
     Skin skin;
+    const auto read = [&] { skin = readSkin(source, from, where); };
+    if (source.usage().skins[i]) {
+      read();
+    } else {
+      source.notes().tolerate(NoteKind::unused, "; nothing skinned uses it", read);
+    }
     skin.name = from.name;
-    std::transform(from.joints.begin(), from.joints.end(), std::back_inserter(skin.joints),
-                   indexOf);
-    skin.inverseBindMatrices =
-        readInverseBindMatrices(source, from.inverseBindMatrices, skin.joints.size(), where);
     const bool oneRoot = std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {
       return roots[joint] == roots[skin.joints[0]];
     });
-    if (!oneRoot) model.notes.push_back(join(where, ": its joints have no common root"));
+    if (!oneRoot)
+      source.notes().broken(NoteKind::skeleton, where, ": its joints have no common root");
     model.skins.push_back(std::move(skin));
   }
 }
