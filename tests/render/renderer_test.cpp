@@ -289,5 +289,21 @@ TEST(TextureTest, BrokenImagesAreErrors) {
   ASSERT_FALSE(result);
 }
 
+// A few kilobytes may hold a picture of 256 MiB: it is not decoded to find that out.
+TEST(TextureTest, PixelsAreSpentOnTheBudgetOfTheirFile) {
+  const render::Picture picture{2048, 2048, std::vector<std::uint8_t>(2048 * 2048 * 4, 90)};
+  const std::vector<std::byte> png = *render::encodePng(picture);
+  gltf::MemoryBudget budget;
+  const std::uint64_t whole = budget.left(), size = picture.pixels.size();
+  for (std::uint64_t count = 1; count <= whole / size; ++count) {
+    EXPECT_TRUE(render::decodeImage(png, &budget));
+    EXPECT_EQ(budget.left(), whole - count * size);
+  }
+  const auto beyond = render::decodeImage(png, &budget);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().code, ErrorCode::limitExceeded);
+  EXPECT_NE(beyond.error().message.find("2048 x 2048 pixels take more memory"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace dermis::test
