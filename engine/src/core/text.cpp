@@ -72,7 +72,10 @@ std::string shortName(std::string_view name, std::size_t mostCharacters) {
 }
 
 std::string inQuotes(std::string_view name) {
-  return "'" + shortName(name) + "'";
+  std::string quoted(1, '\'');
+  quoted += shortName(name);
+  quoted += '\'';
+  return quoted;
 }
 
 }  // namespace dermis
