@@ -27,8 +27,8 @@ constexpr std::uint64_t copiesOfName = 8;
 std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                       const gltf::Primitive& primitive) {
   const std::string& node = model.nodes[source.node].name;
-  return fmt::format("node {}{}, mesh '{}'", source.node, node.empty() ? "" : " " + inQuotes(node),
-                     primitive.name);
+  const std::string name = node.empty() ? "" : fmt::format(" {}", inQuotes(node));
+  return fmt::format("node {}{}, mesh '{}'", source.node, name, primitive.name);
 }
 
 void addFindings(Scene& scene, const MeshReport& report) {

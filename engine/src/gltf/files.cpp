@@ -51,7 +51,7 @@ bool isInside(const std::filesystem::path& file, const std::filesystem::path& fo
 }
 
 std::string inFull(const std::filesystem::path& path) {
-  return "'" + oneLine(path.string()) + "'";
+  return join("'", oneLine(path.string()), "'");
 }
 
 std::ifstream open(const FileToRead& file, const std::string& where) {
