@@ -323,7 +323,7 @@ TEST(OutputTest, NamesCannotBreakAFile) {
   expectSame(pose);
   ASSERT_EQ(pose.glb.parts.size(), 3u);
   EXPECT_EQ(pose.glb.parts[0].name, "a b\nf 1 1 1\\\n#\tc");
-  EXPECT_EQ(pose.obj.objects[0].name, "a_b_f_1_1_1____c");
+  EXPECT_EQ(pose.obj.objects[0].name, "a_b_nf_1_1_1__n__u0009c");
   EXPECT_NE(pose.obj.objects[1].name, pose.obj.objects[0].name);
   EXPECT_EQ(pose.obj.objects[2].name, "node_4");
 }

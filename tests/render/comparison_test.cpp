@@ -291,7 +291,9 @@ TEST(SheetTest, NamesBreakBehindUnderscoresAndWordsAreCutShort) {
   EXPECT_EQ(cli::brokenName(narrow, "linear", style), std::vector<std::string>{"linear"});
 
   cli::Sheet sheet(400, 1, &*font);
-  sheet.left(std::string(500, 'M') + "ü", style);
+  std::string wide(500, 'M');
+  wide += "ü";
+  sheet.left(wide, style);
   sheet.advance(30);
   const render::Picture picture = sheet.take();
   for (std::uint32_t row = 0; row < picture.height; ++row) {
