@@ -10,6 +10,7 @@
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   exhaustive   every combination of methods and formats, on the device
+#   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
 #
 # Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
@@ -18,7 +19,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang fuzz mesa exhaustive programs"
+parts="asan asan-rest tsan clang fuzz mesa exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -91,6 +92,35 @@ part_mesa() {
 part_exhaustive() {
   build ci exhaustive_test
   tests ci -R ExhaustiveTest
+}
+
+# Whether two tables of numbers are the same but for roundings.
+same_numbers() { # EXPECTED MADE
+  [ "$(wc -l <"$1")" -eq "$(wc -l <"$2")" ] || { echo "$2 has another number of lines than $1"; return 1; }
+  paste -d '\n' "$1" "$2" | awk -F '\t' -v name="$2" '
+    NR % 2 { for (i = 1; i <= NF; ++i) expected[i] = $i; fields = NF; next }
+    /^#/ { next }
+    { bad = NF != fields
+      for (i = 1; i <= NF; ++i) {
+        difference = $i - expected[i]
+        if (i <= 2 ? $i != expected[i] : difference > 1e-6 || difference < -1e-6) bad = 1
+      }
+      if (bad) { print name ", line " NR / 2 ": " $0; exit 1 } }'
+}
+
+part_golden() {
+  build ci dermis_sample_models
+  models=$PWD/build/ci/samples/models
+  golden=$PWD/tests/golden
+  made=build/nightly/golden
+  rm -rf "$made"
+  mkdir -p "$made"
+  cp "$golden/three.mjs" "$made"
+  (cd "$made" && npm install --silent --no-audit --no-fund three@0.170.0 && node three.mjs "$models" >three.tsv)
+  blender -b --factory-startup --python "$golden/blender.py" -- "$models" "$PWD/$made/blender.tsv" >"$made/blender.log" 2>&1 ||
+    { tail -n 20 "$made/blender.log"; return 1; }
+  same_numbers "$golden/three.tsv" "$made/three.tsv"
+  same_numbers "$golden/blender.tsv" "$made/blender.tsv"
 }
 
 part_programs() {
