@@ -9,7 +9,7 @@
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
-#   exhaustive   every combination of methods and formats, on the device
+#   exhaustive   every combination of methods and formats, and every real model, on the device
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
 #
@@ -90,8 +90,8 @@ part_mesa() {
 }
 
 part_exhaustive() {
-  build ci exhaustive_test
-  tests ci -R ExhaustiveTest
+  build ci exhaustive_test real_models_test
+  tests ci -R 'ExhaustiveTest|RealModelsTest'
 }
 
 # Whether two tables of numbers are the same but for roundings.
