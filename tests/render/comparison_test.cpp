@@ -291,9 +291,9 @@ TEST(SheetTest, NamesBreakBehindUnderscoresAndWordsAreCutShort) {
   EXPECT_EQ(cli::brokenName(narrow, "linear", style), std::vector<std::string>{"linear"});
 
   cli::Sheet sheet(400, 1, &*font);
-  std::string wide(500, 'M');
-  wide += "ü";
-  sheet.left(wide, style);
+  std::string longName(500, 'M');
+  longName += "ü";
+  sheet.left(longName, style);
   sheet.advance(30);
   const render::Picture picture = sheet.take();
   for (std::uint32_t row = 0; row < picture.height; ++row) {
