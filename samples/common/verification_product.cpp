@@ -10,18 +10,6 @@
 namespace dermis::samples {
 namespace {
 
-constexpr std::array positionFormats{VertexFormat::float32x3, VertexFormat::float32x4,
-                                     VertexFormat::float16x3, VertexFormat::float16x4,
-                                     VertexFormat::snorm16x3, VertexFormat::snorm16x4};
-constexpr std::array normalFormats{
-    VertexFormat::none,           VertexFormat::float32x3,    VertexFormat::float32x4,
-    VertexFormat::float16x3,      VertexFormat::float16x4,    VertexFormat::snorm16x3,
-    VertexFormat::snorm16x4,      VertexFormat::snorm8x3,     VertexFormat::snorm8x4,
-    VertexFormat::octahedral16x2, VertexFormat::octahedral8x2};
-constexpr std::array tangentFormats{VertexFormat::none,         VertexFormat::float32x4,
-                                    VertexFormat::float16x4,    VertexFormat::snorm16x4,
-                                    VertexFormat::snorm8x4,     VertexFormat::octahedral16x2,
-                                    VertexFormat::octahedral8x2};
 constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
                                   Arrangement::separate};
 constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
@@ -66,15 +54,15 @@ std::vector<std::uint32_t> countsOf(const Values&... values) {
 
 std::vector<std::uint32_t> outputCounts() {
   constexpr std::array<bool, 2> either{};
-  return countsOf(positionFormats, normalFormats, tangentFormats, arrangements, gaps, motions,
-                  either, tunings);
+  return countsOf(verifiedPositionFormats, verifiedNormalFormats, verifiedTangentFormats,
+                  arrangements, gaps, motions, either, tunings);
 }
 
 OutputCase chooseOutput(Choice& choice) {
   OutputCase output;
-  output.layout.positions = choice.of(positionFormats);
-  output.layout.normals = choice.of(normalFormats);
-  output.layout.tangents = choice.of(tangentFormats);
+  output.layout.positions = choice.of(verifiedPositionFormats);
+  output.layout.normals = choice.of(verifiedNormalFormats);
+  output.layout.tangents = choice.of(verifiedTangentFormats);
   output.layout.arrangement = choice.of(arrangements);
   output.layout.gap = choice.of(gaps);
   output.layout.motion = choice.of(motions);

@@ -1,6 +1,7 @@
 // Every way to skin, checked: the product of methods, inputs and outputs, by pairs.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -12,6 +13,20 @@
 #include "stored_mesh.h"
 
 namespace dermis::samples {
+
+/// The formats that are verified.
+inline constexpr std::array verifiedPositionFormats{
+    VertexFormat::float32x3, VertexFormat::float32x4, VertexFormat::float16x3,
+    VertexFormat::float16x4, VertexFormat::snorm16x3, VertexFormat::snorm16x4};
+inline constexpr std::array verifiedNormalFormats{
+    VertexFormat::none,           VertexFormat::float32x3,    VertexFormat::float32x4,
+    VertexFormat::float16x3,      VertexFormat::float16x4,    VertexFormat::snorm16x3,
+    VertexFormat::snorm16x4,      VertexFormat::snorm8x3,     VertexFormat::snorm8x4,
+    VertexFormat::octahedral16x2, VertexFormat::octahedral8x2};
+inline constexpr std::array verifiedTangentFormats{
+    VertexFormat::none,         VertexFormat::float32x4, VertexFormat::float16x4,
+    VertexFormat::snorm16x4,    VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
+    VertexFormat::octahedral8x2};
 
 /// One way to store what is skinned, and to cut up the work.
 struct OutputCase {
