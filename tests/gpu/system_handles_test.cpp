@@ -316,6 +316,7 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
 // The context may move to another place while a system lives, which goes on to make bindings and
 // pipelines with it.
 TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
+  std::optional<vulkan::Context> second;  // outlives the system
   std::optional<vulkan::Context> first = must(vulkan::Context::create(device().description()));
   SkinningSystemDescription own = description();
   own.context = &*first;
@@ -328,7 +329,7 @@ TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
   instance.palette = engine.addPalette(systemPose(1));
   std::vector<InstanceHandle> instances{engine.addInstance(instance)};
   engine.submit();
-  const vulkan::Context second = std::move(*first);
+  second.emplace(std::move(*first));
   first.reset();
   // So many that new tables are needed.
   engine.begin();
