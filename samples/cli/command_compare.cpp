@@ -184,6 +184,10 @@ ExitStatus compare(const CompareOptions& options) {
   ComparisonSubject subject;
   if (const ExitStatus loaded = loadSubject(options, subject); loaded != ExitStatus::done)
     return loaded;
+  if (const ExitStatus kept = checkSideFiles(*subject.scene().model, outputs);
+      kept != ExitStatus::done) {
+    return kept;
+  }
   const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
   if (!columns) return reportWrongUsage(columns.error().message);
   if (options.width < columns->size() * leastColumnWidth) {

@@ -360,9 +360,13 @@ ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {
   return ExitStatus::done;
 }
 
+samples::RequestedOutput requestedOutput(const RenderOptions& options) {
+  return {"-o", options.output, options.frames.value_or(1)};
+}
+
 /// What would be a pity to notice after all pictures are drawn.
 ExitStatus checkOutput(const RenderOptions& options) {
-  const samples::RequestedOutput output{"-o", options.output, options.frames.value_or(1)};
+  const samples::RequestedOutput output = requestedOutput(options);
   if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
     return kept;
   if (*samples::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
@@ -382,6 +386,9 @@ ExitStatus renderModel(const RenderOptions& options) {
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
   const Result<Scene> scene = loadScene(options.model, preparation);
   if (!scene) return reportModelError(scene.error());
+  const samples::RequestedOutput output = requestedOutput(options);
+  if (const ExitStatus kept = checkSideFiles(*scene->model, {&output, 1}); kept != ExitStatus::done)
+    return kept;
   if (const ExitStatus checked = checkScene(options, *scene); checked != ExitStatus::done)
     return checked;
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);

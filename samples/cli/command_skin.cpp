@@ -128,6 +128,8 @@ ExitStatus skin(const SkinOptions& options) {
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
   const Result<Scene> scene = loadScene(options.model, preparation);
   if (!scene) return reportModelError(scene.error());
+  if (const ExitStatus kept = checkSideFiles(*scene->model, {&output, 1}); kept != ExitStatus::done)
+    return kept;
   for (const std::string& warning : scene->warnings) reportWarning(warning);
   for (const std::string& remark : scene->remarks) reportNote(remark);
   for (const std::string& note : scene->notes) reportNote(note);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "commands.h"
@@ -32,8 +34,10 @@ bool isSkinned(const Scene& scene) {
 /// What became of one model, whatever it is; the others have verdicts of their own.
 class Verifier {
  public:
-  Verifier(samples::OpenDevice& open, bool strict)
-      : open_(open), outputs_(outputsToVerify(open.context.limits())) {
+  /// `reports` are refused for a model that they would damage.
+  Verifier(samples::OpenDevice& open, bool strict,
+           std::span<const samples::RequestedOutput> reports)
+      : open_(open), outputs_(outputsToVerify(open.context.limits())), reports_(reports) {
     preparation_.strict = strict;
     preparation_.centersOfRotation = true;
   }
@@ -48,6 +52,11 @@ class Verifier {
   void verify(const std::string& model) {
     const Result<Scene> scene = loadScene(model, preparation_);
     if (!scene) return refuse(model, ExitStatus::badInput, scene.error().message);
+    if (const Result<void> kept = samples::checkInputsAreKept(reports_, scene->model->sideFiles);
+        !kept) {
+      overwrites_ = kept.error().message;
+      return;
+    }
     for (const std::string& warning : scene->warnings) reportWarning(warning);
     if (!isSkinned(*scene)) {
       return refuse(
@@ -61,6 +70,8 @@ class Verifier {
   }
 
   const std::vector<ModelVerification>& models() const { return models_; }
+  /// Which report would overwrite a file of a model; empty if none would.
+  const std::string& overwrites() const { return overwrites_; }
   /// The worst that happened.
   ExitStatus status() const { return status_; }
 
@@ -91,6 +102,8 @@ class Verifier {
 
   samples::OpenDevice& open_;
   std::vector<OutputToVerify> outputs_;
+  std::span<const samples::RequestedOutput> reports_;
+  std::string overwrites_;
   MeshPreparation preparation_;
   std::vector<ModelVerification> models_;
   ExitStatus status_ = ExitStatus::done;
@@ -128,9 +141,12 @@ ExitStatus verify(const VerifyOptions& options) {
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
   if (!open) return reportDeviceError(open.error());
 
-  Verifier verifier(*open, options.strict);
+  Verifier verifier(*open, options.strict, outputFiles);
   if (options.random || options.models.empty()) verifier.verifyRandom();
-  for (const std::string& model : options.models) verifier.verify(model);
+  for (const std::string& model : options.models) {
+    verifier.verify(model);
+    if (!verifier.overwrites().empty()) return reportWrongUsage(verifier.overwrites());
+  }
   // Files first: standard output may be closed.
   const ExitStatus written = writeReports(options, open->device->info().name, verifier.models());
   fmt::print("device  {}\n", open->device->info().name);

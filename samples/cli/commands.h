@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "dermis/gltf.h"
 #include "file_name.h"
 #include "program/exit_status.h"
 
@@ -27,6 +28,13 @@ inline ExitStatus checkInput(const std::string& model,
                              std::span<const samples::RequestedOutput> outputs) {
   const std::filesystem::path input = model;
   const Result<void> kept = samples::checkInputsAreKept(outputs, {&input, 1});
+  return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
+}
+
+/// The same if it would overwrite a file that the model names.
+inline ExitStatus checkSideFiles(const gltf::Model& model,
+                                 std::span<const samples::RequestedOutput> outputs) {
+  const Result<void> kept = samples::checkInputsAreKept(outputs, model.sideFiles);
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
 }
 

@@ -61,6 +61,13 @@ void addFilm(CLI::App& app, FilmRequest& film) {
 
 }  // namespace
 
+Result<void> checkInputsAreKept(const Options& options,
+                                std::span<const std::filesystem::path> inputs) {
+  const std::array<samples::RequestedOutput, 2> outputs{
+      {{"--film", options.film.output, options.frames}, {"--json", options.json}}};
+  return samples::checkInputsAreKept(outputs, inputs);
+}
+
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
   CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and proves every vertex right.",
                "dermis_crowd");
@@ -99,10 +106,8 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
         !samples::frameName(options.film.output, 0);
     if (isOnePicture) options.frames = 1;
   }
-  const std::array<samples::RequestedOutput, 2> outputs{
-      {{"--film", options.film.output, options.frames}, {"--json", options.json}}};
   const std::filesystem::path model = options.model;
-  if (Result<void> kept = samples::checkInputsAreKept(outputs, {&model, 1}); !kept)
+  if (Result<void> kept = checkInputsAreKept(options, {&model, 1}); !kept)
     return samples::reportWrongUsage(kept.error().message);
   options.verifies = !skipsVerification;
   options.crowd.outputBudget = std::uint64_t{outputMebibytes} << 20;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "crowd.h"
@@ -29,6 +31,10 @@ struct Options {
   std::uint32_t checkInterval = 10;  ///< frames from one that is compared to the next
   bool validates = false;            ///< with the validation layer
 };
+
+/// Fails with `invalidArgument` if an output would overwrite one of these files, which are read.
+dermis::Result<void> checkInputsAreKept(const Options& options,
+                                        std::span<const std::filesystem::path> inputs);
 
 /// Nothing where the program is to go on.
 std::optional<dermis::samples::ExitStatus> readOptions(int argc, char** argv, Options& options);

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "file_name.h"
 #include "interface.h"
 #include "joint_overlay.h"
 #include "keys.h"
@@ -457,6 +458,11 @@ void Viewer::countPicture() {
 
 void Viewer::keepScreenshot() {
   const std::string name = std::exchange(screenshotName_, {});
+  const samples::RequestedOutput picture{"--screenshot", name};
+  if (view_ != nullptr) {
+    const auto kept = samples::checkInputsAreKept({&picture, 1}, view_->scene().model->sideFiles);
+    if (!kept) return fail(samples::ExitStatus::wrongUsage, kept.error().message);
+  }
   if (Result<void> written = writeScreenshot(presenter_->picture(), name); !written) {
     fail(samples::ExitStatus::stopped, written.error().message);
     return;

@@ -15,6 +15,7 @@
 
 #include "dermis_command.h"
 #include "file_name.h"
+#include "gltf_builder.h"
 #include "output_file.h"
 #include "ply.h"
 #include "test_paths.h"
@@ -225,6 +226,30 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
   const CommandResult few =
       dermis({"skin", model, "-o", folder + "/b%02d.glb", "--frames", "3", "--device", "cpu"});
   EXPECT_EQ(few.status, 0) << "the fourth would be the model" << few.errors;
+}
+
+TEST(FileOutputTest, FilesBesideTheModelAreNotOverwritten) {
+  const std::string folder = outFile("beside");
+  std::filesystem::create_directories(folder);
+  FileBuilder file = skinnedTriangle();
+  const std::string binary = folder + "/triangle.bin", model = folder + "/triangle.gltf";
+  std::ofstream(binary, std::ios::binary)
+      .write(reinterpret_cast<const char*>(file.binary.data()),
+             static_cast<std::streamsize>(file.binary.size()));
+  file.json["buffers"] = {{{"byteLength", file.binary.size()}, {"uri", "triangle.bin"}}};
+  std::ofstream(model) << file.json.dump();
+  const std::string bytes = textOf(binary), link = folder + "/link.ply";
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink("triangle.bin", link);
+  const CommandResult result = dermis({"skin", model, "-o", link, "--device", "cpu"});
+  EXPECT_EQ(result.status, 2);
+  expectOneErrorLine(result);
+  EXPECT_NE(result.errors.find("would overwrite a file that is read"), std::string::npos)
+      << result.errors;
+  const CommandResult report =
+      dermis({"compare", model, "--device", "cpu", "--json", folder + "/./triangle.bin"});
+  EXPECT_EQ(report.status, 2) << report.errors;
+  EXPECT_TRUE(textOf(binary) == bytes);
 }
 
 /// A child that has half written a file when a signal comes. How it ended, as waitpid says.

@@ -198,6 +198,8 @@ struct Model {
   /// meaning: a sentence for each kind, with its first place and how often it was found. At most
   /// some fifty, however large the file.
   std::vector<std::string> notes;
+  /// The other files that were read, links followed: a program that writes must spare them.
+  std::vector<std::filesystem::path> sideFiles;
   /// What the file may still make a program take: spend on it what is made for each node, primitive
   /// or skin, and the pixels of images, before it is made.
   MemoryBudget budget;

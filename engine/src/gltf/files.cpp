@@ -147,6 +147,12 @@ Bytes SideFiles::read(const FileToRead& file, std::uint64_t needed, const std::s
   return known;
 }
 
+std::vector<std::filesystem::path> SideFiles::paths() const {
+  std::vector<std::filesystem::path> paths;
+  for (const auto& [path, bytes] : read_) paths.push_back(path);
+  return paths;
+}
+
 std::string decodePercent(std::string_view text, const std::string& where) {
   std::string decoded;
   decoded.reserve(text.size());

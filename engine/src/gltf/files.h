@@ -49,6 +49,9 @@ class SideFiles {
   /// more, if more of it was needed before.
   Bytes read(const FileToRead& file, std::uint64_t needed, const std::string& where);
 
+  /// What was read.
+  std::vector<std::filesystem::path> paths() const;
+
  private:
   std::filesystem::path folder_;  ///< as it was given
   MemoryBudget& budget_;

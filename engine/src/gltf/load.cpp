@@ -38,6 +38,7 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   readScene(source, model);
   readAnimations(source, model);
   if (options.images) readImages(appearance, source, files, model);
+  model.sideFiles = files.paths();
   notes.appendTo(model.notes);
   return model;
 }
