@@ -97,7 +97,9 @@ class PrimitiveCheck {
     if (!primitive_.attributes.contains("POSITION")) return;
     checkInfluences();
     // A copy, because some may be left out.
-    for (const auto& [name, accessor] : std::map(primitive_.attributes)) {
+    for (const auto& attribute : std::map(primitive_.attributes)) {
+      const std::string& name = attribute.first;
+      const int accessor = attribute.second;
       const auto check = [&] { checkAttribute(name, accessor); };
       if (!concernsOnlyAppearance(name)) {
         check();
