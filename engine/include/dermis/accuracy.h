@@ -59,8 +59,8 @@ double normalFormatBound(VertexFormat format);
 /// (δ, η, δ + η) with η = 1 / (L − 1) + 12 u, times √3.
 double tangentFormatBound(VertexFormat format);
 
-/// How many vertices no bound can be asked of. Whoever compares says how many that must be: a
-/// reference that excuses more is as wrong as a skinned vertex can be.
+/// The number of vertices that have no bound. The caller of `compare` states it; a comparison with
+/// any other number fails.
 struct Exemptions {
   std::uint64_t onlyFinite = 0;  ///< the answer is a matter of rounding: it is asked to be finite
   std::uint64_t skipped = 0;     ///< there is no answer (`Conditioning::undefined`): not looked at
@@ -68,8 +68,8 @@ struct Exemptions {
   friend bool operator==(const Exemptions&, const Exemptions&) = default;
 };
 
-/// How many the reference says there are. For poses that the caller did not make; whoever did make
-/// them knows the numbers.
+/// The exemptions that the reference reports. Use it for poses from outside; a test that makes its
+/// own pose should state the numbers.
 Exemptions exemptionsOf(const reference::SkinnedMesh& expected, Method method);
 
 /// What a comparison found. An error is counted against its vertex' own bound: 1 is the bound.

@@ -5,19 +5,19 @@
 
 namespace dermis::gltf {
 
-/// 64 MiB, and 64 times the bytes of the file and of all files that it names, each counted once.
-/// What is made is spent before it is made, and never given back: so the time that a file takes is
-/// bounded as well, even where memory is used again.
+/// 64 MiB plus 64 times the bytes of the file and of all files that it names, each counted once.
+/// Every allocation is spent before it is made and never given back. So the budget bounds the time
+/// that a file takes, too.
 class MemoryBudget {
  public:
   static constexpr std::uint64_t base = std::uint64_t{64} << 20;
   static constexpr std::uint64_t perByte = 64;
 
-  /// A file of so many bytes has been opened.
+  /// Adds what a file of `bytes` bytes justifies. Call it once for each file.
   void addFile(std::uint64_t bytes) { left_ += saturated(bytes, perByte); }
 
-  /// Spends `count` times `bytesEach`. False where not so much is left: nothing is spent then, and
-  /// nothing should be made.
+  /// Spends `count` times `bytesEach`. Returns false and spends nothing if less is left; the caller
+  /// must then not allocate.
   [[nodiscard]] bool spend(std::uint64_t count, std::uint64_t bytesEach = 1) {
     const std::uint64_t bytes = saturated(count, bytesEach);
     if (bytes > left_) return false;

@@ -18,8 +18,7 @@ namespace dermis::gltf {
 /// One buffer. `bytes` points into `storage` or into the file itself.
 struct Buffer {
   std::uint64_t byteLength = 0;
-  /// `byteLength` of them, or none: a file may name a buffer without saying where it is, as long as
-  /// nobody reads it.
+  /// `byteLength` bytes, or none: a buffer that no accessor reads may have no data.
   std::span<const std::byte> bytes;
   Bytes storage;  ///< shared by the buffers of one side file; null in the binary chunk
 };

@@ -45,8 +45,8 @@ struct Document {
 struct Appearance;
 class Notes;
 
-/// Parses and checks. What is made of the text is spent first. `appearance` is filled in where it
-/// is wanted. Throws `Failure`.
+/// Parses and checks. Spends the memory of the result before it is allocated. Fills in `appearance`
+/// unless it is null. Throws `Failure`.
 Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes,
                        Appearance* appearance = nullptr);
 

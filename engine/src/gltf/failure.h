@@ -48,7 +48,7 @@ template <typename... Parts>
   fail(ErrorCode::invalidData, join(parts...));
 }
 
-/// Spends, or fails with `limitExceeded`. `where` names what is wanted.
+/// Spends, or fails with `limitExceeded`. `where` names the allocation in the message.
 void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
            std::string_view where);
 

@@ -355,7 +355,7 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
 
 std::string primitiveName(const tinygltf::Mesh& mesh, std::size_t meshIndex,
                           std::size_t primitive) {
-  // Short enough that its number is not cut off by whoever puts it in quotes.
+  // Messages cut names at 80 characters, and must not cut off the number.
   const std::string name =
       mesh.name.empty() ? join("number ", meshIndex) : shortName(mesh.name, 56);
   return mesh.primitives.size() == 1 ? name : join(name, " primitive ", primitive);

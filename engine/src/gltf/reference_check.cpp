@@ -95,7 +95,7 @@ class ReferenceCheck {
               [&](json& accessor, const std::string& where, std::size_t i) {
                 checkAccessor(accessor, where, usage_.accessors[i]);
               });
-    // A buffer that no file has: whoever reads the view is told so.
+    // The replaced view names a buffer that does not exist, so that reading it is an error.
     checkUsed(
         "bufferViews", usage_.views,
         {{"buffer", std::numeric_limits<std::int32_t>::max()}, {"byteLength", 0}},
