@@ -12,6 +12,7 @@
 #include "comparison_instructions.h"
 #include "dermis/reference.h"
 #include "pipeline_statistics.h"
+#include "scene_skinner.h"
 #include "timed_batches.h"
 
 namespace dermis::cli {
@@ -49,16 +50,9 @@ bool isRigid(const JointMatrix& joint) {
 
 /// One instance: its parts.
 std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose& pose) {
-  std::vector<samples::SkinRequest> requests;
-  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
-    const ScenePart& part = scene.parts[index];
-    if (part.mesh == nullptr) continue;
-    samples::SkinRequest& request = requests.emplace_back();
-    request.mesh = &part.mesh->packed();
-    request.palette = pose.palette(part);
+  std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
+  for (samples::SkinRequest& request : requests)
     request.mayScale = !std::ranges::all_of(request.palette, isRigid);
-    request.morphs = pose.morphs[index];
-  }
   return requests;
 }
 

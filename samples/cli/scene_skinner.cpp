@@ -32,6 +32,19 @@ SkinnedPart fromDevice(samples::SkinnedVertices&& vertices) {
 
 }  // namespace
 
+std::vector<samples::SkinRequest> skinRequests(const Scene& scene, const ScenePose& pose) {
+  std::vector<samples::SkinRequest> requests;
+  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+    const ScenePart& part = scene.parts[index];
+    if (part.mesh == nullptr) continue;
+    samples::SkinRequest& request = requests.emplace_back();
+    request.mesh = &part.mesh->packed();
+    request.palette = pose.palette(part);
+    request.morphs = pose.morphs[index];
+  }
+  return requests;
+}
+
 SkinParts referenceSkinner(const Scene& scene, Method method) {
   return [&scene, method](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
     std::vector<SkinnedPart> all;
@@ -58,16 +71,8 @@ SkinParts deviceSkinner(const Scene& scene, Method method, bool tangents, sample
   if (tangents) options.output.tangents = VertexFormat::float32x4;
   return [&scene, method, options, &device,
           &context](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
-    std::vector<samples::SkinRequest> requests;
-    for (std::size_t index = 0; index < scene.parts.size(); ++index) {
-      const ScenePart& part = scene.parts[index];
-      if (part.mesh == nullptr) continue;
-      samples::SkinRequest& request = requests.emplace_back();
-      request.mesh = &part.mesh->packed();
-      request.palette = pose.palette(part);
-      request.method = method;
-      request.morphs = pose.morphs[index];
-    }
+    std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
+    for (samples::SkinRequest& request : requests) request.method = method;
     Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
     if (!result) return result.error();
     std::vector<SkinnedPart> all;
