@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <memory>
+#include <new>
 #include <span>
 #include <string>
 #include <utility>
@@ -50,9 +52,24 @@ class Verifier {
   }
 
   void verify(const std::string& model) {
+    try {
+      verifyModel(model);
+    } catch (const std::bad_alloc&) {
+      refuse(model, ExitStatus::stopped, fmt::format("{}: there is not enough memory", model));
+    }
+  }
+
+  const std::vector<ModelVerification>& models() const { return models_; }
+  /// Which report would overwrite a file of a model; empty if none would.
+  const std::string& overwrites() const { return overwrites_; }
+  /// The worst that happened.
+  ExitStatus status() const { return status_; }
+
+ private:
+  void verifyModel(const std::string& model) {
     const Result<Scene> scene = loadScene(model, preparation_);
     if (!scene) return refuse(model, ExitStatus::badInput, scene.error().message);
-    if (const Result<void> kept = samples::checkInputsAreKept(reports_, scene->model->sideFiles);
+    if (const Result<void> kept = samples::checkOutputFiles(reports_, scene->model->sideFiles);
         !kept) {
       overwrites_ = kept.error().message;
       return;
@@ -69,13 +86,6 @@ class Verifier {
                            [&progress] { progress.step(); }));
   }
 
-  const std::vector<ModelVerification>& models() const { return models_; }
-  /// Which report would overwrite a file of a model; empty if none would.
-  const std::string& overwrites() const { return overwrites_; }
-  /// The worst that happened.
-  ExitStatus status() const { return status_; }
-
- private:
   void add(const std::string& model, Cases cases) {
     if (!cases) {
       const Error& error = cases.error();
@@ -109,19 +119,16 @@ class Verifier {
   ExitStatus status_ = ExitStatus::done;
 };
 
+/// Each that was asked for, whatever becomes of the other.
 ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
                         const std::vector<ModelVerification>& models) {
-  if (!options.json.empty()) {
-    if (Result<void> written = writeJsonReport(options.json, device, models); !written) {
-      return reportError(ExitStatus::stopped, written.error().message);
-    }
-  }
-  if (!options.junit.empty()) {
-    if (Result<void> written = writeJunitReport(options.junit, models); !written) {
-      return reportError(ExitStatus::stopped, written.error().message);
-    }
-  }
-  return ExitStatus::done;
+  ExitStatus status = ExitStatus::done;
+  const auto keep = [&status](const Result<void>& written) {
+    if (!written) status = reportError(ExitStatus::stopped, written.error().message);
+  };
+  if (!options.json.empty()) keep(writeJsonReport(options.json, device, models));
+  if (!options.junit.empty()) keep(writeJunitReport(options.junit, models));
+  return status;
 }
 
 ExitStatus verify(const VerifyOptions& options) {
@@ -132,10 +139,9 @@ ExitStatus verify(const VerifyOptions& options) {
   }
   const std::array<samples::RequestedOutput, 2> outputFiles{
       {{"--json", options.json}, {"--junit", options.junit}}};
-  for (const std::string& model : options.models) {
-    if (const ExitStatus kept = checkInput(model, outputFiles); kept != ExitStatus::done)
-      return kept;
-  }
+  const std::vector<std::filesystem::path> inputs(options.models.begin(), options.models.end());
+  if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
+    return reportWrongUsage(kept.error().message);
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);

@@ -27,14 +27,14 @@ using samples::reportWrongUsage;
 inline ExitStatus checkInput(const std::string& model,
                              std::span<const samples::RequestedOutput> outputs) {
   const std::filesystem::path input = model;
-  const Result<void> kept = samples::checkInputsAreKept(outputs, {&input, 1});
+  const Result<void> kept = samples::checkOutputFiles(outputs, {&input, 1});
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
 }
 
 /// The same if it would overwrite a file that the model names.
 inline ExitStatus checkSideFiles(const gltf::Model& model,
                                  std::span<const samples::RequestedOutput> outputs) {
-  const Result<void> kept = samples::checkInputsAreKept(outputs, model.sideFiles);
+  const Result<void> kept = samples::checkOutputFiles(outputs, model.sideFiles);
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
 }
 

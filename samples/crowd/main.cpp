@@ -205,7 +205,7 @@ ExitStatus run(const Options& options) {
   }
   const Result<Character> character = Character::load(options.model, characterOptions(options));
   if (!character) return reportError(ExitStatus::badInput, character.error().message);
-  if (Result<void> kept = checkInputsAreKept(options, character->model().sideFiles); !kept)
+  if (Result<void> kept = checkOutputFiles(options, character->model().sideFiles); !kept)
     return samples::reportWrongUsage(kept.error().message);
   const Result<std::unique_ptr<Script>> script = makeScript(*character, options);
   if (!script) return reportError(ExitStatus::badInput, script.error().message);

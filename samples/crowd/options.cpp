@@ -61,11 +61,11 @@ void addFilm(CLI::App& app, FilmRequest& film) {
 
 }  // namespace
 
-Result<void> checkInputsAreKept(const Options& options,
-                                std::span<const std::filesystem::path> inputs) {
+Result<void> checkOutputFiles(const Options& options,
+                              std::span<const std::filesystem::path> inputs) {
   const std::array<samples::RequestedOutput, 2> outputs{
       {{"--film", options.film.output, options.frames}, {"--json", options.json}}};
-  return samples::checkInputsAreKept(outputs, inputs);
+  return samples::checkOutputFiles(outputs, inputs);
 }
 
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
@@ -107,7 +107,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
     if (isOnePicture) options.frames = 1;
   }
   const std::filesystem::path model = options.model;
-  if (Result<void> kept = checkInputsAreKept(options, {&model, 1}); !kept)
+  if (Result<void> kept = checkOutputFiles(options, {&model, 1}); !kept)
     return samples::reportWrongUsage(kept.error().message);
   options.verifies = !skipsVerification;
   options.crowd.outputBudget = std::uint64_t{outputMebibytes} << 20;

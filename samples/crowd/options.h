@@ -33,8 +33,8 @@ struct Options {
 };
 
 /// Fails with `invalidArgument` if an output would overwrite one of these files, which are read.
-dermis::Result<void> checkInputsAreKept(const Options& options,
-                                        std::span<const std::filesystem::path> inputs);
+dermis::Result<void> checkOutputFiles(const Options& options,
+                                      std::span<const std::filesystem::path> inputs);
 
 /// Nothing where the program is to go on.
 std::optional<dermis::samples::ExitStatus> readOptions(int argc, char** argv, Options& options);

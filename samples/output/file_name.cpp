@@ -4,7 +4,10 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <string>
+#include <system_error>
 #include <utility>
 
 namespace dermis::samples {
@@ -38,6 +41,19 @@ std::optional<FileIdentity> identityOf(const std::filesystem::path& path) {
   return std::pair(file.st_dev, file.st_ino);
 }
 
+/// The file of that name, or its name where there is none yet; nothing for devices and FIFOs, which
+/// take what several write.
+std::optional<std::string> writtenFile(const std::filesystem::path& path) {
+  struct stat file {};
+  if (stat(path.c_str(), &file) == 0) {
+    if (!S_ISREG(file.st_mode)) return std::nullopt;
+    return fmt::format("{} {}", file.st_dev, file.st_ino);
+  }
+  std::error_code unknown;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(path, unknown);
+  return (unknown ? path : whole).string();
+}
+
 }  // namespace
 
 bool hasEnding(std::string_view name, std::string_view ending) {
@@ -61,21 +77,29 @@ bool hasWrongPattern(std::string_view name) {
   return place && (!place->isRight() || nextPlace(name, place->end));
 }
 
-Result<void> checkInputsAreKept(std::span<const RequestedOutput> outputs,
-                                std::span<const std::filesystem::path> inputs) {
-  std::set<FileIdentity> files;
+Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
+                              std::span<const std::filesystem::path> inputs) {
+  std::set<FileIdentity> read;
   for (const std::filesystem::path& input : inputs) {
-    if (const std::optional<FileIdentity> file = identityOf(input)) files.insert(*file);
+    if (const std::optional<FileIdentity> file = identityOf(input)) read.insert(*file);
   }
+  std::map<std::string, std::string_view> written;  // and by which option
   for (const auto& [option, output, frames] : outputs) {
     if (output.empty()) continue;
     const std::uint32_t names = frameName(output, 0) ? frames : 1;
     for (std::uint32_t frame = 0; frame < names; ++frame) {
       const std::string name = frameName(output, frame).value_or(output);
-      const std::optional<FileIdentity> file = identityOf(name);
-      if (!file || !files.contains(*file)) continue;
+      const std::optional<FileIdentity> identity = identityOf(name);
+      if (identity && read.contains(*identity)) {
+        return Error{ErrorCode::invalidArgument,
+                     fmt::format("{} {} would overwrite a file that is read", option, name)};
+      }
+      const std::optional<std::string> file = writtenFile(name);
+      if (!file) continue;
+      const auto [other, isNew] = written.try_emplace(*file, option);
+      if (isNew) continue;
       return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} {} would overwrite a file that is read", option, name)};
+                   fmt::format("{} {} is the file that {} writes", option, name, other->second)};
     }
   }
   return {};

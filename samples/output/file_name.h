@@ -30,8 +30,9 @@ struct RequestedOutput {
 };
 
 /// Fails with `invalidArgument` if an output, or one of its frames, would overwrite a file that is
-/// read, whatever that is called: links are the same file.
-Result<void> checkInputsAreKept(std::span<const RequestedOutput> outputs,
-                                std::span<const std::filesystem::path> inputs);
+/// read, or another output: whatever they are called, links are the same file. Devices and FIFOs
+/// may be named twice.
+Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
+                              std::span<const std::filesystem::path> inputs);
 
 }  // namespace dermis::samples

@@ -78,7 +78,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   }
   const samples::RequestedOutput screenshot{"--screenshot", options.screenshot};
   const std::filesystem::path input = options.model;
-  if (Result<void> kept = samples::checkInputsAreKept({&screenshot, 1}, {&input, 1}); !kept)
+  if (Result<void> kept = samples::checkOutputFiles({&screenshot, 1}, {&input, 1}); !kept)
     return samples::reportWrongUsage(kept.error().message);
   if (options.model.empty() && !isEmpty) options.model = sampleFigure();
   return std::nullopt;

@@ -460,7 +460,7 @@ void Viewer::keepScreenshot() {
   const std::string name = std::exchange(screenshotName_, {});
   const samples::RequestedOutput picture{"--screenshot", name};
   if (view_ != nullptr) {
-    const auto kept = samples::checkInputsAreKept({&picture, 1}, view_->scene().model->sideFiles);
+    const auto kept = samples::checkOutputFiles({&picture, 1}, view_->scene().model->sideFiles);
     if (!kept) return fail(samples::ExitStatus::wrongUsage, kept.error().message);
   }
   if (Result<void> written = writeScreenshot(presenter_->picture(), name); !written) {

@@ -228,6 +228,33 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
   EXPECT_EQ(few.status, 0) << "the fourth would be the model" << few.errors;
 }
 
+TEST(FileOutputTest, TwoOutputsAreNotOneFile) {
+  const std::string folder = emptyFolder();
+  const std::string there = folder + "/there.json", link = folder + "/link.xml";
+  std::ofstream(there) << "kept";
+  std::filesystem::create_symlink("there.json", link);
+  const std::vector<std::vector<std::string>> commands{
+      {"--junit", "verify", bar, "--json", there, "--junit", link},
+      {"--junit", "verify", "--json", folder + "/new", "--junit", folder + "/./new"},
+      {"--json", "compare", bar, "-o", folder + "/new.png", "--json", folder + "/new.png"},
+  };
+  for (std::vector<std::string> command : commands) {
+    SCOPED_TRACE(::testing::PrintToString(command));
+    const std::string option = command.front();
+    command.erase(command.begin());
+    const CommandResult result = dermis(command);
+    EXPECT_EQ(result.status, 2);
+    expectOneErrorLine(result);
+    EXPECT_NE(result.errors.find(option + " /"), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find(" is the file that -"), std::string::npos) << result.errors;
+    EXPECT_EQ(textOf(there), "kept");
+    EXPECT_FALSE(std::filesystem::exists(folder + "/new"));
+  }
+  const CommandResult devices =
+      dermis({"verify", folder + "/no.glb", "--json", "/dev/null", "--junit", "/dev/null"});
+  EXPECT_EQ(devices.status, 3) << "it is the model that is missing; " << devices.errors;
+}
+
 TEST(FileOutputTest, FilesBesideTheModelAreNotOverwritten) {
   const std::string folder = outFile("beside");
   std::filesystem::create_directories(folder);
