@@ -1,0 +1,75 @@
+#!/bin/sh
+# Compares the speed of this tree with that of another commit: both are built for release, and their benchmarks alternate.
+#
+#   tests/bench/against.sh COMMIT [FILTER]   FILTER: a regular expression of benchmark names, "." for all (the default)
+#
+# For each benchmark that both have: the time of COMMIT divided by the time of this tree (over 1: this tree is faster), each the
+# best of ROUNDS rounds; the median of RUNS runs, and the lowest and the highest of them. DERMIS_DEVICE names another device than
+# the best. With the machine idle: half an hour for all of them.
+set -eu
+commit=${1:?usage: tests/bench/against.sh COMMIT [FILTER]}
+filter=${2:-.}
+RUNS=${RUNS:-5}
+ROUNDS=${ROUNDS:-3}
+cd "$(dirname "$0")/../.."
+./cmake/install-deps.sh
+
+folder=$PWD/build/against
+tree=$folder/$commit
+mkdir -p "$folder"
+[ -e "$tree/CMakeLists.txt" ] || git worktree add --detach --force "$tree" "$commit" >/dev/null
+build() { # TREE
+  (cd "$1" && cmake --preset release >"$folder/configure.log" && cmake --build build/release --target dermis_benchmarks |
+    tail -n 1)
+}
+build "$tree"
+build "$PWD"
+
+times=$folder/times.csv # run, side, benchmark, time
+: >"$times"
+measure() { # RUN SIDE TREE
+  out=$folder/out.csv
+  "$3/build/release/tests/bench/dermis_benchmarks" --benchmark_filter="$filter" --benchmark_repetitions=3 \
+    --benchmark_min_time=0.03 --benchmark_enable_random_interleaving=true --benchmark_out="$out" \
+    --benchmark_out_format=csv >"$folder/console.log"
+  awk -F, -v run="$1" -v side="$2" '
+    /^name,/ { start = 1; next }
+    start && $1 !~ /_(mean|median|stddev|cv)"?$/ { gsub(/"|\/manual_time/, "", $1); print run "," side "," $1 "," $4 }' \
+    "$out" >>"$times"
+}
+run=1
+while [ "$run" -le "$RUNS" ]; do
+  round=1
+  while [ "$round" -le "$ROUNDS" ]; do
+    measure "$run" before "$tree"
+    measure "$run" after "$PWD"
+    round=$((round + 1))
+  done
+  echo "run $run of $RUNS done" >&2
+  run=$((run + 1))
+done
+
+awk -F, -v runs="$RUNS" -v commit="$commit" '
+  { key = $1 "," $2 "," $3
+    if (!(key in best) || $4 + 0 < best[key]) best[key] = $4 + 0
+    if (!($3 in seen)) { seen[$3] = 1; names[++count] = $3 } }
+  END {
+    printf "%-44s %8s %8s %8s\n", commit " / this tree", "median", "lowest", "highest"
+    for (n = 1; n <= count; ++n) {
+      name = names[n]
+      m = 0
+      for (run = 1; run <= runs; ++run) {
+        before = best[run ",before," name]; after = best[run ",after," name]
+        if (before == 0 || after == 0) continue
+        ratio = before / after
+        for (i = m++; i > 0 && sorted[i] > ratio; --i) sorted[i + 1] = sorted[i]
+        sorted[i + 1] = ratio
+      }
+      if (m == 0) continue
+      median = m % 2 ? sorted[(m + 1) / 2] : (sorted[m / 2] + sorted[m / 2 + 1]) / 2
+      printf "%-44s %8.3f %8.3f %8.3f\n", name, median, sorted[1], sorted[m]
+      logs += log(median); ++compared
+    }
+    if (compared == 0) { print "no benchmark is in both"; exit 1 }
+    printf "%-44s %8.3f\n", "geometric mean of " compared, exp(logs / compared)
+  }' "$times"
