@@ -6,16 +6,20 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 # dermis_embed_shaders(TARGET name
 #                      [NAMESPACE dermis::kernels]       # C++ namespace of the symbols
 #                      [ALLOW_CONTRACTION]               # do not demand `precise` everywhere
-#                      KERNELS skin.comp ...             # relative to the current source folder; or .vert, .frag
+#                      KERNELS "skin.comp TEXELS" ...    # a file, relative to the current source folder (or .vert,
+#                                                        # .frag), and the macros that this module is compiled with
 #                      [INCLUDES abi.h ...]              # shown in an IDE; dependencies are found
 #                      [INCLUDE_FOLDERS folder ...]      # where #include is looked up as well
 #                      [DEFINES NAME=VALUE ...])
 #
 # Makes the OBJECT library `name`, with the header name.h, which declares for each kernel
 #
-#     namespace dermis::kernels { extern const std::span<const std::uint32_t> skin_spirv; }
+#     namespace dermis::kernels { extern const std::span<const std::uint32_t> skin_texels_spirv; }
 #
-# and `mesh_vert_spirv` for mesh.vert: the two stages of a pipeline have one name.
+# with the macros in lower case behind the name of the file, `mesh_vert_spirv` for mesh.vert (the two stages of a pipeline have
+# one name), and a look-up by name for all of them:
+#
+#     std::span<const std::uint32_t> dermis::kernels::find(std::string_view name);   // "skin_texels"; empty: there is none
 #
 # A kernel is compiled again when it or a file that it includes changes. It has to pass the compiler,
 # the check that all arithmetic is decorated NoContraction, and spirv-val for Vulkan 1.1.
@@ -48,20 +52,32 @@ function(dermis_embed_shaders)
 
   set(modules)
   set(moduleFlags)
-  foreach(kernel IN LISTS arg_KERNELS)
+  set(sources)
+  foreach(entry IN LISTS arg_KERNELS)
+    separate_arguments(macros UNIX_COMMAND "${entry}")
+    list(POP_FRONT macros kernel)
+    list(APPEND sources ${kernel})
+    set(ownFlags ${flags})
+    foreach(macro IN LISTS macros)
+      list(APPEND ownFlags --define ${macro})
+    endforeach()
     cmake_path(ABSOLUTE_PATH kernel BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
     cmake_path(GET kernel STEM LAST_ONLY stem)
     cmake_path(GET kernel EXTENSION LAST_ONLY extension)
     if(NOT extension STREQUAL ".comp")
       string(APPEND stem ${extension})
     endif()
-    string(MAKE_C_IDENTIFIER "${stem}" name)
+    list(JOIN macros "_" suffix)
+    if(suffix)
+      string(TOLOWER "_${suffix}" suffix)
+    endif()
+    string(MAKE_C_IDENTIFIER "${stem}${suffix}" name)
     set(module ${folder}/${name}.spv)
     # Only a module that spirv-val accepts gets its name: a failed build does not leave one behind.
     set(unchecked ${folder}/${name}.unchecked.spv)
     add_custom_command(
       OUTPUT ${module}
-      COMMAND dermis_embed_shaders compile --input ${kernel} --output ${unchecked} ${flags}
+      COMMAND dermis_embed_shaders compile --input ${kernel} --output ${unchecked} ${ownFlags}
               --depfile ${module}.d --depfile-target ${module}
       COMMAND ${DERMIS_SPIRV_VAL} --target-env vulkan1.1 ${unchecked}
       COMMAND ${CMAKE_COMMAND} -E rename ${unchecked} ${module}
@@ -86,7 +102,8 @@ function(dermis_embed_shaders)
   add_library(${arg_TARGET} OBJECT ${source} ${header})
   dermis_configure_target(${arg_TARGET})
   target_include_directories(${arg_TARGET} INTERFACE ${folder})
-  set(shown ${arg_KERNELS} ${arg_INCLUDES})
+  list(REMOVE_DUPLICATES sources)
+  set(shown ${sources} ${arg_INCLUDES})
   target_sources(${arg_TARGET} PRIVATE ${shown})
   set_source_files_properties(${shown} PROPERTIES HEADER_FILE_ONLY ON)
 endfunction()

@@ -1,7 +1,7 @@
 // How skinned attributes are written. Each has a buffer of its own, which may be one and the same; with ONE_OUTPUT it is, for
 // devices that have no more storage buffers a stage. Needs abi.h.
 
-#ifdef STORE_PAIRS
+#ifdef PAIRS
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
 
 // A position and the normal behind it, two words at a time: drivers that store lane by lane take half as long.

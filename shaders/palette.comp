@@ -1,6 +1,125 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// The palette kernel.
+// Joint matrices (3×4) to unit dual quaternions, or the logarithms of the rigid parts, and, where a joint is not rigid, its
+// scale/shear part: one workgroup a palette, so that what is said of the whole palette needs no second pass. The workgroups
+// behind those clear the results that the skin kernel adds to. With ONE_OUTPUT there are no results (4 storage buffers in all).
 
-#include "palette.glsl"
+#include "abi.h"
+#include "exact.glsl"
+#include "quaternion.glsl"
+#include "polar.glsl"
+#include "dual_exponential.glsl"
+#include "tables.glsl"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Matrices { vec4 matrices[]; };
+layout(set = 0, binding = BINDING_PALETTES, std430) writeonly buffer Palettes { uvec4 palettes[]; };
+#ifndef ONE_OUTPUT
+layout(set = 0, binding = BINDING_RESULTS, std430) writeonly buffer Results { uint results[]; };
+#endif
+
+shared uint nonRigidJoints;
+shared uint nonFiniteJoints;
+
+// A joint is rigid when det > 0 and no row of CᵀC − 1 sums, by absolute values, to more than 8e-6: then no singular value is
+// further than 4e-6 from 1, and no decomposition is needed to know it. (Single entries would not do: nine of 8e-6 make a
+// stretch of 12e-6.)
+bool isRigid(vec3 r0, vec3 r1, vec3 r2) {
+  precise vec3 c0 = vec3(r0.x, r1.x, r2.x);
+  precise vec3 c1 = vec3(r0.y, r1.y, r2.y);
+  precise vec3 c2 = vec3(r0.z, r1.z, r2.z);
+  precise vec3 squares = vec3(dot3(c0, c0), dot3(c1, c1), dot3(c2, c2)) - 1.0;
+  precise vec3 products = vec3(dot3(c0, c1), dot3(c0, c2), dot3(c1, c2));
+  precise float determinant = dot3(r0, cross3(r1, r2));
+  precise vec3 rowSums = abs(squares) + vec3(abs(products.x) + abs(products.y), abs(products.x) + abs(products.z),
+                                             abs(products.y) + abs(products.z));
+  return determinant > 0.0 && largestComponent(rowSums) <= 8e-6;
+}
+
+void writeScaleShear(uint unit, ScaleShear part) {
+  palettes[unit] = floatBitsToUint(vec4(part.diagonal, part.mixed.x));
+  palettes[unit + 1u] = floatBitsToUint(vec4(part.mixed.yz, 0.0, 0.0));
+}
+
+// The logarithm of a rigid transform, the short way round: rows of [ω]× | v, twice its screw.
+void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
+  Screw screw = rotation.w < 0.0 ? screwOf(-rotation, -dual) : screwOf(rotation, dual);
+  precise vec3 turn = 2.0 * screw.real;
+  precise vec3 shift = 2.0 * screw.dual;
+  palettes[unit] = floatBitsToUint(vec4(0.0, -turn.z, turn.y, shift.x));
+  palettes[unit + 1u] = floatBitsToUint(vec4(turn.z, 0.0, -turn.x, shift.y));
+  palettes[unit + 2u] = floatBitsToUint(vec4(-turn.y, turn.x, 0.0, shift.z));
+}
+
+void clearResult(uint number) {
+#ifndef ONE_OUTPUT
+  if (number >= push[PUSH_INSTANCE_RECORDS]) return;
+  uint result = tables[push[PUSH_FIRST_RECORD] + push[PUSH_RECORD_COUNT] * PALETTE_WORDS + number] * RESULT_WORDS;
+  for (uint word = 0u; word < RESULT_WORDS; ++word) results[result + word] = 0u;
+  for (uint axis = 0u; axis < 3u; ++axis) results[result + RESULT_MIN + axis] = 0xffffffffu;
+#endif
+}
+
+void main() {
+  uint number = workgroupNumber();
+  if (number >= push[PUSH_WORKGROUP_COUNT]) return;
+  if (number >= push[PUSH_RECORD_COUNT]) {
+    clearResult((number - push[PUSH_RECORD_COUNT]) * gl_WorkGroupSize.x + gl_LocalInvocationID.x);
+    return;
+  }
+  uint record = push[PUSH_FIRST_RECORD] + number * PALETTE_WORDS;
+  uint firstMatrix = tables[record + PALETTE_MATRICES];
+  uint status = tables[record + PALETTE_OUTPUT];
+  uint jointCount = tables[record + PALETTE_JOINTS];
+  bool mayScale = (tables[record + PALETTE_FLAGS] & PALETTE_MAY_SCALE) != 0u;
+  bool logarithms = (tables[record + PALETTE_FLAGS] & PALETTE_LOGARITHMS) != 0u;
+  uint unitsOfJoint = logarithms ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
+
+  if (gl_LocalInvocationID.x == 0u) {
+    nonRigidJoints = 0u;
+    nonFiniteJoints = 0u;
+  }
+  barrier();
+
+  // Asked at its end, as some drivers execute the rest of a loop once more after the question.
+  uint joint = gl_LocalInvocationID.x;
+  if (joint < jointCount) do {
+    vec4 r0 = matrices[firstMatrix + joint * 3u];
+    vec4 r1 = matrices[firstMatrix + joint * 3u + 1u];
+    vec4 r2 = matrices[firstMatrix + joint * 3u + 2u];
+    vec4 rotation;
+    ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
+    if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
+      atomicAdd(nonFiniteJoints, 1u);
+      rotation = vec4(uintBitsToFloat(0x7fc00000u));
+    } else if (isRigid(r0.xyz, r1.xyz, r2.xyz)) {
+      rotation = quaternionOfRows(r0.xyz, r1.xyz, r2.xyz);
+    } else {
+      atomicAdd(nonRigidJoints, 1u);
+      polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
+    }
+    vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
+    uint unit = status + 1u + joint * unitsOfJoint;
+    if (logarithms) {
+      writeLogarithm(unit, rotation, dual);
+    } else {
+      palettes[unit] = floatBitsToUint(rotation);
+      palettes[unit + 1u] = floatBitsToUint(dual);
+    }
+    if (mayScale) writeScaleShear(status + 1u + jointCount * unitsOfJoint + joint * 2u, scaleShear);
+    joint += gl_WorkGroupSize.x;
+  } while (joint < jointCount);
+  barrier();
+
+  if (gl_LocalInvocationID.x == 0u) {
+    uint nonRigid = nonRigidJoints;
+    uint words[4];
+    words[STATUS_TWO_PHASE] = mayScale && nonRigid != 0u ? 1u : 0u;
+    words[STATUS_NON_RIGID] = nonRigid;
+    words[STATUS_UNDECLARED_SCALE] = mayScale ? 0u : nonRigid;
+    words[STATUS_NON_FINITE] = nonFiniteJoints;
+    palettes[status] = uvec4(words[0], words[1], words[2], words[3]);
+  }
+}

@@ -1,6 +1,288 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// The skin kernel for attributes that fill whole words.
+// Skins vertices: a workgroup takes a run of vertices of one mesh, and each invocation skins its vertex for several instances of
+// that mesh, so that a vertex is read once. Macros say what of it a module has (CMakeLists.txt lists the modules); one module for
+// all would take drivers several times as long for each pipeline:
+//   HALVES, BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
+//   EXTRAS          previous positions and results; kept out of other modules, since layers and drivers take what a module names
+//                   for used, whatever its constants say
+//   COMPARISON      the methods that are there for comparison, instead of those for every day
+//   TEXELS          tables, meshes and palettes are read as uniform texel buffers: typed reads, which several drivers do much
+//                   faster
+//   PAIRS           positions and normals, float32x3 each, are stored together (needs 64-bit integers)
+//   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
-#include "skin.glsl"
+#ifdef BYTES
+#define HALVES
+#extension GL_EXT_shader_8bit_storage : require
+#endif
+#ifdef HALVES
+#extension GL_EXT_shader_16bit_storage : require
+#endif
+#ifdef TEXELS
+#extension GL_EXT_samplerless_texture_functions : require
+#endif
+#ifdef PAIRS
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+
+#include "abi.h"
+
+#ifdef COMPARISON
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION_ITERATIVE;
+#else
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
+#endif
+layout(constant_id = CONSTANT_INFLUENCES) const uint INFLUENCES = 0u;
+layout(constant_id = CONSTANT_INSTANCES) const uint INSTANCES = 1u;
+layout(constant_id = CONSTANT_POSITION_FORMAT) const uint POSITION_FORMAT = FORMAT_FLOAT32X3;
+layout(constant_id = CONSTANT_NORMAL_FORMAT) const uint NORMAL_FORMAT = FORMAT_NONE;
+layout(constant_id = CONSTANT_TANGENT_FORMAT) const uint TANGENT_FORMAT = FORMAT_NONE;
+layout(constant_id = CONSTANT_POSITION_UNIT) const uint POSITION_UNIT = 4u;
+layout(constant_id = CONSTANT_NORMAL_UNIT) const uint NORMAL_UNIT = 4u;
+layout(constant_id = CONSTANT_TANGENT_UNIT) const uint TANGENT_UNIT = 4u;
+layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
+layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
+layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
+#if defined(EXTRAS) || defined(ONE_OUTPUT)
+layout(constant_id = CONSTANT_MOTION) const uint MOTION = MOTION_NONE;
+#define HAS_MOTION
+#endif
+#ifdef EXTRAS
+layout(constant_id = CONSTANT_BOUNDS) const bool BOUNDS = false;
+#else
+const bool BOUNDS = false;
+#endif
+
+// Bounds loops over influences by a constant, so that drivers may unroll them.
+const uint MOST_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 0xffffffffu;
+const bool NORMALS = NORMAL_FORMAT != FORMAT_NONE;
+const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
+
+#include "exact.glsl"
+#include "quaternion.glsl"
+#include "polar.glsl"
+#include "tables.glsl"
+#include "vertex.glsl"
+#include "mesh_access.glsl"
+#include "palette_access.glsl"
+#include "morph.glsl"
+#include "blend.glsl"
+#include "encode.glsl"
+#include "output_access.glsl"
+#include "results.glsl"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+// The group that a workgroup belongs to: the first whose end lies behind it.
+uint findGroup(uint number) {
+  uint low = 0u;
+  uint high = push[PUSH_RECORD_COUNT] - 1u;
+  while (low < high) {
+    uint middle = (low + high) / 2u;
+    if (tables[push[PUSH_FIRST_RECORD] + middle * GROUP_WORDS + GROUP_WORKGROUP_END] <= number) {
+      low = middle + 1u;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
+// `first` says where the influences begin.
+Vertex bindVertex(Sections sections, uint vertex, out uint first) {
+  Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
+  uvec4 position = meshUnit(sections.positions + vertex);
+  first = position[VERTEX_INFLUENCES];
+  bind.position = uintBitsToFloat(position.xyz);
+  if (NORMALS) bind.normal = uintBitsToFloat(meshUnit(sections.normals + vertex).xyz);
+  if (TANGENTS) bind.tangent = uintBitsToFloat(meshUnit(sections.tangents + vertex));
+  return bind;
+}
+
+vec3 extensionVector(uint word) {
+  return vec3(uintBitsToFloat(tables[word]), uintBitsToFloat(tables[word + 1u]), uintBitsToFloat(tables[word + 2u]));
+}
+
+// A position as it is stored; snorm16 is relative to the box of the instance.
+uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
+  vec4 v = vec4(position, 1.0);
+  if (isSnormPosition(POSITION_FORMAT)) {
+    precise vec3 relative =
+        (position - extensionVector(extension + EXTENSION_CENTRE)) * extensionVector(extension + EXTENSION_INVERSE);
+    v.xyz = relative;
+    // A vertex of the engine's own box may stand a rounding outside.
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(tables[extension + EXTENSION_RESULT]);
+  }
+  return encodeComponents(POSITION_FORMAT, v);
+}
+
+// The records of a group and of an instance, each read by four words.
+struct Group {
+  uint mesh;
+  uint firstVertex;
+  uint vertexEnd;
+  uint vertexGroups;
+  uint firstInstance;
+  uint instanceCount;
+  uvec4 strides;  // of positions, normals, tangents and previous positions
+};
+
+Group readGroup(uint record) {
+  uvec4 first = tableUnit(record);
+  uvec4 second = tableUnit(record + 4u);
+  uvec4 third = tableUnit(record + 8u);
+  return Group(first[GROUP_MESH], first[GROUP_FIRST_VERTEX], first[GROUP_VERTEX_END], second[GROUP_VERTEX_GROUPS - 4u],
+               second[GROUP_FIRST_INSTANCE - 4u], second[GROUP_INSTANCE_COUNT - 4u],
+               uvec4(second[GROUP_POSITION_STRIDE - 4u], third.xyz));
+}
+
+struct Instance {
+  uint palette;
+  uint jointCount;
+  uint flags;
+  uint extension;
+  uvec4 places;  // the bytes at which this invocation's vertex goes
+};
+
+Instance readInstance(uint record, uvec4 offsets) {
+  uvec4 first = tableUnit(record);
+  uvec4 second = tableUnit(record + 4u);
+  return Instance(first[INSTANCE_PALETTE], second[INSTANCE_JOINTS - 4u], second[INSTANCE_FLAGS - 4u],
+                  second[INSTANCE_EXTENSION - 4u], uvec4(first.yzw, second.x) + offsets);
+}
+
+// What an invocation has read of its vertex, for all its instances.
+struct Work {
+  uint mesh;
+  uint vertex;
+  Vertex bind;
+  Influences influences;
+  MethodInputs inputs;
+};
+
+#ifdef HAS_MOTION
+uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
+  if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
+  if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  Vertex before = work.bind;
+  if (MORPHS) {
+    morphVertex(before, work.mesh, work.vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
+                tables[instance.extension + EXTENSION_PREVIOUS_MORPH_COUNT], false, false);
+  }
+  uint palette = tables[instance.extension + EXTENSION_PREVIOUS_PALETTE];
+  Pose pose = Pose(palette, tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], paletteScales(palette));
+  before = skinVertex(before, work.influences, work.inputs, pose, false, false);
+  return encodePosition(before.position, instance.extension, false);
+}
+#endif
+
+void skinInstance(Instance instance, Work work, bool scales) {
+#ifdef HAS_MOTION
+  if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
+    uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+    return;
+  }
+#endif
+
+  Vertex morphed = work.bind;
+  if (MORPHS) {
+    morphVertex(morphed, work.mesh, work.vertex, tables[instance.extension + EXTENSION_MORPHS],
+                tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
+    makeDirectionsUnit(morphed, NORMALS, TANGENTS);
+  }
+  Pose pose = Pose(instance.palette, instance.jointCount, scales);
+  Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
+  if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
+  uvec4 position = encodePosition(skinned.position, instance.extension, true);
+#ifdef HAS_MOTION
+  if (MOTION != MOTION_NONE) {
+    uvec4 words = previousPosition(instance, position, work);
+    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+  }
+#endif
+#ifdef PAIRS
+  storePositionAndNormal(instance.places.x, position.xyz, floatBitsToUint(skinned.normal));
+#else
+  storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  if (NORMALS)
+    storeNormals(instance.places.y, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+#endif
+  if (TANGENTS) {
+    storeTangents(instance.places.z, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+  }
+}
+
+// Whether instances whose joints scale go through a loop of their own: some drivers execute what is in an `if` whatever its
+// condition is, and the others would pay for them. It takes longer to compile, which is not worth it for methods that are there for
+// comparison, nor where an invocation has few instances: drivers that want it so branch.
+#ifdef COMPARISON
+const bool APART = false;
+#elif defined(HAS_MOTION)
+const bool APART = SCALES && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
+#else
+const bool APART = SCALES && INSTANCES >= 8u;
+#endif
+
+void main() {
+  uint number = workgroupNumber();
+  if (number >= push[PUSH_WORKGROUP_COUNT]) return;
+  uint index = findGroup(number);
+  uint record = push[PUSH_FIRST_RECORD] + index * GROUP_WORDS;
+  uint local = index == 0u ? number : number - tables[record - GROUP_WORDS + GROUP_WORKGROUP_END];
+  Group group = readGroup(record);
+
+  // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
+  uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+  uint vertex = group.firstVertex + run;
+  if (vertex >= group.vertexEnd) return;
+  // Shares of equal size but for the last: of workgroups that take as long as each other, no thread gets the short ones.
+  uint share = INSTANCES;
+  if (INSTANCES > 1u) {
+    uint shares = max((group.instanceCount + INSTANCES - 1u) / INSTANCES, 1u);
+    share = (group.instanceCount + shares - 1u) / shares;
+  }
+  uint firstInstance = (local / group.vertexGroups) * share;
+  if (firstInstance >= group.instanceCount) return;
+  uint count = min(share, group.instanceCount - firstInstance);
+
+  Work work;
+  work.mesh = group.mesh;
+  work.vertex = vertex;
+  Sections sections = sectionsOf(group.mesh);
+  uint firstInfluence;
+  work.bind = bindVertex(sections, vertex, firstInfluence);
+  if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
+  work.inputs = methodInputsOf(group.mesh, vertex);
+  work.influences = influencesOf(sections, vertex, firstInfluence);
+
+  // Outside the loop: some drivers read push constants, too, as often as they stand there.
+  uint records = push[PUSH_INSTANCE_RECORDS] + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
+  uvec4 offsets = run * group.strides;
+  // Loops ask at their end whether they go on: some drivers execute the rest of a loop's body once more, to no effect, after the
+  // question, and where there is one instance that would be half of it all.
+  uint left = 0xffffffffu >> (32u - count);  // a bit an instance
+  if (APART) {
+    uint scaling = 0u;
+    uint i = 0u;
+    do {
+      if (paletteScales(readInstance(records + i * INSTANCE_WORDS, offsets).palette)) scaling |= 1u << i;
+    } while (++i < count);
+    uint rigid = left & ~scaling;
+    if (rigid != 0u) {
+      do {
+        skinInstance(readInstance(records + uint(findLSB(rigid)) * INSTANCE_WORDS, offsets), work, false);
+        rigid &= rigid - 1u;
+      } while (rigid != 0u);
+    }
+    left = scaling;
+    if (left == 0u) return;
+  }
+  do {
+    Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
+    skinInstance(instance, work, APART || paletteScales(instance.palette));
+    left &= left - 1u;
+  } while (left != 0u);
+}

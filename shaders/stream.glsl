@@ -2,22 +2,22 @@
 // for each attribute, with STREAM_BINDING and the names to declare defined.
 
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_WORDS_BLOCK { uint STREAM_WORDS[]; };
-#ifdef STORE_HALVES
+#ifdef HALVES
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_HALVES_BLOCK { uint16_t STREAM_HALVES[]; };
 #endif
-#ifdef STORE_BYTES
+#ifdef BYTES
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_BYTES_BLOCK { uint8_t STREAM_BYTES[]; };
 #endif
 
 // Stores the first `size` bytes of `words`, `unit` bytes at a time; nothing else is touched. `place` counts bytes.
 void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
-#ifdef STORE_BYTES
+#ifdef BYTES
   if (unit == 1u) {
     for (uint i = 0u; i < size; ++i) STREAM_BYTES[place + i] = uint8_t((words[i / 4u] >> (i % 4u * 8u)) & 0xffu);
     return;
   }
 #endif
-#ifdef STORE_HALVES
+#ifdef HALVES
   if (unit == 2u) {
     uint first = place / 2u;
     for (uint i = 0u; i < size / 2u; ++i) STREAM_HALVES[first + i] = uint16_t((words[i / 2u] >> (i % 2u * 16u)) & 0xffffu);
@@ -35,13 +35,13 @@ void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
 // What stands there.
 uvec4 STREAM_LOAD(uint place, uint size, uint unit) {
   uvec4 words = uvec4(0u);
-#ifdef STORE_BYTES
+#ifdef BYTES
   if (unit == 1u) {
     for (uint i = 0u; i < size; ++i) words[i / 4u] |= uint(STREAM_BYTES[place + i]) << (i % 4u * 8u);
     return words;
   }
 #endif
-#ifdef STORE_HALVES
+#ifdef HALVES
   if (unit == 2u) {
     uint first = place / 2u;
     for (uint i = 0u; i < size / 2u; ++i) words[i / 2u] |= uint(STREAM_HALVES[first + i]) << (i % 2u * 16u);

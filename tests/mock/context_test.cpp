@@ -93,27 +93,15 @@ TEST(ContextTest, MissingHandlesAndOldVersionsAreRefused) {
           "3 storage buffers a stage, Dermis needs 4");
 }
 
-// Shader modules of which the device allows all, and the layouts.
 TEST(ContextTest, AFailedCreationLeavesNothingBehind) {
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-  halves.storageBuffer16BitAccess = VK_TRUE;
-  VkPhysicalDevice8BitStorageFeatures bytes{};
-  bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
-  bytes.storageBuffer8BitAccess = VK_TRUE;
-  bytes.pNext = &halves;
-  for (const auto& [function, calls] : {std::pair{"vkCreateShaderModule", 13},
-                                        {"vkCreateDescriptorSetLayout", 1},
-                                        {"vkCreatePipelineLayout", 1}}) {
-    for (int failAfter = 0; failAfter <= calls; ++failAfter) {
+  for (const char* function : {"vkCreateDescriptorSetLayout", "vkCreatePipelineLayout"}) {
+    for (int failAfter = 0; failAfter <= 1; ++failAfter) {
       MockVulkan mock;
       mock.failing = function;
       mock.failAfter = failAfter;
-      vulkan::DeviceDescription description = mock.description();
-      description.enabledFeatures = &bytes;
       {
-        const Result<vulkan::Context> context = vulkan::Context::create(description);
-        ASSERT_EQ(context.ok(), failAfter == calls) << function;
+        const Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+        ASSERT_EQ(context.ok(), failAfter == 1) << function;
         if (!context) {
           EXPECT_EQ(context.error().code, ErrorCode::vulkanError);
           EXPECT_EQ(context.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY);
@@ -183,17 +171,20 @@ TEST(ContextTest, AFailureWhileBindingIsAnErrorAndLeaksNothing) {
 // What was built before the failure stays built, and the next attempt builds the rest.
 TEST(ContextTest, AFailureWhilePreparingIsAnErrorAndLeaksNothing) {
   const int pipelines = 1 + static_cast<int>(allMethods.size());
-  for (int built = 0; built < pipelines; ++built) {
-    FailingContext failing("vkCreateComputePipelines", built);
-    const Result<void> prepared = failing.context->prepare(failing.batch.plan.variants());
-    ASSERT_FALSE(prepared.ok()) << built;
-    expectFailureOf("vkCreateComputePipelines", prepared.error());
-    EXPECT_EQ(failing.mock.alive["Pipeline"], built);
-    failing.mock.failing.clear();
-    EXPECT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
-    EXPECT_EQ(failing.mock.alive["Pipeline"], pipelines);
-    failing.context = Error{};
-    EXPECT_EQ(failing.mock.aliveObjects(), 0);
+  for (const char* function : {"vkCreateShaderModule", "vkCreateComputePipelines"}) {
+    for (int built = 0; built < pipelines; ++built) {
+      FailingContext failing(function, built);
+      const Result<void> prepared = failing.context->prepare(failing.batch.plan.variants());
+      ASSERT_FALSE(prepared.ok()) << built;
+      expectFailureOf(function, prepared.error());
+      EXPECT_EQ(failing.mock.alive["Pipeline"], built);
+      EXPECT_EQ(failing.mock.alive["ShaderModule"], 0);
+      failing.mock.failing.clear();
+      EXPECT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
+      EXPECT_EQ(failing.mock.alive["Pipeline"], pipelines);
+      failing.context = Error{};
+      EXPECT_EQ(failing.mock.aliveObjects(), 0);
+    }
   }
 }
 
@@ -340,63 +331,22 @@ TEST(ContextTest, LayoutsHaveEightBindingsWhereTheDeviceAllowsThem) {
   }
 }
 
-/// The modules that a device like this gets: their code, in any order.
-std::set<const std::uint32_t*> modulesOf(std::uint32_t storageBuffers, bool halves, bool bytes) {
-  FeatureChain features;
-  features.halves.storageBuffer16BitAccess = halves ? VK_TRUE : VK_FALSE;
-  features.bytes.storageBuffer8BitAccess = bytes ? VK_TRUE : VK_FALSE;
+// Each when it is first needed, and for as long as its pipeline is built.
+TEST(ContextTest, ModulesAreCreatedForThePipelinesThatAreBuilt) {
   MockVulkan mock;
-  mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
-  vulkan::DeviceDescription description = mock.description();
-  description.enabledFeatures = features.chain();
-  EXPECT_TRUE(vulkan::Context::create(description).ok());
-  const std::set<const std::uint32_t*> modules(mock.modules.begin(), mock.modules.end());
-  EXPECT_EQ(modules.size(), mock.modules.size()) << "one is created twice";
-  return modules;
-}
-
-/// What the methods need.
-std::set<const std::uint32_t*> codeOf(Kernel kernel, std::uint32_t storageBuffers,
-                                      std::uint8_t unit = 4, bool extras = false) {
-  std::set<const std::uint32_t*> modules;
-  for (const Method method : allMethods) {
-    Variant variant;
-    variant.kernel = kernel;
-    variant.method = method;
-    variant.units[2] = unit;
-    variant.bounds = extras;
-    DeviceLimits limits = richLimits();
-    limits.maxStorageBuffersPerStage = storageBuffers;
-    modules.insert(vulkan::kernelSpirv(variant, limits).data());
+  Result<vulkan::Context> context = vulkan::Context::create(mock.description());
+  EXPECT_TRUE(mock.modules.empty());
+  Variant linear, logarithms, bounds;
+  linear.method = Method::linear;
+  logarithms.method = Method::logMatrix;
+  bounds.bounds = true;
+  std::vector<const std::uint32_t*> expected;
+  for (const Variant& variant : {linear, logarithms, bounds}) {
+    for (int twice = 0; twice < 2; ++twice) ASSERT_TRUE(context->prepare({&variant, 1}).ok());
+    expected.push_back(vulkan::kernelSpirv(variant, context->limits()).data());
   }
-  EXPECT_EQ(modules.size(), kernel == Kernel::palette ? 1u : 2u)
-      << "methods for every day, methods for comparison";
-  return modules;
-}
-
-// A module that uses a feature must not be created where it is not enabled.
-TEST(ContextTest, ModulesAreCreatedWhereTheFeaturesAllow) {
-  std::set<const std::uint32_t*> words;
-  words.merge(codeOf(Kernel::palette, 8));
-  words.merge(codeOf(Kernel::skin, 8));
-  words.merge(codeOf(Kernel::skin, 8, 4, true));
-  EXPECT_EQ(words.size(), 5u) << "results have modules of their own";
-  EXPECT_EQ(modulesOf(8, false, false), words);
-  EXPECT_EQ(modulesOf(8, false, true), words) << "bytes need halves too";
-  std::set<const std::uint32_t*> halves = words;
-  halves.merge(codeOf(Kernel::skin, 8, 2));
-  halves.merge(codeOf(Kernel::skin, 8, 2, true));
-  EXPECT_EQ(modulesOf(8, true, false), halves);
-  std::set<const std::uint32_t*> bytes = halves;
-  bytes.merge(codeOf(Kernel::skin, 8, 1));
-  bytes.merge(codeOf(Kernel::skin, 8, 1, true));
-  EXPECT_EQ(modulesOf(8, true, true), bytes);
-  std::set<const std::uint32_t*> few = codeOf(Kernel::palette, 4);
-  few.merge(codeOf(Kernel::skin, 4));
-  for (const bool enabled : {false, true}) {
-    EXPECT_EQ(modulesOf(4, enabled, enabled), few);
-    EXPECT_EQ(modulesOf(7, enabled, enabled), few);
-  }
+  EXPECT_EQ(mock.modules, expected) << "every day, for comparison, results";
+  EXPECT_EQ(mock.alive["ShaderModule"], 0);
 }
 
 TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {

@@ -46,6 +46,10 @@ inline constexpr std::array<Method, 9> allMethods{
 /// Whether meshes need `MeshView::centersOfRotation` for it.
 bool needsCentersOfRotation(Method method);
 
+/// Whether it is there to be compared with, not for every day: its kernels may have been left out
+/// of the library (`DERMIS_COMPARISON_METHODS`).
+bool isForComparison(Method method);
+
 /// The method's name on the command line and in reports: "linear", "dual_quaternion",
 /// "dual_quaternion_iterative", "log_matrix", "spherical_blend", "quaternion_translation",
 /// "blended", "center_of_rotation", "bulge_controlled".

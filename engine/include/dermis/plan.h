@@ -34,7 +34,8 @@ struct DeviceLimits {
   std::uint32_t maxStorageBuffersPerStage = 4;
   /// Whether kernels may store 2 bytes, 1 byte (VkPhysicalDevice16BitStorageFeatures::
   /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
-  /// Without, attributes must fill whole words.
+  /// Without, attributes must fill whole words. A Dermis that was built without
+  /// `DERMIS_SUBWORD_STORES` stores neither.
   bool storage16Bit = false;
   bool storage8Bit = false;
   /// Texels of a uniform texel buffer. Where they suffice for a batch, kernels read its tables,
@@ -43,6 +44,9 @@ struct DeviceLimits {
   /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64): to store two
   /// words at a time, which is faster on some drivers.
   bool shaderInt64 = false;
+  /// Whether there are kernels for methods that are there for comparison: not where Dermis was
+  /// built without `DERMIS_COMPARISON_METHODS`.
+  bool comparisonMethods = true;
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };

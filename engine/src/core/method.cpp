@@ -30,6 +30,11 @@ bool needsCentersOfRotation(Method method) {
   return method == Method::centerOfRotation || method == Method::bulgeControlled;
 }
 
+bool isForComparison(Method method) {
+  return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
+         method == Method::sphericalBlend || method == Method::quaternionTranslation;
+}
+
 std::optional<Method> methodFromName(std::string_view name) {
   for (const Method method : allMethods) {
     if (methodName(method) == name) return method;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "abi.h"
+#include "dermis_kernels.h"
 #include "vulkan/object_name.h"
 #include "vulkan/state.h"
 #include "vulkan/vulkan_error.h"
@@ -137,6 +138,10 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
+  // What this build has kernels for.
+  state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
+  state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
+  state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
   // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
   if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
     state.tuning.instancesPerInvocation = 24;
@@ -156,7 +161,6 @@ Result<Context> Context::create(const DeviceDescription& description) {
 
   if (Result<void> good = state.createLayouts(); !good) return good.error();
   state.pipelines = std::make_unique<Pipelines>(state.table, description, state.limits);
-  if (Result<void> good = state.pipelines->create(); !good) return good.error();
   return context;
 }
 

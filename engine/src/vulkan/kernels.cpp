@@ -1,7 +1,7 @@
 #include "dermis/vulkan/kernels.h"
 
 #include <algorithm>
-#include <array>
+#include <string>
 
 #include "abi.h"
 #include "dermis_kernels.h"
@@ -47,52 +47,23 @@ static_assert(sizeof(PaletteStatus) == 16 && abi::STATUS_TWO_PHASE == 0 &&
 
 namespace {
 
-using Spirv = std::span<const std::uint32_t>;
-
-/// The modules of a group of methods, by the bytes of the smallest store: 4, 2, 1.
-struct SkinModules {
-  std::array<Spirv, 3> plain, extras;
-  Spirv plainTexels, pairsTexels, extrasTexels;
-  Spirv oneOutput;
-};
-
-bool isForComparison(Method method) {
-  return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
-         method == Method::sphericalBlend || method == Method::quaternionTranslation;
-}
-
-SkinModules skinModules(Method method) {
-  using namespace kernels;
-  if (isForComparison(method)) {
-    return {{skin_comparison_spirv, skin_comparison_halves_spirv, skin_comparison_bytes_spirv},
-            {skin_comparison_extras_spirv, skin_comparison_extras_halves_spirv,
-             skin_comparison_extras_bytes_spirv},
-            skin_comparison_texels_spirv,
-            skin_comparison_texels_pairs_spirv,
-            skin_comparison_extras_texels_spirv,
-            skin_comparison_one_output_spirv};
-  }
-  return {{skin_spirv, skin_halves_spirv, skin_bytes_spirv},
-          {skin_extras_spirv, skin_extras_halves_spirv, skin_extras_bytes_spirv},
-          skin_texels_spirv,
-          skin_texels_pairs_spirv,
-          skin_extras_texels_spirv,
-          skin_one_output_spirv};
+/// The name that shaders/CMakeLists.txt gives the module for a variant.
+std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
+  const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
+  if (variant.kernel == Kernel::palette) return oneOutput ? "palette_one_output" : "palette";
+  std::string name = "skin";
+  if (isForComparison(variant.method)) name += "_comparison";
+  if (oneOutput) return name + "_one_output";
+  if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
+  if (variant.texels) return name + (variant.pairs ? "_texels_pairs" : "_texels");
+  const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
+  return name + (smallest == 4 ? "" : smallest == 2 ? "_halves" : "_bytes");
 }
 
 }  // namespace
 
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
-  const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
-  if (variant.kernel == Kernel::palette)
-    return oneOutput ? kernels::palette_one_output_spirv : kernels::palette_spirv;
-  const SkinModules modules = skinModules(variant.method);
-  if (oneOutput) return modules.oneOutput;
-  const bool extras = variant.motion != Motion::none || hasResults(variant);
-  if (variant.pairs) return modules.pairsTexels;
-  if (variant.texels) return extras ? modules.extrasTexels : modules.plainTexels;
-  const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
-  return (extras ? modules.extras : modules.plain)[smallest == 4 ? 0 : smallest == 2 ? 1 : 2];
+  return kernels::find(moduleName(variant, limits));
 }
 
 SpecializationConstants specializationConstants(const Variant& variant) {

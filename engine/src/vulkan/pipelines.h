@@ -3,9 +3,7 @@
 
 #include <mutex>
 #include <shared_mutex>
-#include <span>
 #include <unordered_map>
-#include <vector>
 
 #include <vulkan/vulkan_core.h>
 
@@ -28,9 +26,8 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Creates the shader modules that the device can have.
-  Result<void> create();
-
+  /// Nothing where it has been built. Fails with `missingFeature` where the device, or this build
+  /// of Dermis, has no module for the variant.
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
 
   /// VK_NULL_HANDLE where the variant has not been built.
@@ -39,19 +36,14 @@ class Pipelines {
   VkPipelineCache cache() const { return cache_; }
 
  private:
-  Result<void> createModule(const Variant& variant);
-  VkShaderModule moduleOf(const Variant& variant) const;
+  Result<VkPipeline> create(const Variant& variant, VkPipelineLayout layout,
+                            VkShaderModule module) const;
 
   const DispatchTable& table_;
   const DeviceLimits& limits_;
   VkDevice device_;
   VkPipelineCache cache_;
   const VkAllocationCallbacks* allocator_;
-  struct Module {
-    const std::uint32_t* code = nullptr;
-    VkShaderModule module = VK_NULL_HANDLE;
-  };
-  std::vector<Module> modules_;
   mutable std::shared_mutex mutex_;
   std::unordered_map<std::uint64_t, VkPipeline> pipelines_;
 };

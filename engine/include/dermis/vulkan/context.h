@@ -46,14 +46,14 @@ struct DeviceDescription {
   const VkAllocationCallbacks* allocator = nullptr;
 };
 
-/// What Dermis has on a device: shader modules, layouts, pipelines. Immutable but for `prepare`;
+/// What Dermis has on a device: layouts and pipelines. Immutable but for `prepare`;
 /// every member function may be called from any thread at any time, `record` with a command buffer
 /// of its own. Destroy it when the GPU has finished with what it recorded, before the device.
 ///
 /// Nothing here submits, waits, maps, or allocates device memory.
 class Context {
  public:
-  /// Looks up entry points and limits, creates shader modules and layouts; no pipeline yet.
+  /// Looks up entry points and limits, creates layouts; no shader module or pipeline yet.
   /// Fails with `invalidArgument` (a handle is missing), `missingEntryPoint`, `missingFeature`
   /// (Vulkan below 1.1, too few storage buffers a stage) or `vulkanError`.
   static Result<Context> create(const DeviceDescription& description);

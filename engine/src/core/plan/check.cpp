@@ -47,14 +47,18 @@ Result<void> checkStream(const OutputStream& stream, const char* name, std::uint
                                                 " storage buffers a stage"};
   }
   if (unit == 2 && !limits.storage16Bit) {
-    return Error{ErrorCode::missingFeature,
-                 place + " must be multiples of 4, or storageBuffer16BitAccess enabled"};
+    return Error{
+        ErrorCode::missingFeature,
+        place +
+            " must be multiples of 4, or storageBuffer16BitAccess enabled, and Dermis built "
+            "with DERMIS_SUBWORD_STORES"};
   }
   if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
-    return Error{ErrorCode::missingFeature,
-                 place +
-                     " must be multiples of 4, or storageBuffer8BitAccess "
-                     "and storageBuffer16BitAccess enabled"};
+    return Error{
+        ErrorCode::missingFeature,
+        place +
+            " must be multiples of 4, or storageBuffer8BitAccess and "
+            "storageBuffer16BitAccess enabled, and Dermis built with DERMIS_SUBWORD_STORES"};
   }
   const std::uint64_t length = std::uint64_t{vertexCount - 1} * stream.stride + stream.size;
   if (stream.offset > bufferSize || length > bufferSize - stream.offset) {
@@ -169,6 +173,13 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
   if (Result<void> good = checkPaletteOf(batch, job, job.palette, subject); !good) return good;
   if (methodName(job.method) == "unknown")
     return invalid(subject.name() + ": its method is not one of Method");
+  if (isForComparison(job.method) && !limits.comparisonMethods) {
+    return Error{ErrorCode::missingFeature,
+                 subject.name() +
+                     ": this Dermis was built without the methods for comparison "
+                     "(DERMIS_COMPARISON_METHODS), " +
+                     std::string(methodName(job.method)) + " among them"};
+  }
   if (needsCentersOfRotation(job.method) && !job.mesh.hasCentersOfRotation) {
     return invalid(subject.name() + ": " + std::string(methodName(job.method)) +
                    " needs centres of rotation, its mesh has none");

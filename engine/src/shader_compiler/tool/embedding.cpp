@@ -28,12 +28,15 @@ std::string arrayOf(const EmbeddedModule& module) {
 std::string embeddingHeader(const std::string& cppNamespace,
                             const std::vector<EmbeddedModule>& modules) {
   std::string text =
-      "// Made by dermis_embed_shaders.\n#pragma once\n\n#include <cstdint>\n#include <span>\n\n"
-      "namespace " +
+      "// Made by dermis_embed_shaders.\n#pragma once\n\n#include <cstdint>\n#include <span>\n"
+      "#include <string_view>\n\nnamespace " +
       cppNamespace + " {\n\n";
   for (const EmbeddedModule& module : modules) {
     text += "extern const std::span<const std::uint32_t> " + module.name + "_spirv;\n";
   }
+  text +=
+      "\n// The module of that name; empty where there is none.\n"
+      "std::span<const std::uint32_t> find(std::string_view name);\n";
   return text + "\n}  // namespace " + cppNamespace + "\n";
 }
 
@@ -47,6 +50,10 @@ std::string embeddingSource(const std::string& cppNamespace, const std::string& 
     text += "constinit const std::span<const std::uint32_t> " + module.name + "_spirv{" +
             module.name + "_words};\n";
   }
+  text += "\nstd::span<const std::uint32_t> find(std::string_view name) {\n";
+  for (const EmbeddedModule& module : modules)
+    text += "  if (name == \"" + module.name + "\") return " + module.name + "_spirv;\n";
+  text += "  return {};\n}\n";
   return text + "\n}  // namespace " + cppNamespace + "\n";
 }
 

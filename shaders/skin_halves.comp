@@ -1,8 +1,0 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_shader_16bit_storage : require
-
-// The skin kernel for attributes at any 2 bytes.
-
-#define STORE_HALVES
-#include "skin.glsl"

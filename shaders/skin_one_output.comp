@@ -1,7 +1,0 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-
-// The skin kernel for devices with four storage buffers a stage.
-
-#define ONE_OUTPUT
-#include "skin.glsl"
