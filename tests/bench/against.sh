@@ -34,7 +34,7 @@ measure() { # RUN SIDE TREE
     --benchmark_out_format=csv >"$folder/console.log"
   awk -F, -v run="$1" -v side="$2" '
     /^name,/ { start = 1; next }
-    start && $1 !~ /_(mean|median|stddev|cv)"?$/ { gsub(/"|\/manual_time/, "", $1); print run "," side "," $1 "," $4 }' \
+    start && $1 !~ /_(mean|median|stddev|cv)"?$/ { gsub(/"|\/manual_time/, "", $1); print run "," side "," $1 "," $3 }' \
     "$out" >>"$times"
 }
 run=1

@@ -12,9 +12,22 @@ file(COPY "${sourceFolder}/CMakeLists.txt" "${sourceFolder}/cmake" "${sourceFold
 file(GLOB_RECURSE before "${engine}/*")
 
 set(consumerFlags "")  # nothing of this build is linked
-build_consumer("${engine}" -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
+# Without the kernels that most engines do not need.
+build_consumer("${engine}" -DDERMIS_COMPARISON_METHODS=OFF -DDERMIS_SUBWORD_STORES=OFF -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
 run(printed "Run engine" "${BUILD}/engine")
 say("${printed}")
+
+file(GLOB_RECURSE modules "${BUILD}/*.spv")
+list(FILTER modules EXCLUDE REGEX "unchecked")
+set(bytes 0)
+foreach(module IN LISTS modules)
+  file(SIZE "${module}" size)
+  math(EXPR bytes "${bytes} + ${size}")
+endforeach()
+say("${bytes} bytes of SPIR-V: ${modules}")
+if(bytes EQUAL 0 OR bytes GREATER 1000000)
+  wrong("the kernels for every day are ${bytes} bytes of SPIR-V")
+endif()
 
 file(GLOB_RECURSE after "${engine}/*")
 if(NOT after STREQUAL before)

@@ -24,7 +24,7 @@ struct ShaderCompilerOptions {
   /// made again. Nothing else is ever deleted: the folder grows until its owner empties it, which
   /// is safe at any time, as is sharing it between threads and processes.
   std::filesystem::path cacheFolder;
-  bool optimize = true;    ///< Run SPIRV-Tools' performance passes.
+  bool optimize = true;    ///< Run SPIRV-Tools' performance passes, but for inlining.
   bool debugInfo = false;  ///< Keep names and line numbers.
 };
 

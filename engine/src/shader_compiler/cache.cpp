@@ -16,7 +16,7 @@ namespace {
 //   magic, version, key (4 words), length of the module in words, checksum (2 words), module
 // The checksum covers all that stands before it, and the module.
 constexpr std::string_view magic = "DSKC";
-constexpr std::uint32_t formatVersion = 1;
+constexpr std::uint32_t formatVersion = 2;
 constexpr std::size_t checksumOffset = 28;
 constexpr std::size_t headerSize = 36;
 constexpr std::size_t wordSize = 4;

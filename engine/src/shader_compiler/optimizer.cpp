@@ -35,6 +35,44 @@ Result<void> validate(std::span<const std::uint32_t> words, const std::string& n
   return {};
 }
 
+/// SPIRV-Tools' performance passes without inlining, which triples a module, and which drivers do for
+/// themselves.
+void registerPasses(spvtools::Optimizer& optimizer) {
+  using namespace spvtools;
+  constexpr std::uint32_t mostMembers = 100;  // of a struct that is taken apart
+  const auto removeLoadsAndStores = [&optimizer] {
+    optimizer.RegisterPass(CreateLocalSingleBlockLoadStoreElimPass());
+    optimizer.RegisterPass(CreateLocalSingleStoreElimPass());
+    optimizer.RegisterPass(CreateAggressiveDCEPass());
+  };
+  optimizer.RegisterPass(CreateEliminateDeadFunctionsPass());
+  optimizer.RegisterPass(CreatePrivateToLocalPass());
+  removeLoadsAndStores();
+  optimizer.RegisterPass(CreateScalarReplacementPass(mostMembers));
+  optimizer.RegisterPass(CreateLocalAccessChainConvertPass());
+  removeLoadsAndStores();
+  optimizer.RegisterPass(CreateSSARewritePass());
+  optimizer.RegisterPass(CreateAggressiveDCEPass());
+  optimizer.RegisterPass(CreateCCPPass());
+  optimizer.RegisterPass(CreateAggressiveDCEPass());
+  optimizer.RegisterPass(CreateRedundancyEliminationPass());
+  optimizer.RegisterPass(CreateCombineAccessChainsPass());
+  optimizer.RegisterPass(CreateSimplificationPass());
+  optimizer.RegisterPass(CreateVectorDCEPass());
+  optimizer.RegisterPass(CreateDeadInsertElimPass());
+  optimizer.RegisterPass(CreateDeadBranchElimPass());
+  optimizer.RegisterPass(CreateSimplificationPass());
+  optimizer.RegisterPass(CreateIfConversionPass());
+  optimizer.RegisterPass(CreateCopyPropagateArraysPass());
+  optimizer.RegisterPass(CreateReduceLoadSizePass());
+  optimizer.RegisterPass(CreateAggressiveDCEPass());
+  optimizer.RegisterPass(CreateBlockMergePass());
+  optimizer.RegisterPass(CreateRedundancyEliminationPass());
+  optimizer.RegisterPass(CreateDeadBranchElimPass());
+  optimizer.RegisterPass(CreateBlockMergePass());
+  optimizer.RegisterPass(CreateSimplificationPass());
+}
+
 }  // namespace
 
 Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint32_t> words,
@@ -49,7 +87,7 @@ Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint
   spvtools::Optimizer optimizer(targetEnvironment);
   optimizer.SetMessageConsumer(message.consumer());
   if (!options.keepDebugInfo) optimizer.RegisterPass(spvtools::CreateStripDebugInfoPass());
-  if (options.optimize) optimizer.RegisterPerformancePasses();
+  if (options.optimize) registerPasses(optimizer);
 
   spvtools::OptimizerOptions runOptions;
   runOptions.set_run_validator(false);

@@ -46,10 +46,28 @@ bool hasKernels() {
   return !variants.empty();
 }
 
+/// Whether kernels that an option leaves out are there where it does not, and only there.
+bool hasChosenKernels() {
+#ifdef HAS_EVERYDAY_KERNELS_ONLY
+  constexpr bool isLeftOut = true;
+#else
+  constexpr bool isLeftOut = false;
+#endif
+  Variant comparison, halves;
+  comparison.method = Method::logMatrix;
+  halves.units[0] = 2;
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.storage16Bit = true;
+  return vulkan::kernelSpirv(comparison, limits).empty() == isLeftOut &&
+         vulkan::kernelSpirv(halves, limits).empty() == isLeftOut;
+}
+
 }  // namespace
 
 int main() {
   if (!hasKernels()) return 1;
+  if (!hasChosenKernels()) return 5;
   if (vulkan::outputScope(vulkan::Consumer::vertexInput).destination.accesses !=
       VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT)
     return 2;
