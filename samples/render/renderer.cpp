@@ -118,8 +118,10 @@ std::vector<const Draw*> inOrder(std::span<const Draw> draws) {
   for (const Draw& draw : draws) {
     if (draw.geometry != nullptr && draw.geometry->indexCount() != 0) ordered.push_back(&draw);
   }
-  std::ranges::stable_partition(
-      ordered, [](const Draw* draw) { return draw->surface.transparency != Transparency::blend; });
+  // Not std::ranges: Clang 14 and GCC's library do not agree about what that returns.
+  std::stable_partition(ordered.begin(), ordered.end(), [](const Draw* draw) {
+    return draw->surface.transparency != Transparency::blend;
+  });
   return ordered;
 }
 
