@@ -1,6 +1,5 @@
 // What C++ and GLSL agree on: records, binding numbers, specialisation constants. The one file that
-// both include. Every record is made of 32-bit words and read by word, so that no layout rule comes
-// between the two languages.
+// both include.
 #ifndef DERMIS_ABI_H
 #define DERMIS_ABI_H
 
@@ -141,52 +140,61 @@ DERMIS_CONSTANT MORPH_BLOCK_MASK = 0u;           // 2 words, the low one first
 DERMIS_CONSTANT MORPH_BLOCK_DISPLACEMENTS = 2u;  // word offset
 DERMIS_CONSTANT MORPH_BLOCK_WORDS = 3u;
 
-// Table record of a palette. Offsets into the matrices and palettes buffers count 16-byte units.
-DERMIS_CONSTANT PALETTE_MATRICES = 0u;  // the first joint matrix: 3 units each
-DERMIS_CONSTANT PALETTE_OUTPUT =
-    1u;  // the palette: a status unit, the joints, 2 more units a joint where it may scale
-DERMIS_CONSTANT PALETTE_JOINTS = 2u;
-DERMIS_CONSTANT PALETTE_FLAGS = 3u;
+// ---- Records. A struct of scalars has the same layout in C++ and in std430; tables.glsl has a
+// loader for each. NAME_WORDS is its size. Tables are one buffer of words; records in them begin at
+// multiples of four words.
+
+// A palette to be converted. Offsets into the matrices and palettes buffers count 16-byte units.
+struct PaletteRecord {
+  uint matrices;  // the first joint matrix: 3 units each
+  uint place;     // of the palette: a status, the joints, 2 more units a joint where it may scale
+  uint jointCount;
+  uint flags;
+};
 DERMIS_CONSTANT PALETTE_WORDS = 4u;
 DERMIS_CONSTANT PALETTE_MAY_SCALE = 1u;
 DERMIS_CONSTANT PALETTE_LOGARITHMS = 2u;  // joints are logarithms instead of dual quaternions
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 
-// Words of the status unit at the start of a palette.
-DERMIS_CONSTANT STATUS_TWO_PHASE = 0u;
-DERMIS_CONSTANT STATUS_NON_RIGID = 1u;
-DERMIS_CONSTANT STATUS_UNDECLARED_SCALE = 2u;
-DERMIS_CONSTANT STATUS_NON_FINITE = 3u;
+// The unit at the beginning of a palette, as PaletteStatus has it.
+struct StatusRecord {
+  uint twoPhase;
+  uint nonRigidJoints;
+  uint undeclaredScale;
+  uint nonFiniteJoints;
+};
 
-// Table record of a group: the instances of one mesh with one output layout, in one dispatch.
-DERMIS_CONSTANT GROUP_WORKGROUP_END = 0u;  // workgroups of this dispatch up to and with this group
-DERMIS_CONSTANT GROUP_MESH = 1u;           // word offset of the packed mesh in the mesh buffer
-DERMIS_CONSTANT GROUP_FIRST_VERTEX = 2u;
-DERMIS_CONSTANT GROUP_VERTEX_END = 3u;
-DERMIS_CONSTANT GROUP_VERTEX_GROUPS = 4u;  // workgroups that cover the vertices once
-DERMIS_CONSTANT GROUP_FIRST_INSTANCE = 5u;
-DERMIS_CONSTANT GROUP_INSTANCE_COUNT = 6u;
-DERMIS_CONSTANT GROUP_POSITION_STRIDE = 7u;  // bytes, as the following
-DERMIS_CONSTANT GROUP_NORMAL_STRIDE = 8u;
-DERMIS_CONSTANT GROUP_TANGENT_STRIDE = 9u;
-DERMIS_CONSTANT GROUP_PREVIOUS_STRIDE = 10u;
+// A group: the instances of one mesh with one output layout, in one dispatch.
+struct GroupRecord {
+  uint workgroupEnd;  // workgroups of this dispatch up to and with this group
+  uint mesh;          // word offset of the packed mesh in the mesh buffer
+  uint firstVertex;
+  uint vertexEnd;
+  uint vertexGroups;  // workgroups that cover the vertices once
+  uint firstInstance;
+  uint instanceCount;
+  uint positionStride;  // bytes, as the following
+  uint normalStride;
+  uint tangentStride;
+  uint previousStride;
+  uint reserved;
+};
 DERMIS_CONSTANT GROUP_WORDS = 12u;
 
-// Table record of an instance. Output offsets are bytes from the start of the output range that the
-// dispatch writes, for the group's first vertex.
-DERMIS_CONSTANT INSTANCE_PALETTE =
-    0u;  // unit of the palette's status, or of the first joint matrix for linear
-DERMIS_CONSTANT INSTANCE_POSITIONS = 1u;
-DERMIS_CONSTANT INSTANCE_NORMALS = 2u;
-DERMIS_CONSTANT INSTANCE_TANGENTS = 3u;
-DERMIS_CONSTANT INSTANCE_PREVIOUS = 4u;  // from here on what many variants need not read
-DERMIS_CONSTANT INSTANCE_JOINTS = 5u;    // joints of the palette
-DERMIS_CONSTANT INSTANCE_FLAGS = 6u;
-DERMIS_CONSTANT INSTANCE_EXTENSION =
-    7u;  // word offset of its extension in the tables, where it has one
+// An instance. Output offsets are bytes from the start of the output range that the dispatch
+// writes, for the group's first vertex.
+struct InstanceRecord {
+  uint palette;  // unit of the palette's status, or of the first joint matrix for linear
+  uint positions;
+  uint normals;
+  uint tangents;
+  uint previousPositions;
+  uint jointCount;  // of the palette
+  uint flags;
+  uint extension;  // word offset of its extension in the tables, where it has one
+};
 DERMIS_CONSTANT INSTANCE_WORDS = 8u;
-
 DERMIS_CONSTANT INSTANCE_RESTARTS = 1u;  // previous positions are the current ones
 DERMIS_CONSTANT INSTANCE_SETTLES = 2u;   // not skinned; previous positions become the current ones
 // Of instances that the GPU chooses:
@@ -195,78 +203,118 @@ DERMIS_CONSTANT INSTANCE_HAS_RESULT =
     8u;  // its extension names one, to be cleared when it is skinned
 
 // What only some instances have.
-DERMIS_CONSTANT EXTENSION_PREVIOUS_PALETTE = 0u;  // as INSTANCE_PALETTE
-DERMIS_CONSTANT EXTENSION_PREVIOUS_JOINTS = 1u;
-DERMIS_CONSTANT EXTENSION_MORPHS = 2u;  // word offset of the active morph targets in the tables
-DERMIS_CONSTANT EXTENSION_MORPH_COUNT = 3u;
-DERMIS_CONSTANT EXTENSION_PREVIOUS_MORPHS = 4u;
-DERMIS_CONSTANT EXTENSION_PREVIOUS_MORPH_COUNT = 5u;
-DERMIS_CONSTANT EXTENSION_RESULT = 6u;    // word offset in the results
-DERMIS_CONSTANT EXTENSION_CENTRE = 8u;    // of the box of snorm16 positions: 3 floats
-DERMIS_CONSTANT EXTENSION_INVERSE = 12u;  // 1 / half its size: 3 floats
+struct ExtensionRecord {
+  uint previousPalette;  // as InstanceRecord::palette
+  uint previousJointCount;
+  uint morphs;  // word offset of the active morph targets in the tables
+  uint morphCount;
+  uint previousMorphs;
+  uint previousMorphCount;
+  uint result;  // number of its result
+  uint reserved;
+  float centreX;  // of the box of snorm16 positions
+  float centreY;
+  float centreZ;
+  float inverseX;  // 1 / half its size
+  float inverseY;
+  float inverseZ;
+  uint reserved1;
+  uint reserved2;
+};
 DERMIS_CONSTANT EXTENSION_WORDS = 16u;
 
-// An active morph target.
-DERMIS_CONSTANT ACTIVE_TARGET = 0u;
-DERMIS_CONSTANT ACTIVE_WEIGHT = 1u;  // float
-DERMIS_CONSTANT ACTIVE_WORDS = 2u;
+// An active morph target. They stand two by two, in rising order.
+struct ActiveMorph {
+  uint target;
+  float weight;
+};
+DERMIS_CONSTANT ACTIVE_MORPH_WORDS = 2u;
 
-// What is found out about an instance's skinned positions, as InstanceResult has it.
-DERMIS_CONSTANT RESULT_MIN = 0u;  // 3 ordered numbers
-DERMIS_CONSTANT RESULT_CLAMPED = 3u;
-DERMIS_CONSTANT RESULT_MAX = 4u;  // likewise
-DERMIS_CONSTANT RESULT_WORDS = 8u;
+// What is found out about an instance's skinned positions, as InstanceResult has it. Extremes are
+// numbers in the order of the floats.
+struct ResultRecord {
+  uint minX;
+  uint minY;
+  uint minZ;
+  uint clampedVertices;
+  uint maxX;
+  uint maxY;
+  uint maxZ;
+  uint reserved;
+};
 
 // Instances that the GPU chooses. Behind the records of a frame's tables stand, for each such
 // instance, in the order of the instance records, what the visibility kernel has to know of it …
-DERMIS_CONSTANT CANDIDATE_SLOT = 0u;  // its place in the visibility and history buffers
-DERMIS_CONSTANT CANDIDATE_VERSION =
-    1u;  // of what it should show; different for all instances and poses
+struct CandidateRecord {
+  uint slot;     // its place in the visibility and history buffers
+  uint version;  // of what it should show; different for all instances and poses
+};
 DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
 // … for each of their dispatches its groups …
-DERMIS_CONSTANT CULLED_DISPATCH_GROUPS = 0u;  // word offset of the first group record
-DERMIS_CONSTANT CULLED_DISPATCH_GROUP_COUNT = 1u;
-DERMIS_CONSTANT CULLED_DISPATCH_INSTANCES = 2u;  // instances per invocation
+struct CulledDispatchRecord {
+  uint groups;  // word offset of the first group record
+  uint groupCount;
+  uint instancesPerInvocation;
+  uint reserved;
+};
 DERMIS_CONSTANT CULLED_DISPATCH_WORDS = 4u;
 // … and the arguments of the indirect dispatches, as VkDispatchIndirectCommand, which the kernel
 // writes.
+struct IndirectRecord {
+  uint x;
+  uint y;
+  uint z;
+  uint reserved;
+};
 DERMIS_CONSTANT INDIRECT_WORDS = 4u;
 
 // What the GPU remembers of a slot.
-DERMIS_CONSTANT HISTORY_VERSION = 0u;       // that was last skinned
-DERMIS_CONSTANT HISTORY_LAST_VISIBLE = 1u;  // frame
-DERMIS_CONSTANT HISTORY_MOVES = 2u;         // 1: its previous positions are not its positions
-DERMIS_CONSTANT HISTORY_WORDS = 3u;
+struct HistoryRecord {
+  uint version;      // that was last skinned
+  uint lastVisible;  // frame
+  uint moves;        // 1: its previous positions are not its positions
+};
 
 // What the visibility kernel counts, for the engine's statistics.
-DERMIS_CONSTANT COUNTER_VISIBLE = 0u;
-DERMIS_CONSTANT COUNTER_SKINNED = 1u;
-DERMIS_CONSTANT COUNTER_SETTLED = 2u;
-DERMIS_CONSTANT COUNTER_WORKGROUPS = 3u;
-DERMIS_CONSTANT COUNTER_WORDS = 4u;
+struct CounterRecord {
+  uint visible;
+  uint skinned;
+  uint settled;
+  uint workgroups;
+};
 
 // Bindings of the visibility kernel; the tables are written too.
 DERMIS_CONSTANT BINDING_VISIBILITY = 1u;
 DERMIS_CONSTANT BINDING_HISTORY = 2u;
 DERMIS_CONSTANT BINDING_COUNTERS = 3u;
 
-// Push constants of the visibility kernel, by word.
-DERMIS_CONSTANT PUSH_CULLED_GROUPS = 0u;      // word offset of the first group, or culled dispatch
-DERMIS_CONSTANT PUSH_CULLED_CANDIDATES = 1u;  // word offset, or that of the indirect arguments
-DERMIS_CONSTANT PUSH_CULLED_FRAME = 2u;       // number of the frame, or the most workgroups in x
-DERMIS_CONSTANT PUSH_CULLED_INSTANCES = 3u;   // word offset of the instance records
-DERMIS_CONSTANT PUSH_CULLED_FIRST_INSTANCE = 4u;  // the number of the first culled one
-DERMIS_CONSTANT PUSH_CULLED_COUNT = 5u;           // of groups or dispatches: one workgroup each
-DERMIS_CONSTANT PUSH_CULLED_PASS = 6u;            // 0: instances, 1: dispatches
-DERMIS_CONSTANT PUSH_CULLED_WORDS = 8u;
+// ---- Push constants, of each kernel its own. Word offsets count from the beginning of the tables.
 
-// Push constants, by word.
-DERMIS_CONSTANT PUSH_FIRST_RECORD = 0u;
-DERMIS_CONSTANT PUSH_RECORD_COUNT = 1u;
-DERMIS_CONSTANT PUSH_WORKGROUP_COUNT = 2u;
-DERMIS_CONSTANT PUSH_INSTANCE_RECORDS =
-    3u;  // palette kernel: how many results to clear; their numbers follow the palette records
-DERMIS_CONSTANT PUSH_WORDS = 4u;
+struct PalettePush {
+  uint palettes;  // word offset of the palette records
+  uint paletteCount;
+  uint workgroupCount;  // before folding into y
+  uint resultCount;     // to clear; their numbers follow the palette records
+};
+struct SkinPush {
+  uint groups;  // word offset of the group records
+  uint groupCount;
+  uint workgroupCount;
+  uint instances;  // word offset of the instance records
+};
+struct VisibilityPush {
+  uint pass;  // VISIBILITY_CHOOSES: a workgroup a group; VISIBILITY_COUNTS: a workgroup a dispatch
+  uint groups;          // word offset of the first group
+  uint candidates;      // word offset
+  uint instances;       // word offset of the instance records
+  uint firstInstance;   // the number of the first that the GPU chooses
+  uint frame;           // counts records
+  uint dispatches;      // word offset
+  uint arguments;       // word offset
+  uint mostWorkgroups;  // in x
+};
+DERMIS_CONSTANT VISIBILITY_CHOOSES = 0u;
+DERMIS_CONSTANT VISIBILITY_COUNTS = 1u;
 
 #ifdef __cplusplus
 }  // namespace dermis::abi

@@ -1,5 +1,11 @@
-// A vertex, its influences and a palette to a skinned vertex, by the method. Needs what the methods need.
+// A vertex, its influences and a palette to a skinned vertex, by the method.
+#ifndef DERMIS_BLEND_GLSL
+#define DERMIS_BLEND_GLSL
 
+#include "abi.h"
+#include "mesh_access.glsl"
+#include "palette_access.glsl"
+#include "vertex.glsl"
 #include "direction_map.glsl"
 #include "dual_quaternion.glsl"
 #ifdef COMPARISON
@@ -55,3 +61,5 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pos
   if (still) skinned = vertex;
   return skinned;
 }
+
+#endif

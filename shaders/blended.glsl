@@ -1,5 +1,10 @@
 // Between linear blending and dual quaternions. The linear part is made of the joints as they were taken apart, so that one
-// palette serves both. Needs linear and dual_quaternion.
+// palette serves both.
+#ifndef DERMIS_BLENDED_GLSL
+#define DERMIS_BLENDED_GLSL
+
+#include "linear.glsl"
+#include "dual_quaternion.glsl"
 
 // The rows of R S, one joint's 3×3.
 void jointRows(vec4 q, Pose pose, uint joint, out vec3 r0, out vec3 r1, out vec3 r2) {
@@ -46,3 +51,5 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
   }
   return skinned;
 }
+
+#endif

@@ -1,5 +1,9 @@
 // Blended quaternions about a centre of rotation that was found at import (Le and Hodgins 2016), and dual quaternions drawn
-// towards them. The centre itself is skinned linearly, by the joints as they were taken apart. Needs dual_quaternion.
+// towards them. The centre itself is skinned linearly, by the joints as they were taken apart.
+#ifndef DERMIS_CENTER_OF_ROTATION_GLSL
+#define DERMIS_CENTER_OF_ROTATION_GLSL
+
+#include "dual_quaternion.glsl"
 
 // A point moved by one joint: R S p + t.
 vec3 throughJoint(Pose pose, uint joint, vec3 point) {
@@ -41,3 +45,5 @@ Vertex skinBulgeControlled(Vertex vertex, Influences influences, Pose pose, vec3
       translation + strength * (linearPoint(influences, pose, center) - bulged);
   return turnVertex(scaled, blend.real, factor, drawn, withNormal, withTangent);
 }
+
+#endif

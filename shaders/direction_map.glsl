@@ -1,4 +1,9 @@
-// What directions go through. Needs exact and vertex.
+// What directions go through.
+#ifndef DERMIS_DIRECTION_MAP_GLSL
+#define DERMIS_DIRECTION_MAP_GLSL
+
+#include "exact.glsl"
+#include "vertex.glsl"
 
 // A blended 3×3 matrix by its rows, scaled so that no product of two of them leaves the range of a float, and the sign of its
 // determinant: what directions are transformed by.
@@ -30,3 +35,5 @@ vec3 mapTangent(DirectionMap map, vec3 tangent) {
   precise vec3 turned = vec3(dot3(map.r0, tangent), dot3(map.r1, tangent), dot3(map.r2, tangent));
   return turned;
 }
+
+#endif

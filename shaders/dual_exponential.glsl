@@ -1,5 +1,9 @@
-// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix): polynomials,
-// since what a driver's own sine and arc tangent are worth differs. Needs exact.
+// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix): polynomials, since what a driver's own sine
+// and arc tangent are worth differs.
+#ifndef DERMIS_DUAL_EXPONENTIAL_GLSL
+#define DERMIS_DUAL_EXPONENTIAL_GLSL
+
+#include "exact.glsl"
 
 // A pure dual quaternion: half the angle about, and half the way along, a screw axis.
 struct Screw {
@@ -86,3 +90,5 @@ void exponentialOf(Screw screw, out vec4 real, out vec4 dual) {
   real = vec4(turn, fullCosine);
   dual = vec4(shift, dualScalar);
 }
+
+#endif

@@ -1,5 +1,14 @@
-// Dual-quaternion linear blending, in two phases where joints scale or shear, and what other methods share with it. Needs exact,
-// quaternion, polar, direction_map, mesh_access, palette_access and vertex.
+// Dual-quaternion linear blending, in two phases where joints scale or shear, and what other methods share with it.
+#ifndef DERMIS_DUAL_QUATERNION_GLSL
+#define DERMIS_DUAL_QUATERNION_GLSL
+
+#include "exact.glsl"
+#include "quaternion.glsl"
+#include "polar.glsl"
+#include "direction_map.glsl"
+#include "mesh_access.glsl"
+#include "palette_access.glsl"
+#include "vertex.glsl"
 
 // What the joints of a vertex blend to (Kavan et al. 2007, section 4): in the hemisphere of the pivot, which stands first. Not
 // normalised.
@@ -106,3 +115,5 @@ Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose, bool 
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   return turnVertex(scaled, blend.real, factor, translationOf(blend.real, blend.dual, factor), withNormal, withTangent);
 }
+
+#endif

@@ -1,4 +1,9 @@
-// Attributes as they are stored: the formats of VertexFormat, in up to four words. Needs abi.h and exact.glsl.
+// Attributes as they are stored: the formats of VertexFormat, in up to four words.
+#ifndef DERMIS_ENCODE_GLSL
+#define DERMIS_ENCODE_GLSL
+
+#include "abi.h"
+#include "exact.glsl"
 
 uint formatBytes(uint format) {
   switch (format) {
@@ -106,3 +111,5 @@ uvec4 encodeTangent(uint format, vec4 tangent) {
   }
   return encodeComponents(format, tangent);
 }
+
+#endif

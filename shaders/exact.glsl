@@ -1,6 +1,7 @@
-// Arithmetic that a compiler may not reorder. Built-in dot, cross and normalize may be computed in
-// any order and differ between specialisations of one kernel, so every sum that reaches an output
-// is spelled out here.
+// Arithmetic that a compiler may not reorder. Built-in dot, cross and normalize may be computed in any order and differ between
+// specialisations of one kernel, so every sum that reaches an output is spelled out here.
+#ifndef DERMIS_EXACT_GLSL
+#define DERMIS_EXACT_GLSL
 
 float dot3(vec3 a, vec3 b) {
   precise float sum = a.x * b.x + a.y * b.y + a.z * b.z;
@@ -75,3 +76,5 @@ vec3 unitOr(vec3 v, vec3 fallback) {
   precise vec3 unit = scaled * inversesqrt(squared);
   return squared == 0.0 ? fallback : unit;
 }
+
+#endif

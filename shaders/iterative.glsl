@@ -1,5 +1,10 @@
-// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean
-// screw from it to the joints', until that is nothing. Needs dual_quaternion and dual_exponential.
+// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean screw from it to the joints',
+// until that is nothing.
+#ifndef DERMIS_ITERATIVE_GLSL
+#define DERMIS_ITERATIVE_GLSL
+
+#include "dual_quaternion.glsl"
+#include "dual_exponential.glsl"
 
 // Reached where joints all but contradict each other; elsewhere a handful are enough.
 const uint MOST_STEPS = 20u;
@@ -63,3 +68,5 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   return turnVertex(scaled, blend.real, 2.0, translationOf(blend.real, blend.dual, 2.0), withNormal, withTangent);
 }
+
+#endif

@@ -1,4 +1,12 @@
-// Linear blend skinning. Needs exact, direction_map, mesh_access, palette_access and vertex.
+// Linear blend skinning.
+#ifndef DERMIS_LINEAR_GLSL
+#define DERMIS_LINEAR_GLSL
+
+#include "exact.glsl"
+#include "direction_map.glsl"
+#include "mesh_access.glsl"
+#include "palette_access.glsl"
+#include "vertex.glsl"
 
 // A vertex through a blended 3×4 matrix, given by its rows.
 Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, bool withTangent) {
@@ -33,3 +41,5 @@ Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNorm
   }
   return throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
 }
+
+#endif

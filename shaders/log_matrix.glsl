@@ -1,6 +1,9 @@
-// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): the joints' logarithms, 3×4 matrices
-// that the palette kernel made, are blended, and the exponential is taken as Alexa 2002 does, by
-// scaling and squaring. Needs dual_quaternion.
+// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): the joints' logarithms, 3×4 matrices that the palette kernel made,
+// are blended, and the exponential is taken as Alexa 2002 does, by scaling and squaring.
+#ifndef DERMIS_LOG_MATRIX_GLSL
+#define DERMIS_LOG_MATRIX_GLSL
+
+#include "dual_quaternion.glsl"
 
 struct Affine {  // rows; the fourth is 0 0 0 1, or 0 0 0 0 of a logarithm
   vec4 r0;
@@ -78,3 +81,5 @@ Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose, bool withN
   }
   return skinned;
 }
+
+#endif

@@ -1,4 +1,8 @@
-// How a packed mesh is read: what every vertex has by units of four words, the rest by words. Needs abi.h.
+// How a packed mesh is read: what every vertex has by units of four words, the rest by words.
+#ifndef DERMIS_MESH_ACCESS_GLSL
+#define DERMIS_MESH_ACCESS_GLSL
+
+#include "abi.h"
 
 #ifdef TEXELS
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
@@ -104,3 +108,5 @@ MethodInputs methodInputsOf(uint mesh, uint vertex) {
   }
   return inputs;
 }
+
+#endif

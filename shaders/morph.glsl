@@ -1,4 +1,11 @@
-// Morph targets: what the active ones add to a vertex in bind pose. Needs abi.h, tables, mesh_access and vertex.
+// Morph targets: what the active ones add to a vertex in bind pose.
+#ifndef DERMIS_MORPH_GLSL
+#define DERMIS_MORPH_GLSL
+
+#include "abi.h"
+#include "tables.glsl"
+#include "mesh_access.glsl"
+#include "vertex.glsl"
 
 // The displacement of a vertex by a target, at `word`; false where the target leaves it alone.
 bool findDisplacement(uint mesh, uint target, uint vertex, out uint word) {
@@ -24,8 +31,9 @@ void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint c
   precise vec3 tangent = vertex.tangent.xyz;
   uint targets = meshSection(mesh, MESH_HEADER_MORPHS);
   for (uint i = 0u; i < count; ++i) {
-    uint target = targets + tables[first + i * ACTIVE_WORDS + ACTIVE_TARGET] * MORPH_WORDS;
-    float weight = uintBitsToFloat(tables[first + i * ACTIVE_WORDS + ACTIVE_WEIGHT]);
+    ActiveMorph morph = loadActiveMorph(first + i * ACTIVE_MORPH_WORDS);
+    uint target = targets + morph.target * MORPH_WORDS;
+    float weight = morph.weight;
     uint word;
     if (!findDisplacement(mesh, target, number, word)) continue;
     uint attributes = meshWord(target + MORPH_ATTRIBUTES);
@@ -43,3 +51,5 @@ void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint c
   vertex.normal = normal;
   vertex.tangent.xyz = tangent;
 }
+
+#endif

@@ -1,5 +1,9 @@
 // How skinned attributes are written. Each has a buffer of its own, which may be one and the same; with ONE_OUTPUT it is, for
-// devices that have no more storage buffers a stage. Needs abi.h.
+// devices that have no more storage buffers a stage.
+#ifndef DERMIS_OUTPUT_ACCESS_GLSL
+#define DERMIS_OUTPUT_ACCESS_GLSL
+
+#include "abi.h"
 
 #ifdef PAIRS
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
@@ -62,4 +66,6 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
 #define STREAM_STORE storePrevious
 #include "stream.glsl"
 #endif
+#endif
+
 #endif

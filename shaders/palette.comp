@@ -11,14 +11,14 @@
 #include "polar.glsl"
 #include "dual_exponential.glsl"
 #include "tables.glsl"
+#include "results.glsl"
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
+layout(push_constant) uniform Push { PalettePush push; };
+
 layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Matrices { vec4 matrices[]; };
 layout(set = 0, binding = BINDING_PALETTES, std430) writeonly buffer Palettes { uvec4 palettes[]; };
-#ifndef ONE_OUTPUT
-layout(set = 0, binding = BINDING_RESULTS, std430) writeonly buffer Results { uint results[]; };
-#endif
 
 shared uint nonRigidJoints;
 shared uint nonFiniteJoints;
@@ -53,28 +53,17 @@ void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
   palettes[unit + 2u] = floatBitsToUint(vec4(-turn.y, turn.x, 0.0, shift.z));
 }
 
-void clearResult(uint number) {
-#ifndef ONE_OUTPUT
-  if (number >= push[PUSH_INSTANCE_RECORDS]) return;
-  uint result = tables[push[PUSH_FIRST_RECORD] + push[PUSH_RECORD_COUNT] * PALETTE_WORDS + number] * RESULT_WORDS;
-  for (uint word = 0u; word < RESULT_WORDS; ++word) results[result + word] = 0u;
-  for (uint axis = 0u; axis < 3u; ++axis) results[result + RESULT_MIN + axis] = 0xffffffffu;
-#endif
-}
-
 void main() {
   uint number = workgroupNumber();
-  if (number >= push[PUSH_WORKGROUP_COUNT]) return;
-  if (number >= push[PUSH_RECORD_COUNT]) {
-    clearResult((number - push[PUSH_RECORD_COUNT]) * gl_WorkGroupSize.x + gl_LocalInvocationID.x);
+  if (number >= push.workgroupCount) return;
+  if (number >= push.paletteCount) {
+    uint cleared = (number - push.paletteCount) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    if (cleared < push.resultCount) clearResult(tables[push.palettes + push.paletteCount * PALETTE_WORDS + cleared]);
     return;
   }
-  uint record = push[PUSH_FIRST_RECORD] + number * PALETTE_WORDS;
-  uint firstMatrix = tables[record + PALETTE_MATRICES];
-  uint status = tables[record + PALETTE_OUTPUT];
-  uint jointCount = tables[record + PALETTE_JOINTS];
-  bool mayScale = (tables[record + PALETTE_FLAGS] & PALETTE_MAY_SCALE) != 0u;
-  bool logarithms = (tables[record + PALETTE_FLAGS] & PALETTE_LOGARITHMS) != 0u;
+  PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
+  bool mayScale = (palette.flags & PALETTE_MAY_SCALE) != 0u;
+  bool logarithms = (palette.flags & PALETTE_LOGARITHMS) != 0u;
   uint unitsOfJoint = logarithms ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
 
   if (gl_LocalInvocationID.x == 0u) {
@@ -85,10 +74,10 @@ void main() {
 
   // Asked at its end, as some drivers execute the rest of a loop once more after the question.
   uint joint = gl_LocalInvocationID.x;
-  if (joint < jointCount) do {
-    vec4 r0 = matrices[firstMatrix + joint * 3u];
-    vec4 r1 = matrices[firstMatrix + joint * 3u + 1u];
-    vec4 r2 = matrices[firstMatrix + joint * 3u + 2u];
+  if (joint < palette.jointCount) do {
+    vec4 r0 = matrices[palette.matrices + joint * 3u];
+    vec4 r1 = matrices[palette.matrices + joint * 3u + 1u];
+    vec4 r2 = matrices[palette.matrices + joint * 3u + 2u];
     vec4 rotation;
     ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
     if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
@@ -101,25 +90,23 @@ void main() {
       polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
-    uint unit = status + 1u + joint * unitsOfJoint;
+    uint unit = palette.place + 1u + joint * unitsOfJoint;
     if (logarithms) {
       writeLogarithm(unit, rotation, dual);
     } else {
       palettes[unit] = floatBitsToUint(rotation);
       palettes[unit + 1u] = floatBitsToUint(dual);
     }
-    if (mayScale) writeScaleShear(status + 1u + jointCount * unitsOfJoint + joint * 2u, scaleShear);
+    if (mayScale) writeScaleShear(palette.place + 1u + palette.jointCount * unitsOfJoint + joint * 2u, scaleShear);
     joint += gl_WorkGroupSize.x;
-  } while (joint < jointCount);
+  } while (joint < palette.jointCount);
   barrier();
 
   if (gl_LocalInvocationID.x == 0u) {
     uint nonRigid = nonRigidJoints;
-    uint words[4];
-    words[STATUS_TWO_PHASE] = mayScale && nonRigid != 0u ? 1u : 0u;
-    words[STATUS_NON_RIGID] = nonRigid;
-    words[STATUS_UNDECLARED_SCALE] = mayScale ? 0u : nonRigid;
-    words[STATUS_NON_FINITE] = nonFiniteJoints;
-    palettes[status] = uvec4(words[0], words[1], words[2], words[3]);
+    StatusRecord status =
+        StatusRecord(mayScale && nonRigid != 0u ? 1u : 0u, nonRigid, mayScale ? 0u : nonRigid, nonFiniteJoints);
+    palettes[palette.place] =
+        uvec4(status.twoPhase, status.nonRigidJoints, status.undeclaredScale, status.nonFiniteJoints);
   }
 }

@@ -1,5 +1,10 @@
-// How the palette is read. A status unit, then each joint's rotation and dual part, or its logarithm, then the scale/shear
-// parts. Linear: the joint matrices, three rows each. Needs abi.h and polar.glsl's ScaleShear.
+// How the palette is read. A status unit, then each joint's rotation and dual part, or its logarithm, then the scale/shear parts.
+// Linear: the joint matrices, three rows each.
+#ifndef DERMIS_PALETTE_ACCESS_GLSL
+#define DERMIS_PALETTE_ACCESS_GLSL
+
+#include "abi.h"
+#include "polar.glsl"
 
 #ifdef TEXELS
 layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
@@ -20,8 +25,13 @@ struct Pose {
   bool scales;
 };
 
+StatusRecord loadStatus(uint palette) {
+  uvec4 a = paletteBits(palette);
+  return StatusRecord(a.x, a.y, a.z, a.w);
+}
+
 // False, and a constant, where no palette may scale: nothing of what scales is left in the code.
-bool paletteScales(uint palette) { return SCALES && paletteBits(palette)[STATUS_TWO_PHASE] != 0u; }
+bool paletteScales(uint palette) { return SCALES && loadStatus(palette).twoPhase != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }
@@ -39,3 +49,5 @@ vec4 paletteLogarithmRow(uint palette, uint joint, uint row) {
 }
 
 vec4 paletteRow(uint palette, uint joint, uint row) { return paletteUnit(palette + joint * 3u + row); }
+
+#endif

@@ -1,4 +1,9 @@
-// Polar decomposition of a 3×3 matrix. Needs exact.glsl and quaternion.glsl.
+// Polar decomposition of a 3×3 matrix.
+#ifndef DERMIS_POLAR_GLSL
+#define DERMIS_POLAR_GLSL
+
+#include "exact.glsl"
+#include "quaternion.glsl"
 
 // One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are
 // the other two indices, vp and vq the eigenvectors so far. In scalars, since drivers keep an array
@@ -187,3 +192,5 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
   precise vec3 mixed = scaled.mixed * back;
   scaleShear = ScaleShear(diagonal, mixed);
 }
+
+#endif

@@ -1,4 +1,8 @@
-// Quaternions are x y z w, Hamilton's. Needs exact.glsl.
+// Quaternions are x y z w, Hamilton's.
+#ifndef DERMIS_QUATERNION_GLSL
+#define DERMIS_QUATERNION_GLSL
+
+#include "exact.glsl"
 
 vec4 unitQuaternion(vec4 q) {
   precise vec4 unit = q * inverseRoot(dot4(q, q));
@@ -73,3 +77,5 @@ void rowsOfQuaternion(vec4 q, out vec3 r0, out vec3 r1, out vec3 r2) {
   r1 = row1;
   r2 = row2;
 }
+
+#endif

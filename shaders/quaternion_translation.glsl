@@ -1,4 +1,8 @@
-// Quaternions and translations, each blended on its own (Hejl 2004). Needs dual_quaternion.
+// Quaternions and translations, each blended on its own (Hejl 2004).
+#ifndef DERMIS_QUATERNION_TRANSLATION_GLSL
+#define DERMIS_QUATERNION_TRANSLATION_GLSL
+
+#include "dual_quaternion.glsl"
 
 vec3 jointTranslation(Pose pose, uint joint) {
   return translationOf(paletteRotation(pose.palette, joint), paletteDual(pose.palette, joint), 2.0);
@@ -13,3 +17,5 @@ Vertex skinQuaternionTranslation(Vertex vertex, Influences influences, Pose pose
   Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
   return turnVertex(scaled, blend.real, turningFactor(blend.real), translation, withNormal, withTangent);
 }
+
+#endif

@@ -1,8 +1,24 @@
-// What is found out about an instance besides its vertices: the box of its positions, and how many were clamped. Needs abi.h and exact.glsl.
+// What is found out about an instance besides its vertices: the box of its positions, and how many were clamped.
+#ifndef DERMIS_RESULTS_GLSL
+#define DERMIS_RESULTS_GLSL
 
-#ifdef EXTRAS
+#include "abi.h"
+#include "exact.glsl"
 
-layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { uint results[]; };
+#ifdef ONE_OUTPUT
+
+// There is no buffer for results; a plan asks for none.
+void clearResult(uint result) {}
+void addToBounds(uint result, vec3 position) {}
+void countClamped(uint result) {}
+
+#else
+
+layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { ResultRecord results[]; };
+
+void clearResult(uint result) {
+  results[result] = ResultRecord(0xffffffffu, 0xffffffffu, 0xffffffffu, 0u, 0u, 0u, 0u, 0u);
+}
 
 // As unsigned numbers these have the order of the floats; -0 counts as 0.
 uint orderedBits(float value) {
@@ -12,25 +28,21 @@ uint orderedBits(float value) {
 }
 
 // Most positions are no extreme: it is cheaper to look first. What is read may be old; it is only ever farther in.
-void addExtreme(uint result, uint axis, float value) {
-  if (isNan(value)) return;
-  uint bits = orderedBits(value);
-  if (bits < results[result + RESULT_MIN + axis]) atomicMin(results[result + RESULT_MIN + axis], bits);
-  if (bits > results[result + RESULT_MAX + axis]) atomicMax(results[result + RESULT_MAX + axis], bits);
-}
+#define ADD_EXTREME(least, greatest, value)                  \
+  if (!isNan(value)) {                                       \
+    uint bits = orderedBits(value);                          \
+    if (bits < (least)) atomicMin(least, bits);              \
+    if (bits > (greatest)) atomicMax(greatest, bits);        \
+  }
 
 void addToBounds(uint result, vec3 position) {
-  addExtreme(result, 0u, position.x);
-  addExtreme(result, 1u, position.y);
-  addExtreme(result, 2u, position.z);
+  ADD_EXTREME(results[result].minX, results[result].maxX, position.x)
+  ADD_EXTREME(results[result].minY, results[result].maxY, position.y)
+  ADD_EXTREME(results[result].minZ, results[result].maxZ, position.z)
 }
 
-void countClamped(uint result) { atomicAdd(results[result + RESULT_CLAMPED], 1u); }
+void countClamped(uint result) { atomicAdd(results[result].clampedVertices, 1u); }
 
-#else
-
-// There is no buffer for results; a plan asks for none.
-void addToBounds(uint result, vec3 position) {}
-void countClamped(uint result) {}
+#endif
 
 #endif

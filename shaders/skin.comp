@@ -71,17 +71,24 @@ const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 #include "blend.glsl"
 #include "encode.glsl"
 #include "output_access.glsl"
+#ifdef EXTRAS
 #include "results.glsl"
+#else
+void addToBounds(uint result, vec3 position) {}
+void countClamped(uint result) {}
+#endif
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+layout(push_constant) uniform Push { SkinPush push; };
 
 // The group that a workgroup belongs to: the first whose end lies behind it.
 uint findGroup(uint number) {
   uint low = 0u;
-  uint high = push[PUSH_RECORD_COUNT] - 1u;
+  uint high = push.groupCount - 1u;
   while (low < high) {
     uint middle = (low + high) / 2u;
-    if (tables[push[PUSH_FIRST_RECORD] + middle * GROUP_WORDS + GROUP_WORKGROUP_END] <= number) {
+    if (loadGroup(push.groups + middle * GROUP_WORDS).workgroupEnd <= number) {
       low = middle + 1u;
     } else {
       high = middle;
@@ -101,56 +108,29 @@ Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   return bind;
 }
 
-vec3 extensionVector(uint word) {
-  return vec3(uintBitsToFloat(tables[word]), uintBitsToFloat(tables[word + 1u]), uintBitsToFloat(tables[word + 2u]));
-}
-
 // A position as it is stored; snorm16 is relative to the box of the instance.
 uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
-    precise vec3 relative =
-        (position - extensionVector(extension + EXTENSION_CENTRE)) * extensionVector(extension + EXTENSION_INVERSE);
+    ExtensionRecord record = loadExtension(extension);
+    precise vec3 relative = (position - vec3(record.centreX, record.centreY, record.centreZ)) *
+                            vec3(record.inverseX, record.inverseY, record.inverseZ);
     v.xyz = relative;
     // A vertex of the engine's own box may stand a rounding outside.
-    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(tables[extension + EXTENSION_RESULT]);
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(record.result);
   }
   return encodeComponents(POSITION_FORMAT, v);
 }
 
-// The records of a group and of an instance, each read by four words.
-struct Group {
-  uint mesh;
-  uint firstVertex;
-  uint vertexEnd;
-  uint vertexGroups;
-  uint firstInstance;
-  uint instanceCount;
-  uvec4 strides;  // of positions, normals, tangents and previous positions
-};
-
-Group readGroup(uint record) {
-  uvec4 first = tableUnit(record);
-  uvec4 second = tableUnit(record + 4u);
-  uvec4 third = tableUnit(record + 8u);
-  return Group(first[GROUP_MESH], first[GROUP_FIRST_VERTEX], first[GROUP_VERTEX_END], second[GROUP_VERTEX_GROUPS - 4u],
-               second[GROUP_FIRST_INSTANCE - 4u], second[GROUP_INSTANCE_COUNT - 4u],
-               uvec4(second[GROUP_POSITION_STRIDE - 4u], third.xyz));
-}
-
+// An instance, and the bytes at which this invocation's vertex goes: positions, normals, tangents, previous positions.
 struct Instance {
-  uint palette;
-  uint jointCount;
-  uint flags;
-  uint extension;
-  uvec4 places;  // the bytes at which this invocation's vertex goes
+  InstanceRecord record;
+  uvec4 places;
 };
 
-Instance readInstance(uint record, uvec4 offsets) {
-  uvec4 first = tableUnit(record);
-  uvec4 second = tableUnit(record + 4u);
-  return Instance(first[INSTANCE_PALETTE], second[INSTANCE_JOINTS - 4u], second[INSTANCE_FLAGS - 4u],
-                  second[INSTANCE_EXTENSION - 4u], uvec4(first.yzw, second.x) + offsets);
+Instance readInstance(uint word, uvec4 offsets) {
+  InstanceRecord record = loadInstance(word);
+  return Instance(record, uvec4(record.positions, record.normals, record.tangents, record.previousPositions) + offsets);
 }
 
 // What an invocation has read of its vertex, for all its instances.
@@ -164,23 +144,23 @@ struct Work {
 
 #ifdef HAS_MOTION
 uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
-  if ((instance.flags & INSTANCE_RESTARTS) != 0u) return current;
+  if ((instance.record.flags & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  ExtensionRecord extension = loadExtension(instance.record.extension);
   Vertex before = work.bind;
   if (MORPHS) {
-    morphVertex(before, work.mesh, work.vertex, tables[instance.extension + EXTENSION_PREVIOUS_MORPHS],
-                tables[instance.extension + EXTENSION_PREVIOUS_MORPH_COUNT], false, false);
+    morphVertex(before, work.mesh, work.vertex, extension.previousMorphs, extension.previousMorphCount, false, false);
   }
-  uint palette = tables[instance.extension + EXTENSION_PREVIOUS_PALETTE];
-  Pose pose = Pose(palette, tables[instance.extension + EXTENSION_PREVIOUS_JOINTS], paletteScales(palette));
+  uint palette = extension.previousPalette;
+  Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
   before = skinVertex(before, work.influences, work.inputs, pose, false, false);
-  return encodePosition(before.position, instance.extension, false);
+  return encodePosition(before.position, instance.record.extension, false);
 }
 #endif
 
 void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef HAS_MOTION
-  if (MOTION != MOTION_NONE && (instance.flags & INSTANCE_SETTLES) != 0u) {
+  if (MOTION != MOTION_NONE && (instance.record.flags & INSTANCE_SETTLES) != 0u) {
     uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     return;
@@ -189,14 +169,14 @@ void skinInstance(Instance instance, Work work, bool scales) {
 
   Vertex morphed = work.bind;
   if (MORPHS) {
-    morphVertex(morphed, work.mesh, work.vertex, tables[instance.extension + EXTENSION_MORPHS],
-                tables[instance.extension + EXTENSION_MORPH_COUNT], NORMALS, TANGENTS);
+    ExtensionRecord extension = loadExtension(instance.record.extension);
+    morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount, NORMALS, TANGENTS);
     makeDirectionsUnit(morphed, NORMALS, TANGENTS);
   }
-  Pose pose = Pose(instance.palette, instance.jointCount, scales);
+  Pose pose = Pose(instance.record.palette, instance.record.jointCount, scales);
   Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
-  if (BOUNDS) addToBounds(tables[instance.extension + EXTENSION_RESULT], skinned.position);
-  uvec4 position = encodePosition(skinned.position, instance.extension, true);
+  if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
+  uvec4 position = encodePosition(skinned.position, instance.record.extension, true);
 #ifdef HAS_MOTION
   if (MOTION != MOTION_NONE) {
     uvec4 words = previousPosition(instance, position, work);
@@ -228,11 +208,11 @@ const bool APART = SCALES && INSTANCES >= 8u;
 
 void main() {
   uint number = workgroupNumber();
-  if (number >= push[PUSH_WORKGROUP_COUNT]) return;
+  if (number >= push.workgroupCount) return;
   uint index = findGroup(number);
-  uint record = push[PUSH_FIRST_RECORD] + index * GROUP_WORDS;
-  uint local = index == 0u ? number : number - tables[record - GROUP_WORDS + GROUP_WORKGROUP_END];
-  Group group = readGroup(record);
+  uint word = push.groups + index * GROUP_WORDS;
+  uint local = index == 0u ? number : number - loadGroup(word - GROUP_WORDS).workgroupEnd;
+  GroupRecord group = loadGroup(word);
 
   // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -259,8 +239,8 @@ void main() {
   work.influences = influencesOf(sections, vertex, firstInfluence);
 
   // Outside the loop: some drivers read push constants, too, as often as they stand there.
-  uint records = push[PUSH_INSTANCE_RECORDS] + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
-  uvec4 offsets = run * group.strides;
+  uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
+  uvec4 offsets = run * uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
   // Loops ask at their end whether they go on: some drivers execute the rest of a loop's body once more, to no effect, after the
   // question, and where there is one instance that would be half of it all.
   uint left = 0xffffffffu >> (32u - count);  // a bit an instance
@@ -268,7 +248,7 @@ void main() {
     uint scaling = 0u;
     uint i = 0u;
     do {
-      if (paletteScales(readInstance(records + i * INSTANCE_WORDS, offsets).palette)) scaling |= 1u << i;
+      if (paletteScales(loadInstance(records + i * INSTANCE_WORDS).palette)) scaling |= 1u << i;
     } while (++i < count);
     uint rigid = left & ~scaling;
     if (rigid != 0u) {
@@ -282,7 +262,7 @@ void main() {
   }
   do {
     Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
-    skinInstance(instance, work, APART || paletteScales(instance.palette));
+    skinInstance(instance, work, APART || paletteScales(instance.record.palette));
     left &= left - 1u;
   } while (left != 0u);
 }

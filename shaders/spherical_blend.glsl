@@ -1,7 +1,11 @@
 // Spherical blend skinning (Kavan and Žára 2005): blended quaternions about the point that the joints come nearest to agreeing
-// on. That point r solves (R_a − R_b) r = t_b − t_a over all pairs of joints in the least-squares sense, which is
-// (R_j − mean R) r = mean t − t_j over all joints. The rows are brought to triangular form one after the other, for the square of
-// that matrix would have half its digits. Needs dual_quaternion.
+// on. That point r solves (R_a − R_b) r = t_b − t_a over all pairs of joints in the least-squares sense, which is (R_j − mean R)
+// r = mean t − t_j over all joints. The rows are brought to triangular form one after the other, for the square of that matrix
+// would have half its digits.
+#ifndef DERMIS_SPHERICAL_BLEND_GLSL
+#define DERMIS_SPHERICAL_BLEND_GLSL
+
+#include "dual_quaternion.glsl"
 
 // Directions in which rotations differ by less are left alone: the pseudo-inverse.
 const float LEAST_SINGULAR_VALUE = 1e-3;
@@ -130,3 +134,5 @@ Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withN
       vec3(dot3(w0.xyz, center) + w0.w, dot3(w1.xyz, center) + w1.w, dot3(w2.xyz, center) + w2.w);
   return turnVertex(scaled, blend.real, turningFactor(blend.real), moved, withNormal, withTangent);
 }
+
+#endif

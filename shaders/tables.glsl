@@ -1,14 +1,23 @@
-// The tables of a batch and this dispatch's place in them. Needs abi.h.
+// The records of the tables (abi.h), a loader for each.
+#ifndef DERMIS_TABLES_GLSL
+#define DERMIS_TABLES_GLSL
 
-layout(set = 0, binding = BINDING_TABLES, std430) readonly buffer Tables { uint tables[]; };
+#include "abi.h"
 
+// TABLES_ARE_WRITTEN: the kernel stores records, too. Never with TEXELS.
+#ifdef TABLES_ARE_WRITTEN
+#define TABLE_ACCESS
+#else
+#define TABLE_ACCESS readonly
+#endif
+layout(set = 0, binding = BINDING_TABLES, std430) TABLE_ACCESS buffer Tables { uint tables[]; };
 #ifdef TEXELS
 layout(set = 0, binding = BINDING_TABLE_TEXELS) uniform utextureBuffer tableTexels;
 #else
-layout(set = 0, binding = BINDING_TABLES, std430) readonly buffer TableUnits { uvec4 tableUnits[]; };
+layout(set = 0, binding = BINDING_TABLES, std430) TABLE_ACCESS buffer TableUnits { uvec4 tableUnits[]; };
 #endif
 
-// Four words of a record. Records begin at multiples of four words.
+// Four words of a record.
 uvec4 tableUnit(uint word) {
 #ifdef TEXELS
   return texelFetch(tableTexels, int(word / 4u));
@@ -17,7 +26,58 @@ uvec4 tableUnit(uint word) {
 #endif
 }
 
-layout(push_constant) uniform Push { uint push[PUSH_WORDS]; };
+PaletteRecord loadPalette(uint word) {
+  uvec4 a = tableUnit(word);
+  return PaletteRecord(a.x, a.y, a.z, a.w);
+}
+
+GroupRecord loadGroup(uint word) {
+  uvec4 a = tableUnit(word);
+  uvec4 b = tableUnit(word + 4u);
+  uvec4 c = tableUnit(word + 8u);
+  return GroupRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w);
+}
+
+InstanceRecord loadInstance(uint word) {
+  uvec4 a = tableUnit(word);
+  uvec4 b = tableUnit(word + 4u);
+  return InstanceRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
+}
+
+ExtensionRecord loadExtension(uint word) {
+  uvec4 a = tableUnit(word);
+  uvec4 b = tableUnit(word + 4u);
+  vec4 c = uintBitsToFloat(tableUnit(word + 8u));
+  uvec4 d = tableUnit(word + 12u);
+  return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, uintBitsToFloat(d.x), uintBitsToFloat(d.y),
+                         d.z, d.w);
+}
+
+CandidateRecord loadCandidate(uint word) { return CandidateRecord(tables[word], tables[word + 1u]); }
+
+CulledDispatchRecord loadCulledDispatch(uint word) {
+  uvec4 a = tableUnit(word);
+  return CulledDispatchRecord(a.x, a.y, a.z, a.w);
+}
+
+#ifdef TABLES_ARE_WRITTEN
+void storeGroup(uint word, GroupRecord r) {
+  tableUnits[word / 4u] = uvec4(r.workgroupEnd, r.mesh, r.firstVertex, r.vertexEnd);
+  tableUnits[word / 4u + 1u] = uvec4(r.vertexGroups, r.firstInstance, r.instanceCount, r.positionStride);
+  tableUnits[word / 4u + 2u] = uvec4(r.normalStride, r.tangentStride, r.previousStride, r.reserved);
+}
+
+void storeInstance(uint word, InstanceRecord r) {
+  tableUnits[word / 4u] = uvec4(r.palette, r.positions, r.normals, r.tangents);
+  tableUnits[word / 4u + 1u] = uvec4(r.previousPositions, r.jointCount, r.flags, r.extension);
+}
+
+void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(r.x, r.y, r.z, r.reserved); }
+#endif
+
+ActiveMorph loadActiveMorph(uint word) { return ActiveMorph(tables[word], uintBitsToFloat(tables[word + 1u])); }
 
 // Workgroups are numbered through, whatever part of the number was folded into y.
 uint workgroupNumber() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
+
+#endif

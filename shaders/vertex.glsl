@@ -1,4 +1,8 @@
-// A vertex on its way through a kernel. Needs exact.glsl.
+// A vertex on its way through a kernel.
+#ifndef DERMIS_VERTEX_GLSL
+#define DERMIS_VERTEX_GLSL
+
+#include "exact.glsl"
 
 struct Vertex {
   vec3 position;
@@ -21,3 +25,5 @@ void makeDirectionsUnit(inout Vertex vertex, bool withNormal, bool withTangent) 
 vec4 tangentOf(vec3 direction, float handedness, float side) {
   return vec4(direction, (handedness < 0.0) == (side < 0.0) ? 1.0 : -1.0);
 }
+
+#endif

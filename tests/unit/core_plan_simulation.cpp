@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
+#include <cstring>
 #include <map>
 #include <set>
 #include <utility>
@@ -80,7 +81,17 @@ class Simulation {
 
  private:
   std::uint32_t word(std::uint64_t index) const { return tables_.at(index); }
-  float number(std::uint64_t index) const { return std::bit_cast<float>(word(index)); }
+  template <typename Record>
+  Record at(std::uint64_t index) const {
+    Record record{};
+    static_cast<void>(word(index + sizeof(Record) / 4 - 1));  // it lies in the tables
+    std::memcpy(&record, &tables_[index], sizeof(Record));
+    return record;
+  }
+  abi::GroupRecord groupAt(std::uint64_t index) const { return at<abi::GroupRecord>(index); }
+  abi::InstanceRecord instanceAt(std::uint64_t index) const {
+    return at<abi::InstanceRecord>(index);
+  }
 
   void checkResults() {
     std::uint64_t next = 0;
@@ -147,21 +158,22 @@ class Simulation {
               wanted.size() + divideUp(resultCount_, tuning_.workgroupSize));
     std::uint64_t end = 0;
     for (std::uint32_t number = 0; number < constants.recordCount; ++number) {
-      const std::uint64_t record = constants.firstRecord + number * abi::PALETTE_WORDS;
-      const std::uint64_t status = std::uint64_t{word(record + abi::PALETTE_OUTPUT)} * 16;
+      const auto record =
+          at<abi::PaletteRecord>(constants.firstRecord + number * abi::PALETTE_WORDS);
+      const std::uint64_t status = std::uint64_t{record.place} * 16;
       // No two palettes of a batch begin at the same matrix.
-      const auto matrices = std::uint64_t{word(record + abi::PALETTE_MATRICES)} * 16;
+      const auto matrices = std::uint64_t{record.matrices} * 16;
       const auto found =
           std::find_if(batch_.palettes.begin(), batch_.palettes.end(),
                        [&](const Palette& palette) { return palette.matrixOffset == matrices; });
       ASSERT_NE(found, batch_.palettes.end());
       const Palette& palette = *found;
-      const std::uint32_t flags = word(record + abi::PALETTE_FLAGS);
+      const std::uint32_t flags = record.flags;
       const bool logarithms = (flags & abi::PALETTE_LOGARITHMS) != 0;
       const PaletteInForm form{static_cast<std::uint32_t>(found - batch_.palettes.begin()),
                                logarithms};
       ASSERT_EQ(wanted.erase(form), 1u) << "a palette that nobody reads, or twice in a form";
-      ASSERT_EQ(word(record + abi::PALETTE_JOINTS), palette.jointCount);
+      ASSERT_EQ(record.jointCount, palette.jointCount);
       ASSERT_EQ(flags, (palette.mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
                            (logarithms ? abi::PALETTE_LOGARITHMS : 0u));
       ASSERT_GE(status, end) << "palettes overlap";
@@ -201,8 +213,7 @@ class Simulation {
       for (;; ++index) {
         ASSERT_LT(index, constants.recordCount) << "workgroup " << number << " has no group";
         begin = end;
-        end = word(std::uint64_t{constants.firstRecord} + index * abi::GROUP_WORDS +
-                   abi::GROUP_WORKGROUP_END);
+        end = groupAt(std::uint64_t{constants.firstRecord} + index * abi::GROUP_WORDS).workgroupEnd;
         ASSERT_GT(end, begin) << "an empty group";
         if (number < end) break;
       }
@@ -212,12 +223,12 @@ class Simulation {
   }
 
   void runWorkgroup(const Dispatch& dispatch, std::uint32_t group, std::uint32_t local) {
-    const std::uint32_t vertexGroups = word(group + abi::GROUP_VERTEX_GROUPS);
-    const std::uint32_t firstVertex = word(group + abi::GROUP_FIRST_VERTEX);
-    const std::uint32_t vertexEnd = word(group + abi::GROUP_VERTEX_END);
+    const std::uint32_t vertexGroups = groupAt(group).vertexGroups;
+    const std::uint32_t firstVertex = groupAt(group).firstVertex;
+    const std::uint32_t vertexEnd = groupAt(group).vertexEnd;
     const std::uint32_t instancesEach = dispatch.variant.instancesPerInvocation;
     const std::uint32_t firstInstance = local / vertexGroups * instancesEach;
-    const std::uint32_t instanceCount = word(group + abi::GROUP_INSTANCE_COUNT);
+    const std::uint32_t instanceCount = groupAt(group).instanceCount;
     ASSERT_LT(firstInstance, instanceCount) << "an idle workgroup";
     const std::uint32_t firstRun = local % vertexGroups * dispatch.variant.workgroupSize;
     ASSERT_LT(firstVertex + firstRun, vertexEnd) << "an idle workgroup";
@@ -225,9 +236,8 @@ class Simulation {
         std::min(firstRun + dispatch.variant.workgroupSize, vertexEnd - firstVertex);
     for (std::uint32_t instance = firstInstance;
          instance < std::min(firstInstance + instancesEach, instanceCount); ++instance) {
-      const std::uint64_t record =
-          std::uint64_t{dispatch.constants.instanceRecords} +
-          (word(group + abi::GROUP_FIRST_INSTANCE) + instance) * abi::INSTANCE_WORDS;
+      const std::uint64_t record = std::uint64_t{dispatch.constants.instanceRecords} +
+                                   (groupAt(group).firstInstance + instance) * abi::INSTANCE_WORDS;
       std::uint32_t job = 0;
       ASSERT_NO_FATAL_FAILURE(findJob(dispatch, record, firstVertex, job));
       ASSERT_NO_FATAL_FAILURE(checkVariant(dispatch, batch_.jobs[job]));
@@ -243,7 +253,7 @@ class Simulation {
   /// The job whose positions the record points at.
   void findJob(const Dispatch& dispatch, std::uint64_t record, std::uint32_t firstVertex,
                std::uint32_t& index) {
-    const std::uint64_t place = dispatch.windows[0].offset + word(record + abi::INSTANCE_POSITIONS);
+    const std::uint64_t place = dispatch.windows[0].offset + instanceAt(record).positions;
     const auto behind =
         std::upper_bound(begins_.begin(), begins_.end(), std::pair{place, ~std::uint32_t{0}});
     ASSERT_NE(behind, begins_.begin()) << "a write that no job asked for";
@@ -287,58 +297,55 @@ class Simulation {
 
   void checkRecord(std::uint32_t group, std::uint64_t record, std::uint32_t index) {
     const Job& job = batch_.jobs[index];
-    ASSERT_EQ(std::uint64_t{word(group + abi::GROUP_MESH)} * 4, job.meshOffset);
-    ASSERT_EQ(word(record + abi::INSTANCE_JOINTS), batch_.palettes[job.palette].jointCount);
-    ASSERT_EQ(std::uint64_t{word(record + abi::INSTANCE_PALETTE)} * 16,
+    ASSERT_EQ(std::uint64_t{groupAt(group).mesh} * 4, job.meshOffset);
+    ASSERT_EQ(instanceAt(record).jointCount, batch_.palettes[job.palette].jointCount);
+    ASSERT_EQ(std::uint64_t{instanceAt(record).palette} * 16,
               paletteBytes(job.method, job.palette));
-    ASSERT_EQ(word(record + abi::INSTANCE_FLAGS),
-              (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
-                  (job.settles ? abi::INSTANCE_SETTLES : 0u));
+    ASSERT_EQ(instanceAt(record).flags, (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
+                                            (job.settles ? abi::INSTANCE_SETTLES : 0u));
   }
 
   void checkMorphs(std::uint64_t first, std::uint32_t count, std::span<const MorphWeight> morphs) {
     const std::vector<MorphWeight> expected = activeMorphs(morphs);
     ASSERT_EQ(count, expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
-      ASSERT_EQ(word(first + i * abi::ACTIVE_WORDS + abi::ACTIVE_TARGET), expected[i].target);
-      ASSERT_EQ(number(first + i * abi::ACTIVE_WORDS + abi::ACTIVE_WEIGHT), expected[i].weight);
+      const auto morph = at<abi::ActiveMorph>(first + i * abi::ACTIVE_MORPH_WORDS);
+      ASSERT_EQ(morph.target, expected[i].target);
+      ASSERT_EQ(morph.weight, expected[i].weight);
     }
   }
 
   void checkExtension(std::uint64_t record, std::uint32_t index) {
     const Job& job = batch_.jobs[index];
-    const std::uint64_t extension = word(record + abi::INSTANCE_EXTENSION);
+    const std::uint64_t place = instanceAt(record).extension;
     if (!wantsResult(job) && job.motion != Motion::reskinned && !isMorphed(job)) {
-      ASSERT_EQ(extension, 0u) << "what the instance does not need costs words";
+      ASSERT_EQ(place, 0u) << "what the instance does not need costs words";
       return;
     }
-    ASSERT_GT(extension, record);
-    ASSERT_LE(extension + abi::EXTENSION_WORDS, tables_.size());
-    ASSERT_NO_FATAL_FAILURE(checkMorphs(word(extension + abi::EXTENSION_MORPHS),
-                                        word(extension + abi::EXTENSION_MORPH_COUNT), job.morphs));
+    ASSERT_GT(place, record);
+    ASSERT_EQ(place % 4, 0u);
+    const auto extension = at<abi::ExtensionRecord>(place);
+    ASSERT_NO_FATAL_FAILURE(checkMorphs(extension.morphs, extension.morphCount, job.morphs));
     if (job.motion == Motion::reskinned) {
-      ASSERT_EQ(std::uint64_t{word(extension + abi::EXTENSION_PREVIOUS_PALETTE)} * 16,
+      ASSERT_EQ(std::uint64_t{extension.previousPalette} * 16,
                 paletteBytes(job.method, job.previousPalette));
-      ASSERT_EQ(word(extension + abi::EXTENSION_PREVIOUS_JOINTS),
-                batch_.palettes[job.previousPalette].jointCount);
-      ASSERT_NO_FATAL_FAILURE(checkMorphs(word(extension + abi::EXTENSION_PREVIOUS_MORPHS),
-                                          word(extension + abi::EXTENSION_PREVIOUS_MORPH_COUNT),
-                                          job.previousMorphs));
+      ASSERT_EQ(extension.previousJointCount, batch_.palettes[job.previousPalette].jointCount);
+      ASSERT_NO_FATAL_FAILURE(
+          checkMorphs(extension.previousMorphs, extension.previousMorphCount, job.previousMorphs));
     }
     if (wantsResult(job)) {
-      ASSERT_EQ(std::uint64_t{word(extension + abi::EXTENSION_RESULT)} * 4,
-                plan_.resultOffset(index));
+      ASSERT_EQ(extension.result * sizeof(InstanceResult), plan_.resultOffset(index));
     }
     if (job.positions.format != VertexFormat::snorm16x3 &&
         job.positions.format != VertexFormat::snorm16x4)
       return;
+    const std::array<float, 3> centre{extension.centreX, extension.centreY, extension.centreZ};
+    const std::array<float, 3> inverse{extension.inverseX, extension.inverseY, extension.inverseZ};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = static_cast<double>(job.box.min[axis]);
       const double high = static_cast<double>(job.box.max[axis]);
-      ASSERT_EQ(number(extension + abi::EXTENSION_CENTRE + axis),
-                static_cast<float>((low + high) / 2));
-      ASSERT_EQ(number(extension + abi::EXTENSION_INVERSE + axis),
-                static_cast<float>(2 / (high - low)));
+      ASSERT_EQ(centre[axis], static_cast<float>((low + high) / 2));
+      ASSERT_EQ(inverse[axis], static_cast<float>(2 / (high - low)));
     }
   }
 
@@ -355,10 +362,14 @@ class Simulation {
     const std::uint64_t window = dispatch.windows[stream].offset;
     ASSERT_LE(window, sizes_[stream]);
     const std::uint64_t range = std::min(limits_.maxStorageBufferRange, sizes_[stream] - window);
-    const std::uint32_t stride = word(group + abi::GROUP_POSITION_STRIDE + stream);
+    const abi::GroupRecord layout = groupAt(group);
+    const abi::InstanceRecord places = instanceAt(record);
+    const std::uint32_t stride = std::array{layout.positionStride, layout.normalStride,
+                                            layout.tangentStride, layout.previousStride}[stream];
+    const std::uint32_t begin = std::array{places.positions, places.normals, places.tangents,
+                                           places.previousPositions}[stream];
     for (std::uint32_t i = run.begin; i < run.end; ++i) {
-      const std::uint64_t place =
-          word(record + abi::INSTANCE_POSITIONS + stream) + std::uint64_t{i} * stride;
+      const std::uint64_t place = begin + std::uint64_t{i} * stride;
       const std::uint32_t vertex = run.firstVertex + i;
       ASSERT_EQ(window + place, attribute.offset + std::uint64_t{vertex} * attribute.stride)
           << "job " << index << ", stream " << stream << ", vertex " << vertex;

@@ -1,5 +1,5 @@
 // Batches for tests of plans, and a stand-in for the kernels: it reads the tables as shaders/abi.h
-// lays them out, as skin.glsl and palette.glsl do, and marks what they would write.
+// lays them out, as skin.comp and palette.comp do, and marks what they would write.
 #pragma once
 
 #include <array>

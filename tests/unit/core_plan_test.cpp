@@ -57,25 +57,32 @@ TEST(Plan, BuffersAreDescribed) {
 
 TEST(Plan, StatusHasFourWords) {
   EXPECT_EQ(sizeof(PaletteStatus), 16u);
-  EXPECT_EQ(offsetof(PaletteStatus, twoPhase), abi::STATUS_TWO_PHASE * 4);
-  EXPECT_EQ(offsetof(PaletteStatus, nonRigidJoints), abi::STATUS_NON_RIGID * 4);
-  EXPECT_EQ(offsetof(PaletteStatus, undeclaredScale), abi::STATUS_UNDECLARED_SCALE * 4);
-  EXPECT_EQ(offsetof(PaletteStatus, nonFiniteJoints), abi::STATUS_NON_FINITE * 4);
+  EXPECT_EQ(offsetof(PaletteStatus, twoPhase), offsetof(abi::StatusRecord, twoPhase));
+  EXPECT_EQ(offsetof(PaletteStatus, nonRigidJoints), offsetof(abi::StatusRecord, nonRigidJoints));
+  EXPECT_EQ(offsetof(PaletteStatus, undeclaredScale), offsetof(abi::StatusRecord, undeclaredScale));
+  EXPECT_EQ(offsetof(PaletteStatus, nonFiniteJoints), offsetof(abi::StatusRecord, nonFiniteJoints));
 }
 
 TEST(Plan, PushConstantsStandInTheOrderOfAbiH) {
-  EXPECT_EQ(offsetof(DispatchConstants, firstRecord), abi::PUSH_FIRST_RECORD * 4);
-  EXPECT_EQ(offsetof(DispatchConstants, recordCount), abi::PUSH_RECORD_COUNT * 4);
-  EXPECT_EQ(offsetof(DispatchConstants, workgroupCount), abi::PUSH_WORKGROUP_COUNT * 4);
-  EXPECT_EQ(offsetof(DispatchConstants, instanceRecords), abi::PUSH_INSTANCE_RECORDS * 4);
-  EXPECT_EQ(sizeof(DispatchConstants), abi::PUSH_WORDS * 4);
+  EXPECT_EQ(sizeof(DispatchConstants), sizeof(abi::PalettePush));
+  EXPECT_EQ(offsetof(DispatchConstants, firstRecord), offsetof(abi::PalettePush, palettes));
+  EXPECT_EQ(offsetof(DispatchConstants, recordCount), offsetof(abi::PalettePush, paletteCount));
+  EXPECT_EQ(offsetof(DispatchConstants, workgroupCount),
+            offsetof(abi::PalettePush, workgroupCount));
+  EXPECT_EQ(offsetof(DispatchConstants, instanceRecords), offsetof(abi::PalettePush, resultCount));
+  EXPECT_EQ(sizeof(DispatchConstants), sizeof(abi::SkinPush));
+  EXPECT_EQ(offsetof(DispatchConstants, firstRecord), offsetof(abi::SkinPush, groups));
+  EXPECT_EQ(offsetof(DispatchConstants, recordCount), offsetof(abi::SkinPush, groupCount));
+  EXPECT_EQ(offsetof(DispatchConstants, workgroupCount), offsetof(abi::SkinPush, workgroupCount));
+  EXPECT_EQ(offsetof(DispatchConstants, instanceRecords), offsetof(abi::SkinPush, instances));
 }
 
 TEST(Plan, ResultsAreLaidOutAsAbiHSays) {
-  EXPECT_EQ(sizeof(InstanceResult), abi::RESULT_WORDS * 4);
-  EXPECT_EQ(offsetof(InstanceResult, orderedMin), abi::RESULT_MIN * 4);
-  EXPECT_EQ(offsetof(InstanceResult, clampedVertices), abi::RESULT_CLAMPED * 4);
-  EXPECT_EQ(offsetof(InstanceResult, orderedMax), abi::RESULT_MAX * 4);
+  EXPECT_EQ(sizeof(InstanceResult), sizeof(abi::ResultRecord));
+  EXPECT_EQ(offsetof(InstanceResult, orderedMin), offsetof(abi::ResultRecord, minX));
+  EXPECT_EQ(offsetof(InstanceResult, clampedVertices),
+            offsetof(abi::ResultRecord, clampedVertices));
+  EXPECT_EQ(offsetof(InstanceResult, orderedMax), offsetof(abi::ResultRecord, maxX));
 }
 
 TEST(Plan, ResultsTurnIntoTheBoxOfTheirFloats) {

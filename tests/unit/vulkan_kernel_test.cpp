@@ -17,8 +17,9 @@ namespace dermis::test {
 namespace {
 
 // The SPIR-V specification, section 3.
-constexpr std::uint32_t opConstant = 43, opLoad = 61, opStore = 62, opAccessChain = 65,
-                        opDecorate = 71, opControlBarrier = 224;
+constexpr std::uint32_t opEntryPoint = 15, opConstant = 43, opFunction = 54, opFunctionCall = 57,
+                        opLoad = 61, opStore = 62, opAccessChain = 65, opDecorate = 71,
+                        opControlBarrier = 224;
 constexpr std::uint32_t decorationBinding = 33;
 constexpr std::uint32_t acquireRelease = 0x8, uniformMemory = 0x40, workgroupMemory = 0x100;
 
@@ -40,29 +41,50 @@ std::vector<Instruction> instructionsOf(std::span<const std::uint32_t> module) {
   return instructions;
 }
 
-/// Reads and writes of the tables, and barriers, in the order of the module.
+/// Reads and writes of the tables, and barriers.
 struct Event {
   enum class Kind { load, store, barrier } kind;
   std::uint32_t semantics = 0;  ///< of a barrier
 };
 
-std::vector<Event> traceOf(std::span<const std::uint32_t> module) {
-  std::vector<Event> trace;
-  std::map<std::uint32_t, std::uint32_t> constants;
-  std::set<std::uint32_t> tables;  // the variable, and pointers into it
-  for (const auto& [opcode, operands] : instructionsOf(module)) {
-    if (opcode == opConstant) constants[operands[1]] = operands[2];
-    if (opcode == opDecorate && operands[1] == decorationBinding &&
-        operands[2] == abi::BINDING_TABLES)
-      tables.insert(operands[0]);
-    if (opcode == opAccessChain && tables.contains(operands[2])) tables.insert(operands[1]);
-    if (opcode == opLoad && tables.contains(operands[2])) trace.push_back({Event::Kind::load});
-    if (opcode == opStore && tables.contains(operands[0])) trace.push_back({Event::Kind::store});
-    if (opcode == opControlBarrier)
-      trace.push_back({Event::Kind::barrier, constants.at(operands[2])});
+/// What a module does from its entry point on, calls in their place, in the order in which blocks
+/// stand.
+class Trace {
+ public:
+  explicit Trace(std::span<const std::uint32_t> module) {
+    std::uint32_t entry = 0, function = 0;
+    for (const Instruction& instruction : instructionsOf(module)) {
+      const auto& [opcode, operands] = instruction;
+      if (opcode == opEntryPoint) entry = operands[1];
+      if (opcode == opConstant) constants_[operands[1]] = operands[2];
+      if (opcode == opDecorate && operands[1] == decorationBinding &&
+          operands[2] == abi::BINDING_TABLES)
+        tables_.insert(operands[0]);
+      if (opcode == opFunction) function = operands[1];
+      if (function != 0) functions_[function].push_back(instruction);
+    }
+    follow(entry);
   }
-  return trace;
-}
+  const std::vector<Event>& events() const { return events_; }
+
+ private:
+  void follow(std::uint32_t function) {
+    for (const auto& [opcode, operands] : functions_.at(function)) {
+      if (opcode == opFunctionCall) follow(operands[2]);
+      if (opcode == opAccessChain && tables_.contains(operands[2])) tables_.insert(operands[1]);
+      if (opcode == opLoad && tables_.contains(operands[2])) events_.push_back({Event::Kind::load});
+      if (opcode == opStore && tables_.contains(operands[0]))
+        events_.push_back({Event::Kind::store});
+      if (opcode == opControlBarrier)
+        events_.push_back({Event::Kind::barrier, constants_.at(operands[2])});
+    }
+  }
+
+  std::map<std::uint32_t, std::uint32_t> constants_;
+  std::set<std::uint32_t> tables_;  // the variables, and pointers into them
+  std::map<std::uint32_t, std::vector<Instruction>> functions_;
+  std::vector<Event> events_;
+};
 
 // An invocation overwrites the record that another one has read: between the two stands the first
 // barrier, which must order storage buffers besides shared memory.
@@ -71,7 +93,8 @@ TEST(KernelTest, RecordsAreReadBeforeOthersOverwriteThem) {
        {std::span<const std::uint32_t>(kernels::visibility_spirv),
         std::span<const std::uint32_t>(kernels::visibility_one_output_spirv)}) {
     std::size_t loads = 0, storesBefore = 0, storesBehind = 0, barriers = 0;
-    for (const auto& [kind, semantics] : traceOf(module)) {
+    const Trace trace(module);
+    for (const auto& [kind, semantics] : trace.events()) {
       if (kind == Event::Kind::barrier && barriers++ == 0) {
         EXPECT_EQ(semantics, acquireRelease | uniformMemory | workgroupMemory);
       }

@@ -281,6 +281,8 @@ struct PaletteStatus {
   std::uint32_t nonFiniteJoints = 0;  ///< joints with a NaN or an infinity
 };
 
+struct PlanData;
+
 /// The dispatches of a batch. Reuse one object: its memory is kept. Not thread-safe while
 /// `makePlan` fills it, immutable after.
 class Plan {
@@ -313,11 +315,9 @@ class Plan {
   std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances
 
  private:
+  friend struct PlanData;  // what it consists of
   friend Result<void> makePlan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
-  friend Result<void> writeTables(const Plan&, std::span<std::byte>);
-  friend class FrameBuilder;  // of SkinningSystem
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<PlanData> data_;
 };
 
 /// Turns a batch into dispatches: one for all palettes, then one for each combination of method,

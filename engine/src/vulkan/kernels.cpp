@@ -1,6 +1,7 @@
 #include "dermis/vulkan/kernels.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <string>
 
 #include "abi.h"
@@ -36,14 +37,29 @@ static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexForm
 static_assert(abi::MOTION_NONE == static_cast<std::uint32_t>(Motion::none));
 static_assert(abi::MOTION_KEPT == static_cast<std::uint32_t>(Motion::kept));
 static_assert(abi::MOTION_RESKINNED == static_cast<std::uint32_t>(Motion::reskinned));
-// Records are read by four words.
-static_assert(abi::PALETTE_WORDS % 4 == 0 && abi::GROUP_WORDS % 4 == 0 &&
+// Records are read four words at a time.
+static_assert(sizeof(abi::PaletteRecord) == abi::PALETTE_WORDS * 4);
+static_assert(sizeof(abi::GroupRecord) == abi::GROUP_WORDS * 4 && abi::GROUP_WORDS % 4 == 0);
+static_assert(sizeof(abi::InstanceRecord) == abi::INSTANCE_WORDS * 4 &&
               abi::INSTANCE_WORDS % 4 == 0);
-static_assert(sizeof(InstanceResult) == abi::RESULT_WORDS * 4);
-static_assert(sizeof(DispatchConstants) == abi::PUSH_WORDS * 4);
-static_assert(sizeof(PaletteStatus) == 16 && abi::STATUS_TWO_PHASE == 0 &&
-              abi::STATUS_NON_RIGID == 1 && abi::STATUS_UNDECLARED_SCALE == 2 &&
-              abi::STATUS_NON_FINITE == 3);
+static_assert(sizeof(abi::ExtensionRecord) == abi::EXTENSION_WORDS * 4 &&
+              abi::EXTENSION_WORDS % 4 == 0);
+static_assert(sizeof(abi::CulledDispatchRecord) == abi::CULLED_DISPATCH_WORDS * 4);
+static_assert(sizeof(abi::IndirectRecord) == abi::INDIRECT_WORDS * 4);
+static_assert(sizeof(abi::ActiveMorph) == abi::ACTIVE_MORPH_WORDS * 4);
+static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
+// What the engine sees has the layout of what kernels write and read.
+static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&
+              offsetof(InstanceResult, clampedVertices) ==
+                  offsetof(abi::ResultRecord, clampedVertices) &&
+              offsetof(InstanceResult, orderedMax) == offsetof(abi::ResultRecord, maxX));
+static_assert(
+    sizeof(PaletteStatus) == sizeof(abi::StatusRecord) &&
+    offsetof(PaletteStatus, nonRigidJoints) == offsetof(abi::StatusRecord, nonRigidJoints) &&
+    offsetof(PaletteStatus, undeclaredScale) == offsetof(abi::StatusRecord, undeclaredScale) &&
+    offsetof(PaletteStatus, nonFiniteJoints) == offsetof(abi::StatusRecord, nonFiniteJoints));
+static_assert(sizeof(DispatchConstants) == sizeof(abi::PalettePush) &&
+              sizeof(DispatchConstants) == sizeof(abi::SkinPush));
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "dermis/plan.h"
-#include "plan/outputs.h"
+#include "plan/placement.h"
 
 namespace dermis {
 

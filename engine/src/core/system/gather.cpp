@@ -47,7 +47,7 @@ void Scene::convertPalette(const SceneInstance& instance) {
   conversions_.push_back({instance.palette, static_cast<std::size_t>(*form)});
   builder_.addPalette(static_cast<std::uint32_t>(poseOffset(palette) / unitBytes),
                       static_cast<std::uint32_t>(converted.units->offset), palette.jointCount,
-                      paletteFlags(*form, palette.mayScale));
+                      *form, palette.mayScale);
 }
 
 void Scene::addRuns(const SceneInstance& instance, std::uint32_t flags,
@@ -160,8 +160,9 @@ Result<void> Scene::plan() {
   moves_.clear();
   plannedVertices_ = plannedBytes_ = plannedPoseBytes_ = 0;
   const OutputSizes outputs = OutputSizes::oneBuffer(description_.outputBudget);
-  builder_.begin({description_.meshBudget, description_.matricesSize(), description_.palettesSize(),
-                  description_.resultsSize(), outputs});
+  builder_.begin(PlanData::of(plan_), groups_, description_.limits, description_.tuning,
+                 {description_.meshBudget, description_.matricesSize(), description_.palettesSize(),
+                  description_.boundsBudget, outputs});
   gatherPoses();
   gatherMoves();
   gatherPending();

@@ -4,8 +4,6 @@
 #include <string>
 
 #include "plan/check.h"
-#include "plan/outputs.h"
-#include "plan/variant.h"
 #include "system/errors.h"
 #include "system/scene.h"
 
@@ -31,6 +29,7 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVer
   job.motion = instance.hasMotion ? Motion::kept : Motion::none;
   job.box = instance.box;
   job.bounds = instance.bounds;
+  job.morphs = instance.extras.morphs;
   return job;
 }
 
@@ -122,53 +121,20 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
   const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
   const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
-  const Job job = jobOf(instance, mesh, *laidOut, instance.target.bytes.offset);
-  const OutputStreams streams = outputStreams(job);
-  Variant variant = outputVariant(job);
-  variant.morphs = !instance.extras.morphs.empty();
-  variant.instancesPerInvocation =
-      static_cast<std::uint8_t>(description_.tuning.instancesPerInvocation);
-  variant.workgroupSize = static_cast<std::uint16_t>(description_.tuning.workgroupSize);
-  const bool mayPair = mayStorePairs(job, description_.limits);
-  GroupKey key;
-  key.mesh = job.meshOffset;
-  key.isCulled = instance.isCulled;
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
-
-  const std::array<std::uint64_t, streamCount> sizes =
-      outputSizes(OutputSizes::oneBuffer(description_.outputBudget));
-  cutIntoRuns(streams, mesh.info.vertexCount, sizes, description_.limits, runsScratch_);
-  for (const VertexRun& run : runsScratch_) {
-    if (Result<void> good = checkWindows(streams, run.windows, theInstance, description_.limits);
-        !good)
-      return good;
-  }
-  if (instance.isCulled && runsScratch_.size() > 1) {
-    return Error{ErrorCode::limitExceeded,
-                 "the instance is culled on the GPU and needs more than one output range: the GPU "
-                 "would choose each part for itself"};
-  }
-  const std::uint64_t step = outputWindowStep(description_.limits);
-  for (std::size_t index = 0; index < runsScratch_.size(); ++index) {
-    const VertexRun& run = runsScratch_[index];
-    key.windows = run.windows;
-    key.firstVertex = run.firstVertex;
-    key.vertexEnd = run.vertexEnd;
-    variant.pairs = mayPair && run.windows[0] == run.windows[1];
-    key.variant = variant.key();
-    PlacedRun& placed = index == 0 ? instance.run : instance.furtherRuns.emplace_back();
-    placed.group = groups_.acquire(key, variant, mesh.info.maxInfluences,
-                                   instance.method != Method::linear && palette.mayScale);
-    placed.record[abi::INSTANCE_JOINTS] = palette.jointCount;
-    for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      placed.record[abi::INSTANCE_POSITIONS + stream] =
-          streams[stream].size == 0
-              ? 0u
-              : static_cast<std::uint32_t>(streams[stream].begin(run.firstVertex) -
-                                           run.windows[stream] * step);
-    }
-  }
+  Placing placing;
+  placing.subject = theInstance;
+  placing.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  placing.jointCount = palette.jointCount;
+  placing.mayScale = instance.method != Method::linear && palette.mayScale;
+  placing.isCulled = instance.isCulled;
+  runsScratch_.clear();
+  if (Result<void> placed =
+          groups_.place(jobOf(instance, mesh, *laidOut, instance.target.bytes.offset), placing,
+                        description_.limits, description_.tuning, runsScratch_);
+      !placed)
+    return placed;
+  instance.run = runsScratch_.front();
+  instance.furtherRuns.assign(runsScratch_.begin() + 1, runsScratch_.end());
   return {};
 }
 

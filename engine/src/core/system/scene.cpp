@@ -2,11 +2,9 @@
 
 #include "system/scene.h"
 
-#include <algorithm>
 #include <string>
 
 #include "plan/check.h"
-#include "plan/outputs.h"
 #include "system/errors.h"
 
 namespace dermis {
@@ -32,8 +30,7 @@ Scene::Scene(const SceneDescription& description)
       meshStore_(description.meshBudget),
       jointStore_(description.jointBudget),
       unitStore_(description.paletteUnits()),
-      outputStore_(description.outputBudget),
-      builder_(groups_, description.limits, description.tuning) {}
+      outputStore_(description.outputBudget) {}
 
 // -- Meshes and palettes.
 
@@ -222,10 +219,7 @@ Result<void> Scene::setMorphWeights(InstanceHandle handle, std::span<const Morph
     return good;
   std::vector<MorphWeight>& active = instance->extras.morphs;
   const bool hadMorphs = !active.empty();
-  active.assign(morphs.begin(), morphs.end());
-  std::erase_if(active, [](const MorphWeight& morph) { return morph.weight == 0; });
-  std::sort(active.begin(), active.end(),
-            [](const MorphWeight& a, const MorphWeight& b) { return a.target < b.target; });
+  assignActive(morphs, active);
   // With and without are two kernels.
   if (hadMorphs == active.empty()) {
     releaseRuns(*instance);
@@ -241,7 +235,7 @@ Scene::Counts Scene::counts() const {
   counts.skinned = static_cast<std::uint32_t>(skinned_.size());
   counts.settled = static_cast<std::uint32_t>(settled_.size());
   counts.palettes = builder_.paletteCount();
-  counts.culled = builder_.culled().candidateCount;
+  counts.culled = culled().candidateCount;
   counts.vertices = plannedVertices_;
   counts.writtenBytes = plannedBytes_;
   counts.poseBytes = plannedPoseBytes_;

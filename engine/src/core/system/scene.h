@@ -13,7 +13,7 @@
 #include "dermis/instance.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "system/frame_builder.h"
+#include "plan/builder.h"
 #include "system/layout.h"
 #include "system/range_allocator.h"
 #include "system/slot_map.h"
@@ -147,7 +147,11 @@ class Scene {
   Result<void> plan();
   void commit();
 
-  const FrameBuilder& frame() const { return builder_; }
+  /// What `plan` made; behind it, what is culled on the GPU.
+  const Plan& currentPlan() const { return plan_; }
+  const CulledTables& culled() const { return PlanData::of(plan_).culled; }
+  /// Dispatches of the plan from here on have their arguments from the GPU.
+  std::size_t firstIndirect() const { return PlanData::of(plan_).firstIndirect; }
   std::span<const OutputMove> moves() const { return moves_; }
   std::uint64_t frameNumber() const { return frame_; }
   std::uint64_t recordNumber() const { return record_; }
@@ -222,8 +226,9 @@ class Scene {
   RangeAllocator meshStore_, jointStore_, unitStore_, outputStore_;
   std::vector<std::uint32_t> freeResults_;
   std::uint32_t nextResult_ = 0;
-  FrameGroups groups_;
-  FrameBuilder builder_;
+  Groups groups_;
+  Plan plan_;
+  PlanBuilder builder_;
   std::deque<Retired> retired_;
 
   std::uint64_t frame_ = 0, completed_ = 0;
@@ -231,7 +236,7 @@ class Scene {
   std::uint64_t recordedFrame_ = 0;  ///< its frame
   bool hasBegun_ = false;
   std::uint32_t nextVersion_ = 0;
-  std::vector<VertexRun> runsScratch_;
+  std::vector<PlacedRun> runsScratch_;
 
   std::vector<PaletteHandle> posed_;      ///< written since the last plan
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled

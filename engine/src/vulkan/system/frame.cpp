@@ -40,7 +40,7 @@ void barrier(const DispatchTable& table, VkCommandBuffer commandBuffer, const Sc
 
 /// Tables that are too small are replaced, the old ones kept until their frames are complete.
 Result<void> SkinningSystem::State::makeRoomForTables() {
-  const std::uint64_t needed = scene.frame().plan().buffer(BufferRole::tables).size;
+  const std::uint64_t needed = scene.currentPlan().buffer(BufferRole::tables).size;
   std::uint64_t size = std::max(tables.size(), leastTables);
   while (size < needed) size *= 2;
   size = std::min(size, scene.description().limits.maxStorageBufferRange & ~std::uint64_t{3});
@@ -91,7 +91,7 @@ const Visibility* SkinningSystem::State::preparedVisibility() {
 Result<void> SkinningSystem::State::makeHistory() {
   if (history.size() != 0) return {};
   Result<SystemBuffer> made = SystemBuffer::create(
-      source, {std::uint64_t{scene.description().instanceBudget} * abi::HISTORY_WORDS * 4,
+      source, {std::uint64_t{scene.description().instanceBudget} * sizeof(abi::HistoryRecord),
                VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                MemoryUse::device, "dermis history"});
   if (!made) return made.error();
@@ -100,24 +100,24 @@ Result<void> SkinningSystem::State::makeHistory() {
 }
 
 bool SkinningSystem::State::hasWork() const {
-  return !scene.frame().plan().dispatches().empty() || !scene.moves().empty() || !uploads.empty();
+  return !scene.currentPlan().dispatches().empty() || !scene.moves().empty() || !uploads.empty();
 }
 
 Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
                                                 const FrameDescription& frame) {
   const Stopwatch planning;
   if (Result<void> planned = scene.plan(); !planned) return planned;
-  const Plan& plan = scene.frame().plan();
-  const bool culls = scene.frame().culled().candidateCount != 0;
+  const Plan& plan = scene.currentPlan();
+  const bool culls = scene.culled().candidateCount != 0;
   if (culls && frame.visibility == VK_NULL_HANDLE) {
     return Error{ErrorCode::invalidArgument,
                  "FrameDescription::visibility is null, and there are instances that are culled on "
                  "the GPU"};
   }
-  if (scene.frame().culled().groupCount > context->limits.maxWorkgroupCountX) {
+  if (scene.culled().groupCount > context->limits.maxWorkgroupCountX) {
     return Error{ErrorCode::limitExceeded,
                  "instances that are culled on the GPU have " +
-                     std::to_string(scene.frame().culled().groupCount) +
+                     std::to_string(scene.culled().groupCount) +
                      " meshes and layouts, more than the device can count workgroups"};
   }
   if (culls && preparedVisibility() == nullptr) {
@@ -180,7 +180,7 @@ void SkinningSystem::State::recordCommands(VkCommandBuffer commandBuffer,
 
 void SkinningSystem::State::recordCopies(VkCommandBuffer commandBuffer) {
   const Label label(context->table, commandBuffer, "dermis: upload");
-  if (const std::uint64_t size = scene.frame().plan().buffer(BufferRole::tables).size; size != 0) {
+  if (const std::uint64_t size = scene.currentPlan().buffer(BufferRole::tables).size; size != 0) {
     const VkBufferCopy region{0, 0, size};
     functions.cmdCopyBuffer(commandBuffer, slot().staging.handle(), tables.handle(), 1, &region);
     ++frameStatistics.copies;
@@ -205,7 +205,7 @@ void SkinningSystem::State::recordCopies(VkCommandBuffer commandBuffer) {
                             static_cast<std::uint32_t>(regions.size()), regions.data());
     ++frameStatistics.copies;
   }
-  if (scene.frame().culled().candidateCount == 0) return;
+  if (scene.culled().candidateCount == 0) return;
   functions.cmdFillBuffer(commandBuffer, counters.handle(), 0, VK_WHOLE_SIZE, 0);
   if (!historyIsClear)
     functions.cmdFillBuffer(commandBuffer, history.handle(), 0, VK_WHOLE_SIZE, 0);
@@ -215,8 +215,7 @@ void SkinningSystem::State::recordCopies(VkCommandBuffer commandBuffer) {
 void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
                                              const FrameDescription& frame) {
   const DispatchTable& table = context->table;
-  const FrameBuilder& builder = scene.frame();
-  const CulledTables& culled = builder.culled();
+  const CulledTables& culled = scene.culled();
   if (culled.candidateCount != 0) {
     const BufferRange chosen{frame.visibility, frame.visibilityOffset,
                              std::uint64_t{scene.description().instanceBudget} * 4};
@@ -227,7 +226,7 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
     frameStatistics.dispatches += 2;
   }
   bool palettesVisible = false;
-  const std::span<const Dispatch> dispatches = builder.plan().dispatches();
+  const std::span<const Dispatch> dispatches = scene.currentPlan().dispatches();
   for (std::size_t index = 0; index < dispatches.size(); ++index) {
     const Dispatch& dispatch = dispatches[index];
     if (dispatch.afterPalettes && !palettesVisible) {
@@ -235,14 +234,13 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
       palettesVisible = true;
     }
     ++frameStatistics.dispatches;
-    const std::uint32_t indirect = builder.indirectNumber(index);
-    if (indirect == notUsed) {
+    if (index < scene.firstIndirect()) {
       recordDispatch(commandBuffer, dispatch, *bindings.state_, nullptr);
       frameStatistics.workgroups += dispatch.constants.workgroupCount;
       continue;
     }
     const std::uint64_t offset =
-        (culled.arguments + std::uint64_t{indirect} * abi::INDIRECT_WORDS) * 4;
+        (culled.arguments + (index - scene.firstIndirect()) * abi::INDIRECT_WORDS) * 4;
     const IndirectArguments arguments{functions.cmdDispatchIndirect, tables.handle(), offset};
     recordDispatch(commandBuffer, dispatch, *bindings.state_, &arguments);
   }
@@ -250,7 +248,7 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
 
 /// Counters and boxes, where there are any.
 void SkinningSystem::State::recordReadBack(VkCommandBuffer commandBuffer) {
-  const bool culls = scene.frame().culled().candidateCount != 0;
+  const bool culls = scene.culled().candidateCount != 0;
   const std::uint32_t resultCount = scene.resultCount();
   if (!culls && resultCount == 0) return;
   const DispatchTable& table = context->table;

@@ -24,7 +24,8 @@ void SkinningSystem::State::readBackUpTo(std::uint64_t completedFrame) {
   if (newest != nullptr) readStatistics(*newest);
   if (newestResults == nullptr) return;
   latestResults.resize(newestResults->resultCount);
-  std::memcpy(latestResults.data(), newestResults->readBack.bytes().data() + abi::COUNTER_WORDS * 4,
+  std::memcpy(latestResults.data(),
+              newestResults->readBack.bytes().data() + sizeof(abi::CounterRecord),
               newestResults->resultCount * sizeof(InstanceResult));
   latestResultsFrame = newestResults->frame;
 }
@@ -35,12 +36,12 @@ void SkinningSystem::State::readStatistics(const FrameSlot& slot) {
   if (slot.hasTimestamps)
     gpuStatistics.seconds = timestamps.seconds(static_cast<std::uint32_t>(&slot - slots.data()));
   if (!slot.hasCounters) return;
-  std::uint32_t counted[abi::COUNTER_WORDS];
-  std::memcpy(counted, slot.readBack.bytes().data(), sizeof(counted));
-  gpuStatistics.visibleInstances = counted[abi::COUNTER_VISIBLE];
-  gpuStatistics.skinnedInstances = counted[abi::COUNTER_SKINNED];
-  gpuStatistics.settledInstances = counted[abi::COUNTER_SETTLED];
-  gpuStatistics.workgroups = counted[abi::COUNTER_WORKGROUPS];
+  abi::CounterRecord counted;
+  std::memcpy(&counted, slot.readBack.bytes().data(), sizeof(counted));
+  gpuStatistics.visibleInstances = counted.visible;
+  gpuStatistics.skinnedInstances = counted.skinned;
+  gpuStatistics.settledInstances = counted.settled;
+  gpuStatistics.workgroups = counted.workgroups;
 }
 
 Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle handle) const {

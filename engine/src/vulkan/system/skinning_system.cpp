@@ -41,7 +41,7 @@ Result<void> checkBudgets(const SkinningSystemDescription& description,
         {"jointBudget (matrices)", scene.matricesSize()},
         {"jointBudget (palettes)", scene.palettesSize()},
         {"boundsBudget", scene.resultsSize()},
-        {"instanceBudget", std::uint64_t{scene.instanceBudget} * abi::HISTORY_WORDS * 4}}) {
+        {"instanceBudget", std::uint64_t{scene.instanceBudget} * sizeof(abi::HistoryRecord)}}) {
     if (bytes > limits.maxStorageBufferRange) return tooLarge(field, bytes, limits);
   }
   if (Result<void> good = checkLimits(limits); !good) return good;
@@ -110,7 +110,7 @@ Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage
          {sizes.outputBudget, storage | to | from | outputUsage, MemoryUse::device,
           "dermis output"}},
         {&counters,
-         {abi::COUNTER_WORDS * 4, storage | to | from, MemoryUse::device, "dermis counters"}},
+         {sizeof(abi::CounterRecord), storage | to | from, MemoryUse::device, "dermis counters"}},
         {&results, {sizes.resultsSize(), storage | from, MemoryUse::device, "dermis results"}}}) {
     if (wanted.description.size == 0) continue;
     Result<SystemBuffer> made = SystemBuffer::create(source, wanted.description);
@@ -119,7 +119,7 @@ Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage
   }
   for (FrameSlot& frameSlot : slots) {
     Result<SystemBuffer> made =
-        SystemBuffer::create(source, {abi::COUNTER_WORDS * 4 + sizes.resultsSize(), to,
+        SystemBuffer::create(source, {sizeof(abi::CounterRecord) + sizes.resultsSize(), to,
                                       MemoryUse::readBack, "dermis read-back"});
     if (!made) return made.error();
     frameSlot.readBack = std::move(*made);

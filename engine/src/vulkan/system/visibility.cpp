@@ -16,8 +16,6 @@ constexpr std::array<std::uint32_t, 5> bindingNumbers{
     0, abi::BINDING_VISIBILITY, abi::BINDING_HISTORY, abi::BINDING_COUNTERS, abi::BINDING_RESULTS};
 static_assert(abi::BINDING_TABLES == 0);
 
-using Constants = std::array<std::uint32_t, abi::PUSH_CULLED_WORDS>;
-
 }  // namespace
 
 Visibility::~Visibility() {
@@ -60,7 +58,7 @@ Result<void> Visibility::createLayouts(std::uint32_t setCount) {
     setLayout_ = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorSetLayout", result);
   }
-  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(Constants)};
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(abi::VisibilityPush)};
   VkPipelineLayoutCreateInfo layoutInfo{};
   layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   layoutInfo.setLayoutCount = 1;
@@ -175,11 +173,21 @@ void Visibility::record(VkCommandBuffer commandBuffer, const CulledTables& table
   const DispatchTable& table = context_->table;
   const Label label(table, commandBuffer, "dermis: choose visible instances");
   bind(commandBuffer, buffers, set);
-  const auto pass = [&](const Constants& constants, VkPipelineStageFlags readers,
+  abi::VisibilityPush push{};
+  push.groups = tables.groups;
+  push.candidates = tables.candidates;
+  push.instances = tables.instances;
+  push.firstInstance = tables.firstInstance;
+  push.frame = frame;
+  push.dispatches = tables.dispatches;
+  push.arguments = tables.arguments;
+  push.mostWorkgroups = context_->limits.maxWorkgroupCountX;
+  const auto pass = [&](std::uint32_t which, std::uint32_t workgroups, VkPipelineStageFlags readers,
                         VkAccessFlags accesses) {
+    push.pass = which;
     table.cmdPushConstants(commandBuffer, pipelineLayout_, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                           sizeof(Constants), constants.data());
-    table.cmdDispatch(commandBuffer, constants[abi::PUSH_CULLED_COUNT], 1, 1);
+                           sizeof(push), &push);
+    table.cmdDispatch(commandBuffer, workgroups, 1, 1);
     VkMemoryBarrier barrier{};
     barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
     barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
@@ -188,20 +196,9 @@ void Visibility::record(VkCommandBuffer commandBuffer, const CulledTables& table
                              &barrier, 0, nullptr, 0, nullptr);
   };
   constexpr VkAccessFlags shader = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT;
-  Constants constants{};
-  constants[abi::PUSH_CULLED_GROUPS] = tables.groups;
-  constants[abi::PUSH_CULLED_CANDIDATES] = tables.candidates;
-  constants[abi::PUSH_CULLED_FRAME] = frame;
-  constants[abi::PUSH_CULLED_INSTANCES] = tables.instances;
-  constants[abi::PUSH_CULLED_FIRST_INSTANCE] = tables.firstInstance;
-  constants[abi::PUSH_CULLED_COUNT] = tables.groupCount;
-  pass(constants, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, shader);
-  constants[abi::PUSH_CULLED_GROUPS] = tables.dispatches;
-  constants[abi::PUSH_CULLED_CANDIDATES] = tables.arguments;
-  constants[abi::PUSH_CULLED_FRAME] = context_->limits.maxWorkgroupCountX;
-  constants[abi::PUSH_CULLED_COUNT] = tables.dispatchCount;
-  constants[abi::PUSH_CULLED_PASS] = 1;
-  pass(constants, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
+  pass(abi::VISIBILITY_CHOOSES, tables.groupCount, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, shader);
+  pass(abi::VISIBILITY_COUNTS, tables.dispatchCount,
+       VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
        shader | VK_ACCESS_INDIRECT_COMMAND_READ_BIT);
 }
 

@@ -9,7 +9,7 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/vulkan/bindings.h"
-#include "system/frame_builder.h"
+#include "plan/builder.h"
 #include "vulkan/system/functions.h"
 
 namespace dermis::vulkan {

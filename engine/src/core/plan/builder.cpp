@@ -1,0 +1,425 @@
+#include "plan/builder.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <tuple>
+#include <type_traits>
+
+namespace dermis {
+namespace {
+
+/// Kernels number workgroups in 32 bits, with those that fill the last row: up to twice as many.
+constexpr std::uint64_t maxWorkgroups = std::uint64_t{1} << 31;
+
+std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
+  return (value + divisor - 1) / divisor;
+}
+
+std::uint32_t wordsOf(const std::vector<std::uint32_t>& tables) {
+  return static_cast<std::uint32_t>(tables.size());
+}
+
+/// Records begin at multiples of four words.
+void alignToUnit(std::vector<std::uint32_t>& tables) {
+  tables.resize(divideUp(tables.size(), 4) * 4);
+}
+
+template <typename Record>
+void store(std::vector<std::uint32_t>& tables, std::size_t word, const Record& record) {
+  static_assert(std::is_trivially_copyable_v<Record> && sizeof(Record) % 4 == 0);
+  std::memcpy(&tables[word], &record, sizeof(Record));
+}
+
+void setBox(abi::ExtensionRecord& extension, const Box& box) {
+  const auto centre = [&](std::size_t axis) {
+    return static_cast<float>(
+        (static_cast<double>(box.min[axis]) + static_cast<double>(box.max[axis])) / 2);
+  };
+  const auto inverse = [&](std::size_t axis) {
+    return static_cast<float>(
+        2 / (static_cast<double>(box.max[axis]) - static_cast<double>(box.min[axis])));
+  };
+  extension.centreX = centre(0);
+  extension.centreY = centre(1);
+  extension.centreZ = centre(2);
+  extension.inverseX = inverse(0);
+  extension.inverseY = inverse(1);
+  extension.inverseZ = inverse(2);
+}
+
+}  // namespace
+
+void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active) {
+  active.assign(morphs.begin(), morphs.end());
+  std::erase_if(active, [](const MorphWeight& morph) { return morph.weight == 0; });
+  std::ranges::sort(active, {}, &MorphWeight::target);
+}
+
+// -- Groups.
+
+Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceLimits& limits,
+                           const Tuning& tuning, std::vector<PlacedRun>& runs) {
+  const OutputStreams streams = outputStreams(job);
+  cutIntoRuns(streams, job.mesh.vertexCount, outputSizes(placing.outputs), limits, vertexRuns_);
+  for (const VertexRun& run : vertexRuns_) {
+    if (Result<void> good = checkWindows(streams, run.windows, placing.subject, limits); !good)
+      return good;
+  }
+  if (placing.isCulled && vertexRuns_.size() > 1) {
+    return Error{ErrorCode::limitExceeded,
+                 placing.subject.name() +
+                     " is culled on the GPU and needs more than one output range: the GPU would "
+                     "choose each part for itself"};
+  }
+  Variant variant = skinVariant(job, tuning);
+  const bool mayPair = placing.outputs.isOneBuffer && mayStorePairs(job, limits);
+  const std::uint64_t step = outputWindowStep(limits);
+  GroupKey key;
+  key.mesh = job.meshOffset;
+  key.isCulled = placing.isCulled;
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
+  for (const VertexRun& run : vertexRuns_) {
+    key.windows = run.windows;
+    key.firstVertex = run.firstVertex;
+    key.vertexEnd = run.vertexEnd;
+    variant.pairs = mayPair && run.windows[0] == run.windows[1];
+    key.variant = variant.key();
+    const auto place = [&](std::size_t stream) {
+      if (streams[stream].size == 0) return 0u;
+      return static_cast<std::uint32_t>(streams[stream].begin(run.firstVertex) -
+                                        run.windows[stream] * step);
+    };
+    PlacedRun& placed = runs.emplace_back();
+    placed.group = acquire(key, variant, job.mesh.maxInfluences, placing.mayScale);
+    placed.record.jointCount = placing.jointCount;
+    placed.record.positions = place(0);
+    placed.record.normals = place(1);
+    placed.record.tangents = place(2);
+    placed.record.previousPositions = place(3);
+  }
+  return {};
+}
+
+std::uint32_t Groups::acquire(const GroupKey& key, const Variant& variant,
+                              std::uint32_t maxInfluences, bool scales) {
+  std::uint32_t group = last_;
+  if (group == notUsed || entries_[group].users == 0 || !(entries_[group].group.key == key)) {
+    const auto [found, isNew] = find_.try_emplace(key, 0);
+    if (isNew) {
+      if (free_.empty()) {
+        found->second = static_cast<std::uint32_t>(entries_.size());
+        entries_.emplace_back();
+      } else {
+        found->second = free_.back();
+        free_.pop_back();
+      }
+      Entry& entry = entries_[found->second];
+      entry = {};
+      entry.group.key = key;
+      entry.group.variant = variant;
+    }
+    group = last_ = found->second;
+  }
+  Entry& entry = entries_[group];
+  entry.group.maxInfluences = std::max(entry.group.maxInfluences, maxInfluences);
+  entry.group.scales |= scales;
+  ++entry.users;
+  return group;
+}
+
+void Groups::release(std::uint32_t group) {
+  Entry& entry = entries_[group];
+  if (--entry.users != 0) return;
+  find_.erase(entry.group.key);
+  free_.push_back(group);
+}
+
+void Groups::clear() {
+  entries_.clear();
+  free_.clear();
+  find_.clear();
+  last_ = notUsed;
+}
+
+// -- Plans.
+
+void PlanData::clear() {
+  dispatches.clear();
+  variants.clear();
+  tables.clear();
+  for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
+  results.clear();
+  resultCount = 0;
+  palettesSize = meshesSize = matricesSize = 0;
+  outputs = {};
+  instanceCount = 0;
+  vertexCount = 0;
+  culled = {};
+  firstIndirect = 0;
+}
+
+void PlanBuilder::begin(PlanData& plan, Groups& groups, const DeviceLimits& limits,
+                        const Tuning& tuning, const Sizes& sizes) {
+  plan_ = &plan;
+  groups_ = &groups;
+  limits_ = limits;
+  tuning_ = tuning;
+  plan.clear();
+  plan.limits = limits;
+  plan.meshesSize = sizes.meshes;
+  plan.matricesSize = sizes.matrices;
+  plan.palettesSize = sizes.palettes;
+  plan.resultCount = sizes.results;
+  plan.outputs = sizes.outputs;
+  ++number_;
+  paletteCount_ = 0;
+  cleared_.clear();
+  entries_.clear();
+  candidates_.clear();
+  planGroups_.clear();
+}
+
+void PlanBuilder::startGroup(Groups::Entry& entry) {
+  entry.plan = number_;
+  entry.planGroup = static_cast<std::uint32_t>(planGroups_.size());
+  planGroups_.push_back(entry.group);
+}
+
+Result<void> PlanBuilder::finish() {
+  if (Result<void> good = addPaletteDispatch(); !good) return good;
+  if (Result<void> good = addDispatches(); !good) return good;
+  writeInstances();
+  plan_->firstIndirect = plan_->dispatches.size();
+  if (!candidates_.empty()) {
+    appendCandidates();
+    appendCulledDispatches();
+  }
+  if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
+    return Error{ErrorCode::limitExceeded,
+                 "the tables of the batch are larger than a storage buffer range; split it"};
+  }
+  plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
+  chooseTexels();
+  listVariants();
+  return {};
+}
+
+Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t workgroups,
+                                      const DispatchConstants& constants) {
+  if (workgroups > std::min(std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY,
+                            maxWorkgroups)) {
+    return Error{ErrorCode::limitExceeded,
+                 "the batch needs " + std::to_string(workgroups) +
+                     " workgroups in one dispatch, more than the device can count; split it"};
+  }
+  Dispatch dispatch;
+  dispatch.variant = variant;
+  dispatch.constants = constants;
+  dispatch.constants.workgroupCount = static_cast<std::uint32_t>(workgroups);
+  dispatch.groupCountY =
+      static_cast<std::uint32_t>(divideUp(workgroups, limits_.maxWorkgroupCountX));
+  dispatch.groupCountX = static_cast<std::uint32_t>(divideUp(workgroups, dispatch.groupCountY));
+  plan_->dispatches.push_back(dispatch);
+  return {};
+}
+
+/// Their records stand at the beginning of the tables already, the results to be cleared follow.
+Result<void> PlanBuilder::addPaletteDispatch() {
+  if (paletteCount_ == 0 && cleared_.empty()) return {};
+  plan_->tables.insert(plan_->tables.end(), cleared_.begin(), cleared_.end());
+  alignToUnit(plan_->tables);
+  // Behind the workgroups of the palettes come those that clear the results.
+  return addDispatch(paletteVariant(tuning_),
+                     paletteCount_ + divideUp(cleared_.size(), tuning_.workgroupSize),
+                     {0, paletteCount_, 0, static_cast<std::uint32_t>(cleared_.size())});
+}
+
+/// A record for each group, and a dispatch for groups of one variant and output range.
+Result<void> PlanBuilder::addDispatches() {
+  const auto dispatchOrder = [&](std::uint32_t index) {
+    const GroupKey& key = planGroups_[index].key;
+    return std::tie(key.isCulled, key.windows, key.variant);
+  };
+  order_.resize(planGroups_.size());
+  for (std::uint32_t index = 0; index < order_.size(); ++index) order_[index] = index;
+  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return dispatchOrder(a) < dispatchOrder(b);
+  });
+
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::uint32_t groupRecords = wordsOf(tables);
+  tables.resize(groupRecords + planGroups_.size() * abi::GROUP_WORDS);
+  const std::uint32_t instanceRecords = wordsOf(tables);
+  const bool palettesRun = !plan_->dispatches.empty();
+
+  std::uint32_t firstInstance = 0;
+  for (std::size_t begin = 0; begin < order_.size();) {
+    std::size_t end = begin;
+    std::uint64_t workgroups = 0;
+    std::uint32_t maxInfluences = 0;
+    bool scales = false;
+    for (; end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin]);
+         ++end) {
+      Group& group = planGroups_[order_[end]];
+      group.firstInstance = firstInstance;
+      firstInstance += group.instances;
+      maxInfluences = std::max(maxInfluences, group.maxInfluences);
+      scales |= group.scales;
+      const std::uint64_t vertexGroups =
+          divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
+      workgroups += vertexGroups * divideUp(group.instances, tuning_.instancesPerInvocation);
+      abi::GroupRecord record{};
+      record.workgroupEnd =
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(workgroups, notUsed));
+      record.mesh = static_cast<std::uint32_t>(group.key.mesh / 4);
+      record.firstVertex = group.key.firstVertex;
+      record.vertexEnd = group.key.vertexEnd;
+      record.vertexGroups = static_cast<std::uint32_t>(vertexGroups);
+      record.firstInstance = group.firstInstance;
+      record.instanceCount = group.instances;
+      record.positionStride = group.key.strides[0];
+      record.normalStride = group.key.strides[1];
+      record.tangentStride = group.key.strides[2];
+      record.previousStride = group.key.strides[3];
+      store(tables, groupRecords + end * abi::GROUP_WORDS, record);
+    }
+    const Group& group = planGroups_[order_[begin]];
+    Variant variant = group.variant;
+    variant.influences = influenceClass(maxInfluences);
+    variant.scales = scales;
+    const DispatchConstants constants{
+        static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
+        static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
+    if (Result<void> good = addDispatch(variant, workgroups, constants); !good) return good;
+    Dispatch& dispatch = plan_->dispatches.back();
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      const std::uint32_t window = group.key.windows[stream];
+      dispatch.windows[stream] = {window, window * outputWindowStep(limits_)};
+    }
+    // A kernel that may name the results counts as one that reads them.
+    dispatch.afterPalettes = palettesRun && (variant.method != Method::linear ||
+                                             variant.motion != Motion::none || hasResults(variant));
+    begin = end;
+  }
+  return {};
+}
+
+/// The word of the first; nothing aligned needs to be.
+std::uint32_t PlanBuilder::appendMorphs(std::span<const MorphWeight> morphs) {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::uint32_t first = wordsOf(tables);
+  for (const MorphWeight& morph : morphs)
+    tables.insert(tables.end(), {morph.target, std::bit_cast<std::uint32_t>(morph.weight)});
+  return first;
+}
+
+std::uint32_t PlanBuilder::appendExtension(const InstanceExtras& extras) {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  alignToUnit(tables);
+  const std::uint32_t place = wordsOf(tables);
+  tables.resize(tables.size() + abi::EXTENSION_WORDS);
+  abi::ExtensionRecord extension{};
+  extension.morphs = appendMorphs(extras.morphs);
+  extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
+  if (extras.hasPrevious) {
+    extension.previousPalette = extras.previousPalette;
+    extension.previousJointCount = extras.previousJoints;
+    extension.previousMorphs = appendMorphs(extras.previousMorphs);
+    extension.previousMorphCount = static_cast<std::uint32_t>(extras.previousMorphs.size());
+  }
+  if (extras.result != notUsed) extension.result = extras.result;
+  if (extras.hasBox) setBox(extension, extras.box);
+  store(tables, place, extension);
+  return place;
+}
+
+void PlanBuilder::writeInstances() {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::uint32_t firstRecord = wordsOf(tables);
+  tables.resize(firstRecord + entries_.size() * abi::INSTANCE_WORDS);
+  culledPlaces_.resize(candidates_.size());
+  auto candidate = candidates_.begin();
+  for (std::uint32_t number = 0; number < entries_.size(); ++number) {
+    const Entry& entry = entries_[number];
+    Group& group = planGroups_[groups_->entries_[entry.run->group].planGroup];
+    const std::uint32_t place = group.firstInstance + group.filled++;
+    abi::InstanceRecord record = entry.run->record;
+    record.palette = entry.palette;
+    record.flags = entry.flags;
+    record.extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
+    store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
+    if (candidate != candidates_.end() && candidate->entry == number)
+      culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;
+  }
+  plan_->culled.instances = firstRecord;
+}
+
+/// In the order of the instance records, which are the last.
+void PlanBuilder::appendCandidates() {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  CulledTables& culled = plan_->culled;
+  culled.candidateCount = static_cast<std::uint32_t>(candidates_.size());
+  culled.firstInstance = static_cast<std::uint32_t>(entries_.size() - candidates_.size());
+  culled.candidates = wordsOf(tables);
+  tables.resize(tables.size() + candidates_.size() * abi::CANDIDATE_WORDS);
+  for (std::size_t index = 0; index < candidates_.size(); ++index) {
+    const Candidate& candidate = candidates_[index].candidate;
+    const std::size_t number = culledPlaces_[index] - culled.firstInstance;
+    store(tables, culled.candidates + number * abi::CANDIDATE_WORDS,
+          abi::CandidateRecord{candidate.slot, candidate.version});
+  }
+}
+
+void PlanBuilder::appendCulledDispatches() {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  std::vector<Dispatch>& dispatches = plan_->dispatches;
+  CulledTables& culled = plan_->culled;
+  // Groups that are culled come last, and so do their dispatches.
+  const auto culledGroups = static_cast<std::uint32_t>(
+      std::ranges::count_if(planGroups_, [](const Group& group) { return group.key.isCulled; }));
+  const std::uint32_t groupsEnd = culled.instances;  // instance records follow the groups
+  culled.groupCount = culledGroups;
+  culled.groups = groupsEnd - culledGroups * abi::GROUP_WORDS;
+  std::size_t first = dispatches.size();
+  while (first > 0 && dispatches[first - 1].variant.kernel == Kernel::skin &&
+         dispatches[first - 1].constants.firstRecord >= culled.groups)
+    --first;
+  plan_->firstIndirect = first;
+  culled.dispatchCount = static_cast<std::uint32_t>(dispatches.size() - first);
+  alignToUnit(tables);
+  culled.dispatches = wordsOf(tables);
+  culled.arguments = culled.dispatches + culled.dispatchCount * abi::CULLED_DISPATCH_WORDS;
+  tables.resize(culled.arguments + std::size_t{culled.dispatchCount} * abi::INDIRECT_WORDS, 0u);
+  for (std::size_t index = first; index < dispatches.size(); ++index) {
+    Dispatch& dispatch = dispatches[index];
+    store(tables, culled.dispatches + (index - first) * abi::CULLED_DISPATCH_WORDS,
+          abi::CulledDispatchRecord{dispatch.constants.firstRecord, dispatch.constants.recordCount,
+                                    dispatch.variant.instancesPerInvocation, 0});
+    // Only the GPU will know how many there are. Those too many find no instance in the last group.
+    dispatch.constants.workgroupCount = notUsed;
+  }
+}
+
+/// All that a variant reads through texels has to fit, or nothing is read so.
+void PlanBuilder::chooseTexels() {
+  const bool fits = fitsUnitTexels(plan_->tables.size() * 4, limits_) &&
+                    fitsWordTexels(plan_->meshesSize, limits_);
+  for (Dispatch& dispatch : plan_->dispatches) {
+    Variant& variant = dispatch.variant;
+    const std::uint64_t palettes =
+        variant.method == Method::linear ? plan_->matricesSize : plan_->palettesSize;
+    variant.texels = fits && fitsUnitTexels(palettes, limits_) && mayReadTexels(variant, limits_);
+    variant.pairs &= variant.texels;
+  }
+}
+
+void PlanBuilder::listVariants() {
+  for (const Dispatch& dispatch : plan_->dispatches) {
+    if (std::ranges::find(plan_->variants, dispatch.variant) == plan_->variants.end())
+      plan_->variants.push_back(dispatch.variant);
+  }
+}
+
+}  // namespace dermis

@@ -1,0 +1,282 @@
+// What a plan consists of, and how it is made: `makePlan` and the scene hand in palettes and
+// instances, and this is the one place that writes their records.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/plan.h"
+#include "plan/check.h"
+#include "plan/placement.h"
+
+namespace dermis {
+
+inline constexpr std::uint64_t unitBytes = 16;  ///< offsets into palettes and matrices count these
+inline constexpr std::uint32_t notUsed = 0xffffffffu;
+
+// -- Palettes.
+
+/// What stands in the palettes buffer for a joint.
+enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms };
+inline constexpr std::size_t paletteFormCount = 2;
+
+/// What a method reads; nothing where it reads the joint matrices themselves.
+inline std::optional<PaletteForm> paletteForm(Method method) {
+  if (method == Method::linear) return std::nullopt;
+  return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
+}
+
+/// Units of a palette: its status, its joints, and their scale/shear parts.
+inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
+  const std::uint32_t joint =
+      form == PaletteForm::logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
+  return 1 + std::uint64_t{jointCount} * (joint + (mayScale ? 2 : 0));
+}
+
+// -- Groups.
+
+/// One mesh with one output layout, in one dispatch; the instances follow in the instance table.
+struct GroupKey {
+  std::uint64_t mesh = 0;     ///< bytes into the mesh buffer
+  std::uint64_t variant = 0;  ///< its key
+  std::array<std::uint32_t, streamCount> windows{};
+  std::array<std::uint32_t, streamCount> strides{};
+  std::uint32_t firstVertex = 0;
+  std::uint32_t vertexEnd = 0;
+  bool isCulled = false;  ///< its instances are chosen on the GPU
+
+  friend bool operator==(const GroupKey&, const GroupKey&) = default;
+};
+
+struct GroupKeyHash {
+  std::size_t operator()(const GroupKey& key) const {
+    std::uint64_t hash = key.mesh;
+    const auto add = [&hash](std::uint64_t part) {
+      hash = (std::rotl(hash, 29) ^ part) * 0x9e3779b97f4a7c15u;
+    };
+    add(key.variant);
+    for (std::size_t stream = 0; stream < streamCount; ++stream)
+      add(std::uint64_t{key.windows[stream]} << 32 | key.strides[stream]);
+    add(std::uint64_t{key.firstVertex} << 32 | key.vertexEnd);
+    add(key.isCulled ? 1 : 0);
+    return static_cast<std::size_t>(hash ^ (hash >> 32));
+  }
+};
+
+struct Group {
+  GroupKey key;
+  Variant variant;  ///< of its dispatch, but for the influences and scale
+  std::uint32_t maxInfluences = 0;
+  bool scales = false;
+  std::uint32_t instances = 0;
+  std::uint32_t firstInstance = 0;
+  std::uint32_t filled = 0;
+};
+
+/// A run of an instance's vertices: the group it belongs to, and its record in the tables but for
+/// the palette, the flags and the extension.
+struct PlacedRun {
+  std::uint32_t group = notUsed;
+  abi::InstanceRecord record{};
+};
+
+/// What decides on an instance's place besides its job.
+struct Placing {
+  Subject subject;
+  OutputSizes outputs;
+  std::uint32_t jointCount = 0;  ///< of its palette
+  bool mayScale = false;         ///< a palette that it reads may
+  bool isCulled = false;         ///< the GPU chooses whether it is skinned
+};
+
+/// Groups live as long as instances are in them.
+class Groups {
+ public:
+  /// Appends a run for each output range that the vertices of a job lie in, and takes part in their
+  /// groups. Fails with `limitExceeded` where a kernel cannot see all windows of a run, or the GPU
+  /// would choose more than one; nothing is appended then.
+  Result<void> place(const Job& job, const Placing& placing, const DeviceLimits& limits,
+                     const Tuning& tuning, std::vector<PlacedRun>& runs);
+  void release(std::uint32_t group);
+  void clear();
+
+ private:
+  friend class PlanBuilder;
+  struct Entry {
+    Group group;
+    std::uint32_t users = 0;
+    std::uint64_t plan = 0;       ///< the last one that it was used in …
+    std::uint32_t planGroup = 0;  ///< … and its number there
+  };
+  std::uint32_t acquire(const GroupKey& key, const Variant& variant, std::uint32_t maxInfluences,
+                        bool scales);
+
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> free_;
+  std::unordered_map<GroupKey, std::uint32_t, GroupKeyHash> find_;
+  std::uint32_t last_ = notUsed;  ///< that was acquired: neighbours mostly belong together
+  std::vector<VertexRun> vertexRuns_;
+};
+
+// -- Instances.
+
+/// What stands in the extension of an instance that has one.
+struct InstanceExtras {
+  std::vector<MorphWeight> morphs;  ///< in rising order, none of weight 0
+  std::uint32_t result = notUsed;   ///< its number among the results
+  Box box;
+  bool hasBox = false;
+  /// Motion::reskinned: a palette as instance records name it, and the morph weights of that time.
+  bool hasPrevious = false;
+  std::uint32_t previousPalette = 0, previousJoints = 0;
+  std::vector<MorphWeight> previousMorphs;
+
+  bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox || hasPrevious; }
+};
+
+/// The targets that are not of weight 0, in rising order: the order of a sum decides on its last
+/// bits.
+void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active);
+
+/// What the GPU has to know of an instance to choose whether it is skinned.
+struct Candidate {
+  std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
+  std::uint32_t version = 0;  ///< of what it should show; different for all instances and poses
+};
+
+/// Where the tables of a plan have what the visibility kernel works on, in words.
+struct CulledTables {
+  std::uint32_t groups = 0;  ///< the first group record
+  std::uint32_t groupCount = 0;
+  std::uint32_t instances = 0;   ///< the instance records that groups count from
+  std::uint32_t candidates = 0;  ///< a record for each, from the first culled instance on
+  std::uint32_t firstInstance = 0;
+  std::uint32_t dispatches = 0;
+  std::uint32_t dispatchCount = 0;
+  std::uint32_t arguments = 0;  ///< of the indirect dispatches
+  std::uint32_t candidateCount = 0;
+};
+
+// -- Plans.
+
+class PlanMaker;
+
+struct PlanData {
+  PlanData();
+  ~PlanData();
+  static PlanData& of(Plan& plan) { return *plan.data_; }
+  static const PlanData& of(const Plan& plan) { return *plan.data_; }
+  void clear();
+
+  std::vector<Dispatch> dispatches;
+  std::vector<Variant> variants;
+  /// Palette records, the numbers of results to clear, group records, instance records, then
+  /// extensions and active morph targets; at last what is culled on the GPU.
+  std::vector<std::uint32_t> tables;
+  /// Where each palette stands in the palettes buffer in each form, or notUsed.
+  std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
+  std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed
+  std::uint32_t resultCount = 0;
+  std::uint64_t palettesSize = 0, meshesSize = 0, matricesSize = 0;
+  OutputSizes outputs;
+  DeviceLimits limits;
+  std::uint32_t instanceCount = 0;
+  std::uint64_t vertexCount = 0;
+  CulledTables culled;
+  std::size_t firstIndirect = 0;  ///< dispatches from here on have their arguments from the GPU
+
+  std::unique_ptr<PlanMaker> maker;  ///< of `makePlan`, kept for its memory
+};
+
+/// Fills a plan: `begin`, what it consists of, `finish`.
+class PlanBuilder {
+ public:
+  /// The sizes of the buffers that do not follow from the plan.
+  struct Sizes {
+    std::uint64_t meshes = 0, matrices = 0, palettes = 0;
+    std::uint32_t results = 0;
+    OutputSizes outputs;
+  };
+  void begin(PlanData& plan, Groups& groups, const DeviceLimits& limits, const Tuning& tuning,
+             const Sizes& sizes);
+
+  /// A palette to be converted. All palettes come before `finish`, in any order with the rest.
+  void addPalette(std::uint32_t matrixUnit, std::uint32_t outputUnit, std::uint32_t joints,
+                  PaletteForm form, bool mayScale) {
+    const std::uint32_t flags = (mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
+                                (form == PaletteForm::logarithms ? abi::PALETTE_LOGARITHMS : 0u);
+    plan_->tables.insert(plan_->tables.end(), {matrixUnit, outputUnit, joints, flags});
+    ++paletteCount_;
+  }
+
+  void clearResult(std::uint32_t result) { cleared_.push_back(result); }
+
+  /// `run` and `extras` must stay until `finish`; `extras` is null where they are not needed.
+  void add(const PlacedRun& run, std::uint32_t palette, std::uint32_t flags,
+           const InstanceExtras* extras) {
+    count(run.group);
+    entries_.push_back({&run, extras, palette, flags});
+  }
+  void addCulled(const PlacedRun& run, std::uint32_t palette, std::uint32_t flags,
+                 const InstanceExtras* extras, const Candidate& candidate) {
+    add(run, palette, flags, extras);
+    candidates_.push_back({static_cast<std::uint32_t>(entries_.size() - 1), candidate});
+  }
+
+  /// Fails with `limitExceeded` where the tables, or a dispatch, become too large.
+  Result<void> finish();
+
+  std::uint32_t paletteCount() const { return paletteCount_; }
+
+ private:
+  struct Entry {
+    const PlacedRun* run;
+    const InstanceExtras* extras;
+    std::uint32_t palette;
+    std::uint32_t flags;
+  };
+  struct CulledEntry {
+    std::uint32_t entry;
+    Candidate candidate;
+  };
+
+  void count(std::uint32_t group) {
+    Groups::Entry& entry = groups_->entries_[group];
+    if (entry.plan != number_) startGroup(entry);
+    ++planGroups_[entry.planGroup].instances;
+  }
+  void startGroup(Groups::Entry& entry);
+  Result<void> addPaletteDispatch();
+  Result<void> addDispatches();
+  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
+                           const DispatchConstants& constants);
+  void writeInstances();
+  std::uint32_t appendMorphs(std::span<const MorphWeight> morphs);
+  std::uint32_t appendExtension(const InstanceExtras& extras);
+  void appendCandidates();
+  void appendCulledDispatches();
+  void chooseTexels();
+  void listVariants();
+
+  PlanData* plan_ = nullptr;
+  Groups* groups_ = nullptr;
+  DeviceLimits limits_;
+  Tuning tuning_;
+  std::uint64_t number_ = 0;  ///< of the plan, among those of this builder
+  std::uint32_t paletteCount_ = 0;
+  std::vector<std::uint32_t> cleared_;
+  std::vector<Entry> entries_;
+  std::vector<CulledEntry> candidates_;
+  std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
+  std::vector<Group> planGroups_;            ///< those in use, in the order of their first instance
+  std::vector<std::uint32_t> order_;
+};
+
+}  // namespace dermis

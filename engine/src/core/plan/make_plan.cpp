@@ -1,0 +1,188 @@
+// A whole batch handed to the builder.
+
+#include <algorithm>
+#include <string>
+
+#include "plan/builder.h"
+
+namespace dermis {
+
+/// Kept from plan to plan for its memory.
+class PlanMaker {
+ public:
+  Result<void> make(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                    PlanData& plan);
+
+ private:
+  Result<void> checkSizes(const Batch& batch, const DeviceLimits& limits) const;
+  void placePalettes(const Batch& batch);
+  Result<void> placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
+                        const Tuning& tuning);
+  std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
+  InstanceExtras& nextExtras();
+  const InstanceExtras* extrasOf(const Batch& batch, std::size_t index);
+
+  std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits_;
+  std::uint64_t palettesSize_ = 0;
+  std::vector<std::uint32_t> results_;  ///< each job's number among them, or notUsed
+  std::uint32_t resultCount_ = 0;
+  PlanBuilder builder_;
+  Groups groups_;
+  std::vector<PlacedRun> runs_;
+  std::vector<std::uint32_t> firstRuns_;  ///< of each job
+  std::vector<InstanceExtras> extras_;    ///< of jobs that need any; the first `extrasUsed_`
+  std::size_t extrasUsed_ = 0;
+};
+
+/// Marks the forms that jobs read, and finds a place for each.
+void PlanMaker::placePalettes(const Batch& batch) {
+  for (std::vector<std::uint32_t>& units : paletteUnits_)
+    units.assign(batch.palettes.size(), notUsed);
+  for (const Job& job : batch.jobs) {
+    const std::optional<PaletteForm> form = paletteForm(job.method);
+    if (!form) continue;
+    std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(*form)];
+    units[job.palette] = 0;
+    if (job.motion == Motion::reskinned) units[job.previousPalette] = 0;
+  }
+  std::uint64_t end = 0;
+  for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
+    std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
+    for (std::size_t index = 0; index < units.size(); ++index) {
+      if (units[index] == notUsed) continue;
+      units[index] = static_cast<std::uint32_t>(end);
+      end += paletteSize(form, batch.palettes[index].jointCount, batch.palettes[index].mayScale);
+    }
+  }
+  palettesSize_ = end * unitBytes;
+}
+
+Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limits) const {
+  const std::uint64_t most = std::max({palettesSize_, batch.matricesSize, batch.meshesSize});
+  if (most <= limits.maxStorageBufferRange) return {};
+  return Error{ErrorCode::limitExceeded, "meshes, matrices or palettes of " + std::to_string(most) +
+                                             " bytes are more than a storage buffer range of " +
+                                             std::to_string(limits.maxStorageBufferRange) +
+                                             " bytes; a batch of fewer of them would fit"};
+}
+
+std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint32_t palette) const {
+  const std::optional<PaletteForm> form = paletteForm(method);
+  return form ? paletteUnits_[static_cast<std::size_t>(*form)][palette]
+              : static_cast<std::uint32_t>(batch.palettes[palette].matrixOffset / unitBytes);
+}
+
+InstanceExtras& PlanMaker::nextExtras() {
+  if (extrasUsed_ == extras_.size()) extras_.emplace_back();
+  return extras_[extrasUsed_++];
+}
+
+/// Null where the job needs none. There is memory for those of all jobs, so that none moves.
+const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index) {
+  const Job& job = batch.jobs[index];
+  InstanceExtras& extras = nextExtras();
+  assignActive(job.morphs, extras.morphs);
+  extras.result = results_[index];
+  extras.hasBox = isSnormPosition(job.positions.format);
+  extras.box = job.box;
+  extras.hasPrevious = job.motion == Motion::reskinned;
+  if (extras.hasPrevious) {
+    extras.previousPalette = paletteOf(batch, job.method, job.previousPalette);
+    extras.previousJoints = batch.palettes[job.previousPalette].jointCount;
+    assignActive(job.previousMorphs, extras.previousMorphs);
+  }
+  if (extras.isNeeded()) return &extras;
+  --extrasUsed_;
+  return nullptr;
+}
+
+Result<void> PlanMaker::placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
+                                 const Tuning& tuning) {
+  const Job& job = batch.jobs[index];
+  const Palette& palette = batch.palettes[job.palette];
+  Placing placing;
+  placing.subject = {"job", index};
+  placing.outputs = batch.outputs;
+  placing.jointCount = palette.jointCount;
+  placing.mayScale = job.method != Method::linear &&
+                     (palette.mayScale || (job.motion == Motion::reskinned &&
+                                           batch.palettes[job.previousPalette].mayScale));
+  return groups_.place(job, placing, limits, tuning, runs_);
+}
+
+Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                             PlanData& plan) {
+  if (Result<void> good = checkLimits(limits); !good) return good;
+  if (Result<void> good = checkTuning(tuning); !good) return good;
+  const std::size_t count = batch.jobs.size();
+  if (count > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
+  resultCount_ = 0;
+  results_.resize(count);
+  std::uint64_t vertexCount = 0;
+  for (std::size_t index = 0; index < count; ++index) {
+    const Job& job = batch.jobs[index];
+    if (Result<void> good = checkJob(batch, job, {"job", index}, limits); !good) return good;
+    results_[index] = hasResult(job) ? resultCount_++ : notUsed;
+    vertexCount += job.mesh.vertexCount;
+  }
+  for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
+    if (Result<void> good = checkPalette(batch, batch.palettes[index], index); !good) return good;
+  }
+  placePalettes(batch);
+  if (Result<void> good = checkSizes(batch, limits); !good) return good;
+
+  groups_.clear();
+  runs_.clear();
+  firstRuns_.clear();
+  for (std::size_t index = 0; index < count; ++index) {
+    firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
+    if (Result<void> good = placeJob(batch, index, limits, tuning); !good) return good;
+  }
+  firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
+
+  builder_.begin(
+      plan, groups_, limits, tuning,
+      {batch.meshesSize, batch.matricesSize, palettesSize_, resultCount_, batch.outputs});
+  for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
+    const std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
+    for (std::size_t index = 0; index < units.size(); ++index) {
+      if (units[index] == notUsed) continue;
+      const Palette& palette = batch.palettes[index];
+      builder_.addPalette(static_cast<std::uint32_t>(palette.matrixOffset / unitBytes),
+                          units[index], palette.jointCount, form, palette.mayScale);
+    }
+  }
+  for (std::uint32_t result = 0; result < resultCount_; ++result) builder_.clearResult(result);
+  extrasUsed_ = 0;
+  extras_.resize(std::max(extras_.size(), count));
+  for (std::size_t index = 0; index < count; ++index) {
+    const Job& job = batch.jobs[index];
+    const std::uint32_t palette = paletteOf(batch, job.method, job.palette);
+    const std::uint32_t flags = (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
+                                (job.settles ? abi::INSTANCE_SETTLES : 0u);
+    const InstanceExtras* extras = extrasOf(batch, index);
+    for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
+      builder_.add(runs_[run], palette, flags, extras);
+  }
+  if (Result<void> good = builder_.finish(); !good) return good;
+  plan.paletteUnits = paletteUnits_;
+  plan.results = results_;
+  plan.instanceCount = static_cast<std::uint32_t>(count);
+  plan.vertexCount = vertexCount;
+  return {};
+}
+
+PlanData::PlanData() = default;
+PlanData::~PlanData() = default;
+
+Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                      Plan& out) {
+  if (out.data_ == nullptr) out.data_ = std::make_unique<PlanData>();
+  PlanData& plan = *out.data_;
+  if (plan.maker == nullptr) plan.maker = std::make_unique<PlanMaker>();
+  Result<void> made = plan.maker->make(batch, limits, tuning, plan);
+  if (!made) plan.clear();
+  return made;
+}
+
+}  // namespace dermis

@@ -1,0 +1,80 @@
+// Which kernel skins an instance, and where its vertices go: known before there is a frame.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dermis/plan.h"
+
+namespace dermis {
+
+/// One attribute of a job's output; `size` 0 where it is not wanted.
+struct OutputStream {
+  std::uint64_t offset = 0;
+  std::uint32_t stride = 0;
+  std::uint32_t size = 0;  ///< bytes of one element
+
+  std::uint64_t begin(std::uint64_t vertex) const { return offset + vertex * stride; }
+  /// Of vertices before `vertexEnd`.
+  std::uint64_t end(std::uint64_t vertexEnd) const { return begin(vertexEnd - 1) + size; }
+};
+
+using OutputStreams = std::array<OutputStream, streamCount>;
+
+OutputStreams outputStreams(const Job& job);
+
+std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes);
+
+const char* streamName(std::size_t stream);
+
+/// Bytes that one store may write: 4, 2 or 1.
+std::uint8_t storeUnit(const OutputStream& stream);
+
+/// Whether positions are stored relative to a box.
+bool isSnormPosition(VertexFormat format);
+
+/// Whether the kernel finds something out about the instance.
+bool hasResult(const Job& job);
+
+// -- Variants.
+
+/// The `Variant::influences` for a mesh whose vertices have at most so many.
+std::uint8_t influenceClass(std::uint32_t maxInfluences);
+
+Variant paletteVariant(const Tuning& tuning);
+
+/// The skin kernel for a job, but for the influences, and for what depends on the sizes of the
+/// batch: scale, texels, pairs.
+Variant skinVariant(const Job& job, const Tuning& tuning);
+
+/// Whether there is a kernel for a variant that reads through uniform texel buffers. Those that
+/// store less than a word, and devices with few storage buffers, do without.
+bool mayReadTexels(const Variant& variant, const DeviceLimits& limits);
+
+/// Whether one with the outputs of this job may store pairs, given that it reads texels and that
+/// its outputs are one buffer.
+bool mayStorePairs(const Job& job, const DeviceLimits& limits);
+
+/// Whether tables and palettes, or meshes, of that many bytes fit in a uniform texel buffer.
+bool fitsUnitTexels(std::uint64_t bytes, const DeviceLimits& limits);
+bool fitsWordTexels(std::uint64_t bytes, const DeviceLimits& limits);
+
+// -- Windows: output that is larger than a storage buffer range may be is written through several
+// ranges.
+
+/// Vertices of one job of which each attribute lies in one window of its buffer.
+struct VertexRun {
+  std::uint32_t firstVertex = 0;
+  std::uint32_t vertexEnd = 0;
+  std::array<std::uint32_t, streamCount> windows{};
+};
+
+/// Cuts a job's vertices into runs. Attributes that lie near to each other get windows of one
+/// number.
+void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
+                 const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
+                 std::vector<VertexRun>& runs);
+
+}  // namespace dermis
