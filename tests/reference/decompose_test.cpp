@@ -1,6 +1,6 @@
 // Singular values and the polar decomposition that the reference rests on.
 
-#include "reference/decompose.h"
+#include "reference/joint.h"
 
 #include <algorithm>
 

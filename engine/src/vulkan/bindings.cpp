@@ -7,9 +7,7 @@
 
 #include "abi.h"
 #include "vulkan/descriptor_writes.h"
-#include "vulkan/object_name.h"
 #include "vulkan/state.h"
-#include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
 namespace {

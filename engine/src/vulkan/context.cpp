@@ -6,9 +6,7 @@
 
 #include "abi.h"
 #include "dermis_kernels.h"
-#include "vulkan/object_name.h"
 #include "vulkan/state.h"
-#include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
 namespace {

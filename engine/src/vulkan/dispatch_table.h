@@ -1,6 +1,9 @@
-// The entry points of one device. A table per device: there is no global state that a second device
-// could overwrite.
+// The entry points of one device, and what goes with each call: its error, names and labels for
+// tools. A table per device: there is no global state that a second device could overwrite.
 #pragma once
+
+#include <cstdint>
+#include <string>
 
 #include <vulkan/vulkan_core.h>
 
@@ -43,5 +46,43 @@ struct DispatchTable {
 
 /// Fails with `missingEntryPoint`, naming the function.
 Result<DispatchTable> loadDispatchTable(const DeviceDescription& description);
+
+/// "vkCreateBuffer failed: out of device memory (VK_ERROR_OUT_OF_DEVICE_MEMORY)".
+Error vulkanError(const char* function, VkResult result);
+
+/// Nothing where VK_EXT_debug_utils was not enabled.
+template <typename Handle>
+void nameObject(const DispatchTable& table, VkDevice device, VkObjectType type, Handle handle,
+                const std::string& name) {
+  if (table.setDebugUtilsObjectName == nullptr || handle == VK_NULL_HANDLE) return;
+  VkDebugUtilsObjectNameInfoEXT info{};
+  info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
+  info.objectType = type;
+  info.objectHandle = reinterpret_cast<std::uint64_t>(handle);
+  info.pObjectName = name.c_str();
+  table.setDebugUtilsObjectName(device, &info);
+}
+
+/// A stretch for as long as it lives; nothing where VK_EXT_debug_utils was not enabled.
+class Label {
+ public:
+  Label(const DispatchTable& table, VkCommandBuffer commandBuffer, const char* name)
+      : table_(table), commandBuffer_(commandBuffer) {
+    if (table_.cmdBeginDebugUtilsLabel == nullptr) return;
+    VkDebugUtilsLabelEXT label{};
+    label.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_LABEL_EXT;
+    label.pLabelName = name;
+    table_.cmdBeginDebugUtilsLabel(commandBuffer_, &label);
+  }
+  ~Label() {
+    if (table_.cmdEndDebugUtilsLabel != nullptr) table_.cmdEndDebugUtilsLabel(commandBuffer_);
+  }
+  Label(const Label&) = delete;
+  Label& operator=(const Label&) = delete;
+
+ private:
+  const DispatchTable& table_;
+  VkCommandBuffer commandBuffer_;
+};
 
 }  // namespace dermis::vulkan

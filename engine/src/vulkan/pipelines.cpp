@@ -5,8 +5,6 @@
 #include <string>
 
 #include "dermis/vulkan/kernels.h"
-#include "vulkan/object_name.h"
-#include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
 

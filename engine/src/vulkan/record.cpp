@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "vulkan/descriptor_writes.h"
-#include "vulkan/label.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {

@@ -1,14 +1,103 @@
-// Extents: what `jointBounds` makes of vertices and `skinnedBounds` maps by joints.
+// Boxes and affine maps in double precision, for the bounds of a skinned mesh.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
-#include "bounds/box.h"
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
 #include "dermis/bounds.h"
+#include "dermis/types.h"
 
 namespace dermis::bounds {
+
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Empty as it is made: min > max.
+struct Range {
+  glm::dvec3 min{infinity, infinity, infinity};
+  glm::dvec3 max{-infinity, -infinity, -infinity};
+
+  bool empty() const { return min.x > max.x; }
+  void add(const glm::dvec3& point) { add(Range{point, point}); }
+  void add(const Range& other) {
+    min = glm::min(min, other.min);
+    max = glm::max(max, other.max);
+  }
+  Range grownBy(double margin) const { return {min - margin, max + margin}; }
+};
+
+inline Range everything() {
+  return {glm::dvec3(-infinity), glm::dvec3(infinity)};
+}
+
+inline Range operator+(const Range& a, const Range& b) {
+  return {a.min + b.min, a.max + b.max};
+}
+/// No point of the range is further from the origin.
+inline double reachOf(const Range& range) {
+  return glm::length(glm::max(glm::abs(range.min), glm::abs(range.max)));
+}
+
+/// The float next to `value` that is not above it; never beyond the infinities.
+inline float roundDown(double value) {
+  constexpr float largest = std::numeric_limits<float>::max();
+  if (value < -static_cast<double>(largest)) return -std::numeric_limits<float>::infinity();
+  if (value >= static_cast<double>(largest)) {
+    return value == infinity ? std::numeric_limits<float>::infinity() : largest;
+  }
+  const auto rounded = static_cast<float>(value);
+  return static_cast<double>(rounded) <= value
+             ? rounded
+             : std::nextafter(rounded, -std::numeric_limits<float>::infinity());
+}
+
+inline float roundUp(double value) {
+  return -roundDown(-value);
+}
+
+/// Rounded outward.
+inline Box boxOf(const Range& range) {
+  Box box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[axis] = roundDown(range.min[axis]);
+    box.max[axis] = roundUp(range.max[axis]);
+  }
+  return box;
+}
+
+inline Range rangeOf(const Box& box) {
+  return {{box.min[0], box.min[1], box.min[2]}, {box.max[0], box.max[1], box.max[2]}};
+}
+
+/// An affine map x → linear x + offset.
+struct Affine {
+  glm::dmat3 linear{1.0};
+  glm::dvec3 offset{0.0};
+};
+
+inline Affine operator+(const Affine& a, const Affine& b) {
+  return {a.linear + b.linear, a.offset + b.offset};
+}
+inline Affine operator-(const Affine& a, const Affine& b) {
+  return {a.linear - b.linear, a.offset - b.offset};
+}
+inline Affine operator*(double factor, const Affine& a) {
+  return {factor * a.linear, factor * a.offset};
+}
+/// x → a(x) × v
+inline Affine cross(const Affine& a, const glm::dvec3& v) {
+  return {glm::dmat3(glm::cross(a.linear[0], v), glm::cross(a.linear[1], v),
+                     glm::cross(a.linear[2], v)),
+          glm::cross(a.offset, v)};
+}
 
 /// How far each direction of an `Extent` reaches, in double precision.
 struct Reach {

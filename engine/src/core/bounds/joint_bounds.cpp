@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "attribute.h"
-#include "bounds/box.h"
 #include "bounds/extent.h"
 #include "dermis/bounds.h"
 #include "dermis/text.h"

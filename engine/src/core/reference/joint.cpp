@@ -1,14 +1,109 @@
-#include "joint.h"
-
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "decompose.h"
+#include "joint.h"
 
 namespace dermis::reference {
+namespace {
+
+/// Rotates columns a and b of both matrices so that those of `work` become orthogonal. Golub and
+/// Van Loan, "Matrix Computations", section 8.6.3.
+bool orthogonalize(glm::dmat3& work, glm::dmat3& right, int a, int b) {
+  const double alpha = glm::dot(work[a], work[a]);
+  const double beta = glm::dot(work[b], work[b]);
+  const double gamma = glm::dot(work[a], work[b]);
+  if (std::abs(gamma) <= 1e-16 * std::sqrt(alpha * beta) || gamma == 0) return false;
+  const double zeta = (beta - alpha) / (2 * gamma);
+  const double tangent = std::copysign(1.0, zeta) / (std::abs(zeta) + std::sqrt(1 + zeta * zeta));
+  const double cosine = 1 / std::sqrt(1 + tangent * tangent);
+  const double sine = cosine * tangent;
+  for (glm::dmat3* matrix : {&work, &right}) {
+    const glm::dvec3 first = (*matrix)[a], second = (*matrix)[b];
+    (*matrix)[a] = cosine * first - sine * second;
+    (*matrix)[b] = sine * first + cosine * second;
+  }
+  return true;
+}
+
+glm::dvec3 anyPerpendicular(const glm::dvec3& v) {
+  const glm::dvec3 axis = std::abs(v.x) <= std::abs(v.y) && std::abs(v.x) <= std::abs(v.z)
+                              ? glm::dvec3(1, 0, 0)
+                          : std::abs(v.y) <= std::abs(v.z) ? glm::dvec3(0, 1, 0)
+                                                           : glm::dvec3(0, 0, 1);
+  return glm::normalize(glm::cross(v, axis));
+}
+
+/// How large the determinant would be if no product in it cancelled.
+double uncancelledDeterminant(const glm::dmat3& m) {
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    sum += std::abs(m[0][i]) * (std::abs(m[1][j] * m[2][k]) + std::abs(m[1][k] * m[2][j]));
+  }
+  return sum;
+}
+
+}  // namespace
+
+SingularValues singularValues(const glm::dmat3& matrix) {
+  glm::dmat3 work = matrix, right(1.0);
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    bool rotated = orthogonalize(work, right, 0, 1);
+    rotated |= orthogonalize(work, right, 0, 2);
+    rotated |= orthogonalize(work, right, 1, 2);
+    if (!rotated) break;
+  }
+  std::array<int, 3> order{0, 1, 2};
+  const glm::dvec3 lengths(glm::length(work[0]), glm::length(work[1]), glm::length(work[2]));
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return lengths[a] > lengths[b]; });
+
+  SingularValues result{glm::dmat3(1.0), glm::dvec3(0.0), glm::dmat3(1.0)};
+  for (int i = 0; i < 3; ++i) {
+    result.values[i] = lengths[order[static_cast<std::size_t>(i)]];
+    result.right[i] = right[order[static_cast<std::size_t>(i)]];
+  }
+  // Left vectors that the matrix does not determine are completed to an orthonormal set.
+  const double tiny = 1e-300;
+  if (result.values[0] > tiny) {
+    result.left[0] = work[order[0]] / result.values[0];
+    result.left[1] = result.values[1] > 1e-14 * result.values[0] ? work[order[1]] / result.values[1]
+                                                                 : anyPerpendicular(result.left[0]);
+    result.left[2] = result.values[2] > 1e-14 * result.values[0]
+                         ? work[order[2]] / result.values[2]
+                         : glm::cross(result.left[0], result.left[1]);
+  }
+  return result;
+}
+
+PolarParts polarParts(const glm::dmat3& matrix) {
+  const SingularValues svd = singularValues(matrix);
+  PolarParts parts;
+  parts.largest = svd.values[0];
+  parts.distanceFromRotation = std::max(std::abs(svd.values[0] - 1), std::abs(svd.values[2] - 1));
+  parts.degenerate = svd.values[1] <= 1e-5 * svd.values[0] || svd.values[0] == 0;
+  // A GPU may take entries below 2^-126 for 0.
+  parts.degenerate |= svd.values[1] + svd.values[2] < 0x1p-100;
+
+  // A determinant within 16 roundings of 0 counts as 0; a kernel, whose own determinant is rounded
+  // as well, draws the line somewhere between that and twice as much.
+  const double determinant = glm::determinant(matrix);
+  const double rounding = 16 * 0x1p-24 * uncancelledDeterminant(matrix);
+  const bool mirrored = determinant < -rounding;
+  parts.degenerate |= mirrored && determinant >= -2 * rounding;
+
+  glm::dmat3 left = mirrored ? -svd.left : svd.left;
+  // Where the matrix is singular the last axis may point either way: take the one that makes a
+  // rotation.
+  if (glm::determinant(left) * glm::determinant(svd.right) < 0) left[2] = -left[2];
+  parts.rotation = left * glm::transpose(svd.right);
+  parts.scaleShear = glm::transpose(parts.rotation) * matrix;
+  return parts;
+}
+
 namespace {
 
 using glm::dmat3;

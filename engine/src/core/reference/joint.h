@@ -1,4 +1,5 @@
-// A joint matrix taken apart, in double precision.
+// A joint matrix taken apart, in double precision: singular values, the polar decomposition, the
+// rigid part.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -8,6 +9,32 @@
 #include "rigid.h"
 
 namespace dermis::reference {
+
+struct SingularValues {
+  glm::dmat3 left;    ///< orthonormal columns
+  glm::dvec3 values;  ///< falling, not negative
+  glm::dmat3 right;   ///< orthonormal columns; matrix = left · diag(values) · rightᵀ
+};
+
+/// One-sided Jacobi: small singular values come out as exact as large ones. The matrix must be
+/// finite.
+SingularValues singularValues(const glm::dmat3& matrix);
+
+struct PolarParts {
+  glm::dmat3 rotation;    ///< det +1
+  glm::dmat3 scaleShear;  ///< symmetric; matrix = rotation · scaleShear
+  double largest = 0;     ///< the largest singular value
+  double distanceFromRotation =
+      0;  ///< the largest |singular value - 1|: how far it moves a point at distance 1
+  bool degenerate =
+      false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of
+              ///< rounding, or σ₂ + σ₃ < 2^-100, where that a GPU may flush denormals to 0 turns it
+};
+
+/// With a negative determinant the rotation is that of −matrix, and the sign goes into the scale
+/// part. A matrix whose determinant is 0 but for rounding in float32 is flat, not mirrored: the
+/// rotation of its two axes, det +1.
+PolarParts polarParts(const glm::dmat3& matrix);
 
 struct Joint {
   glm::dmat3 linear;

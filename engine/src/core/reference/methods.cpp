@@ -1,13 +1,13 @@
-#include "methods.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "directions.h"
+#include "joint.h"
+#include "methods.h"
 
 namespace dermis::reference {
 namespace {
@@ -15,6 +15,182 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 using glm::dvec4;
+
+dmat3 adjugateTranspose(const dmat3& m) {
+  // The cofactor matrix: its columns are the cross products of the other two.
+  return dmat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+}
+
+/// A normal by the inverse transpose of m, but for its length; finite also where m is singular.
+dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
+                      Conditioning& conditioning) {
+  const auto& [m, determinant, largest, stretch] = matrix;
+  const dvec3 result = adjugateTranspose(m) * normal;
+  const double inputLength = glm::length(normal);
+  if (inputLength == 0) return result;  // stays zero, exactly
+  conditioning.normalAlignment =
+      largest > 0 ? glm::length(result) / (largest * stretch * inputLength) : 0;
+  // Where the determinant is a matter of rounding, so is the side that the normal points to.
+  if (matrix.isFlat()) conditioning.normalAlignment = 0;
+  if (glm::length(result) == 0) return normal;  // of rank 1 or 0: any direction will do
+  return determinant < 0 ? -result : result;
+}
+
+/// A tangent by the map of positions, but for its length.
+dvec3 transformTangent(const BlendedMatrix& matrix, const dvec3& tangent,
+                       Conditioning& conditioning) {
+  const dvec3 result = matrix.m * tangent;
+  const double inputLength = glm::length(tangent);
+  if (inputLength == 0) return result;  // stays zero, exactly
+  conditioning.tangentAlignment =
+      matrix.stretch > 0 ? glm::length(result) / (matrix.stretch * inputLength) : 0;
+  return glm::length(result) == 0 ? tangent : result;
+}
+
+/// A mirror turns a tangent frame's handedness over.
+double transformHandedness(const BlendedMatrix& matrix, double handedness,
+                           Conditioning& conditioning) {
+  conditioning.handednessAmbiguous = matrix.isFlat();
+  return matrix.determinant < 0 ? -handedness : handedness;
+}
+
+}  // namespace
+
+BlendedMatrix::BlendedMatrix(const dmat3& matrix, double largestOfJoints)
+    : m(matrix),
+      determinant(glm::determinant(matrix)),
+      largest(singularValues(matrix).values[0]),
+      stretch(largestOfJoints) {}
+
+bool BlendedMatrix::isFlat() const {
+  return std::abs(determinant) <= 1e-5 * stretch * largest * largest;
+}
+
+BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,
+                               Conditioning& conditioning) {
+  return {vertex.position, unitOrZero(transformNormal(matrix, vertex.normal, conditioning)),
+          unitOrZero(transformTangent(matrix, vertex.tangent, conditioning)),
+          transformHandedness(matrix, vertex.handedness, conditioning)};
+}
+
+dvec3 unitOrZero(const dvec3& v) {
+  const double length = glm::length(v);
+  return length > 0 ? v / length : dvec3(0.0);
+}
+
+// -- Iterative blending (DIB).
+
+namespace {
+
+constexpr int mostSteps = 20;
+
+/// The square of a screw's size; the dual part is measured by how far the joints reach.
+double squareOf(const Rigid& screw, double reach) {
+  const double dual = glm::dot(screw.dual, screw.dual);
+  return glm::dot(screw.real, screw.real) + (reach > 0 ? dual / (reach * reach) : 0);
+}
+
+}  // namespace
+
+Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditioning) {
+  const glm::dvec4 pivot = vertex.joints[pivotOf(vertex.influences).joint].rigid.real;
+  Rigid b = normalize(start);
+  double reach = 0, before = 0, slowest = 0;
+  for (const Influence& influence : vertex.influences) {
+    const glm::dvec4& dual = vertex.joints[influence.joint].rigid.dual;
+    reach = std::max(reach, std::sqrt(glm::dot(dual, dual)));
+  }
+  for (int step = 0; step < mostSteps; ++step) {
+    Rigid mean{glm::dvec4(0.0), glm::dvec4(0.0)};
+    for (const Influence& influence : vertex.influences) {
+      Rigid joint = vertex.joints[influence.joint].rigid;
+      if (glm::dot(joint.real, pivot) < 0) joint = -joint;
+      const Rigid difference = normalize(conjugate(b) * joint);
+      // Near a full turn the axis, and with it the step, is a matter of rounding.
+      conditioning.signAmbiguous |= difference.real.w < -0.9;
+      mean = mean + log(difference) * influence.weight;
+    }
+    b = normalize(b * exp(mean));
+    const double size = std::sqrt(squareOf(mean, reach));
+    if (before > 0 && size > 1e-9) slowest = std::max(slowest, size / before);
+    before = size;
+    if (size <= 1e-15) break;
+  }
+  // Errors of one step live on in the next, by the factor by which steps shrink.
+  conditioning.turning = 1 / (1 - std::min(slowest, 1 - 1.0 / mostSteps));
+  conditioning.leverage = (conditioning.turning - 1) * conditioning.scale;
+  return b;
+}
+
+/// A rigid transform's matrix logarithm is that of its dual quaternion in another dress, and so is
+/// the exponential: sums of them are sums of these.
+Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning) {
+  Rigid mean{glm::dvec4(0.0), glm::dvec4(0.0)};
+  for (const Influence& influence : vertex.influences) {
+    Rigid joint = vertex.joints[influence.joint].rigid;
+    // At half a turn the logarithm jumps to the opposite one.
+    conditioning.signAmbiguous |= vertex.influences.size() > 1 && std::abs(joint.real.w) < 1e-5;
+    if (joint.real.w < 0) joint = -joint;
+    mean = mean + log(normalize(joint)) * influence.weight;
+  }
+  return exp(mean);
+}
+
+// -- Spherical blending.
+
+namespace {
+
+/// In directions in which the rotations differ by less, the centre stays where it is: 0.
+constexpr double leastSingularValue = 1e-3;
+/// What packing drops.
+constexpr double leastWeight = 0x1p-49;
+
+}  // namespace
+
+dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
+  struct Turned {
+    dmat3 rotation;
+    dvec3 translation;
+  };
+  std::vector<Turned> joints;
+  for (const Influence& influence : vertex.influences) {
+    if (influence.weight < leastWeight) continue;
+    const Joint& joint = vertex.joints[influence.joint];
+    joints.push_back({matrixOf(joint.rigid.real), joint.translation});
+  }
+  // The normal equations of (R_a − R_b) r = t_b − t_a over all pairs.
+  dmat3 square(0.0);
+  dvec3 right(0.0);
+  double apart = 0;
+  for (std::size_t a = 0; a < joints.size(); ++a) {
+    for (std::size_t b = a + 1; b < joints.size(); ++b) {
+      const dmat3 difference = joints[a].rotation - joints[b].rotation;
+      const dvec3 shift = joints[b].translation - joints[a].translation;
+      square += glm::transpose(difference) * difference;
+      right += glm::transpose(difference) * shift;
+      apart = std::max(apart, glm::length(shift));
+    }
+  }
+  // Pairs count as many times as there are joints what differences from the mean would give.
+  const auto count = static_cast<double>(joints.size());
+  const SingularValues parts = singularValues(square);
+  dvec3 center(0.0);
+  double least = HUGE_VAL;
+  for (int i = 0; i < 3; ++i) {
+    const double singularValue = std::sqrt(parts.values[i] / count);
+    conditioning.signAmbiguous |= std::abs(singularValue - leastSingularValue) < 1e-5;
+    if (singularValue <= leastSingularValue) continue;
+    least = std::min(least, singularValue);
+    center += parts.right[i] * (glm::dot(parts.right[i], right) / parts.values[i]);
+  }
+  // Rotations are known to a rounding; where they all but agree, that moves the centre far.
+  conditioning.leverage = glm::length(center) + (std::isfinite(least) ? apart / least : 0);
+  return center;
+}
+
+// -- All methods.
+
+namespace {
 
 BindVertex skinLinear(const VertexToSkin& vertex, Conditioning& conditioning) {
   dmat3 linear(0.0);

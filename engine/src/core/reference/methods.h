@@ -9,11 +9,10 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include "bind_vertex.h"
 #include "dermis/method.h"
 #include "dermis/reference.h"
 #include "joint.h"
-#include "morph.h"
-#include "read.h"
 #include "rigid.h"
 
 namespace dermis::reference {
@@ -57,5 +56,27 @@ Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditionin
 Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
 /// Kavan and Žára 2005: the point that the rigid parts come nearest to agreeing on.
 glm::dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning);
+
+/// The 3×3 that directions go through, and what their sense depends on.
+struct BlendedMatrix {
+  /// `largestOfJoints` is their largest singular value.
+  BlendedMatrix(const glm::dmat3& matrix, double largestOfJoints);
+
+  /// Whether the sign of the determinant is a matter of rounding.
+  bool isFlat() const;
+
+  glm::dmat3 m;
+  double determinant;
+  double largest;  ///< its largest singular value
+  double stretch;  ///< that of the joints: what the blended entries were rounded by
+};
+
+/// A vertex through a blended matrix, but for its position: the normal by the inverse transpose,
+/// finite also where the matrix is singular, the tangent by the matrix, both of unit length or
+/// zero, the handedness by the sign of the determinant. Fills the conditioning's alignments.
+BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,
+                               Conditioning& conditioning);
+
+glm::dvec3 unitOrZero(const glm::dvec3& v);
 
 }  // namespace dermis::reference

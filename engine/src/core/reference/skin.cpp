@@ -9,12 +9,10 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "bind_vertex.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
-#include "directions.h"
 #include "methods.h"
-#include "morph.h"
-#include "read.h"
 
 namespace dermis::reference {
 namespace {

@@ -1,11 +1,177 @@
-// Instances: how they are added, changed and removed.
+// Instances: how they are added, placed, changed and removed.
 
 #include <algorithm>
+#include <string>
 
-#include "system/errors.h"
+#include "plan/check.h"
 #include "system/scene.h"
 
 namespace dermis {
+namespace {
+
+constexpr Subject theInstance{"the instance"};
+
+/// The job that skins an instance, but for what changes from frame to frame; its attributes
+/// `offset` bytes into the output.
+Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVertices& laidOut,
+          std::uint64_t offset) {
+  Job job;
+  job.mesh = mesh.info;
+  job.meshOffset = mesh.bytes.offset;
+  job.method = instance.method;
+  std::array<OutputAttribute, streamCount> attributes = laidOut.attributes;
+  for (OutputAttribute& attribute : attributes) attribute.offset += offset;
+  job.positions = attributes[0];
+  job.normals = attributes[1];
+  job.tangents = attributes[2];
+  job.previousPositions = attributes[3];
+  job.motion = instance.hasMotion ? Motion::kept : Motion::none;
+  job.box = instance.box;
+  job.bounds = instance.bounds;
+  job.morphs = instance.extras.morphs;
+  return job;
+}
+
+}  // namespace
+
+/// Whether it could be skinned, were there room.
+Result<void> Scene::check(const SceneInstance& instance) const {
+  const SceneMesh* mesh = meshes_.find(instance.mesh);
+  if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
+  const ScenePalette* palette = palettes_.find(instance.paletteHandle);
+  if (palette == nullptr) return unknownHandle("palette", instance.paletteHandle);
+  if (instance.updateInterval == 0) {
+    return invalid("the instance's update interval is 1 or more frames, not 0");
+  }
+  if (instance.layout.arrangement > Arrangement::planar)
+    return invalid("the instance's arrangement is not one of Arrangement");
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh->info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  if (laidOut->size > description_.outputBudget) {
+    return Error{ErrorCode::limitExceeded, "the instance takes " + std::to_string(laidOut->size) +
+                                               " bytes of output, the whole budget is " +
+                                               std::to_string(description_.outputBudget)};
+  }
+  const Palette own{palette->jointCount, 0, palette->mayScale};
+  Batch batch;
+  batch.palettes = {&own, 1};
+  batch.meshesSize = description_.meshBudget;
+  batch.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  return checkJob(batch, jobOf(instance, *mesh, *laidOut, 0), theInstance, description_.limits);
+}
+
+Result<void> Scene::takeResult(SceneInstance& instance) {
+  if (!instance.bounds && !isSnormPosition(instance.layout.positions)) return {};
+  if (!freeResults_.empty()) {
+    instance.extras.result = freeResults_.back();
+    freeResults_.pop_back();
+    return {};
+  }
+  if (nextResult_ == description_.boundsBudget) {
+    return Error{ErrorCode::limitExceeded,
+                 "the instance wants bounds, or positions in snorm16: as many as the budget has, " +
+                     std::to_string(description_.boundsBudget) + ", have them already"};
+  }
+  instance.extras.result = nextResult_++;
+  return {};
+}
+
+/// The palette's place in the form that the method reads; it stays until the palette is removed.
+Result<void> Scene::reserveUnits(const SceneInstance& instance) {
+  const std::optional<PaletteForm> form = paletteForm(instance.method);
+  if (!form) return {};
+  ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
+  std::optional<Range>& units = palette.forms[static_cast<std::size_t>(*form)].units;
+  if (units) return {};
+  const std::uint64_t size = paletteSize(*form, palette.jointCount, palette.mayScale);
+  units = unitStore_.allocate(size, 1);
+  if (units) return {};
+  return Error{ErrorCode::limitExceeded,
+               "palette " + std::to_string(instance.paletteHandle.index) + " takes " +
+                   std::to_string(size * unitBytes) + " bytes in the form that " +
+                   std::string(methodName(instance.method)) + " reads; of the " +
+                   std::to_string(unitStore_.capacity() * unitBytes) +
+                   " that go with the joint budget, " +
+                   std::to_string(unitStore_.largestFree() * unitBytes) + " are free in one piece"};
+}
+
+/// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
+Result<void> Scene::findRoom(SceneInstance& instance) {
+  const SceneMesh& mesh = meshes_.at(instance.mesh.index);
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  const std::optional<Range> bytes = outputStore_.allocate(laidOut->size, laidOut->alignment);
+  if (!bytes) {
+    return Error{ErrorCode::limitExceeded,
+                 "the instance takes " + std::to_string(laidOut->size) + " bytes of output, of " +
+                     std::to_string(outputStore_.capacity()) + " in the budget " +
+                     std::to_string(outputStore_.capacity() - outputStore_.used()) + " are free, " +
+                     std::to_string(outputStore_.largestFree()) + " in one piece"};
+  }
+  instance.target = {*bytes, instance.mesh, mesh.info.vertexCount};
+  instance.vertexCount = mesh.info.vertexCount;
+  Result<void> made = makeRuns(instance);
+  if (!made) outputStore_.free(*bytes);
+  return made;
+}
+
+Result<void> Scene::makeRuns(SceneInstance& instance) {
+  const SceneMesh& mesh = meshes_.at(instance.mesh.index);
+  const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
+  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  if (!laidOut) return laidOut.error();
+  Placing placing;
+  placing.subject = theInstance;
+  placing.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  placing.jointCount = palette.jointCount;
+  placing.mayScale = instance.method != Method::linear && palette.mayScale;
+  placing.isCulled = instance.isCulled;
+  runsScratch_.clear();
+  if (Result<void> placed =
+          groups_.place(jobOf(instance, mesh, *laidOut, instance.target.bytes.offset), placing,
+                        description_.limits, description_.tuning, runsScratch_);
+      !placed)
+    return placed;
+  instance.run = runsScratch_.front();
+  instance.furtherRuns.assign(runsScratch_.begin() + 1, runsScratch_.end());
+  return {};
+}
+
+void Scene::releaseRuns(SceneInstance& instance) {
+  groups_.release(instance.run.group);
+  for (const PlacedRun& run : instance.furtherRuns) groups_.release(run.group);
+  instance.furtherRuns.clear();
+}
+
+/// What was recorded is still drawn from, and stays `shown`; what never was is free at once.
+void Scene::releaseTarget(SceneInstance& instance) {
+  releaseRuns(instance);
+  if (instance.shown != instance.target) outputStore_.free(instance.target.bytes);
+}
+
+void Scene::link(std::uint32_t index) {
+  SceneInstance& instance = instances_.at(index);
+  ScenePalette& palette = palettes_.at(instance.palette);
+  instance.previousOfPalette = notUsed;
+  instance.nextOfPalette = palette.firstInstance;
+  if (palette.firstInstance != notUsed)
+    instances_.at(palette.firstInstance).previousOfPalette = index;
+  palette.firstInstance = index;
+  ++palette.users;
+}
+
+void Scene::unlink(std::uint32_t index) {
+  const SceneInstance& instance = instances_.at(index);
+  ScenePalette& palette = palettes_.at(instance.palette);
+  if (instance.previousOfPalette != notUsed) {
+    instances_.at(instance.previousOfPalette).nextOfPalette = instance.nextOfPalette;
+  } else {
+    palette.firstInstance = instance.nextOfPalette;
+  }
+  if (instance.nextOfPalette != notUsed)
+    instances_.at(instance.nextOfPalette).previousOfPalette = instance.previousOfPalette;
+  --palette.users;
+}
 
 Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
   SceneInstance instance;

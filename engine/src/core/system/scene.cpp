@@ -5,7 +5,7 @@
 #include <string>
 
 #include "plan/check.h"
-#include "system/errors.h"
+#include "system/slot_map.h"
 
 namespace dermis {
 namespace {

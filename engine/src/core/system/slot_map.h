@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "dermis/handle.h"
+#include "dermis/result.h"
 
 namespace dermis {
 
@@ -75,5 +77,15 @@ class SlotMap {
   std::vector<std::uint32_t> free_;
   std::uint32_t size_ = 0;
 };
+
+/// `kind` is "mesh", "palette" or "instance".
+template <typename Thing>
+Error unknownHandle(const char* kind, Handle<Thing> handle) {
+  if (!handle) return {ErrorCode::invalidArgument, std::string("a null ") + kind + " handle"};
+  return {ErrorCode::invalidArgument, "there is no " + std::string(kind) + " " +
+                                          std::to_string(handle.index) + " of generation " +
+                                          std::to_string(handle.generation) +
+                                          "; it was removed, or is another system's"};
+}
 
 }  // namespace dermis

@@ -3,9 +3,6 @@
 #include <string>
 #include <utility>
 
-#include "vulkan/object_name.h"
-#include "vulkan/vulkan_error.h"
-
 namespace dermis::vulkan {
 
 Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Description& description) {

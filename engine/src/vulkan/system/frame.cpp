@@ -7,7 +7,6 @@
 
 #include "abi.h"
 #include "dermis/vulkan/scope.h"
-#include "vulkan/label.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {

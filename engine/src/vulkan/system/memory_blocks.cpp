@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <string>
 
-#include "vulkan/vulkan_error.h"
-
 namespace dermis::vulkan {
 namespace {
 

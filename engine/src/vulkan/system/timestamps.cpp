@@ -2,9 +2,6 @@
 
 #include <array>
 
-#include "vulkan/object_name.h"
-#include "vulkan/vulkan_error.h"
-
 namespace dermis::vulkan {
 
 Timestamps::~Timestamps() {

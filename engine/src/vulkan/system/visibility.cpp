@@ -4,9 +4,6 @@
 
 #include "abi.h"
 #include "dermis_kernels.h"
-#include "vulkan/label.h"
-#include "vulkan/object_name.h"
-#include "vulkan/vulkan_error.h"
 
 namespace dermis::vulkan {
 namespace {

@@ -1,7 +1,9 @@
-// The bind pose with morph targets added, in double precision, for the reference.
+// A vertex in bind pose, in double precision: every type that an attribute may have, influences,
+// and morph targets added. Packing reads the same by its own means.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -12,6 +14,26 @@
 #include "dermis/result.h"
 
 namespace dermis::reference {
+
+/// The number that a component stands for: `unorm` and `snorm` types divided by their largest.
+double readComponent(const AttributeView& view, std::size_t element, std::uint32_t component);
+
+/// The first three components.
+glm::dvec3 readVector(const AttributeView& view, std::size_t element);
+
+/// A vertex' position: what is stored, times the mesh's scale, plus its offset.
+glm::dvec3 readPosition(const MeshView& mesh, std::size_t vertex);
+
+struct Influence {
+  std::uint32_t joint;
+  double stored;      ///< the weight as stored, times 65535, duplicates added up: what the pivot is
+                      ///< chosen by
+  double weight = 0;  ///< normalised
+};
+
+/// All sets together, one entry a joint, in the order of joints; the weights sum to 1. Empty: no
+/// weight. `influences` is overwritten.
+void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influence>& influences);
 
 struct ActiveMorph {
   const MorphTargetView* target;
