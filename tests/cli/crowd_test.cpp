@@ -115,11 +115,18 @@ TEST(CrowdCommandTest, EndsAsTheDermisCommandDoes) {
 
 TEST(CrowdReportTest, AFullDiskLeavesTheReportThatStoodThere) {
   REQUIRE_DEVICE();
+  const auto withoutDisk = [](const Arguments& arguments) {
+    Arguments command{"/bin/sh",          "-c",        "ulimit -f 1; exec \"$0\" \"$@\" >/dev/null",
+                      dermisCrowdProgram, "--figures", "2",
+                      "--frames",         "2",         "--no-verify"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return runCommand(command);
+  };
+  if (withoutDisk({}).status != 0)
+    GTEST_SKIP() << "this driver has its memory in files, which must not be larger either";
   const std::string json = outFile("report.json");
   std::ofstream(json) << "a good report";
-  const CommandResult result =
-      runCommand({"/bin/sh", "-c", "ulimit -f 1; exec \"$0\" \"$@\" >/dev/null", dermisCrowdProgram,
-                  "--figures", "2", "--frames", "2", "--no-verify", "--json", json});
+  const CommandResult result = withoutDisk({"--json", json});
   EXPECT_EQ(result.status, 5);
   EXPECT_EQ(result.errors, "dermis_crowd: error: " + json + " cannot be written: File too large\n");
   std::ifstream file(json);
