@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "command_log.h"
 #include "system_visibility.h"
 
 namespace dermis::test {
@@ -143,6 +144,47 @@ TEST_F(SystemResultsTest, NothingIsReadBackOfAFrameThatIsNotComplete) {
   expectBox(boundsOf(0), boxOf(positionsIn(100)));
   expectBox(boundsOf(10), boxOf(positionsIn(10)));
   submit();
+}
+
+// 200 instances have boxes; two of them move, and no more than their boxes are read back.
+TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
+  constexpr std::uint32_t count = 200, moved[] = {3, 190};
+  InterceptedDevice intercepted(device().description());
+  CommandLog log(intercepted);
+  vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
+  vulkan::SkinningSystemDescription system = description();
+  system.context = &watched;
+  system.boundsBudget = count;
+  SystemEngine engine(device(), system);
+  engine.begin();
+  instance_.mesh = engine.addMesh(packed_);
+  instance_.layout = plainLayout();
+  instance_.bounds = true;
+  std::vector<InstanceHandle> instances;
+  std::vector<PaletteHandle> palettes;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    palettes.push_back(instance_.palette = engine.addPalette(systemPose(i % 20)));
+    instances.push_back(engine.addInstance(instance_));
+  }
+  engine.submit();
+  ASSERT_EQ(log.copies.back().size(), 1u);
+  EXPECT_EQ(log.copies.back()[0].size, count * sizeof(InstanceResult));
+
+  engine.begin();
+  for (const std::uint32_t i : moved) engine.writePose(palettes[i], systemPose(20));
+  engine.submit();
+  ASSERT_EQ(log.copies.back().size(), std::size(moved));
+  for (std::size_t i = 0; i < std::size(moved); ++i) {
+    EXPECT_EQ(log.copies.back()[i].srcOffset, moved[i] * sizeof(InstanceResult));
+    EXPECT_EQ(log.copies.back()[i].size, sizeof(InstanceResult));
+  }
+  engine.begin();
+  engine.submit();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    SCOPED_TRACE(i);
+    const bool hasMoved = std::ranges::find(moved, i) != std::end(moved);
+    expectBox(must(engine->bounds(instances[i])), boxOf(positionsIn(hasMoved ? 20 : i % 20)));
+  }
 }
 
 // An instance that finds no room in the output gives back its slot among the results.

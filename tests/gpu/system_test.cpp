@@ -5,7 +5,7 @@
 #include "batch_runner.h"
 #include "dermis/accuracy.h"
 #include "dermis/reference.h"
-#include "reference/decompose.h"
+#include "reference/joint.h"
 
 namespace dermis::test {
 namespace {

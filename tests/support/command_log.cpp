@@ -44,6 +44,7 @@ void VKAPI_CALL cmdDispatchIndirect(VkCommandBuffer commandBuffer, VkBuffer buff
 void VKAPI_CALL cmdCopyBuffer(VkCommandBuffer commandBuffer, VkBuffer source, VkBuffer destination,
                               std::uint32_t count, const VkBufferCopy* regions) {
   ++commandLog->calls["vkCmdCopyBuffer"];
+  commandLog->copies.emplace_back(regions, regions + count);
   real.CmdCopyBuffer(commandBuffer, source, destination, count, regions);
 }
 void VKAPI_CALL cmdFillBuffer(VkCommandBuffer commandBuffer, VkBuffer buffer, VkDeviceSize offset,

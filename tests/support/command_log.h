@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "intercepted_device.h"
 
@@ -26,6 +27,8 @@ class CommandLog {
     const auto found = calls.find(name);
     return found == calls.end() ? 0 : found->second;
   }
+  /// The regions of each vkCmdCopyBuffer, in order.
+  std::vector<std::vector<VkBufferCopy>> copies;
   /// Objects that live: created and not destroyed, allocated and not freed.
   std::int64_t buffersAlive = 0, allocationsAlive = 0;
   std::uint64_t allocatedBytes = 0;  ///< of all allocations there were

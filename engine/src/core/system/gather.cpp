@@ -84,7 +84,10 @@ void Scene::addDue(std::uint32_t index) {
   const bool restarts = instance.restartsMotion || instance.visibleFrom == record_ + 1;
   instance.willMove = instance.hasMotion && !restarts;
   addRuns(instance, instance.hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
-  if (instance.extras.result != notUsed) builder_.clearResult(instance.extras.result);
+  if (instance.extras.result != notUsed) {
+    builder_.clearResult(instance.extras.result);
+    plannedResults_.push_back(instance.extras.result);
+  }
   plannedVertices_ += instance.vertexCount;
   plannedBytes_ += std::uint64_t{instance.vertexCount} * attributeBytes(instance.layout);
 }
@@ -129,8 +132,10 @@ void Scene::gatherCulled() {
       versioned_.push_back(index);
     }
     // Nobody knows when the GPU will skin it for the first time; until then there is no box.
-    if (instance.extras.result != notUsed && instance.firstFrame == 0)
-      builder_.clearResult(instance.extras.result);
+    if (instance.extras.result != notUsed) {
+      if (instance.firstFrame == 0) builder_.clearResult(instance.extras.result);
+      plannedResults_.push_back(instance.extras.result);
+    }
     convertPalette(instance);
     const Candidate candidate{index, instance.version};
     addRuns(instance, culledFlags(instance), &candidate);
@@ -158,6 +163,7 @@ Result<void> Scene::plan() {
   versioned_.clear();
   conversions_.clear();
   moves_.clear();
+  plannedResults_.clear();
   plannedVertices_ = plannedBytes_ = plannedPoseBytes_ = 0;
   const OutputSizes outputs = OutputSizes::oneBuffer(description_.outputBudget);
   builder_.begin(PlanData::of(plan_), groups_, description_.limits, description_.tuning,

@@ -162,8 +162,9 @@ class Scene {
   std::uint64_t poseOffset(const ScenePalette& palette) const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
   const SceneDescription& description() const { return description_; }
-  /// Results from this number on are nobody's.
-  std::uint32_t resultCount() const { return nextResult_ == freeResults_.size() ? 0 : nextResult_; }
+  /// The numbers of the results that the plan writes, in no order; those that the GPU may write
+  /// among them.
+  std::span<const std::uint32_t> plannedResults() const { return plannedResults_; }
 
   const RangeAllocator& meshStore() const { return meshStore_; }
   const RangeAllocator& unitStore() const { return unitStore_; }
@@ -255,6 +256,7 @@ class Scene {
   };
   std::vector<Conversion> conversions_;
   std::vector<OutputMove> moves_;
+  std::vector<std::uint32_t> plannedResults_;
   std::vector<InstanceHandle> skinned_, settled_, moved_;
   std::uint64_t plannedVertices_ = 0, plannedBytes_ = 0, plannedPoseBytes_ = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <string>
 
@@ -139,7 +140,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   FrameSlot& own = slot();
   own.frame = scene.frameNumber();
   own.hasCounters = own.hasTimestamps = false;
-  own.resultCount = 0;
+  own.results.clear();
   if (works) recordCommands(commandBuffer, frame);
   scene.commit();
 
@@ -245,26 +246,51 @@ void SkinningSystem::State::recordDispatches(VkCommandBuffer commandBuffer,
   }
 }
 
-/// Counters and boxes, where there are any.
+/// The regions of the results that the frame writes, each as far into the read-back behind the
+/// counters. What lies between two near each other is copied too.
+void SkinningSystem::State::findResults(std::vector<VkBufferCopy>& regions) {
+  constexpr std::uint32_t bits = 64;
+  std::vector<std::uint64_t>& marks = resultMarks;
+  marks.clear();
+  for (const std::uint32_t result : scene.plannedResults()) {
+    if (result / bits >= marks.size()) marks.resize(result / bits + std::size_t{1});
+    marks[result / bits] |= std::uint64_t{1} << result % bits;
+  }
+  for (std::size_t begin = 0; begin < marks.size(); ++begin) {
+    if (marks[begin] == 0) continue;
+    std::size_t last = begin;
+    while (last + 1 < marks.size() && marks[last + 1] != 0) ++last;
+    const std::uint64_t first =
+        begin * bits + static_cast<std::uint64_t>(std::countr_zero(marks[begin]));
+    const std::uint64_t end =
+        (last + 1) * bits - static_cast<std::uint64_t>(std::countl_zero(marks[last]));
+    regions.push_back({first * sizeof(InstanceResult),
+                       counters.size() + first * sizeof(InstanceResult),
+                       (end - first) * sizeof(InstanceResult)});
+    begin = last;
+  }
+}
+
+/// Counters and boxes that the frame writes.
 void SkinningSystem::State::recordReadBack(VkCommandBuffer commandBuffer) {
   const bool culls = scene.culled().candidateCount != 0;
-  const std::uint32_t resultCount = scene.resultCount();
-  if (!culls && resultCount == 0) return;
-  const DispatchTable& table = context->table;
   FrameSlot& own = slot();
+  findResults(own.results);
+  if (!culls && own.results.empty()) return;
+  const DispatchTable& table = context->table;
   barrier(table, commandBuffer, {compute, VK_ACCESS_SHADER_WRITE_BIT},
           {transfer, VK_ACCESS_TRANSFER_READ_BIT});
-  const auto copy = [&](const SystemBuffer& from, std::uint64_t size, std::uint64_t place) {
-    const VkBufferCopy region{0, place, size};
-    functions.cmdCopyBuffer(commandBuffer, from.handle(), own.readBack.handle(), 1, &region);
+  const auto copy = [&](const SystemBuffer& from, std::span<const VkBufferCopy> regions) {
+    functions.cmdCopyBuffer(commandBuffer, from.handle(), own.readBack.handle(),
+                            static_cast<std::uint32_t>(regions.size()), regions.data());
     ++frameStatistics.copies;
   };
-  if (culls) copy(counters, counters.size(), 0);
-  if (resultCount != 0) copy(results, resultCount * sizeof(InstanceResult), counters.size());
+  const VkBufferCopy allCounters{0, 0, counters.size()};
+  if (culls) copy(counters, {&allCounters, 1});
+  if (!own.results.empty()) copy(results, own.results);
   barrier(table, commandBuffer, {transfer, VK_ACCESS_TRANSFER_WRITE_BIT},
           {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT});
   own.hasCounters = culls;
-  own.resultCount = resultCount;
 }
 
 }  // namespace dermis::vulkan

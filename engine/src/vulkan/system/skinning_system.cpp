@@ -302,27 +302,29 @@ SystemStatistics SkinningSystem::statistics() const {
   return statistics;
 }
 
-/// Slots are used again soon: what is in those of complete frames is copied. A later frame that
-/// found nothing out does not take away what an earlier one did.
+/// Slots are used again soon: what is in those of complete frames is copied, the oldest first.
 void SkinningSystem::State::readBackUpTo(std::uint64_t completedFrame) {
-  FrameSlot* newest = nullptr;
-  FrameSlot* newestResults = nullptr;
-  const auto isNewer = [](const FrameSlot& slot, const FrameSlot* than) {
-    return than == nullptr || slot.frame > than->frame;
-  };
-  for (FrameSlot& slot : slots) {
-    if (slot.frame == 0 || slot.frame > completedFrame) continue;
-    if (slot.frame > gpuStatistics.frame && isNewer(slot, newest)) newest = &slot;
-    if (slot.frame > latestResultsFrame && slot.resultCount != 0 && isNewer(slot, newestResults))
-      newestResults = &slot;
+  std::vector<const FrameSlot*>& complete = completeScratch;
+  complete.clear();
+  for (const FrameSlot& slot : slots) {
+    if (slot.frame > gpuStatistics.frame && slot.frame <= completedFrame) complete.push_back(&slot);
   }
-  if (newest != nullptr) readStatistics(*newest);
-  if (newestResults == nullptr) return;
-  latestResults.resize(newestResults->resultCount);
-  std::memcpy(latestResults.data(),
-              newestResults->readBack.bytes().data() + sizeof(abi::CounterRecord),
-              newestResults->resultCount * sizeof(InstanceResult));
-  latestResultsFrame = newestResults->frame;
+  std::ranges::sort(complete, {}, &FrameSlot::frame);
+  for (const FrameSlot* slot : complete) readResults(*slot);
+  if (!complete.empty()) readStatistics(*complete.back());
+}
+
+/// A frame that found nothing out about an instance does not take away what an earlier one did.
+void SkinningSystem::State::readResults(const FrameSlot& slot) {
+  if (slot.results.empty()) return;
+  latestResultsFrame = slot.frame;
+  for (const VkBufferCopy& region : slot.results) {
+    const std::size_t first = region.srcOffset / sizeof(InstanceResult);
+    const std::size_t count = region.size / sizeof(InstanceResult);
+    latestResults.resize(std::max(latestResults.size(), first + count));
+    std::memcpy(&latestResults[first], slot.readBack.bytes().data() + region.dstOffset,
+                region.size);
+  }
 }
 
 void SkinningSystem::State::readStatistics(const FrameSlot& slot) {

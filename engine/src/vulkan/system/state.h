@@ -23,7 +23,7 @@ struct FrameSlot {
   SystemBuffer staging;     ///< of the tables
   SystemBuffer readBack;    ///< the counters, then the results
   bool hasCounters = false;
-  std::uint32_t resultCount = 0;
+  std::vector<VkBufferCopy> results;  ///< that it read back: from the results to the read-back
   bool hasTimestamps = false;
 };
 
@@ -48,11 +48,13 @@ struct SkinningSystem::State {
   void recordCommands(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   void recordCopies(VkCommandBuffer commandBuffer);
   void recordDispatches(VkCommandBuffer commandBuffer, const FrameDescription& frame);
+  void findResults(std::vector<VkBufferCopy>& regions);
   void recordReadBack(VkCommandBuffer commandBuffer);
   bool hasWork() const;
 
-  // read_back.cpp
+  // skinning_system.cpp
   void readBackUpTo(std::uint64_t completedFrame);
+  void readResults(const FrameSlot& slot);
   void readStatistics(const FrameSlot& slot);
 
   FrameSlot& slot() { return slots[slotNumber()]; }
@@ -86,8 +88,10 @@ struct SkinningSystem::State {
 
   FrameStatistics frameStatistics;
   GpuStatistics gpuStatistics;
-  std::vector<InstanceResult> latestResults;
+  std::vector<InstanceResult> latestResults;  ///< each of the newest complete frame that wrote it
   std::uint64_t latestResultsFrame = 0;
+  std::vector<std::uint64_t> resultMarks;  ///< scratch: a bit for each that the frame writes
+  std::vector<const FrameSlot*> completeScratch;
 };
 
 }  // namespace dermis::vulkan
