@@ -425,19 +425,11 @@ TEST(CommandTest, VerifyReportsEveryCase) {
   EXPECT_NE(text.find("classname=\"dermis.verify.dual_quaternion\""), std::string::npos);
 }
 
-TEST(CommandTest, VerifyWithoutAModelVerifiesRandomMeshes) {
-  REQUIRE_DEVICE();
-  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
-  const CommandResult result = dermis({"verify", "--json", json, "--junit", junit});
-  EXPECT_EQ(result.status, 0) << result.output << result.errors;
-  EXPECT_TRUE(result.errors.empty()) << "no progress on a pipe: " << result.errors;
-  EXPECT_TRUE(result.output.starts_with("device  ")) << result.output;
-
-  const nlohmann::json parsed = nlohmann::json::parse(readText(json));
-  EXPECT_TRUE(parsed.at("passed").get<bool>());
-  ASSERT_EQ(parsed.at("models").size(), 1u);
-  EXPECT_EQ(parsed.at("models")[0].at("model"), "random meshes");
-  const nlohmann::json& cases = parsed.at("models")[0].at("cases");
+/// The report on random meshes: each method in many combinations, and all of them passed.
+void expectRandomMeshes(const CommandResult& result, const nlohmann::json& model,
+                        const std::string& xml) {
+  EXPECT_EQ(model.at("model"), "random meshes");
+  const nlohmann::json& cases = model.at("cases");
   std::string variants;
   std::map<std::string, std::size_t> byMethod;
   for (const nlohmann::json& verified : cases) {
@@ -454,23 +446,23 @@ TEST(CommandTest, VerifyWithoutAModelVerifiesRandomMeshes) {
   for (const char* output : {"positions float32x3", "positions float16x4", "normals float32x3",
                              "tangents float32x4", "previous kept", "previous reskinned"})
     EXPECT_GE(countOf(variants, output), 1u) << output;
-
-  const std::string xml = readText(junit);
   const std::string tests = "tests=\"" + std::to_string(cases.size()) + "\" failures=\"0\"";
   EXPECT_EQ(countOf(xml, "<testsuite name=\"random meshes\" " + tests), 1u) << xml.substr(0, 300);
-  EXPECT_EQ(countOf(xml, "<testcase "), cases.size());
+  EXPECT_GE(countOf(xml, "<testcase "), cases.size());
 }
 
 TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
   REQUIRE_DEVICE();
   REQUIRE_TERMINAL();
-  const std::string json = outFile("verify.json");
+  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
   const CommandResult result =
-      runOnTerminal({dermisProgram, "verify", bar, "--random", "--json", json});
+      runOnTerminal({dermisProgram, "verify", bar, "--random", "--json", json, "--junit", junit});
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_TRUE(result.output.starts_with("device  ")) << result.output;
   const nlohmann::json parsed = nlohmann::json::parse(readText(json));
+  EXPECT_TRUE(parsed.at("passed").get<bool>());
   ASSERT_EQ(parsed.at("models").size(), 2u);
-  EXPECT_EQ(parsed.at("models")[0].at("model"), "random meshes");
+  expectRandomMeshes(result, parsed.at("models")[0], readText(junit));
   EXPECT_EQ(parsed.at("models")[1].at("model"), bar);
   for (const nlohmann::json& model : parsed.at("models")) EXPECT_FALSE(model.at("cases").empty());
   // Each counts its own steps, and leaves a clean line behind.
@@ -495,16 +487,8 @@ TEST(CommandTest, ProgressIsShownOnATerminalOnly) {
   EXPECT_EQ(pipe.output + pipe.errors, "");
 }
 
-TEST(CommandTest, VerifyGoesOnAfterABadModel) {
-  REQUIRE_DEVICE();
-  const CommandResult result = dermis({"verify", outFile("does not exist.glb"), bar});
-  EXPECT_EQ(result.status, 3);
-  expectOneErrorLine(result);
-  EXPECT_NE(result.output.find("passed  " + bar), std::string::npos) << result.output;
-}
-
-// Numbers that float32 cannot compute with: whatever becomes of such a model, it is named, and the
-// others are verified and reported.
+// A model that is not there, and numbers that float32 cannot compute with: whatever becomes of such
+// a model, it is named, and the others are verified and reported.
 TEST(CommandTest, NoModelSpoilsTheReportOfAnother) {
   REQUIRE_DEVICE();
   // Vertex 1 of the model stands at (FLT_MAX, 0, 0).
@@ -519,8 +503,8 @@ TEST(CommandTest, NoModelSpoilsTheReportOfAnother) {
   const std::string huge = writeModel("huge.gltf", "a", "[1e37,1,1]");
   const std::string larger = writeModel("larger.gltf", "a", "[1e38,1e38,1e38]");
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
-  const CommandResult result =
-      dermis({"verify", far, huge, larger, bar, "--json", json, "--junit", junit});
+  const CommandResult result = dermis(
+      {"verify", outFile("none.glb"), far, huge, larger, bar, "--json", json, "--junit", junit});
   EXPECT_EQ(result.status, 3) << result.output << result.errors;
   for (const std::string& refused : {far, larger}) {
     EXPECT_EQ(countOf(result.errors, "dermis: error: " + refused + ": node 0 'a', mesh"), 1u)
@@ -529,26 +513,15 @@ TEST(CommandTest, NoModelSpoilsTheReportOfAnother) {
   EXPECT_EQ(countOf(result.output, huge), allMethods.size()) << "each with a verdict";
   EXPECT_EQ(countOf(result.output, "passed  " + bar), allMethods.size()) << result.output;
   const nlohmann::json models = nlohmann::json::parse(readText(json)).at("models");
-  ASSERT_EQ(models.size(), 4u);
+  ASSERT_EQ(models.size(), 5u);
   EXPECT_TRUE(models[0].contains("error"));
-  EXPECT_FALSE(models[1].contains("error"));
-  EXPECT_TRUE(models[2].contains("error"));
-  EXPECT_FALSE(models[1].at("cases").empty());
-  EXPECT_EQ(models[3].at("failures"), 0);
-  EXPECT_FALSE(models[3].at("cases").empty());
-  EXPECT_EQ(countOf(readText(junit), "<error message="), 2u);
-}
-
-// Three that differ; RealModelsTest goes through all of them at night.
-TEST(CommandTest, SomeRealModelsVerify) {
-  REQUIRE_DEVICE();
-  const std::optional<std::filesystem::path> data = testDataFolder();
-  if (!data) GTEST_SKIP() << noTestData;
-  const std::string models = (*data / "models").string();
-  const CommandResult result = dermis({"verify", models + "/Fox/glTF-Binary/Fox.glb",
-                                       models + "/RiggedSimple/glTF/RiggedSimple.gltf",
-                                       models + "/SimpleSkin/glTF-Embedded/SimpleSkin.gltf"});
-  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_TRUE(models[1].contains("error"));
+  EXPECT_FALSE(models[2].contains("error"));
+  EXPECT_TRUE(models[3].contains("error"));
+  EXPECT_FALSE(models[2].at("cases").empty());
+  EXPECT_EQ(models[4].at("failures"), 0);
+  EXPECT_FALSE(models[4].at("cases").empty());
+  EXPECT_EQ(countOf(readText(junit), "<error message="), 3u);
 }
 
 // Every file that is broken on purpose: status 3 with one sentence, or accepted (the importer's

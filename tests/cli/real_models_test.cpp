@@ -1,4 +1,5 @@
-// `dermis verify` on every real model. Too long for every change; tests/run.sh nightly runs it.
+// `dermis verify` on every real model, and without one. Too long for every change; tests/run.sh
+// nightly runs it.
 
 #include <gtest/gtest.h>
 
@@ -33,6 +34,14 @@ TEST(RealModelsTest, AllVerify) {
   EXPECT_GE(arguments.size(), 30u);
   const CommandResult result = dermis(arguments);
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
+}
+
+TEST(RealModelsTest, WithoutAModelRandomMeshesVerify) {
+  REQUIRE_DEVICE();
+  const CommandResult result = dermis({"verify"});
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_TRUE(result.errors.empty()) << "no progress on a pipe: " << result.errors;
+  EXPECT_NE(result.output.find("passed  random meshes"), std::string::npos) << result.output;
 }
 
 }  // namespace
