@@ -45,14 +45,14 @@ VkDescriptorBufferInfo infoOf(const BufferRange& range) {
 
 }  // namespace
 
-Bindings::State::~State() {
+BindingsState::~BindingsState() {
   if (context == nullptr) return;
   for (const VkBufferView view : {tableTexels, meshTexels, meshWords, matrixTexels, paletteTexels})
     context->table.destroyBufferView(context->device, view, context->allocator);
   context->table.destroyDescriptorPool(context->device, pool, context->allocator);
 }
 
-const BufferRange& Bindings::State::output(std::size_t stream) const {
+const BufferRange& BindingsState::output(std::size_t stream) const {
   const OutputBuffers& outputs = buffers.outputs;
   switch (static_cast<Stream>(stream)) {
     case Stream::normals:
@@ -66,7 +66,7 @@ const BufferRange& Bindings::State::output(std::size_t stream) const {
   }
 }
 
-BoundBuffers Bindings::State::paletteKernel() const {
+BoundBuffers BindingsState::paletteKernel() const {
   const auto orElse = [](const BufferRange& range, const BufferRange& other) {
     return infoOf(range.buffer != VK_NULL_HANDLE ? range : other);
   };
@@ -79,7 +79,7 @@ BoundBuffers Bindings::State::paletteKernel() const {
   return bound;
 }
 
-BoundBuffers Bindings::State::skinKernel(Method method, const Windows& windows) const {
+BoundBuffers BindingsState::skinKernel(Method method, const Windows& windows) const {
   BoundBuffers bound;
   bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
   bound.buffers[abi::BINDING_MESHES] = infoOf(buffers.meshes);
@@ -111,7 +111,7 @@ BoundBuffers Bindings::State::skinKernel(Method method, const Windows& windows) 
   return bound;
 }
 
-Result<void> Bindings::State::createTexelViews() {
+Result<void> BindingsState::createTexelViews() {
   if (context->texelBindingCount() == 0) return {};
   const auto create = [this](const BufferRange& range, VkFormat format, std::uint32_t texelSize,
                              VkBufferView& view) -> Result<void> {
@@ -144,13 +144,13 @@ Result<void> Bindings::State::createTexelViews() {
   return create(buffers.palettes, unit, 16, paletteTexels);
 }
 
-std::uint32_t Bindings::State::windowCount(std::size_t stream) const {
+std::uint32_t BindingsState::windowCount(std::size_t stream) const {
   const std::uint64_t size = output(stream).size;
   if (size <= context->limits.maxStorageBufferRange) return 1;
   return static_cast<std::uint32_t>((size + windowStep - 1) / windowStep);
 }
 
-std::uint32_t Bindings::State::mostWindows() const {
+std::uint32_t BindingsState::mostWindows() const {
   std::uint32_t most = 1;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     most = std::max(most, windowCount(stream));
@@ -171,7 +171,7 @@ bool writesStream(const Variant& variant, std::size_t stream) {
   }
 }
 
-std::optional<std::uint32_t> Bindings::State::commonWindow(const Dispatch& dispatch) const {
+std::optional<std::uint32_t> BindingsState::commonWindow(const Dispatch& dispatch) const {
   std::uint32_t common = 0;
   for (const OutputWindow& window : dispatch.windows) common = std::max(common, window.index);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
@@ -183,7 +183,7 @@ std::optional<std::uint32_t> Bindings::State::commonWindow(const Dispatch& dispa
 }
 
 /// Descriptor sets for every kernel and window.
-Result<void> Bindings::State::createSets() {
+Result<void> BindingsState::createSets() {
   const std::uint32_t windows = mostWindows();
   const std::uint32_t setCount = 1 + windows * 2;
   const std::array<VkDescriptorPoolSize, 2> sizes{
@@ -227,7 +227,7 @@ Result<void> Bindings::State::createSets() {
       Variant variant;
       variant.method = method;
       update(skinKernel(method, {window, window, window, window}),
-             sets[Bindings::State::setIndex(variant, window)]);
+             sets[BindingsState::setIndex(variant, window)]);
     }
   }
   return {};
@@ -242,7 +242,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   return state_->createBindings(buffers);
 }
 
-Result<Bindings> Context::State::createBindings(const BatchBuffers& buffers) const {
+Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers) const {
   const OutputBuffers& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
@@ -270,8 +270,8 @@ Result<Bindings> Context::State::createBindings(const BatchBuffers& buffers) con
   }
 
   Bindings bindings;
-  bindings.state_ = std::make_unique<Bindings::State>();
-  Bindings::State& state = *bindings.state_;
+  bindings.state_ = std::make_unique<BindingsState>();
+  BindingsState& state = *bindings.state_;
   state.context = this;
   state.buffers = buffers;
   state.windowStep = outputWindowStep(limits);

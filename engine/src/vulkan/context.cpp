@@ -63,7 +63,7 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
 
 }  // namespace
 
-Context::State::~State() {
+ContextState::~ContextState() {
   pipelines.reset();
   if (table.destroyPipelineLayout != nullptr)
     table.destroyPipelineLayout(device, pipelineLayout, allocator);
@@ -71,7 +71,7 @@ Context::State::~State() {
     table.destroyDescriptorSetLayout(device, setLayout, allocator);
 }
 
-Result<void> Context::State::createLayouts() {
+Result<void> ContextState::createLayouts() {
   std::array<VkDescriptorSetLayoutBinding, abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT>
       bindings{};
   const std::uint32_t count = bindingCount() + texelBindingCount();
@@ -121,8 +121,8 @@ Result<Context> Context::create(const DeviceDescription& description) {
   if (!table) return table.error();
 
   Context context;
-  context.state_ = std::make_unique<State>(description);
-  State& state = *context.state_;
+  context.state_ = std::make_unique<ContextState>(description);
+  ContextState& state = *context.state_;
   state.table = *table;
 
   VkPhysicalDeviceProperties properties{};

@@ -39,7 +39,7 @@ std::string describe(const Variant& variant) {
 
 }  // namespace
 
-Result<void> Bindings::State::checkBuffers(const Plan& plan) const {
+Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   for (const auto& [role, range, name] : {std::tuple{BufferRole::meshes, &buffers.meshes, "meshes"},
                                           {BufferRole::matrices, &buffers.matrices, "matrices"},
                                           {BufferRole::tables, &buffers.tables, "tables"},
@@ -66,7 +66,7 @@ Result<void> Bindings::State::checkBuffers(const Plan& plan) const {
 }
 
 /// Variants that store pairs write normals through the binding of the positions.
-Result<void> Bindings::State::checkPairs(const Plan& plan) const {
+Result<void> BindingsState::checkPairs(const Plan& plan) const {
   const bool stores = std::any_of(plan.variants().begin(), plan.variants().end(),
                                   [](const Variant& variant) { return variant.pairs; });
   const BufferRange& positions = buffers.outputs.positions;
@@ -77,7 +77,7 @@ Result<void> Bindings::State::checkPairs(const Plan& plan) const {
                "the plan was made for outputs in one buffer, the bindings have normals in another"};
 }
 
-Result<void> Bindings::State::checkVariants(const Plan& plan) const {
+Result<void> BindingsState::checkVariants(const Plan& plan) const {
   for (const Variant& variant : plan.variants()) {
     if (context->pipelines->find(variant) == VK_NULL_HANDLE)
       return Error{ErrorCode::notPrepared, describe(variant) + " has not been prepared"};
@@ -85,7 +85,7 @@ Result<void> Bindings::State::checkVariants(const Plan& plan) const {
   return {};
 }
 
-Result<void> Bindings::State::check(const Plan& plan) const {
+Result<void> BindingsState::check(const Plan& plan) const {
   if (Result<void> good = checkBuffers(plan); !good) return good;
   if (!plan.dispatches().empty() && plan.limits() != context->limits) {
     return Error{
@@ -129,8 +129,8 @@ void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuf
 }
 
 void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
-                    const Bindings::State& bound, const IndirectArguments* arguments) {
-  const Context::State& context = *bound.context;
+                    const BindingsState& bound, const IndirectArguments* arguments) {
+  const ContextState& context = *bound.context;
   const DispatchTable& table = context.table;
   const bool isPalette = dispatch.variant.kernel == Kernel::palette;
   table.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
@@ -146,7 +146,7 @@ void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
                                context.pipelineLayout, 0, writes.count(), writes.data());
   } else {
     const VkDescriptorSet set =
-        bound.sets[Bindings::State::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
+        bound.sets[BindingsState::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
     table.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
                                 context.pipelineLayout, 0, 1, &set, 0, nullptr);
   }
@@ -161,11 +161,11 @@ void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
 
 Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
                              const Bindings& bindings) const {
-  const State& context = *state_;
+  const ContextState& context = *state_;
   if (bindings.state_ == nullptr || bindings.state_->context != &context) {
     return Error{ErrorCode::invalidArgument, "the bindings were not made by this context"};
   }
-  const Bindings::State& bound = *bindings.state_;
+  const BindingsState& bound = *bindings.state_;
   if (Result<void> good = bound.check(plan); !good) return good;
 
   const DispatchTable& table = context.table;

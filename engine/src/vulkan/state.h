@@ -14,14 +14,14 @@
 
 namespace dermis::vulkan {
 
-struct Context::State {
-  explicit State(const DeviceDescription& description)
+struct ContextState {
+  explicit ContextState(const DeviceDescription& description)
       : instance(description.instance),
         getInstanceProcAddr(description.getInstanceProcAddr),
         physicalDevice(description.physicalDevice),
         device(description.device),
         allocator(description.allocator) {}
-  ~State();
+  ~ContextState();
 
   std::uint32_t bindingCount() const {
     return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::BINDING_COUNT_LEAST
@@ -58,10 +58,10 @@ struct BoundBuffers {
 /// The windows of the four outputs that a kernel sees.
 using Windows = std::array<std::uint32_t, streamCount>;
 
-struct Bindings::State {
-  ~State();
+struct BindingsState {
+  ~BindingsState();
 
-  const Context::State* context = nullptr;
+  const ContextState* context = nullptr;
   BatchBuffers buffers;
   std::uint64_t windowStep = 0;
   /// Of buffers that kernels read through texels, where there are such buffers.
@@ -113,9 +113,9 @@ struct IndirectArguments {
   VkDeviceSize offset = 0;
 };
 
-/// Records one dispatch of a plan that `Bindings::State::check` has passed.
+/// Records one dispatch of a plan that `BindingsState::check` has passed.
 void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
-                    const Bindings::State& bound, const IndirectArguments* arguments);
+                    const BindingsState& bound, const IndirectArguments* arguments);
 /// What the palette kernel wrote becomes visible to the skin kernel, which adds to the results.
 void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
                           const BatchBuffers& buffers);

@@ -43,6 +43,8 @@ struct BatchBuffers {
   BufferRange results;  ///< what `record` finds out: `InstanceResult` at `Plan::resultOffset`
 };
 
+struct BindingsState;
+
 /// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. It
 /// must outlive every command buffer that `record` used it in, until the GPU is done with them;
 /// destroy it before the Context. Movable, not thread-safe to destroy while in use; any number of
@@ -54,12 +56,11 @@ class Bindings {
   Bindings(Bindings&&) noexcept;
   Bindings& operator=(Bindings&&) noexcept;
 
-  struct State;  // internal
-
  private:
   friend class Context;
   friend class SkinningSystem;
-  std::unique_ptr<State> state_;
+  friend struct ContextState;
+  std::unique_ptr<BindingsState> state_;
 };
 
 }  // namespace dermis::vulkan

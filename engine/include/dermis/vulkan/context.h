@@ -46,6 +46,8 @@ struct DeviceDescription {
   const VkAllocationCallbacks* allocator = nullptr;
 };
 
+struct ContextState;
+
 /// What Dermis has on a device: layouts and pipelines. Immutable but for `prepare`;
 /// every member function may be called from any thread at any time, `record` with a command buffer
 /// of its own. Destroy it when the GPU has finished with what it recorded, before the device.
@@ -94,13 +96,11 @@ class Context {
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 
-  struct State;  // internal
-
  private:
   Context();
   friend class Bindings;
   friend class SkinningSystem;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<ContextState> state_;
 };
 
 }  // namespace dermis::vulkan

@@ -6,7 +6,7 @@
 namespace dermis::vulkan {
 
 Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Description& description) {
-  const Context::State& context = *source.context;
+  const ContextState& context = *source.context;
   const SystemFunctions& functions = *source.functions;
   VkBufferCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;

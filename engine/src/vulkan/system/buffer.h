@@ -13,7 +13,7 @@ namespace dermis::vulkan {
 
 /// What buffers are made with; outlives them.
 struct BufferSource {
-  const Context::State* context = nullptr;
+  const ContextState* context = nullptr;
   const SystemFunctions* functions = nullptr;
   MemoryCallbacks memory;
   std::uint64_t allocatedBytes = 0;  ///< that are not freed

@@ -4,7 +4,7 @@
 
 namespace dermis::vulkan {
 
-Result<SystemFunctions> loadSystemFunctions(const Context::State& context) {
+Result<SystemFunctions> loadSystemFunctions(const ContextState& context) {
   SystemFunctions functions;
   std::string missing;
   const auto load = [&](const char* name, auto& function) {

@@ -28,6 +28,6 @@ struct SystemFunctions {
 };
 
 /// Fails with `missingEntryPoint`, naming the function.
-Result<SystemFunctions> loadSystemFunctions(const Context::State& context);
+Result<SystemFunctions> loadSystemFunctions(const ContextState& context);
 
 }  // namespace dermis::vulkan

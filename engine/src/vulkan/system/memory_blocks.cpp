@@ -32,7 +32,7 @@ Wishes wishesOf(MemoryUse use) {
 
 }  // namespace
 
-MemoryBlocks::MemoryBlocks(const Context::State& context, const SystemFunctions& functions)
+MemoryBlocks::MemoryBlocks(const ContextState& context, const SystemFunctions& functions)
     : context_(context), functions_(functions) {
   functions.getPhysicalDeviceMemoryProperties(context.physicalDevice, &properties_);
 }

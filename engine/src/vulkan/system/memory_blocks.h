@@ -13,7 +13,7 @@ namespace dermis::vulkan {
 
 class MemoryBlocks {
  public:
-  MemoryBlocks(const Context::State& context, const SystemFunctions& functions);
+  MemoryBlocks(const ContextState& context, const SystemFunctions& functions);
   ~MemoryBlocks();
   MemoryBlocks(const MemoryBlocks&) = delete;
   MemoryBlocks& operator=(const MemoryBlocks&) = delete;
@@ -39,7 +39,7 @@ class MemoryBlocks {
   Result<MemoryBlock> allocateFrom(std::uint32_t type, const MemoryRequest& request);
   Result<Block*> addBlock(std::uint32_t type, const MemoryRequest& request);
 
-  const Context::State& context_;
+  const ContextState& context_;
   const SystemFunctions& functions_;
   VkPhysicalDeviceMemoryProperties properties_{};
   std::vector<std::unique_ptr<Block>> blocks_;

@@ -55,7 +55,7 @@ std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
 }
 
 SceneDescription sceneOf(const SkinningSystemDescription& description,
-                         const Context::State& context) {
+                         const ContextState& context) {
   const DeviceLimits& limits = context.limits;
   SceneDescription scene;
   scene.framesInFlight = description.framesInFlight;
@@ -77,7 +77,7 @@ SkinningSystem::~SkinningSystem() = default;
 SkinningSystem::SkinningSystem(SkinningSystem&&) noexcept = default;
 SkinningSystem& SkinningSystem::operator=(SkinningSystem&&) noexcept = default;
 
-SkinningSystem::State::State(Context::State& contextState, const SceneDescription& sceneDescription)
+SkinningSystem::State::State(ContextState& contextState, const SceneDescription& sceneDescription)
     : context(&contextState), scene(sceneDescription) {}
 
 /// Of what kernels read, through texel buffers where the device has them.
@@ -129,7 +129,7 @@ Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage
 
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
   if (description.context == nullptr) return wrongField("context is null");
-  Context::State& context = *description.context->state_;
+  ContextState& context = *description.context->state_;
   const SceneDescription scene = sceneOf(description, context);
   if (Result<void> good = checkBudgets(description, scene); !good) return good.error();
   Result<SystemFunctions> functions = loadSystemFunctions(context);

@@ -34,7 +34,7 @@ struct MeshUpload {
 };
 
 struct SkinningSystem::State {
-  State(Context::State& context, const SceneDescription& sceneDescription);
+  State(ContextState& context, const SceneDescription& sceneDescription);
   VkBufferUsageFlags readUsage() const;
   Result<void> createBuffers(VkBufferUsageFlags outputUsage);
 
@@ -62,7 +62,7 @@ struct SkinningSystem::State {
     return static_cast<std::uint32_t>((scene.recordNumber() + 1) % slots.size());
   }
 
-  Context::State* context;  ///< stays where it is when the Context is moved
+  ContextState* context;  ///< stays where it is when the Context is moved
   SystemFunctions functions;
   std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
   BufferSource source;

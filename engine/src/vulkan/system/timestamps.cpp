@@ -9,7 +9,7 @@ Timestamps::~Timestamps() {
     functions_->destroyQueryPool(context_->device, pool_, context_->allocator);
 }
 
-Result<void> Timestamps::create(const Context::State& context, const SystemFunctions& functions,
+Result<void> Timestamps::create(const ContextState& context, const SystemFunctions& functions,
                                 std::uint32_t frames) {
   context_ = &context;
   functions_ = &functions;

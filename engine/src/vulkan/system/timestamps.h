@@ -16,7 +16,7 @@ class Timestamps {
   Timestamps(const Timestamps&) = delete;
   Timestamps& operator=(const Timestamps&) = delete;
 
-  Result<void> create(const Context::State& context, const SystemFunctions& functions,
+  Result<void> create(const ContextState& context, const SystemFunctions& functions,
                       std::uint32_t frames);
   bool isCreated() const { return pool_ != VK_NULL_HANDLE; }
 
@@ -26,7 +26,7 @@ class Timestamps {
   std::optional<double> seconds(std::uint32_t frame) const;
 
  private:
-  const Context::State* context_ = nullptr;
+  const ContextState* context_ = nullptr;
   const SystemFunctions* functions_ = nullptr;
   VkQueryPool pool_ = VK_NULL_HANDLE;
 };

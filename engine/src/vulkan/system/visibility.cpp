@@ -28,7 +28,7 @@ bool Visibility::hasResults() const {
   return context_->bindingCount() == abi::BINDING_COUNT;
 }
 
-Result<void> Visibility::create(const Context::State& context, const Tuning& tuning,
+Result<void> Visibility::create(const ContextState& context, const Tuning& tuning,
                                 std::uint32_t setCount) {
   context_ = &context;
   if (Result<void> made = createLayouts(setCount); !made) return made;

@@ -22,7 +22,7 @@ class Visibility {
   Visibility& operator=(const Visibility&) = delete;
 
   /// Pipeline and layouts. `setCount` is the number of frames whose commands may be in flight.
-  Result<void> create(const Context::State& context, const Tuning& tuning, std::uint32_t setCount);
+  Result<void> create(const ContextState& context, const Tuning& tuning, std::uint32_t setCount);
 
   struct Buffers {
     BufferRange tables, visibility, history, counters, results;
@@ -38,7 +38,7 @@ class Visibility {
   Result<void> createPipeline(const Tuning& tuning);
   void bind(VkCommandBuffer commandBuffer, const Buffers& buffers, std::uint32_t set) const;
 
-  const Context::State* context_ = nullptr;
+  const ContextState* context_ = nullptr;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkPipelineLayout pipelineLayout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
