@@ -35,8 +35,8 @@ Result<void> validate(std::span<const std::uint32_t> words, const std::string& n
   return {};
 }
 
-/// SPIRV-Tools' performance passes without inlining, which triples a module, and which drivers do for
-/// themselves.
+/// SPIRV-Tools' performance passes without inlining, which triples a module, and which drivers do
+/// for themselves.
 void registerPasses(spvtools::Optimizer& optimizer) {
   using namespace spvtools;
   constexpr std::uint32_t mostMembers = 100;  // of a struct that is taken apart

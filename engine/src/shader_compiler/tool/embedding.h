@@ -12,8 +12,8 @@ struct EmbeddedModule {
   std::vector<std::uint32_t> words;
 };
 
-/// Declares `extern const std::span<const std::uint32_t> NAME_spirv` for each module, and a function
-/// that finds them by name.
+/// Declares `extern const std::span<const std::uint32_t> NAME_spirv` for each module, and a
+/// function that finds them by name.
 std::string embeddingHeader(const std::string& cppNamespace,
                             const std::vector<EmbeddedModule>& modules);
 
