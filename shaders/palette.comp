@@ -72,7 +72,7 @@ void main() {
   }
   barrier();
 
-  // Asked at its end, as some drivers execute the rest of a loop once more after the question.
+  // The loop tests at its end: if the test comes first, lavapipe executes the rest of the body once more with all lanes off.
   uint joint = gl_LocalInvocationID.x;
   if (joint < palette.jointCount) do {
     vec4 r0 = matrices[palette.matrices + joint * 3u];

@@ -8,8 +8,7 @@
 //   EXTRAS          previous positions and results; kept out of other modules, since layers and drivers take what a module names
 //                   for used, whatever its constants say
 //   COMPARISON      the methods that are there for comparison, instead of those for every day
-//   TEXELS          tables, meshes and palettes are read as uniform texel buffers: typed reads, which several drivers do much
-//                   faster
+//   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
 //   PAIRS           positions and normals, float32x3 each, are stored together (needs 64-bit integers)
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
@@ -195,9 +194,9 @@ void skinInstance(Instance instance, Work work, bool scales) {
   }
 }
 
-// Whether instances whose joints scale go through a loop of their own: some drivers execute what is in an `if` whatever its
-// condition is, and the others would pay for them. It takes longer to compile, which is not worth it for methods that are there for
-// comparison, nor where an invocation has few instances: drivers that want it so branch.
+// Whether instances with scaling joints have their own loop. lavapipe predicates instead of branching, so without that loop rigid
+// instances pay for the scale, too. The second loop takes longer to compile. Comparison methods do without it, and so do
+// invocations with few instances (the default for GPUs, which branch).
 #ifdef COMPARISON
 const bool APART = false;
 #elif defined(HAS_MOTION)
@@ -238,11 +237,11 @@ void main() {
   work.inputs = methodInputsOf(group.mesh, vertex);
   work.influences = influencesOf(sections, vertex, firstInfluence);
 
-  // Outside the loop: some drivers read push constants, too, as often as they stand there.
+  // Outside the loop, because lavapipe reads a push constant each time it is named.
   uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
   uvec4 offsets = run * uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
-  // Loops ask at their end whether they go on: some drivers execute the rest of a loop's body once more, to no effect, after the
-  // question, and where there is one instance that would be half of it all.
+  // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
+  // lanes off, which doubles the work of an invocation with one instance.
   uint left = 0xffffffffu >> (32u - count);  // a bit an instance
   if (APART) {
     uint scaling = 0u;

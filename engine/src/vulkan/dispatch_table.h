@@ -1,4 +1,4 @@
-// The entry points of one device, and what goes with each call: its error, names and labels for
+// The entry points of one device, error messages of failed calls, and names and labels for
 // tools. A table per device: there is no global state that a second device could overwrite.
 #pragma once
 

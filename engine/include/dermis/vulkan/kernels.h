@@ -17,8 +17,8 @@ namespace dermis::vulkan {
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
 /// memory is static: variants with one module get the same span. A module that stores less than a
-/// word needs the features that `DeviceLimits` tells of. Empty where this build of Dermis was made
-/// without it.
+/// word requires `storage16Bit` or `storage8Bit` of `DeviceLimits`. Empty if this build of Dermis
+/// does not contain the module.
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits);
 
 /// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
