@@ -83,23 +83,35 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
   for (const std::filesystem::path& input : inputs) {
     if (const std::optional<FileIdentity> file = identityOf(input)) read.insert(*file);
   }
-  std::map<std::string, std::string_view> written;  // and by which option
-  for (const auto& [option, output, frames] : outputs) {
-    if (output.empty()) continue;
-    const std::uint32_t names = frameName(output, 0) ? frames : 1;
-    for (std::uint32_t frame = 0; frame < names; ++frame) {
-      const std::string name = frameName(output, frame).value_or(output);
-      const std::optional<FileIdentity> identity = identityOf(name);
-      if (identity && read.contains(*identity)) {
-        return Error{ErrorCode::invalidArgument,
-                     fmt::format("{} {} would overwrite a file that is read", option, name)};
-      }
-      const std::optional<std::string> file = writtenFile(name);
-      if (!file) continue;
-      const auto [other, isNew] = written.try_emplace(*file, option);
-      if (isNew) continue;
+  std::map<std::string, std::string_view> written;  // single files, and by which option
+  const auto check = [&](std::string_view option, const std::string& name,
+                         bool isFrame) -> Result<void> {
+    const std::optional<FileIdentity> identity = identityOf(name);
+    if (identity && read.contains(*identity)) {
+      return Error{ErrorCode::invalidArgument,
+                   fmt::format("{} {} would overwrite a file that is read", option, name)};
+    }
+    if (isFrame && written.empty()) return {};
+    const std::optional<std::string> file = writtenFile(name);
+    if (!file) return {};
+    const auto other = written.find(*file);
+    if (other != written.end()) {
       return Error{ErrorCode::invalidArgument,
                    fmt::format("{} {} is the file that {} writes", option, name, other->second)};
+    }
+    if (!isFrame) written.emplace(*file, option);
+    return {};
+  };
+  // Single files first: frames, of which there may be millions, are only looked up.
+  for (const auto& [option, output, frames] : outputs) {
+    if (output.empty() || frameName(output, 0)) continue;
+    if (Result<void> good = check(option, output, false); !good) return good;
+  }
+  for (const auto& [option, output, frames] : outputs) {
+    for (std::uint32_t frame = 0; frame < frames; ++frame) {
+      const std::optional<std::string> name = frameName(output, frame);
+      if (!name) break;
+      if (Result<void> good = check(option, *name, true); !good) return good;
     }
   }
   return {};

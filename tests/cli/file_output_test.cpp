@@ -186,6 +186,18 @@ TEST(FileOutputTest, StandardOutputFifosAndDevicesAreWrittenThrough) {
   EXPECT_EQ(namesIn(folder).size(), 4u) << "no temporary file is left";
 }
 
+/// The first word is the option whose file is refused; the rest is the command.
+void expectRefusedOutput(std::vector<std::string> command, const std::string& why) {
+  SCOPED_TRACE(::testing::PrintToString(command));
+  const std::string option = command.front();
+  command.erase(command.begin());
+  const CommandResult result = dermis(command);
+  EXPECT_EQ(result.status, 2);
+  expectOneErrorLine(result);
+  EXPECT_NE(result.errors.find(option + " /"), std::string::npos) << result.errors;
+  EXPECT_NE(result.errors.find(why), std::string::npos) << result.errors;
+}
+
 TEST(FileOutputTest, TheModelIsNeverOverwritten) {
   const std::string folder = emptyFolder();
   const std::string model = folder + "/a0.glb";
@@ -211,16 +223,8 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
       {"--json", "verify", bar, model, "--json", model},
       {"--junit", "verify", model, "--junit", folder + "/hard.glb"},
   };
-  for (std::vector<std::string> command : commands) {
-    SCOPED_TRACE(::testing::PrintToString(command));
-    const std::string option = command.front();
-    command.erase(command.begin());
-    const CommandResult result = dermis(command);
-    EXPECT_EQ(result.status, 2);
-    expectOneErrorLine(result);
-    EXPECT_NE(result.errors.find(option + " /"), std::string::npos) << result.errors;
-    EXPECT_NE(result.errors.find(" would overwrite a file that is read"), std::string::npos)
-        << result.errors;
+  for (const std::vector<std::string>& command : commands) {
+    expectRefusedOutput(command, " would overwrite a file that is read");
     EXPECT_TRUE(textOf(model) == bytes);
   }
   const CommandResult few =
@@ -238,21 +242,24 @@ TEST(FileOutputTest, TwoOutputsAreNotOneFile) {
       {"--junit", "verify", "--json", folder + "/new", "--junit", folder + "/./new"},
       {"--json", "compare", bar, "-o", folder + "/new.png", "--json", folder + "/new.png"},
   };
-  for (std::vector<std::string> command : commands) {
-    SCOPED_TRACE(::testing::PrintToString(command));
-    const std::string option = command.front();
-    command.erase(command.begin());
-    const CommandResult result = dermis(command);
-    EXPECT_EQ(result.status, 2);
-    expectOneErrorLine(result);
-    EXPECT_NE(result.errors.find(option + " /"), std::string::npos) << result.errors;
-    EXPECT_NE(result.errors.find(" is the file that -"), std::string::npos) << result.errors;
+  for (const std::vector<std::string>& command : commands) {
+    expectRefusedOutput(command, " is the file that -");
     EXPECT_EQ(textOf(there), "kept");
     EXPECT_FALSE(std::filesystem::exists(folder + "/new"));
   }
   const CommandResult devices =
       dermis({"verify", folder + "/no.glb", "--json", "/dev/null", "--junit", "/dev/null"});
   EXPECT_EQ(devices.status, 3) << "it is the model that is missing; " << devices.errors;
+}
+
+TEST(FileOutputTest, AReportThatCannotBeWrittenDoesNotKeepTheOtherOne) {
+  REQUIRE_DEVICE();
+  const std::string folder = emptyFolder(), report = folder + "/good.xml";
+  const CommandResult result = dermis(
+      {"verify", folder + "/no.glb", "--json", folder + "/none/bad.json", "--junit", report});
+  EXPECT_EQ(result.status, 5) << result.errors;
+  EXPECT_NE(result.errors.find("bad.json"), std::string::npos) << result.errors;
+  EXPECT_NE(textOf(report).find("<error message="), std::string::npos) << textOf(report);
 }
 
 TEST(FileOutputTest, FilesBesideTheModelAreNotOverwritten) {
