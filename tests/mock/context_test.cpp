@@ -362,6 +362,7 @@ TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
       EXPECT_NE(prepared.error().message.find("storageBuffer16BitAccess"), std::string::npos);
     }
   }
+  EXPECT_TRUE(mock.modules.empty()) << "a module needs the feature, too";
   EXPECT_EQ(mock.alive["Pipeline"], 0);
 }
 

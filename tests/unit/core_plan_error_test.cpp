@@ -346,6 +346,19 @@ TEST_F(PlanErrors, FewStorageBuffersMeanNoResults) {
   }
 }
 
+TEST_F(PlanErrors, MethodsForComparisonMayBeLeftOutOfTheLibrary) {
+  limits.comparisonMethods = false;
+  for (const Method method : allMethods) {
+    job().method = method;
+    if (isForComparison(method)) {
+      expectRefused(ErrorCode::missingFeature, {"job 1", "DERMIS_COMPARISON_METHODS",
+                                                std::string(methodName(method)).c_str()});
+    } else {
+      expectGood();
+    }
+  }
+}
+
 // The one kernel that such devices have stores words.
 TEST_F(PlanErrors, FewStorageBuffersMeanWholeWords) {
   limits.maxStorageBuffersPerStage = 4;
