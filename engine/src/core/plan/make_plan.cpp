@@ -19,7 +19,6 @@ class PlanMaker {
   Result<void> placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
                         const Tuning& tuning);
   std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
-  InstanceExtras& nextExtras();
   const InstanceExtras* extrasOf(const Batch& batch, std::size_t index);
 
   std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits_;
@@ -72,15 +71,10 @@ std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint3
               : static_cast<std::uint32_t>(batch.palettes[palette].matrixOffset / unitBytes);
 }
 
-InstanceExtras& PlanMaker::nextExtras() {
-  if (extrasUsed_ == extras_.size()) extras_.emplace_back();
-  return extras_[extrasUsed_++];
-}
-
-/// Null where the job needs none. There is memory for those of all jobs, so that none moves.
+/// Null if the job needs none. `extras_` has room for those of all jobs, so that none moves.
 const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index) {
   const Job& job = batch.jobs[index];
-  InstanceExtras& extras = nextExtras();
+  InstanceExtras& extras = extras_[extrasUsed_];
   assignActive(job.morphs, extras.morphs);
   extras.result = results_[index];
   extras.hasBox = isSnormPosition(job.positions.format);
@@ -91,9 +85,9 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
     extras.previousJoints = batch.palettes[job.previousPalette].jointCount;
     assignActive(job.previousMorphs, extras.previousMorphs);
   }
-  if (extras.isNeeded()) return &extras;
-  --extrasUsed_;
-  return nullptr;
+  if (!extras.isNeeded()) return nullptr;
+  ++extrasUsed_;
+  return &extras;
 }
 
 Result<void> PlanMaker::placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
