@@ -5,13 +5,14 @@
 #
 # For each benchmark that both have: the time of COMMIT divided by the time of this tree (over 1: this tree is faster), each the
 # best of ROUNDS rounds; the median of RUNS runs, and the lowest and the highest of them. DERMIS_DEVICE names another device than
-# the best. With the machine idle: half an hour for all of them.
+# the best. Leave the machine idle. Shorter: RUNS=1 ROUNDS=1.
 set -eu
 commit=${1:?usage: tests/bench/against.sh COMMIT [FILTER]}
 filter=${2:-.}
 RUNS=${RUNS:-5}
 ROUNDS=${ROUNDS:-3}
 cd "$(dirname "$0")/../.."
+commit=$(git rev-parse --short "$commit^{commit}")
 ./cmake/install-deps.sh
 
 folder=$PWD/build/against
@@ -19,8 +20,9 @@ tree=$folder/$commit
 mkdir -p "$folder"
 [ -e "$tree/CMakeLists.txt" ] || git worktree add --detach --force "$tree" "$commit" >/dev/null
 build() { # TREE
-  (cd "$1" && cmake --preset release >"$folder/configure.log" && cmake --build build/release --target dermis_benchmarks |
-    tail -n 1)
+  echo "building $1" >&2
+  (cd "$1" && cmake --preset release && cmake --build build/release --target dermis_benchmarks) >"$folder/build.log" 2>&1 ||
+    { tail -n 20 "$folder/build.log"; exit 1; }
 }
 build "$tree"
 build "$PWD"
