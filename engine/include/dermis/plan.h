@@ -39,10 +39,10 @@ struct DeviceLimits {
   bool storage16Bit = false;
   bool storage8Bit = false;
   /// Texels of a uniform texel buffer. Where they suffice for a batch, kernels read its tables,
-  /// meshes and palettes through such buffers, which is faster on some drivers. 0: never.
+  /// meshes and palettes through such buffers, which is faster on lavapipe. 0: never.
   std::uint32_t maxTexelBufferElements = 0;
   /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64): to store two
-  /// words at a time, which is faster on some drivers.
+  /// words at a time, which is faster on lavapipe.
   bool shaderInt64 = false;
   /// Whether there are kernels for methods that are there for comparison: not where Dermis was
   /// built without `DERMIS_COMPARISON_METHODS`.
@@ -66,7 +66,7 @@ struct Palette {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPaletteJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
   /// Whether joints may scale or shear: many exporters leave a scale in their joints. It costs 32
-  /// bytes a joint of scratch, and on some drivers time, whether or not a pose makes use of it.
+  /// bytes a joint of scratch, and on lavapipe time, whether or not a pose makes use of it.
   /// Where it is denied, joints that do so all the same are skinned by their rotation alone, and
   /// counted in `PaletteStatus`.
   bool mayScale = true;
