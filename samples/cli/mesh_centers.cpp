@@ -69,7 +69,7 @@ class JoinedMesh {
       if (corner % 3 != 2) continue;
       std::ranges::sort(joints);
       const auto count =
-          static_cast<std::uint64_t>(std::ranges::unique(joints).begin() - joints.begin());
+          static_cast<std::uint64_t>(std::unique(joints.begin(), joints.end()) - joints.begin());
       if (count > 1) pairs += count * (count - 1) / 2;
       joints.clear();
     }
