@@ -4,7 +4,10 @@
 #define DERMIS_ABI_H
 
 #ifdef __cplusplus
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <span>
 namespace dermis::abi {
 using uint = std::uint32_t;
 #define DERMIS_CONSTANT inline constexpr uint
@@ -85,7 +88,7 @@ DERMIS_CONSTANT MOTION_RESKINNED = 2u;
 
 // Packed mesh: a header, then sections at word offsets from the blob's start.
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
-DERMIS_CONSTANT MESH_VERSION = 4u;
+DERMIS_CONSTANT MESH_VERSION = 5u;
 DERMIS_CONSTANT MESH_HEADER_MAGIC = 0u;
 DERMIS_CONSTANT MESH_HEADER_VERSION = 1u;
 DERMIS_CONSTANT MESH_HEADER_CHECKSUM =
@@ -124,21 +127,26 @@ DERMIS_CONSTANT INFLUENCE_JOINT = 1u;
 DERMIS_CONSTANT INFLUENCE_WORDS = 2u;
 
 // A morph target displaces some vertices of some blocks of MORPH_BLOCK_VERTICES: a record a block,
-// from the first such block to the last, with a mask of the displaced vertices and the place of the
-// first one's displacement; those of the others follow. A displacement has 3 floats for each
-// attribute of the target, in the order of MORPH_HAS_*.
-DERMIS_CONSTANT MORPH_FIRST_BLOCK = 0u;
-DERMIS_CONSTANT MORPH_BLOCK_COUNT = 1u;
-DERMIS_CONSTANT MORPH_BLOCKS = 2u;  // word offset of the block records
-DERMIS_CONSTANT MORPH_ATTRIBUTES = 3u;
+// from the first such block to the last. A displacement has 3 floats for each attribute of the
+// target, in the order of MORPH_HAS_*. Both records begin at multiples of 4 words.
+struct MorphRecord {
+  uint firstBlock;
+  uint blockCount;
+  uint blocks;      // word offset of the block records
+  uint attributes;  // MORPH_HAS_*
+};
 DERMIS_CONSTANT MORPH_WORDS = 4u;
 DERMIS_CONSTANT MORPH_HAS_POSITIONS = 1u;
 DERMIS_CONSTANT MORPH_HAS_NORMALS = 2u;
 DERMIS_CONSTANT MORPH_HAS_TANGENTS = 4u;
 DERMIS_CONSTANT MORPH_BLOCK_VERTICES = 64u;
-DERMIS_CONSTANT MORPH_BLOCK_MASK = 0u;           // 2 words, the low one first
-DERMIS_CONSTANT MORPH_BLOCK_DISPLACEMENTS = 2u;  // word offset
-DERMIS_CONSTANT MORPH_BLOCK_WORDS = 3u;
+struct MorphBlockRecord {
+  uint maskLow;  // a bit a vertex: whether it is displaced
+  uint maskHigh;
+  uint displacements;  // word offset of the first one; those of further vertices follow
+  uint reserved;
+};
+DERMIS_CONSTANT MORPH_BLOCK_WORDS = 4u;
 
 // ---- Records. A struct of scalars has the same layout in C++ and in std430; tables.glsl has a
 // loader for each. NAME_WORDS is its size. Tables are one buffer of words; records in them begin at
@@ -317,6 +325,18 @@ DERMIS_CONSTANT VISIBILITY_CHOOSES = 0u;
 DERMIS_CONSTANT VISIBILITY_COUNTS = 1u;
 
 #ifdef __cplusplus
+/// Records as words of a table or a packed mesh.
+template <typename Record>
+Record load(std::span<const uint> words, std::size_t first) {
+  Record record;
+  std::memcpy(&record, words.subspan(first, sizeof(Record) / 4).data(), sizeof(Record));
+  return record;
+}
+template <typename Record>
+void store(std::span<uint> words, std::size_t first, const Record& record) {
+  std::memcpy(words.subspan(first, sizeof(Record) / 4).data(), &record, sizeof(Record));
+}
+
 }  // namespace dermis::abi
 #endif
 #undef DERMIS_CONSTANT

@@ -48,12 +48,12 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
 
 // A vertex without influences stays in bind pose.
 Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
-  // Where up to four influences were read they are joint 0 for such a vertex. Most meshes have none: choosing afterwards costs
-  // less than a branch around everything, unless the method goes on until it converges.
+  // The loaded influences of such a vertex are joint 0. Most meshes have none: choosing afterwards costs less than a branch around
+  // everything, unless the method goes on until it converges.
 #ifdef COMPARISON
   const bool branches = true;
 #else
-  const bool branches = INFLUENCES == 0u;
+  const bool branches = false;
 #endif
   bool still = influences.count == 0u;
   if (branches && still) return vertex;

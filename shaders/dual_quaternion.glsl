@@ -19,38 +19,57 @@ struct Blend {
 
 float signedWeight(vec4 pivot, vec4 rotation, float weight) { return dot4(pivot, rotation) < 0.0 ? -weight : weight; }
 
-Blend blendJoints(Influences influences, Pose pose) {
-  uint pivotJoint = influenceJoint(influences, 0u);
-  vec4 pivot = paletteRotation(pose.palette, pivotJoint);
-  float pivotWeight = influenceWeight(influences, 0u);
-  precise vec4 real = pivotWeight * pivot;
-  precise vec4 dual = pivotWeight * paletteDual(pose.palette, pivotJoint);
-  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
-    if (slot >= influences.count) break;
-    float weight = influenceWeight(influences, slot);
-    uint joint = influenceJoint(influences, slot);
-    vec4 rotation = paletteRotation(pose.palette, joint);
-    float towardsPivot = signedWeight(pivot, rotation, weight);
-    real += towardsPivot * rotation;
-    dual += towardsPivot * paletteDual(pose.palette, joint);
-  }
+Blend addJoint(Blend blend, vec4 pivot, float weight, Pose pose, uint joint) {
+  vec4 rotation = paletteRotation(pose.palette, joint);
+  float towardsPivot = signedWeight(pivot, rotation, weight);
+  precise vec4 real = blend.real + towardsPivot * rotation;
+  precise vec4 dual = blend.dual + towardsPivot * paletteDual(pose.palette, joint);
   return Blend(real, dual);
+}
+
+Blend blendJoints(Influences influences, Pose pose) {
+  vec4 pivot = paletteRotation(pose.palette, influences.joints.x);
+  precise vec4 real = influences.weights.x * pivot;
+  precise vec4 dual = influences.weights.x * paletteDual(pose.palette, influences.joints.x);
+  Blend blend = Blend(real, dual);
+  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
+    if (slot >= influences.count) break;
+    blend = addJoint(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
+  }
+  if (hasFurther(influences)) {
+    uint slot = LOADED_INFLUENCES;
+    do {
+      Influence further = loadInfluence(influences, slot);
+      blend = addJoint(blend, pivot, further.weight, pose, further.joint);
+    } while (++slot < influences.count);
+  }
+  return blend;
 }
 
 // Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex comes
 // out to the bit as if the palette had no joint that does.
-ScaleShear blendScaleShear(Influences influences, Pose pose) {
-  ScaleShear pivot = paletteScaleShear(pose, influenceJoint(influences, 0u));
-  precise vec3 diagonal = pivot.diagonal;
-  precise vec3 mixed = pivot.mixed;
-  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
-    if (slot >= influences.count) break;
-    float weight = influenceWeight(influences, slot);
-    ScaleShear part = paletteScaleShear(pose, influenceJoint(influences, slot));
-    diagonal += weight * (part.diagonal - pivot.diagonal);
-    mixed += weight * (part.mixed - pivot.mixed);
-  }
+ScaleShear addScaleShear(ScaleShear blend, ScaleShear pivot, float weight, Pose pose, uint joint) {
+  ScaleShear part = paletteScaleShear(pose, joint);
+  precise vec3 diagonal = blend.diagonal + weight * (part.diagonal - pivot.diagonal);
+  precise vec3 mixed = blend.mixed + weight * (part.mixed - pivot.mixed);
   return ScaleShear(diagonal, mixed);
+}
+
+ScaleShear blendScaleShear(Influences influences, Pose pose) {
+  ScaleShear pivot = paletteScaleShear(pose, influences.joints.x);
+  ScaleShear blend = pivot;
+  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
+    if (slot >= influences.count) break;
+    blend = addScaleShear(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
+  }
+  if (hasFurther(influences)) {
+    uint slot = LOADED_INFLUENCES;
+    do {
+      Influence further = loadInfluence(influences, slot);
+      blend = addScaleShear(blend, pivot, further.weight, pose, further.joint);
+    } while (++slot < influences.count);
+  }
+  return blend;
 }
 
 // The first phase: a vertex scaled and sheared in bind space. Its directions are of unit length.

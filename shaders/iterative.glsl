@@ -45,7 +45,7 @@ Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 piv
 
 Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
   Blend blend = blendJoints(influences, pose);
-  vec4 pivot = paletteRotation(pose.palette, influenceJoint(influences, 0u));
+  vec4 pivot = paletteRotation(pose.palette, influences.joints.x);
   makeUnit(blend.real, blend.dual);
   for (uint step = 0u; step < MOST_STEPS; ++step) {
     float reach;

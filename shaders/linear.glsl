@@ -25,21 +25,37 @@ Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, 
   return skinned;
 }
 
+// Rows of a 3×4 matrix.
+struct Rows {
+  vec4 r0;
+  vec4 r1;
+  vec4 r2;
+};
+
+Rows addMatrix(Rows blend, float weight, Pose pose, uint joint) {
+  precise vec4 r0 = blend.r0 + weight * paletteRow(pose.palette, joint, 0u);
+  precise vec4 r1 = blend.r1 + weight * paletteRow(pose.palette, joint, 1u);
+  precise vec4 r2 = blend.r2 + weight * paletteRow(pose.palette, joint, 2u);
+  return Rows(r0, r1, r2);
+}
+
 Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
-  float pivotWeight = influenceWeight(influences, 0u);
-  uint pivotJoint = influenceJoint(influences, 0u);
-  precise vec4 r0 = pivotWeight * paletteRow(pose.palette, pivotJoint, 0u);
-  precise vec4 r1 = pivotWeight * paletteRow(pose.palette, pivotJoint, 1u);
-  precise vec4 r2 = pivotWeight * paletteRow(pose.palette, pivotJoint, 2u);
-  for (uint slot = 1u; slot < MOST_INFLUENCES; ++slot) {
+  precise vec4 r0 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 0u);
+  precise vec4 r1 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 1u);
+  precise vec4 r2 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 2u);
+  Rows blend = Rows(r0, r1, r2);
+  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
     if (slot >= influences.count) break;
-    float weight = influenceWeight(influences, slot);
-    uint joint = influenceJoint(influences, slot);
-    r0 += weight * paletteRow(pose.palette, joint, 0u);
-    r1 += weight * paletteRow(pose.palette, joint, 1u);
-    r2 += weight * paletteRow(pose.palette, joint, 2u);
+    blend = addMatrix(blend, influences.weights[slot], pose, influences.joints[slot]);
   }
-  return throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
+  if (hasFurther(influences)) {
+    uint slot = LOADED_INFLUENCES;
+    do {
+      Influence further = loadInfluence(influences, slot);
+      blend = addMatrix(blend, further.weight, pose, further.joint);
+    } while (++slot < influences.count);
+  }
+  return throughMatrix(vertex, blend.r0, blend.r1, blend.r2, withNormal, withTangent);
 }
 
 #endif

@@ -25,6 +25,16 @@ vec3 meshVector(uint word) {
 // The word at which a section begins.
 uint meshSection(uint mesh, uint header) { return mesh + meshWord(mesh + header); }
 
+MorphRecord loadMorph(uint word) {
+  uvec4 a = meshUnit(word / 4u);
+  return MorphRecord(a.x, a.y, a.z, a.w);
+}
+
+MorphBlockRecord loadMorphBlock(uint word) {
+  uvec4 a = meshUnit(word / 4u);
+  return MorphBlockRecord(a.x, a.y, a.z, a.w);
+}
+
 // The units at which stand the vertices of a mesh.
 struct Sections {
   uint positions;
@@ -38,7 +48,10 @@ Sections sectionsOf(uint mesh) {
   return Sections(units.x, units.y, units.z, units.w);
 }
 
-// The influences of one vertex. Up to four are read once, for all instances.
+// Influences of a vertex that are read once, for all its instances. Bounds the loops over them, so that drivers unroll these.
+const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
+
+// The influences of one vertex: the loaded ones, and where all of them stand.
 struct Influences {
   uint unit;
   uint count;
@@ -52,36 +65,42 @@ Influences influencesOf(Sections sections, uint vertex, uint first) {
   Influences influences;
   influences.unit = sections.influences + first / 2u;
   influences.count = (end / 2u - first / 2u) * 2u - first % 2u;
+  if (INFLUENCES != 0u) influences.count = min(influences.count, INFLUENCES);
   influences.weights = vec4(0.0);
   influences.joints = uvec4(0u);
-  if (INFLUENCES != 0u) {
-    influences.count = min(influences.count, INFLUENCES);
-    uvec4 two = uvec4(0u);
-    if (influences.count > 0u) two = meshUnit(influences.unit);
-    influences.weights.xy = uintBitsToFloat(two.xz);
-    influences.joints.xy = two.yw;
-    if (INFLUENCES > 2u) {
-      two = uvec4(0u);
-      if (influences.count > 2u) two = meshUnit(influences.unit + 1u);
-      influences.weights.zw = uintBitsToFloat(two.xz);
-      influences.joints.zw = two.yw;
-    }
+  uvec4 two = uvec4(0u);
+  if (influences.count > 0u) two = meshUnit(influences.unit);
+  influences.weights.xy = uintBitsToFloat(two.xz);
+  influences.joints.xy = two.yw;
+  if (LOADED_INFLUENCES > 2u) {
+    two = uvec4(0u);
+    if (influences.count > 2u) two = meshUnit(influences.unit + 1u);
+    influences.weights.zw = uintBitsToFloat(two.xz);
+    influences.joints.zw = two.yw;
   }
   return influences;
 }
 
-uvec2 readInfluence(uint unit, uint slot) {
-  uvec4 two = meshUnit(unit + slot / 2u);
-  return slot % 2u == 0u ? two.xy : two.zw;
+struct Influence {
+  float weight;
+  uint joint;
+};
+
+Influence loadInfluence(Influences influences, uint slot) {
+  uvec4 two = meshUnit(influences.unit + slot / 2u);
+  return slot % 2u == 0u ? Influence(uintBitsToFloat(two.x), two.y) : Influence(uintBitsToFloat(two.z), two.w);
 }
 
+// Whether a vertex has more than the loaded influences. Never, and a constant, where INFLUENCES is not 0.
+bool hasFurther(Influences influences) { return INFLUENCES == 0u && influences.count > LOADED_INFLUENCES; }
+
+// Any of them, for loops that do not tell apart which are loaded.
 float influenceWeight(Influences influences, uint slot) {
-  return INFLUENCES != 0u ? influences.weights[slot]
-                          : uintBitsToFloat(readInfluence(influences.unit, slot)[INFLUENCE_WEIGHT]);
+  return INFLUENCES != 0u ? influences.weights[slot] : loadInfluence(influences, slot).weight;
 }
 
 uint influenceJoint(Influences influences, uint slot) {
-  return INFLUENCES != 0u ? influences.joints[slot] : readInfluence(influences.unit, slot)[INFLUENCE_JOINT];
+  return INFLUENCES != 0u ? influences.joints[slot] : loadInfluence(influences, slot).joint;
 }
 
 // What some methods want to know of a vertex besides.

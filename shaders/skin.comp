@@ -54,8 +54,6 @@ layout(constant_id = CONSTANT_BOUNDS) const bool BOUNDS = false;
 const bool BOUNDS = false;
 #endif
 
-// Bounds loops over influences by a constant, so that drivers may unroll them.
-const uint MOST_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 0xffffffffu;
 const bool NORMALS = NORMAL_FORMAT != FORMAT_NONE;
 const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 

@@ -36,7 +36,8 @@ class OutputPlacer {
       }
     }
     if (output_.arrangement == Arrangement::interleaved) {
-      sizes_.positions = (sizes_.positions + vertices * vertexSize + 3) / 4 * 4;
+      // Positions and normals in pairs begin at multiples of 8 bytes.
+      sizes_.positions = (sizes_.positions + vertices * vertexSize + 7) / 8 * 8;
     }
   }
 

@@ -73,9 +73,10 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
   if (!packed) return packed.error();
   Crowd crowd{std::move(*context), std::move(*packed), jointCount, {}, {}, {}, {}, {}, {}};
 
-  // The plan of the largest batch there will be: which pipelines to build, what buffers to make.
+  // The plan of the largest batch there will be says what buffers to make. Pipelines depend on the
+  // method and the vertex layout, which all jobs share.
   if (Result<void> done = planCrowd(crowd); !done) return done.error();
-  if (Result<void> done = crowd.context.prepare(crowd.plan.variants()); !done) return done.error();
+  if (Result<void> done = crowd.context.prepare(crowd.jobs.front()); !done) return done.error();
 
   for (const auto& [role, buffer] :
        {std::pair{BufferRole::meshes, &crowd.meshes}, {BufferRole::positions, &crowd.output}}) {

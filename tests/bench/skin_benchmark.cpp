@@ -1,5 +1,6 @@
 // What skinning costs: influences, morph targets, formats, extras. Time is that of a submission and
-// the wait for it, of a batch of a hundred instances.
+// the wait for it, of a batch of a hundred instances. And what `prepare` builds for a method and a
+// layout.
 
 #include <benchmark/benchmark.h>
 
@@ -132,7 +133,35 @@ void add(const std::string& name, const std::function<Scene()>& make) {
       ->Unit(benchmark::kMillisecond);
 }
 
+/// Everything that instances of one method and layout may need, built while loading.
+void measurePrepare(benchmark::State& state, Method method) {
+  Job job;
+  job.method = method;
+  job.positions = {0, 24, VertexFormat::float32x3};
+  job.normals = {12, 24, VertexFormat::float32x3};
+  std::size_t pipelines = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Result<vulkan::Context> context = vulkan::Context::create(benchDevice()->device->description());
+    if (!context) return state.SkipWithError(context.error().message.c_str());
+    pipelines = everyVariant(job, context->limits(), context->tuning()).size();
+    state.ResumeTiming();
+    if (Result<void> built = context->prepare(job); !built)
+      return state.SkipWithError(built.error().message.c_str());
+    state.PauseTiming();
+    context = Error{};
+    state.ResumeTiming();
+  }
+  state.counters["pipelines"] = static_cast<double>(pipelines);
+}
+
 void registerAll() {
+  for (const Method method : allMethods) {
+    benchmark::RegisterBenchmark(
+        ("prepare/" + std::string(methodName(method))).c_str(),
+        [method](benchmark::State& state) { measurePrepare(state, method); })
+        ->Unit(benchmark::kMillisecond);
+  }
   using enum VertexFormat;
   for (const Method method : allMethods) {
     add("method/" + std::string(methodName(method)),

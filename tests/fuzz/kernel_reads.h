@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "abi.h"
@@ -46,25 +47,27 @@ class KernelReads {
 
   /// The word at which a target displaces a vertex, or 0. As the kernel finds it.
   std::uint32_t findDisplacement(std::uint32_t target, std::uint32_t vertex) const {
-    const std::uint32_t* record =
-        words_ + words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS;
-    const std::uint32_t block = vertex / abi::MORPH_BLOCK_VERTICES - record[abi::MORPH_FIRST_BLOCK];
-    if (block >= record[abi::MORPH_BLOCK_COUNT]) return 0;
-    const std::uint32_t* entry =
-        words_ + record[abi::MORPH_BLOCKS] + block * abi::MORPH_BLOCK_WORDS;
-    const std::uint64_t mask = entry[0] | std::uint64_t{entry[1]} << 32;
+    const abi::MorphRecord record = morph(target);
+    const std::uint32_t number = vertex / abi::MORPH_BLOCK_VERTICES - record.firstBlock;
+    if (number >= record.blockCount) return 0;
+    abi::MorphBlockRecord block;
+    std::memcpy(&block, words_ + record.blocks + number * abi::MORPH_BLOCK_WORDS, sizeof(block));
+    const std::uint64_t mask = block.maskLow | std::uint64_t{block.maskHigh} << 32;
     const std::uint64_t bit = std::uint64_t{1} << vertex % abi::MORPH_BLOCK_VERTICES;
     if ((mask & bit) == 0) return 0;
     const auto before = static_cast<std::uint32_t>(std::popcount(mask & (bit - 1)));
-    return entry[abi::MORPH_BLOCK_DISPLACEMENTS] + before * displacementWords(target);
+    return block.displacements + before * displacementWords(target);
   }
-  std::uint32_t attributes(std::uint32_t target) const {
-    return words_[words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS +
-                  abi::MORPH_ATTRIBUTES];
-  }
+  std::uint32_t attributes(std::uint32_t target) const { return morph(target).attributes; }
   float floatAt(std::uint32_t word) const { return std::bit_cast<float>(words_[word]); }
 
  private:
+  abi::MorphRecord morph(std::uint32_t target) const {
+    abi::MorphRecord record;
+    std::memcpy(&record, words_ + words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS,
+                sizeof(record));
+    return record;
+  }
   std::uint32_t displacementWords(std::uint32_t target) const {
     return 3 * static_cast<std::uint32_t>(std::popcount(attributes(target)));
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <random>
 #include <set>
 #include <string>
 #include <utility>
@@ -387,10 +388,11 @@ TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
   ASSERT_TRUE(bindings.ok());
   const std::string skin =
       " with positions as float32x3, normals as octahedral16x2, tangents as snorm8x4, previous "
-      "positions, bounds, for 4 influences has not been prepared";
-  const std::string sentences[] = {"the palette kernel has not been prepared",
-                                   "the variant of linear" + skin,
-                                   "the variant of dual_quaternion" + skin};
+      "positions, bounds, for 4 influences";
+  const std::string end = " has not been prepared";
+  const std::string sentences[] = {
+      "the palette kernel has not been prepared", "the variant of linear" + skin + end,
+      "the variant of dual_quaternion" + skin + " and joints that scale" + end};
   ASSERT_EQ(batch.plan.variants().size(), 3u);
   for (std::size_t prepared = 0; prepared < 3; ++prepared) {
     const Result<void> early = context->record(commandBuffer, batch.plan, *bindings);
@@ -416,14 +418,99 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
             "influences has not been prepared");
 }
 
-TEST_F(RecordTest, WhatEveryVariantListsIsEnough) {
-  ASSERT_NO_FATAL_FAILURE(create());
-  const MockBatch batch = richBatch(context->limits());
-  ASSERT_NE(batch.batch.jobs[0].method, batch.batch.jobs[1].method);
-  for (const Job& job : batch.batch.jobs)
-    ASSERT_TRUE(context->prepare(everyVariant(job, context->limits(), context->tuning())).ok());
-  const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-  EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
+/// A few methods and layouts, and batches of nothing else.
+struct KnownLayouts {
+  KnownLayouts(std::uint32_t seed, const Promises& promised) : engine(seed), promises(promised) {
+    const OwnedBatch random = randomRichBatch(seed, 200, false);
+    for (const Job& job : random.jobs) {
+      if (layouts.size() < 3) layouts.push_back(job);
+    }
+    Job pairs;  // stored two words at a time
+    pairs.positions = {0, 24, VertexFormat::float32x3};
+    pairs.normals = {12, 24, VertexFormat::float32x3};
+    layouts.push_back(pairs);
+  }
+
+  std::uint32_t below(std::uint32_t count) { return static_cast<std::uint32_t>(engine()) % count; }
+
+  /// Meshes, palettes and morph targets at random, as far as the promises allow.
+  MockBatch batch(const DeviceLimits& limits) {
+    MockBatch result;
+    OwnedBatch& owned = result.batch;
+    owned = OwnedBatch();
+    const std::uint32_t most = promises.maxInfluences != 0 ? promises.maxInfluences : 9;
+    for (int mesh = 0; mesh < 4; ++mesh) {
+      const std::uint32_t morphTargets = promises.noMorphTargets ? 0 : 3;
+      owned.addMesh(
+          meshOf(1 + below(200), 1 + below(most), 5, MeshParts{true, true, morphTargets}));
+      owned.addPalette(5 + below(4), !promises.noScale && below(2) == 0);
+    }
+    for (std::uint32_t count = below(30); count > 0; --count) {
+      const Job& layout = layouts[below(static_cast<std::uint32_t>(layouts.size()))];
+      Job job = owned.jobOf(below(4), below(4), layout.method);
+      const auto attribute = [&](OutputAttribute from) {
+        if (from.format == VertexFormat::none && from.stride == 0) return from;
+        from.offset += owned.outputSize;
+        return from;
+      };
+      job.positions = attribute(layout.positions);
+      job.normals = attribute(layout.normals);
+      job.tangents = attribute(layout.tangents);
+      job.previousPositions = attribute(layout.previousPositions);
+      job.motion = layout.motion;
+      job.previousPalette = below(4);
+      job.bounds = layout.bounds;
+      job.box = {{0, 0, 0}, {1, 1, 1}};
+      if (!promises.noMorphTargets && below(2) == 0)
+        job.morphs = owned.keep({{below(3), static_cast<float>(below(2))}});
+      owned.jobs.push_back(job);
+      owned.outputSize += std::uint64_t{1} << 20;
+    }
+    result.makePlan(limits);
+    return result;
+  }
+
+  std::mt19937 engine;
+  Promises promises;
+  std::vector<Job> layouts;
+};
+
+// What is known while loading decides which pipelines there are: nothing that happens to be in a
+// batch needs another.
+TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
+  for (std::uint32_t seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    mock.limits.maxTexelBufferElements = seed % 2 == 0 ? 65536 : 1 << 27;
+    VkPhysicalDeviceFeatures2 integers{};
+    integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    integers.features.shaderInt64 = VK_TRUE;
+    VkPhysicalDeviceVulkan12Features bytes{};
+    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    bytes.storageBuffer8BitAccess = VK_TRUE;
+    bytes.pNext = &integers;
+    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+    halves.storageBuffer16BitAccess = VK_TRUE;
+    halves.pNext = &bytes;
+    vulkan::DeviceDescription description = mock.description();
+    description.enabledFeatures = &halves;
+    if (seed % 3 == 1)
+      description.promises = {static_cast<std::uint8_t>(seed % 4 == 0 ? 1 : 4), seed % 5 == 0,
+                              seed % 7 < 3};
+    Result<vulkan::Context> made = vulkan::Context::create(description);
+    ASSERT_TRUE(made.ok());
+    KnownLayouts known(seed, description.promises);
+    for (const Job& layout : known.layouts)
+      ASSERT_TRUE(made->prepare(everyVariant(layout, made->limits(), made->tuning())).ok());
+    const int pipelines = mock.alive["Pipeline"];
+    for (int number = 0; number < 30; ++number) {
+      const MockBatch batch = known.batch(made->limits());
+      const Result<vulkan::Bindings> bindings = made->createBindings(batch.buffers());
+      ASSERT_TRUE(bindings.ok()) << bindings.error().message;
+      const Result<void> recorded = made->record(commandBuffer, batch.plan, *bindings);
+      ASSERT_TRUE(recorded.ok()) << recorded.error().message;
+    }
+    EXPECT_EQ(mock.alive["Pipeline"], pipelines);
+  }
 }
 
 TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {

@@ -15,6 +15,15 @@
 
 namespace dermis::test {
 
+/// Words of a morph target's record, and of its blocks'.
+inline constexpr std::size_t morphFirstBlock = offsetof(abi::MorphRecord, firstBlock) / 4;
+inline constexpr std::size_t morphBlockCount = offsetof(abi::MorphRecord, blockCount) / 4;
+inline constexpr std::size_t morphBlocks = offsetof(abi::MorphRecord, blocks) / 4;
+inline constexpr std::size_t morphAttributes = offsetof(abi::MorphRecord, attributes) / 4;
+inline constexpr std::size_t morphBlockMask = offsetof(abi::MorphBlockRecord, maskLow) / 4;
+inline constexpr std::size_t morphBlockDisplacements =
+    offsetof(abi::MorphBlockRecord, displacements) / 4;
+
 struct BlobInfluence {
   std::uint32_t joint;
   float weight;
@@ -87,34 +96,30 @@ class Blob {
   std::size_t morphRecord(std::uint32_t target) const {
     return word(abi::MESH_HEADER_MORPHS) + std::size_t{target} * abi::MORPH_WORDS;
   }
-  std::uint32_t morphAttributes(std::uint32_t target) const {
-    return word(morphRecord(target) + abi::MORPH_ATTRIBUTES);
-  }
   /// The record of a block, counted from the target's first.
   std::size_t morphBlock(std::uint32_t target, std::uint32_t block) const {
-    return word(morphRecord(target) + abi::MORPH_BLOCKS) +
-           std::size_t{block} * abi::MORPH_BLOCK_WORDS;
+    return word(morphRecord(target) + morphBlocks) + std::size_t{block} * abi::MORPH_BLOCK_WORDS;
   }
   /// Nothing where the target leaves the vertex alone.
   std::optional<BlobDisplacement> displacement(std::uint32_t target, std::uint32_t vertex) const {
-    const std::uint32_t firstBlock = word(morphRecord(target) + abi::MORPH_FIRST_BLOCK);
-    const std::uint32_t blockCount = word(morphRecord(target) + abi::MORPH_BLOCK_COUNT);
+    const std::uint32_t firstBlock = word(morphRecord(target) + morphFirstBlock);
+    const std::uint32_t blockCount = word(morphRecord(target) + morphBlockCount);
     const std::uint32_t vertexBlock = vertex / abi::MORPH_BLOCK_VERTICES;
     if (vertexBlock < firstBlock || vertexBlock - firstBlock >= blockCount) return std::nullopt;
     const std::size_t block = morphBlock(target, vertexBlock - firstBlock);
     const auto isDisplaced = [&](std::uint32_t lane) {
-      return (word(block + abi::MORPH_BLOCK_MASK + lane / 32) >> lane % 32 & 1u) != 0;
+      return (word(block + morphBlockMask + lane / 32) >> lane % 32 & 1u) != 0;
     };
     const std::uint32_t lane = vertex % abi::MORPH_BLOCK_VERTICES;
     if (!isDisplaced(lane)) return std::nullopt;
     std::size_t before = 0;
     for (std::uint32_t other = 0; other < lane; ++other) before += isDisplaced(other) ? 1u : 0u;
 
-    const std::uint32_t attributes = morphAttributes(target);
+    const std::uint32_t attributes = word(morphRecord(target) + morphAttributes);
     std::size_t each = 0;
     for (const std::uint32_t attribute : {1u, 2u, 4u})
       each += (attributes & attribute) != 0 ? 3u : 0u;
-    std::size_t place = word(block + abi::MORPH_BLOCK_DISPLACEMENTS) + before * each;
+    std::size_t place = word(block + morphBlockDisplacements) + before * each;
     const auto next = [&](std::uint32_t attribute) {
       std::array<float, 3> vector{};
       if ((attributes & attribute) == 0) return vector;

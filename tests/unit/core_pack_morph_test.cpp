@@ -103,7 +103,7 @@ TEST_F(PackMorphs, WhatIsZeroCostsNothing) {
   EXPECT_EQ(packTargets({MorphTargetView{}, zero.view()}).bytes().size(), without + 32);
   const Blob blob(packTargets({MorphTargetView{}, zero.view()}).bytes());
   for (std::uint32_t target = 0; target < 2; ++target) {
-    EXPECT_EQ(blob.word(blob.morphRecord(target) + abi::MORPH_BLOCK_COUNT), 0u);
+    EXPECT_EQ(blob.word(blob.morphRecord(target) + morphBlockCount), 0u);
     EXPECT_EQ(blob.displacement(target, 0), std::nullopt);
   }
 }
@@ -115,11 +115,12 @@ TEST_F(PackMorphs, AttributesThatNoVertexDisplacesAreLeftOut) {
   target.normals[77 * 3 + 1] = 0.5f;
   const PackedMesh result = packTargets({target.view()});
   const Blob blob(result.bytes());
-  EXPECT_EQ(blob.morphAttributes(0), abi::MORPH_HAS_NORMALS);
-  EXPECT_LE(result.bytes().size(), without + 4 * (4 + 3 + 3) + 12);
+  EXPECT_EQ(blob.word(blob.morphRecord(0) + morphAttributes), abi::MORPH_HAS_NORMALS);
+  EXPECT_LE(result.bytes().size(), without + 4 * (4 + 4 + 3) + 12);
   EXPECT_EQ(blob.displacement(0, 77)->normal, (std::array<float, 3>{0, 0.5f, 0}));
   target.tangents[200 * 3] = 2;
-  EXPECT_EQ(Blob(packTargets({target.view()}).bytes()).morphAttributes(0),
+  const Blob both(packTargets({target.view()}).bytes());
+  EXPECT_EQ(both.word(both.morphRecord(0) + morphAttributes),
             abi::MORPH_HAS_NORMALS | abi::MORPH_HAS_TANGENTS);
 }
 
@@ -144,17 +145,17 @@ TEST_F(PackMorphs, BlocksGoFromTheFirstDisplacedVertexToTheLast) {
     target.positions[vertex * 3] = 1;
   const Blob blob(packTargets({target.view()}).bytes());
   const std::size_t record = blob.morphRecord(0);
-  EXPECT_EQ(blob.word(record + abi::MORPH_FIRST_BLOCK), 2u);
-  EXPECT_EQ(blob.word(record + abi::MORPH_BLOCK_COUNT), 4u);
-  EXPECT_EQ(blob.morphAttributes(0), abi::MORPH_HAS_POSITIONS);
+  EXPECT_EQ(blob.word(record + morphFirstBlock), 2u);
+  EXPECT_EQ(blob.word(record + morphBlockCount), 4u);
+  EXPECT_EQ(blob.word(blob.morphRecord(0) + morphAttributes), abi::MORPH_HAS_POSITIONS);
   const std::uint32_t masks[][2] = {{1u << 2, 1u << 31}, {0, 0}, {0, 0}, {1u | 1u << 31, 1u}};
   for (std::uint32_t block = 0; block < 4; ++block) {
-    EXPECT_EQ(blob.word(blob.morphBlock(0, block) + abi::MORPH_BLOCK_MASK), masks[block][0]);
-    EXPECT_EQ(blob.word(blob.morphBlock(0, block) + abi::MORPH_BLOCK_MASK + 1), masks[block][1]);
+    EXPECT_EQ(blob.word(blob.morphBlock(0, block) + morphBlockMask), masks[block][0]);
+    EXPECT_EQ(blob.word(blob.morphBlock(0, block) + morphBlockMask + 1), masks[block][1]);
   }
   // The displacements of the second such block follow those of the first.
-  EXPECT_EQ(blob.word(blob.morphBlock(0, 3) + abi::MORPH_BLOCK_DISPLACEMENTS),
-            blob.word(blob.morphBlock(0, 0) + abi::MORPH_BLOCK_DISPLACEMENTS) + 2 * 3);
+  EXPECT_EQ(blob.word(blob.morphBlock(0, 3) + morphBlockDisplacements),
+            blob.word(blob.morphBlock(0, 0) + morphBlockDisplacements) + 2 * 3);
 }
 
 template <typename Stored>

@@ -156,8 +156,8 @@ TEST_F(DamagedBlob, SwappedWordsAreRefused) {
 }
 
 TEST_F(DamagedBlob, AnotherVersionIsNamed) {
-  ASSERT_EQ(abi::MESH_VERSION, 4u);
-  for (const std::uint32_t version : {0u, 1u, 2u, 3u, 5u, 0xffffffffu}) {
+  ASSERT_EQ(abi::MESH_VERSION, 5u);
+  for (const std::uint32_t version : {0u, 1u, 2u, 3u, 4u, 6u, 0xffffffffu}) {
     Blob changed = blob;
     changed.words()[abi::MESH_HEADER_VERSION] = version;
     changed.seal();
@@ -204,7 +204,7 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
   // Inside the blob, but not at a multiple of four words.
   for (const std::uint32_t header :
        {abi::MESH_HEADER_POSITIONS, abi::MESH_HEADER_NORMALS, abi::MESH_HEADER_TANGENTS,
-        abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_INFLUENCES}) {
+        abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_INFLUENCES, abi::MESH_HEADER_MORPHS}) {
     for (const std::uint32_t by : {1u, 2u, 3u}) {
       expectRefusedWith(header, blob.word(header) + by);
       expectRefusedWith(header, blob.word(header) - by);
@@ -266,17 +266,20 @@ TEST_F(DamagedBlob, EveryJointIndexIsChecked) {
 TEST_F(DamagedBlob, MorphRecordsThatLeaveTheBlobAreRefused) {
   for (const std::uint32_t target : {0u, 2u}) {
     const std::size_t record = blob.morphRecord(target);
-    ASSERT_EQ(blob.word(record + abi::MORPH_BLOCK_COUNT), 2u);
+    ASSERT_EQ(blob.word(record + morphBlockCount), 2u);
     // 66 vertices have two blocks.
     for (const std::uint32_t first : {1u, 2u, 0x7fffffffu, 0xfffffffeu, 0xffffffffu})
-      expectRefusedWith(record + abi::MORPH_FIRST_BLOCK, first);
+      expectRefusedWith(record + morphFirstBlock, first);
     for (const std::uint32_t count : {3u, 0x55555556u, 0x80000000u, 0xffffffffu})
-      expectRefusedWith(record + abi::MORPH_BLOCK_COUNT, count);
+      expectRefusedWith(record + morphBlockCount, count);
     for (const std::uint32_t offset :
-         {0u, abi::MESH_HEADER_WORDS - 1, size() - 5, size(), 0x7fffffffu, 0xffffffffu})
-      expectRefusedWith(record + abi::MORPH_BLOCKS, offset);
+         {0u, abi::MESH_HEADER_WORDS - 4, size() - 4, size(), 0x7ffffffcu, 0xfffffffcu})
+      expectRefusedWith(record + morphBlocks, offset);
+    // Kernels read four words at a time.
+    for (const std::uint32_t misaligned : {1u, 2u, 3u})
+      expectRefusedWith(record + morphBlocks, blob.word(record + morphBlocks) + misaligned);
     for (const std::uint32_t attributes : {8u, 15u, 0x80000001u, 0xffffffffu})
-      expectRefusedWith(record + abi::MORPH_ATTRIBUTES, attributes);
+      expectRefusedWith(record + morphAttributes, attributes);
   }
 }
 
@@ -291,11 +294,11 @@ TEST_F(DamagedBlob, DisplacementsOutsideTheBlobAreRefused) {
       ASSERT_GT(displaced, 0u);
       for (const std::uint32_t offset :
            {0u, abi::MESH_HEADER_WORDS - 1, size() - displaced * words + 1, size(), 0xfffffff0u}) {
-        expectRefusedWith(entry + abi::MORPH_BLOCK_DISPLACEMENTS, offset);
+        expectRefusedWith(entry + morphBlockDisplacements, offset);
       }
       // At the very end there is room for those that there are, and for no more.
       Blob changed = blob;
-      changed.words()[entry + abi::MORPH_BLOCK_DISPLACEMENTS] = size() - displaced * words;
+      changed.words()[entry + morphBlockDisplacements] = size() - displaced * words;
       changed.seal();
       ASSERT_TRUE(PackedMesh::fromBytes(changed.bytes()).ok());
       // One more in the mask, high or low.
@@ -373,7 +376,7 @@ TEST_F(DamagedBlob, NoRandomWordReachesOutside) {
   for (std::uint32_t target = 0; target < 3; ++target) {
     for (std::size_t word = 0; word < abi::MORPH_WORDS; ++word)
       targets.push_back(blob.morphRecord(target) + word);
-    if (blob.word(blob.morphRecord(target) + abi::MORPH_BLOCK_COUNT) == 0) continue;
+    if (blob.word(blob.morphRecord(target) + morphBlockCount) == 0) continue;
     for (std::size_t word = 0; word < 2 * abi::MORPH_BLOCK_WORDS; ++word)
       targets.push_back(blob.morphBlock(target, 0) + word);
   }

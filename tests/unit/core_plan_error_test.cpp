@@ -89,6 +89,48 @@ TEST_F(PlanErrors, MeshOffsets) {
   expectInvalid({"job 0"});
 }
 
+TEST_F(PlanErrors, BrokenPromises) {
+  job().mesh = batch.meshes[1].info();
+  job().normals = {};
+  limits.promises = {2, false, false};
+  expectGood();
+  limits.promises.maxInfluences = 1;
+  expectInvalid({"job 0", "2 influences", "maxInfluences is 1"});
+  limits.promises = {0, true, false};
+  expectInvalid({"job 0", "morph targets", "noMorphTargets"});
+  limits.promises = {0, false, true};
+  expectInvalid({"palette 0", "may scale", "noScale"});
+  for (Palette& palette : batch.palettes) palette.mayScale = false;
+  expectGood();
+}
+
+TEST_F(PlanErrors, PromisesThatNoKernelIsMadeFor) {
+  for (const std::uint8_t influences : {std::uint8_t{3}, std::uint8_t{5}, std::uint8_t{255}}) {
+    limits.promises.maxInfluences = influences;
+    expectInvalid({"maxInfluences", std::to_string(influences).c_str()});
+  }
+}
+
+// The same on every device: an engine must not find out on the next one.
+TEST_F(PlanErrors, PairsOfPositionsAndNormals) {
+  for (const bool texels : {false, true}) {
+    limits.texelBuffers = limits.shaderInt64 = texels;
+    batch.outputSize += 24;
+    const Job whole = job();
+    job().positions.offset += 4;
+    job().normals.offset += 4;
+    expectInvalid({"job 1", "multiple of 8"});
+    job().normals.offset += 4;
+    expectGood();
+    job() = whole;
+    batch.hasSeparateOutputs = true;
+    batch.separateSizes = {batch.outputSize, batch.outputSize, 0, 0};
+    expectInvalid({"job 0", "one buffer"});
+    batch.hasSeparateOutputs = false;
+    expectGood();
+  }
+}
+
 TEST_F(PlanErrors, PaletteIndices) {
   job().palette = 3;
   expectInvalid({"job 1", "palette 3", "3"});

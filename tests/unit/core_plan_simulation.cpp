@@ -272,6 +272,9 @@ class Simulation {
     ASSERT_EQ(variant.bounds, job.bounds);
     ASSERT_EQ(variant.morphs, isMorphed(job));
     ASSERT_TRUE(variant.influences == 0 || variant.influences >= job.mesh.maxInfluences);
+    ASSERT_TRUE(variant.scales || !mayScale(job));
+    const std::vector<Variant> foreseen = everyVariant(job, limits_, tuning_);
+    ASSERT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
     const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const bool isWanted = attributes[stream].format != VertexFormat::none;
@@ -288,6 +291,12 @@ class Simulation {
     const bool maySee = reads || job.motion != Motion::none;
     ASSERT_EQ(dispatch.afterPalettes, maySee && palettesDone_);
     ASSERT_TRUE(palettesDone_ || !reads);
+  }
+
+  bool mayScale(const Job& job) const {
+    if (job.method == Method::linear) return false;
+    return batch_.palettes[job.palette].mayScale ||
+           (job.motion == Motion::reskinned && batch_.palettes[job.previousPalette].mayScale);
   }
 
   std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
@@ -449,6 +458,7 @@ Job OwnedBatch::jobOf(std::uint32_t mesh, std::uint32_t palette, Method method) 
 Job& OwnedBatch::addJob(std::uint32_t mesh, std::uint32_t palette, Method method, bool normals,
                         std::uint32_t stride) {
   Job job = jobOf(mesh, palette, method);
+  if (normals && stride % 8 == 0) outputSize += outputSize % 8;
   job.positions = {outputSize, stride, VertexFormat::float32x3};
   if (normals) job.normals = {outputSize + 12, stride, VertexFormat::float32x3};
   outputSize += std::uint64_t{job.mesh.vertexCount} * stride;
@@ -465,6 +475,8 @@ Job& OwnedBatch::place(Job job, Arrangement arrangement, std::uint32_t gap) {
   std::uint32_t inVertex = 0;
   std::uint32_t vertexSize = gap;
   for (const OutputAttribute& attribute : attributes) vertexSize += formatSize(attribute.format);
+  // Positions and normals may stand in pairs.
+  if (arrangement == Arrangement::interleaved) outputSize += (8 - outputSize % 8) % 8;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     const std::uint32_t size = formatSize(attributes[stream].format);
     if (size == 0) continue;

@@ -178,21 +178,26 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
   EXPECT_EQ(keys.keys.size(), keys.count);
 }
 
-/// Every plan of one job with this layout and method, whatever its mesh and morph targets; removes
-/// from `unused` what they need.
+// ---- Which variants there are
+
+/// Every plan of one job with this layout and method, whatever its mesh, palette and morph targets;
+/// removes from `unused` what they need. What breaks a promise is left out.
 void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning& tuning,
                     const std::vector<Variant>& all, std::set<std::uint64_t>& unused) {
+  const Promises& promises = limits.promises;
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u}) {
+    if (promises.maxInfluences != 0 && influences > promises.maxInfluences) continue;
     OwnedBatch batch;
-    batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
+    batch.addMesh(
+        meshOf(10, influences, 8, MeshParts{true, true, promises.noMorphTargets ? 0u : 2u}));
     batch.addPalette(8, false);
-    batch.addPalette(8, true);
+    batch.addPalette(8, !promises.noScale);
     for (const float weight : {0.0f, 1.0f}) {
       for (const std::uint32_t palette : {0u, 1u}) {
         batch.jobs = {layout};
         batch.jobs[0].mesh = batch.jobOf(0, palette, layout.method).mesh;
         batch.jobs[0].palette = palette;
-        batch.jobs[0].morphs = batch.keep({{1, weight}});
+        if (!promises.noMorphTargets) batch.jobs[0].morphs = batch.keep({{1, weight}});
         batch.outputSize = 10000;
         Plan out;
         ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, tuning, out));
@@ -205,7 +210,14 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
   }
 }
 
-TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
+/// Skin kernels for a method without a promise: see `everyVariant`.
+std::size_t formsOf(Method method) {
+  if (method == Method::linear) return 5;
+  if (method == Method::dualQuaternion) return 6;
+  return isForComparison(method) ? 3 : 4;
+}
+
+std::vector<Job> variedLayouts() {
   std::vector<Job> layouts(4);
   layouts[0].positions = {0, 12, VertexFormat::float32x3};
   layouts[1].positions = {0, 24, VertexFormat::float32x3};
@@ -220,12 +232,19 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   layouts[3].tangents = {5000, 4, VertexFormat::octahedral16x2};
   layouts[3].motion = Motion::reskinned;
   layouts[3].previousPositions = {2000, 6, VertexFormat::none};
+  return layouts;
+}
+
+TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   DeviceLimits texelLimits = richLimits();
-  texelLimits.maxTexelBufferElements = 1 << 27;
+  texelLimits.texelBuffers = true;
+  DeviceLimits promising = richLimits();
+  promising.promises = {4, false, true};
   for (const auto& [limits, tuning] : {std::pair{richLimits(), Tuning{}},
                                        {richLimits(), Tuning{8, 1}},
-                                       {texelLimits, Tuning{128, 16}}}) {
-    for (const Job& layout : layouts) {
+                                       {texelLimits, Tuning{128, 16}},
+                                       {promising, Tuning{}}}) {
+    for (const Job& layout : variedLayouts()) {
       for (const Method method : allMethods) {
         Job job = layout;
         job.method = method;
@@ -233,11 +252,10 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
         std::set<std::uint64_t> unused;
         for (const Variant& variant : all) unused.insert(variant.key());
         EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
-        // Of joints that may scale or may not, which linear blending does not ask; with and without
-        // morph targets; for 1, 2, 4 and any number of influences; and palettes.
-        EXPECT_EQ(all.size(), (method == Method::linear ? 1u : 2u) * 2 * 4 + 1u);
+        const bool promised = limits.promises != Promises();
+        EXPECT_EQ(all.size(), 1 + (promised ? 2 : formsOf(method))) << methodName(method);
         ASSERT_NO_FATAL_FAILURE(planEverything(job, limits, tuning, all, unused));
-        // Whoever prepares for linear jobs has the palette kernel too: it clears the results.
+        // Linear jobs alone need no palettes, but results are cleared by that kernel.
         if (method == Method::linear && !hasResults(all.back())) {
           EXPECT_EQ(unused, std::set{all.front().key()});
           EXPECT_EQ(all.front().kernel, Kernel::palette);
@@ -249,41 +267,78 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   }
 }
 
-// A dispatch leaves the two-phase path out where none of its palettes may scale.
-TEST(Plan, DispatchesScaleWhereOneOfTheirPalettesMay) {
+// With every promise one pipeline is left.
+TEST(Plan, EachPromiseLeavesPipelinesOut) {
+  Job job;
+  job.positions = {0, 12, VertexFormat::float32x3};
+  const auto forms = [&](Method method, const Promises& promises) {
+    job.method = method;
+    DeviceLimits limits;
+    limits.promises = promises;
+    return everyVariant(job, limits, {}).size() - 1;
+  };
+  for (const Method method : allMethods) {
+    SCOPED_TRACE(methodName(method));
+    for (const std::uint8_t influences : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{4}})
+      EXPECT_EQ(forms(method, {influences, true, true}), 1u);
+    EXPECT_EQ(forms(method, {4, true, false}), method == Method::linear ? 1u : 2u);
+    EXPECT_EQ(forms(method, {4, false, true}), 2u);
+    EXPECT_EQ(forms(method, {0, true, true}), method == Method::linear           ? 4u
+                                              : method == Method::dualQuaternion ? 4u
+                                                                                 : 2u);
+    EXPECT_EQ(forms(method, {}), formsOf(method));
+  }
+}
+
+// A pipeline follows from the job alone: its neighbours do not change it.
+TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
+  const OwnedBatch batch = randomRichBatch(3, 60, false);
+  const auto variantsOf = [&](std::span<const Job> jobs) {
+    Batch part = batch.batch();
+    part.jobs = jobs;
+    Plan out;
+    EXPECT_TRUE(makePlan(part, richLimits(), {}, out).ok());
+    std::set<std::uint64_t> keys;
+    for (const Variant& variant : out.variants()) {
+      if (variant.kernel == Kernel::skin) keys.insert(variant.key());
+    }
+    return keys;
+  };
+  std::set<std::uint64_t> alone;
+  for (const Job& job : batch.jobs) {
+    const std::set<std::uint64_t> own = variantsOf({&job, 1});
+    EXPECT_EQ(own.size(), 1u);
+    alone.insert(own.begin(), own.end());
+  }
+  EXPECT_EQ(variantsOf(batch.jobs), alone);
+}
+
+// A kernel leaves the two-phase path out if no palette that it reads may scale.
+TEST(Plan, AJobScalesIfAPaletteThatItReadsMay) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 4, 8, MeshParts{true, false, 0}));
   batch.addPalette(8, false);
   batch.addPalette(8, true);
-  const auto scalesOf = [&](std::vector<std::pair<std::uint32_t, Method>> jobs) {
-    batch.jobs.clear();
-    batch.outputSize = 0;
-    for (const auto& [palette, method] : jobs) batch.addJob(0, palette, method, true);
+  const auto scales = [&](const Job& job) {
+    batch.jobs = {job};
     Plan out;
     EXPECT_TRUE(makePlan(batch.batch(), richLimits(), {}, out).ok());
     EXPECT_EQ(out.dispatches().back().variant.kernel, Kernel::skin);
     return out.dispatches().back().variant.scales;
   };
-  const Method dual = Method::dualQuaternion;
-  EXPECT_FALSE(scalesOf({{0, dual}, {0, dual}}));
-  EXPECT_TRUE(scalesOf({{0, dual}, {1, dual}}));
-  EXPECT_TRUE(scalesOf({{1, dual}, {0, dual}}));
-  EXPECT_FALSE(scalesOf({{1, Method::linear}}));
   for (const Method method : allMethods) {
-    EXPECT_FALSE(scalesOf({{0, method}, {0, method}})) << methodName(method);
-    EXPECT_EQ(scalesOf({{0, method}, {1, method}}), method != Method::linear) << methodName(method);
+    const Job rigid = batch.addJob(0, 0, method, true);
+    EXPECT_FALSE(scales(rigid)) << methodName(method);
+    const Job scaling = batch.addJob(0, 1, method, true);
+    EXPECT_EQ(scales(scaling), method != Method::linear) << methodName(method);
   }
   // Skinned again from a palette that may.
-  batch.jobs.clear();
-  batch.outputSize = 0;
-  Job& job = batch.addJob(0, 0, dual, true);
+  Job job = batch.addJob(0, 0, Method::dualQuaternion, true);
   job.motion = Motion::reskinned;
   job.previousPalette = 1;
   job.previousPositions = {240, 12, VertexFormat::none};
-  batch.outputSize = 1000;
-  Plan out;
-  ASSERT_TRUE(makePlan(batch.batch(), richLimits(), {}, out).ok());
-  EXPECT_TRUE(out.dispatches().back().variant.scales);
+  batch.outputSize += 1000;
+  EXPECT_TRUE(scales(job));
 }
 
 // ---- Plans as objects

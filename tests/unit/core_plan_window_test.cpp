@@ -62,9 +62,9 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
             << "attributes that lie near to each other share a window";
       }
       EXPECT_GT(windows.size(), 1u);
-      // One more dispatch a range of output and a combination of method and attributes.
+      // One more dispatch a range of output and a variant.
       EXPECT_LE(out.dispatches().size(),
-                1 + 2 * allMethods.size() * (batch.outputSize / outputWindowStep(limits) + 1));
+                1 + out.variants().size() * (batch.outputSize / outputWindowStep(limits) + 1));
       EXPECT_EQ(out.instanceCount(), batch.jobs.size());
     }
   }

@@ -20,8 +20,20 @@
 
 namespace dermis {
 
-/// The limits of a device that a plan must keep to; `vulkan::Context::limits` fills them. The
-/// defaults are what every Vulkan device has.
+/// What an engine promises of its meshes and palettes, so that it needs fewer pipelines (see
+/// `everyVariant`). `makePlan`, `addMesh` and `addPalette` refuse what breaks a promise.
+struct Promises {
+  /// Maximum influences of a vertex: 1, 2 or 4. All meshes are then skinned by pipelines for that
+  /// number. 0: no promise; there are pipelines for 1, 2, 4 and any number.
+  std::uint8_t maxInfluences = 0;
+  bool noMorphTargets = false;  ///< no mesh has morph targets
+  bool noScale = false;         ///< no palette has `mayScale`
+
+  friend bool operator==(const Promises&, const Promises&) = default;
+};
+
+/// The limits of a device, and what the engine promised, that a plan must keep to;
+/// `vulkan::Context::limits` fills them. The defaults are what every Vulkan device has.
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes
   /// Bytes, a power of two; also that of texel buffers, where they are read.
@@ -38,15 +50,17 @@ struct DeviceLimits {
   /// `DERMIS_SUBWORD_STORES` stores neither.
   bool storage16Bit = false;
   bool storage8Bit = false;
-  /// Texels of a uniform texel buffer. Where they suffice for a batch, kernels read its tables,
-  /// meshes and palettes through such buffers, which is faster on lavapipe. 0: never.
-  std::uint32_t maxTexelBufferElements = 0;
+  /// Whether kernels read tables, meshes and palettes through uniform texel buffers, which is
+  /// faster on lavapipe. A uniform texel buffer of 4-byte texels must then hold a whole storage
+  /// buffer range. Kernels that store less than a word do not.
+  bool texelBuffers = false;
   /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64): to store two
   /// words at a time, which is faster on lavapipe.
   bool shaderInt64 = false;
   /// Whether there are kernels for methods that are there for comparison: not where Dermis was
   /// built without `DERMIS_COMPARISON_METHODS`.
   bool comparisonMethods = true;
+  Promises promises;
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
@@ -74,6 +88,10 @@ struct Palette {
 
 /// Where one attribute of the skinned vertices goes: vertex v to `offset + v * stride` in the
 /// output buffer of that attribute. Bytes between attributes are never touched.
+///
+/// If positions and normals are float32x3 with equal strides, a multiple of 8, and normals begin 12
+/// bytes behind positions, both must go to one buffer (`OutputSizes::isOneBuffer`) and positions
+/// must begin at a multiple of 8.
 ///
 /// Offset, stride and the format's size are multiples of 4. With `DeviceLimits::storage16Bit` they
 /// may be multiples of 2 and, where `storage8Bit` is there too, any number.
@@ -155,8 +173,8 @@ struct OutputSizes {
   std::uint64_t normals = 0;
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
-  /// All attributes go to one and the same buffer. `record` holds the bindings to that where it
-  /// matters (`Variant::pairs`).
+  /// All attributes go to one and the same buffer. `record` checks the bindings if it matters
+  /// (`Variant::pairs`).
   bool isOneBuffer = false;
 
   static constexpr OutputSizes oneBuffer(std::uint64_t size) {
@@ -190,9 +208,11 @@ struct Variant {
   /// Bytes that one store writes to each stream: 4, 2 or 1.
   std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
   Motion motion = Motion::none;
-  bool morphs = false;
   bool bounds = false;
-  /// Dual quaternions: whether joints may scale or shear (`Palette::mayScale`).
+  /// With `scales`, and influences for any vertex.
+  bool morphs = false;
+  /// Whether joints may scale or shear (`Palette::mayScale`). Never for linear blending, which does
+  /// not ask.
   bool scales = false;
   /// Tables, meshes and palettes are read as uniform texel buffers, not as storage buffers.
   bool texels = false;
@@ -200,7 +220,7 @@ struct Variant {
   /// of 8 bytes, are stored together, two words at a time. Only with `texels`, without motion and
   /// results, and with `DeviceLimits::shaderInt64`.
   bool pairs = false;
-  /// 1, 2, 4, or 0 for any number of influences a vertex.
+  /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
   std::uint8_t instancesPerInvocation = 1;
   std::uint16_t workgroupSize = 64;
@@ -214,9 +234,10 @@ struct Variant {
 bool hasResults(const Variant& variant);
 
 /// Every variant that jobs with the method, outputs, motion and bounds of this one may need,
-/// whatever their mesh, palette and morph targets, and the sizes of their buffers, which decide on
-/// `texels` and `pairs`: for an engine that cannot foresee its batches but knows its vertex
-/// layouts, to hand to `Context::prepare` while loading.
+/// whatever their mesh, palette and morph targets and whatever else is in their batch: for
+/// `Context::prepare`, while loading. The palette kernel; and the skin kernel for at most 1, 2 and
+/// 4 influences; for 4 with joints that scale; for any number; for any number with morph targets.
+/// Some methods need fewer, and `Promises` leave more out.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The buffers of a batch.

@@ -115,9 +115,7 @@ Result<void> BindingsState::createTexelViews() {
   if (context->texelBindingCount() == 0) return {};
   const auto create = [this](const BufferRange& range, VkFormat format, std::uint32_t texelSize,
                              VkBufferView& view) -> Result<void> {
-    // What does not fit no plan reads so; a part of a texel at the end is nothing that is read so.
-    const std::uint64_t texels =
-        std::min<std::uint64_t>(range.size / texelSize, context->limits.maxTexelBufferElements);
+    const std::uint64_t texels = range.size / texelSize;
     if (range.buffer == VK_NULL_HANDLE || texels == 0) return {};
     VkBufferViewCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;

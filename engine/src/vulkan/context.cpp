@@ -6,6 +6,7 @@
 
 #include "abi.h"
 #include "dermis_kernels.h"
+#include "plan/check.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {
@@ -26,7 +27,7 @@ Result<void> checkDescription(const DeviceDescription& description) {
                      std::to_string(VK_API_VERSION_MAJOR(description.apiVersion)) + "." +
                      std::to_string(VK_API_VERSION_MINOR(description.apiVersion))};
   }
-  return {};
+  return checkPromises(description.promises);
 }
 
 /// The features that are used, among the structures of a pNext chain.
@@ -143,8 +144,11 @@ Result<Context> Context::create(const DeviceDescription& description) {
   // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
   if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
     state.tuning.instancesPerInvocation = 24;
-  if (description.texelBuffers && state.limits.maxStorageBuffersPerStage >= storageBuffersWanted) {
-    state.limits.maxTexelBufferElements = properties.limits.maxTexelBufferElements;
+  state.limits.promises = description.promises;
+  state.limits.texelBuffers =
+      description.texelBuffers && state.limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
+      state.limits.maxStorageBufferRange / 4 <= properties.limits.maxTexelBufferElements;
+  if (state.limits.texelBuffers) {
     state.limits.minStorageBufferOffsetAlignment =
         std::max(state.limits.minStorageBufferOffsetAlignment,
                  static_cast<std::uint32_t>(properties.limits.minTexelBufferOffsetAlignment));
@@ -168,6 +172,10 @@ const DeviceLimits& Context::limits() const {
 
 Tuning Context::tuning() const {
   return state_->tuning;
+}
+
+Result<void> Context::prepare(const Job& job) {
+  return prepare(everyVariant(job, state_->limits, state_->tuning));
 }
 
 Result<void> Context::prepare(std::span<const Variant> variants) {

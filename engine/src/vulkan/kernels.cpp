@@ -47,6 +47,9 @@ static_assert(sizeof(abi::ExtensionRecord) == abi::EXTENSION_WORDS * 4 &&
 static_assert(sizeof(abi::CulledDispatchRecord) == abi::CULLED_DISPATCH_WORDS * 4);
 static_assert(sizeof(abi::IndirectRecord) == abi::INDIRECT_WORDS * 4);
 static_assert(sizeof(abi::ActiveMorph) == abi::ACTIVE_MORPH_WORDS * 4);
+static_assert(sizeof(abi::MorphRecord) == abi::MORPH_WORDS * 4 && abi::MORPH_WORDS == 4);
+static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
+              abi::MORPH_BLOCK_WORDS == 4);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
 // What the engine sees has the layout of what kernels write and read.
 static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&

@@ -31,10 +31,12 @@ std::string describe(const Variant& variant) {
   if (variant.motion != Motion::none) text += ", previous positions";
   if (variant.morphs) text += ", morph targets";
   if (variant.bounds) text += ", bounds";
-  return text + ", for " +
-         (variant.influences == 0 ? std::string("any number of")
-                                  : std::to_string(variant.influences)) +
-         " influences";
+  text += ", for " +
+          (variant.influences == 0 ? std::string("any number of")
+                                   : std::to_string(variant.influences)) +
+          " influences";
+  if (variant.scales) text += " and joints that scale";
+  return text;
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ struct ContextState {
   }
   /// They follow the storage buffers: a device with fewer of those reads no texels.
   std::uint32_t texelBindingCount() const {
-    return limits.maxTexelBufferElements != 0 ? abi::TEXEL_BINDING_COUNT : 0;
+    return limits.texelBuffers ? abi::TEXEL_BINDING_COUNT : 0;
   }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();

@@ -36,10 +36,12 @@ struct DeviceDescription {
   /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64, of VkPhysicalDeviceFeatures2.
   /// Read by `create` only.
   const void* enabledFeatures = nullptr;
-  /// Whether the engine gives its buffers the usage that `Plan::buffer` tells,
-  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT among it: then kernels read through texel buffers
-  /// where they can. Turn it off for buffers that are made elsewhere and are storage buffers only.
+  /// Whether the engine's buffers have the usage that `Plan::buffer` returns, which includes
+  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT if kernels read through texel buffers. Set it to
+  /// false for buffers that are storage buffers only.
   bool texelBuffers = true;
+  /// What the engine promises of its meshes and palettes, so that it needs fewer pipelines.
+  Promises promises;
   /// Every pipeline is built with it, where given; the engine stores and loads it.
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;
   /// Used for every object that Dermis creates, where given; must outlive the Context.
@@ -70,8 +72,14 @@ class Context {
   /// How to cut up the work on this device.
   Tuning tuning() const;
 
-  /// Builds the pipelines of these variants; those that exist are skipped. May take long: call it
-  /// from a loading thread. Where it fails (`vulkanError`), what was built before stays built.
+  /// Builds every pipeline that jobs with the method, outputs, motion and bounds of this one may
+  /// need (`everyVariant`). Once all methods and layouts are prepared, `record` needs no other
+  /// pipeline, whatever meshes, palettes and morph targets a batch has. May take long: call it from
+  /// a loading thread. If it fails (`missingFeature`, `vulkanError`), what was built before stays
+  /// built.
+  Result<void> prepare(const Job& job);
+
+  /// Builds the pipelines of these variants only. Those that exist are skipped.
   Result<void> prepare(std::span<const Variant> variants);
 
   /// Makes the descriptor sets and buffer views for a set of buffers. Fails with `invalidArgument`
@@ -89,10 +97,10 @@ class Context {
   /// plan stand in the tables buffer when the GPU gets there, and keeps the bindings until the GPU
   /// is done.
   ///
-  /// Fails with `notPrepared` where a variant of the plan has no pipeline, with `invalidArgument`
-  /// where a buffer is smaller than the plan needs, and with `limitExceeded` where, without
-  /// VK_KHR_push_descriptor, the attributes of an instance lie in different windows of outputs that
-  /// are larger than a storage buffer range; nothing is recorded then.
+  /// Fails with `notPrepared` if `prepare` was not called for a method or layout, with
+  /// `invalidArgument` where a buffer is smaller than the plan needs, and with `limitExceeded`
+  /// where, without VK_KHR_push_descriptor, the attributes of an instance lie in different windows
+  /// of outputs that are larger than a storage buffer range; nothing is recorded then.
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 

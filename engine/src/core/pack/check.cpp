@@ -54,31 +54,28 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words) {
 Result<void> checkMorph(std::span<const std::uint32_t> words, std::uint32_t target,
                         std::uint64_t& behind) {
   const std::uint32_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
-  const std::size_t record =
-      words[abi::MESH_HEADER_MORPHS] + std::size_t{target} * abi::MORPH_WORDS;
-  const std::uint64_t firstBlock = words[record + abi::MORPH_FIRST_BLOCK];
-  const std::uint64_t blockCount = words[record + abi::MORPH_BLOCK_COUNT];
-  const std::uint32_t attributes = words[record + abi::MORPH_ATTRIBUTES];
+  const auto morph = abi::load<abi::MorphRecord>(
+      words, words[abi::MESH_HEADER_MORPHS] + std::size_t{target} * abi::MORPH_WORDS);
+  const std::uint64_t blockCount = morph.blockCount;
   if (blockCount == 0) return {};
   const std::uint64_t allBlocks =
       (std::uint64_t{vertices} + abi::MORPH_BLOCK_VERTICES - 1) / abi::MORPH_BLOCK_VERTICES;
-  if (firstBlock + blockCount > allBlocks || attributes > 7 ||
-      !isSection(words[record + abi::MORPH_BLOCKS], blockCount * abi::MORPH_BLOCK_WORDS,
-                 words.size())) {
+  if (morph.firstBlock + blockCount > allBlocks || morph.attributes > 7 ||
+      !isUnitSection(morph.blocks, blockCount, words.size())) {
     return damagedBlob("morph target " + std::to_string(target) + " lies outside the blob");
   }
-  if (words[record + abi::MORPH_BLOCKS] < behind)
+  if (morph.blocks < behind)
     return damagedBlob("morph target " + std::to_string(target) + " overlaps the one before");
-  behind = words[record + abi::MORPH_BLOCKS] + blockCount * abi::MORPH_BLOCK_WORDS;
+  behind = morph.blocks + blockCount * abi::MORPH_BLOCK_WORDS;
   const std::uint64_t displacementWords =
-      std::uint64_t{3} * static_cast<std::uint32_t>(std::popcount(attributes));
-  for (std::uint64_t block = 0; block < blockCount; ++block) {
-    const std::size_t entry = static_cast<std::size_t>(words[record + abi::MORPH_BLOCKS] +
-                                                       block * abi::MORPH_BLOCK_WORDS);
-    const std::uint64_t displaced = static_cast<std::uint64_t>(std::popcount(words[entry])) +
-                                    static_cast<std::uint64_t>(std::popcount(words[entry + 1]));
-    if (displaced != 0 && !isSection(words[entry + abi::MORPH_BLOCK_DISPLACEMENTS],
-                                     displaced * displacementWords, words.size())) {
+      std::uint64_t{3} * static_cast<std::uint32_t>(std::popcount(morph.attributes));
+  for (std::uint64_t number = 0; number < blockCount; ++number) {
+    const auto block = abi::load<abi::MorphBlockRecord>(
+        words, static_cast<std::size_t>(morph.blocks + number * abi::MORPH_BLOCK_WORDS));
+    const std::uint64_t displaced = static_cast<std::uint64_t>(std::popcount(block.maskLow)) +
+                                    static_cast<std::uint64_t>(std::popcount(block.maskHigh));
+    if (displaced != 0 &&
+        !isSection(block.displacements, displaced * displacementWords, words.size())) {
       return damagedBlob("displacements of morph target " + std::to_string(target) +
                          " lie outside the blob");
     }
@@ -129,9 +126,8 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
       !areVectors(abi::MESH_HEADER_CENTERS) ||
       !areFloats(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS) ||
       !areFloats(abi::MESH_HEADER_BULGE_STRENGTHS) ||
-      !isSection(words[abi::MESH_HEADER_MORPHS],
-                 std::uint64_t{words[abi::MESH_HEADER_MORPH_COUNT]} * abi::MORPH_WORDS,
-                 words.size())) {
+      !isUnitSection(words[abi::MESH_HEADER_MORPHS], words[abi::MESH_HEADER_MORPH_COUNT],
+                     words.size())) {
     return damagedBlob("its header does not fit its sections");
   }
   if (Result<void> good = checkInfluences(words); !good) return good;

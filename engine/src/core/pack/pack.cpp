@@ -17,6 +17,11 @@
 namespace dermis {
 namespace {
 
+/// Kernels read four words at a time.
+void alignToUnit(std::vector<std::uint32_t>& words) {
+  words.resize((words.size() + 3) / 4 * 4, 0u);
+}
+
 /// A target's displacements, read by element.
 class Displacements {
  public:
@@ -94,20 +99,21 @@ void appendTarget(const Displacements& displacements, std::size_t record,
   };
   const std::uint32_t firstBlock = blockOf(elements.front());
   const std::uint32_t blockCount = blockOf(elements.back()) - firstBlock + 1;
+  alignToUnit(words);
   const std::size_t blocks = words.size();
   words.resize(blocks + std::size_t{blockCount} * abi::MORPH_BLOCK_WORDS, 0u);
-  words[record + abi::MORPH_FIRST_BLOCK] = firstBlock;
-  words[record + abi::MORPH_BLOCK_COUNT] = blockCount;
-  words[record + abi::MORPH_BLOCKS] = static_cast<std::uint32_t>(blocks);
-  words[record + abi::MORPH_ATTRIBUTES] = displacements.attributes();
+  abi::store(words, record,
+             abi::MorphRecord{firstBlock, blockCount, static_cast<std::uint32_t>(blocks),
+                              displacements.attributes()});
   for (const std::uint32_t element : elements) {
-    const std::size_t block =
+    const std::size_t place =
         blocks + std::size_t{blockOf(element) - firstBlock} * abi::MORPH_BLOCK_WORDS;
+    auto block = abi::load<abi::MorphBlockRecord>(words, place);
+    if (block.maskLow == 0 && block.maskHigh == 0)
+      block.displacements = static_cast<std::uint32_t>(words.size());
     const std::uint32_t lane = displacements.vertex(element) % abi::MORPH_BLOCK_VERTICES;
-    if (words[block] == 0 && words[block + 1] == 0) {
-      words[block + abi::MORPH_BLOCK_DISPLACEMENTS] = static_cast<std::uint32_t>(words.size());
-    }
-    words[block + abi::MORPH_BLOCK_MASK + lane / 32] |= 1u << lane % 32;
+    (lane < 32 ? block.maskLow : block.maskHigh) |= 1u << lane % 32;
+    abi::store(words, place, block);
     displacements.append(element, words);
   }
 }
@@ -115,6 +121,7 @@ void appendTarget(const Displacements& displacements, std::size_t record,
 }  // namespace
 
 std::uint32_t appendMorphs(const MeshView& mesh, std::vector<std::uint32_t>& words) {
+  alignToUnit(words);
   const std::size_t records = words.size();
   words.resize(records + mesh.morphTargets.size() * abi::MORPH_WORDS, 0u);
   for (std::size_t target = 0; target < mesh.morphTargets.size(); ++target) {
@@ -132,10 +139,6 @@ constexpr std::uint64_t mostWords = 0xffffffffu;
 
 std::uint32_t offsetOf(const std::vector<std::uint32_t>& words) {
   return static_cast<std::uint32_t>(words.size());
-}
-
-void alignToUnit(std::vector<std::uint32_t>& words) {
-  words.resize((words.size() + 3) / 4 * 4, 0u);
 }
 
 /// With one record more than there are vertices; where influences begin is not known yet.
@@ -215,7 +218,7 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
   for (const MorphTargetView& target : mesh.morphTargets) {
     const std::uint64_t displaced =
         target.vertices.empty() ? mesh.vertexCount : target.vertices.size();
-    words += abi::MORPH_WORDS + displaced * 9 + mesh.vertexCount / 16;
+    words += 2 * abi::MORPH_WORDS + displaced * 9 + mesh.vertexCount / 16 + abi::MORPH_BLOCK_WORDS;
   }
   return words;
 }

@@ -25,11 +25,7 @@ void alignToUnit(std::vector<std::uint32_t>& tables) {
   tables.resize(divideUp(tables.size(), 4) * 4);
 }
 
-template <typename Record>
-void store(std::vector<std::uint32_t>& tables, std::size_t word, const Record& record) {
-  static_assert(std::is_trivially_copyable_v<Record> && sizeof(Record) % 4 == 0);
-  std::memcpy(&tables[word], &record, sizeof(Record));
-}
+using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
   const auto centre = [&](std::size_t axis) {
@@ -72,11 +68,11 @@ Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceL
                      " is culled on the GPU and needs more than one output range: the GPU would "
                      "choose each part for itself"};
   }
-  Variant variant = skinVariant(job, tuning);
-  const bool mayPair = placing.outputs.isOneBuffer && mayStorePairs(job, limits);
+  const Variant variant = skinVariant(job, placing.mayScale, limits, tuning);
   const std::uint64_t step = outputWindowStep(limits);
   GroupKey key;
   key.mesh = job.meshOffset;
+  key.variant = variant.key();
   key.isCulled = placing.isCulled;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
@@ -84,15 +80,13 @@ Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceL
     key.windows = run.windows;
     key.firstVertex = run.firstVertex;
     key.vertexEnd = run.vertexEnd;
-    variant.pairs = mayPair && run.windows[0] == run.windows[1];
-    key.variant = variant.key();
     const auto place = [&](std::size_t stream) {
       if (streams[stream].size == 0) return 0u;
       return static_cast<std::uint32_t>(streams[stream].begin(run.firstVertex) -
                                         run.windows[stream] * step);
     };
     PlacedRun& placed = runs.emplace_back();
-    placed.group = acquire(key, variant, job.mesh.maxInfluences, placing.mayScale);
+    placed.group = acquire(key, variant);
     placed.record.jointCount = placing.jointCount;
     placed.record.positions = place(0);
     placed.record.normals = place(1);
@@ -102,8 +96,7 @@ Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceL
   return {};
 }
 
-std::uint32_t Groups::acquire(const GroupKey& key, const Variant& variant,
-                              std::uint32_t maxInfluences, bool scales) {
+std::uint32_t Groups::acquire(const GroupKey& key, const Variant& variant) {
   std::uint32_t group = last_;
   if (group == notUsed || entries_[group].users == 0 || !(entries_[group].group.key == key)) {
     const auto [found, isNew] = find_.try_emplace(key, 0);
@@ -122,10 +115,7 @@ std::uint32_t Groups::acquire(const GroupKey& key, const Variant& variant,
     }
     group = last_ = found->second;
   }
-  Entry& entry = entries_[group];
-  entry.group.maxInfluences = std::max(entry.group.maxInfluences, maxInfluences);
-  entry.group.scales |= scales;
-  ++entry.users;
+  ++entries_[group].users;
   return group;
 }
 
@@ -201,7 +191,6 @@ Result<void> PlanBuilder::finish() {
                  "the tables of the batch are larger than a storage buffer range; split it"};
   }
   plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
-  chooseTexels();
   listVariants();
   return {};
 }
@@ -258,15 +247,11 @@ Result<void> PlanBuilder::addDispatches() {
   for (std::size_t begin = 0; begin < order_.size();) {
     std::size_t end = begin;
     std::uint64_t workgroups = 0;
-    std::uint32_t maxInfluences = 0;
-    bool scales = false;
     for (; end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin]);
          ++end) {
       Group& group = planGroups_[order_[end]];
       group.firstInstance = firstInstance;
       firstInstance += group.instances;
-      maxInfluences = std::max(maxInfluences, group.maxInfluences);
-      scales |= group.scales;
       const std::uint64_t vertexGroups =
           divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
       workgroups += vertexGroups * divideUp(group.instances, tuning_.instancesPerInvocation);
@@ -286,9 +271,7 @@ Result<void> PlanBuilder::addDispatches() {
       store(tables, groupRecords + end * abi::GROUP_WORDS, record);
     }
     const Group& group = planGroups_[order_[begin]];
-    Variant variant = group.variant;
-    variant.influences = influenceClass(maxInfluences);
-    variant.scales = scales;
+    const Variant& variant = group.variant;
     const DispatchConstants constants{
         static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
         static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
@@ -399,19 +382,6 @@ void PlanBuilder::appendCulledDispatches() {
                                     dispatch.variant.instancesPerInvocation, 0});
     // Only the GPU will know how many there are. Those too many find no instance in the last group.
     dispatch.constants.workgroupCount = notUsed;
-  }
-}
-
-/// All that a variant reads through texels has to fit, or nothing is read so.
-void PlanBuilder::chooseTexels() {
-  const bool fits = fitsUnitTexels(plan_->tables.size() * 4, limits_) &&
-                    fitsWordTexels(plan_->meshesSize, limits_);
-  for (Dispatch& dispatch : plan_->dispatches) {
-    Variant& variant = dispatch.variant;
-    const std::uint64_t palettes =
-        variant.method == Method::linear ? plan_->matricesSize : plan_->palettesSize;
-    variant.texels = fits && fitsUnitTexels(palettes, limits_) && mayReadTexels(variant, limits_);
-    variant.pairs &= variant.texels;
   }
 }
 

@@ -72,9 +72,7 @@ struct GroupKeyHash {
 
 struct Group {
   GroupKey key;
-  Variant variant;  ///< of its dispatch, but for the influences and scale
-  std::uint32_t maxInfluences = 0;
-  bool scales = false;
+  Variant variant;  ///< of its dispatch
   std::uint32_t instances = 0;
   std::uint32_t firstInstance = 0;
   std::uint32_t filled = 0;
@@ -115,8 +113,7 @@ class Groups {
     std::uint64_t plan = 0;       ///< the last one that it was used in …
     std::uint32_t planGroup = 0;  ///< … and its number there
   };
-  std::uint32_t acquire(const GroupKey& key, const Variant& variant, std::uint32_t maxInfluences,
-                        bool scales);
+  std::uint32_t acquire(const GroupKey& key, const Variant& variant);
 
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
@@ -262,7 +259,6 @@ class PlanBuilder {
   std::uint32_t appendExtension(const InstanceExtras& extras);
   void appendCandidates();
   void appendCulledDispatches();
-  void chooseTexels();
   void listVariants();
 
   PlanData* plan_ = nullptr;

@@ -82,6 +82,20 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& sub
   return {};
 }
 
+Result<void> checkPair(const Batch& batch, const Job& job, const Subject& subject) {
+  if (!standsInPairs(job)) return {};
+  const std::string name = subject.name() +
+                           ": its normals stand right behind its positions, with a stride of " +
+                           std::to_string(job.positions.stride);
+  if (!batch.outputs.isOneBuffer)
+    return invalid(name + ": both must go to one buffer (OutputSizes::isOneBuffer)");
+  if (job.positions.offset % 8 != 0) {
+    return invalid(name + ": they must begin at a multiple of 8, not at " +
+                   std::to_string(job.positions.offset));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
@@ -170,6 +184,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                    " bytes cannot stand at byte " + std::to_string(job.meshOffset) +
                    " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
+  if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
   if (Result<void> good = checkPaletteOf(batch, job, job.palette, subject); !good) return good;
   if (methodName(job.method) == "unknown")
     return invalid(subject.name() + ": its method is not one of Method");
@@ -202,6 +217,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                      std::to_string(limits.maxStorageBuffersPerStage) +
                      " storage buffers a stage there are none"};
   }
+  if (Result<void> good = checkPair(batch, job, subject); !good) return good;
   return checkStreams(batch, job, subject, limits);
 }
 
@@ -221,7 +237,8 @@ Result<void> checkWindows(const OutputStreams& streams,
   return {};
 }
 
-Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index) {
+Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index,
+                          const Promises& promises) {
   const std::string name = "palette " + std::to_string(index);
   if (palette.jointCount == 0 || palette.jointCount > maxPaletteJoints) {
     return invalid(name + " has " + std::to_string(palette.jointCount) +
@@ -234,7 +251,31 @@ Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_
                    " matrices cannot stand at byte " + std::to_string(palette.matrixOffset) +
                    " of a matrices buffer of " + std::to_string(batch.matricesSize));
   }
+  return checkPromisedPalette(palette.mayScale, promises, {"palette", index});
+}
+
+Result<void> checkPromises(const Promises& promises) {
+  const std::uint8_t influences = promises.maxInfluences;
+  if (influences == 0 || influences == 1 || influences == 2 || influences == 4) return {};
+  return invalid("Promises::maxInfluences is 1, 2, 4, or 0 for no promise, not " +
+                 std::to_string(influences));
+}
+
+Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
+                               const Subject& subject) {
+  if (promises.maxInfluences != 0 && mesh.maxInfluences > promises.maxInfluences) {
+    return invalid(subject.name() + ": a vertex has " + std::to_string(mesh.maxInfluences) +
+                   " influences, Promises::maxInfluences is " +
+                   std::to_string(promises.maxInfluences));
+  }
+  if (promises.noMorphTargets && mesh.morphTargetCount != 0)
+    return invalid(subject.name() + " has morph targets, despite Promises::noMorphTargets");
   return {};
+}
+
+Result<void> checkPromisedPalette(bool mayScale, const Promises& promises, const Subject& subject) {
+  if (!mayScale || !promises.noScale) return {};
+  return invalid(subject.name() + " may scale, despite Promises::noScale");
 }
 
 Result<void> checkLimits(const DeviceLimits& limits) {
@@ -245,7 +286,7 @@ Result<void> checkLimits(const DeviceLimits& limits) {
       limits.minStorageBufferOffsetAlignment > limits.maxStorageBufferRange / 4) {
     return invalid("the limits are not those of a Vulkan device");
   }
-  return {};
+  return checkPromises(limits.promises);
 }
 
 Result<void> checkTuning(const Tuning& tuning) {

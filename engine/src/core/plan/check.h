@@ -24,8 +24,16 @@ struct Subject {
 };
 
 Result<void> checkLimits(const DeviceLimits& limits);
+
+/// Whether the values are allowed.
+Result<void> checkPromises(const Promises& promises);
+/// Whether a mesh or a palette keeps the promises.
+Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
+                               const Subject& subject);
+Result<void> checkPromisedPalette(bool mayScale, const Promises& promises, const Subject& subject);
 Result<void> checkTuning(const Tuning& tuning);
-Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index);
+Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index,
+                          const Promises& promises);
 Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                       const DeviceLimits& limits);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,

@@ -120,7 +120,9 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
     vertexCount += job.mesh.vertexCount;
   }
   for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
-    if (Result<void> good = checkPalette(batch, batch.palettes[index], index); !good) return good;
+    if (Result<void> good = checkPalette(batch, batch.palettes[index], index, limits.promises);
+        !good)
+      return good;
   }
   placePalettes(batch);
   if (Result<void> good = checkSizes(batch, limits); !good) return good;

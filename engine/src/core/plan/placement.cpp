@@ -46,20 +46,6 @@ bool hasResult(const Job& job) {
 
 namespace {
 
-/// Kernels are specialised for so many influences a vertex; 0 is any number.
-constexpr std::array<std::uint8_t, 4> influenceClasses{1, 2, 4, 0};
-
-}  // namespace
-
-std::uint8_t influenceClass(std::uint32_t maxInfluences) {
-  for (const std::uint8_t influences : influenceClasses) {
-    if (maxInfluences <= influences) return influences;
-  }
-  return 0;
-}
-
-namespace {
-
 bool hasActive(std::span<const MorphWeight> morphs) {
   return std::ranges::any_of(morphs, [](const MorphWeight& morph) { return morph.weight != 0; });
 }
@@ -81,12 +67,71 @@ Variant outputVariant(const Job& job) {
 
 }  // namespace
 
-Variant skinVariant(const Job& job, const Tuning& tuning) {
+// The forms of a skin kernel: each earned its place in a benchmark on lavapipe
+// (docs/performance.md). Anything else about the instances of a group is a branch in the kernel.
+namespace {
+
+/// What decides on the form besides the method.
+struct Needs {
+  std::uint32_t influences;  ///< of a vertex, at most
+  bool scales;
+  bool morphs;
+};
+
+/// Fewer influences pay off where blending is most of the work.
+bool hasFormsForFewInfluences(Method method) {
+  return method == Method::linear || method == Method::dualQuaternion;
+}
+
+void chooseForm(const Needs& needs, const Promises& promises, Variant& variant) {
+  const std::uint8_t any = promises.maxInfluences;
+  variant.scales = needs.scales && variant.method != Method::linear;
+  variant.morphs = needs.morphs;
+  if (needs.morphs || needs.influences > 4 || (variant.scales && isForComparison(variant.method))) {
+    variant.influences = any;
+    variant.scales = variant.method != Method::linear && !promises.noScale;
+  } else if (any != 0) {
+    variant.influences = any;
+  } else if (variant.scales || !hasFormsForFewInfluences(variant.method)) {
+    variant.influences = 4;
+  } else {
+    variant.influences =
+        static_cast<std::uint8_t>(needs.influences <= 2 ? std::max(needs.influences, 1u) : 4);
+  }
+}
+
+}  // namespace
+
+bool standsInPairs(const Job& job) {
+  return job.positions.format == VertexFormat::float32x3 &&
+         job.normals.format == VertexFormat::float32x3 &&
+         job.normals.offset == job.positions.offset + 12 &&
+         job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
+}
+
+namespace {
+
+/// The skin kernel for a job, but for its form.
+Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = outputVariant(job);
-  variant.morphs =
-      hasActive(job.morphs) || (job.motion == Motion::reskinned && hasActive(job.previousMorphs));
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+  variant.texels = limits.texelBuffers &&
+                   limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
+                   std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit == 4; });
+  variant.pairs = variant.texels && limits.shaderInt64 && !hasResult(job) &&
+                  job.motion == Motion::none && standsInPairs(job);
+  return variant;
+}
+
+}  // namespace
+
+Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
+                    const Tuning& tuning) {
+  Variant variant = layoutVariant(job, limits, tuning);
+  const bool morphs =
+      hasActive(job.morphs) || (job.motion == Motion::reskinned && hasActive(job.previousMorphs));
+  chooseForm({job.mesh.maxInfluences, mayScale, morphs}, limits.promises, variant);
   return variant;
 }
 
@@ -120,64 +165,19 @@ std::uint64_t Variant::key() const {
   return key;
 }
 
-bool mayReadTexels(const Variant& variant, const DeviceLimits& limits) {
-  return variant.kernel == Kernel::skin && limits.maxTexelBufferElements != 0 &&
-         limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
-         std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit == 4; });
-}
-
-bool fitsUnitTexels(std::uint64_t bytes, const DeviceLimits& limits) {
-  return bytes / 16 <= limits.maxTexelBufferElements;
-}
-
-bool fitsWordTexels(std::uint64_t bytes, const DeviceLimits& limits) {
-  return bytes / 4 <= limits.maxTexelBufferElements;
-}
-
-bool mayStorePairs(const Job& job, const DeviceLimits& limits) {
-  const OutputAttribute& positions = job.positions;
-  const OutputAttribute& normals = job.normals;
-  return limits.shaderInt64 && mayReadTexels(outputVariant(job), limits) && !hasResult(job) &&
-         job.motion == Motion::none && positions.format == VertexFormat::float32x3 &&
-         normals.format == VertexFormat::float32x3 && normals.offset == positions.offset + 12 &&
-         normals.stride == positions.stride && (positions.offset | positions.stride) % 8 == 0;
-}
-
-namespace {
-
-/// The ways of reading and storing that a plan chooses by the size of the batch and the buffers.
-struct Access {
-  bool texels, pairs;
-};
-
-std::vector<Access> everyAccess(const Job& job, const DeviceLimits& limits) {
-  const bool mayRead = mayReadTexels(outputVariant(job), limits);
-  const bool mustRead = mayRead && fitsWordTexels(limits.maxStorageBufferRange, limits);
-  std::vector<Access> ways;
-  if (!mustRead) ways.push_back({false, false});
-  if (mayRead) ways.push_back({true, false});
-  if (mayStorePairs(job, limits)) ways.push_back({true, true});
-  return ways;
-}
-
-}  // namespace
-
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
                                   const Tuning& tuning) {
   std::vector<Variant> variants{paletteVariant(tuning)};
-  Variant variant = skinVariant(job, tuning);
-  for (const Access& access : everyAccess(job, limits)) {
-    variant.texels = access.texels;
-    variant.pairs = access.pairs;
-    for (const bool morphs : {false, true}) {
-      for (const std::uint8_t influences : influenceClasses) {
-        for (const bool scales : {false, true}) {
-          if (scales && job.method == Method::linear) continue;
-          variant.morphs = morphs;
-          variant.influences = influences;
-          variant.scales = scales;
-          variants.push_back(variant);
-        }
+  const Promises& promises = limits.promises;
+  Variant variant = layoutVariant(job, limits, tuning);
+  for (const std::uint32_t influences : {1u, 2u, 4u, 5u}) {
+    if (promises.maxInfluences != 0 && influences > promises.maxInfluences) continue;
+    for (const bool scales : {false, true}) {
+      if (scales && promises.noScale) continue;
+      for (const bool morphs : {false, true}) {
+        if (morphs && promises.noMorphTargets) continue;
+        chooseForm({influences, scales, morphs}, promises, variant);
+        if (std::ranges::find(variants, variant) == variants.end()) variants.push_back(variant);
       }
     }
   }

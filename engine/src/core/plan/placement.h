@@ -40,26 +40,15 @@ bool hasResult(const Job& job);
 
 // -- Variants.
 
-/// The `Variant::influences` for a mesh whose vertices have at most so many.
-std::uint8_t influenceClass(std::uint32_t maxInfluences);
-
 Variant paletteVariant(const Tuning& tuning);
 
-/// The skin kernel for a job, but for the influences, and for what depends on the sizes of the
-/// batch: scale, texels, pairs.
-Variant skinVariant(const Job& job, const Tuning& tuning);
+/// The skin kernel for a job. It depends on nothing else in the batch. `mayScale`: whether a
+/// palette that it reads may.
+Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
+                    const Tuning& tuning);
 
-/// Whether there is a kernel for a variant that reads through uniform texel buffers. Those that
-/// store less than a word, and devices with few storage buffers, do without.
-bool mayReadTexels(const Variant& variant, const DeviceLimits& limits);
-
-/// Whether one with the outputs of this job may store pairs, given that it reads texels and that
-/// its outputs are one buffer.
-bool mayStorePairs(const Job& job, const DeviceLimits& limits);
-
-/// Whether tables and palettes, or meshes, of that many bytes fit in a uniform texel buffer.
-bool fitsUnitTexels(std::uint64_t bytes, const DeviceLimits& limits);
-bool fitsWordTexels(std::uint64_t bytes, const DeviceLimits& limits);
+/// Whether positions and normals of a job stand together, so that a kernel may store them together.
+bool standsInPairs(const Job& job);
 
 // -- Windows: output that is larger than a storage buffer range may be is written through several
 // ranges.

@@ -67,7 +67,7 @@ BufferRequirement Plan::buffer(BufferRole role) const {
   // What the host fills may be staged: written to another buffer, and copied.
   constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
   // Whether or not this plan reads texels: a later one that does may use the same buffers.
-  const std::uint32_t texels = data_->limits.maxTexelBufferElements != 0 ? texelBufferUsage : 0;
+  const std::uint32_t texels = data_->limits.texelBuffers ? texelBufferUsage : 0;
   const std::uint32_t alignment = data_->limits.minStorageBufferOffsetAlignment;
   switch (role) {
     case BufferRole::meshes:

@@ -35,6 +35,9 @@ Scene::Scene(const SceneDescription& description)
 // -- Meshes and palettes.
 
 Result<MeshHandle> Scene::addMesh(const MeshInfo& info) {
+  if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
+      !kept)
+    return kept.error();
   const std::optional<Range> bytes = meshStore_.allocate(info.byteSize, packedMeshAlignment);
   if (!bytes) {
     return noRoom("a packed mesh takes " + std::to_string(info.byteSize) + " bytes", meshStore_,
@@ -58,6 +61,10 @@ Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale)
                                                  std::to_string(maxPaletteJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
+  if (Result<void> kept =
+          checkPromisedPalette(mayScale, description_.limits.promises, {"the palette"});
+      !kept)
+    return kept.error();
   const std::optional<Range> joints = jointStore_.allocate(jointCount, 1);
   if (!joints) {
     return noRoom("a palette takes " + std::to_string(jointCount) + " joints", jointStore_,

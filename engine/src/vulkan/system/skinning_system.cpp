@@ -83,8 +83,7 @@ SkinningSystem::State::State(ContextState& contextState, const SceneDescription&
 /// Of what kernels read, through texel buffers where the device has them.
 VkBufferUsageFlags SkinningSystem::State::readUsage() const {
   return VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
-         (context->limits.maxTexelBufferElements != 0 ? VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
-                                                      : 0);
+         (context->limits.texelBuffers ? VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT : 0);
 }
 
 std::span<JointMatrix> SkinningSystem::State::poseAt(std::uint64_t offset,
