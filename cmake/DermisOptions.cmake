@@ -1,6 +1,7 @@
 # Every option of Dermis, with defaults that suit both a checkout of its own and an engine's add_subdirectory.
 
 option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" ON)
+option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy contract" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_VIEWER "Build the viewer, one of the samples; needs SDL 2 and Dear ImGui" ON)
@@ -13,9 +14,11 @@ option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package"
 option(DERMIS_WARNINGS_AS_ERRORS "Stop at the first compiler warning" OFF)
 set(DERMIS_SANITIZE "" CACHE STRING "Sanitizers to build Dermis with: address, thread, or empty for none")
 set_property(CACHE DERMIS_SANITIZE PROPERTY STRINGS "" address thread)
+# Half of what a build with the address sanitizer takes is for the tests' own code.
+option(DERMIS_SANITIZE_TESTS "With DERMIS_SANITIZE=address: sanitize the tests' own code too" ON)
 
-if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_BUILD_VULKAN AND DERMIS_BUILD_GLTF))
-  message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_BUILD_VULKAN and DERMIS_BUILD_GLTF")
+if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_BUILD_VERIFY AND DERMIS_BUILD_VULKAN AND DERMIS_BUILD_GLTF))
+  message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_BUILD_VERIFY, DERMIS_BUILD_VULKAN and DERMIS_BUILD_GLTF")
 endif()
 if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_COMPARISON_METHODS AND DERMIS_SUBWORD_STORES))
   message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES")
@@ -24,8 +27,8 @@ if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_SAMPLES)
   message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_SAMPLES: the tests use its device and its models")
 endif()
 
-if(DERMIS_BUILD_FUZZERS AND NOT (DERMIS_BUILD_GLTF AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))
-  message(FATAL_ERROR "DERMIS_BUILD_FUZZERS needs Clang and DERMIS_BUILD_GLTF")
+if(DERMIS_BUILD_FUZZERS AND NOT (DERMIS_BUILD_VERIFY AND DERMIS_BUILD_GLTF AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))
+  message(FATAL_ERROR "DERMIS_BUILD_FUZZERS needs Clang, DERMIS_BUILD_VERIFY and DERMIS_BUILD_GLTF")
 endif()
 
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "comparison_instructions.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "pipeline_statistics.h"
 #include "scene_skinner.h"
 #include "timed_batches.h"

@@ -12,7 +12,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 
 namespace dermis::cli {
 namespace {

@@ -10,6 +10,7 @@
 #include "dermis/text.h"
 #include "dermis/validate.h"
 #include "progress.h"
+#include "solve_centers.h"
 
 namespace dermis::cli {
 namespace {
@@ -107,21 +108,13 @@ class JoinedMesh {
   InfluenceSet set_;
 };
 
-Result<std::vector<float>> solve(const MeshView& mesh, std::uint32_t jointCount,
-                                 std::span<const std::uint32_t> triangles) {
+std::vector<float> solve(const CenterOfRotationSolver& solver) {
   constexpr std::uint32_t steps = 100;
-  struct Shown {
-    samples::Progress bar{"centres of rotation", steps};
-    std::uint32_t done = 0;
-  } shown;
-  CentersOfRotationOptions options;
-  options.user = &shown;
-  options.progress = [](void* user, float fraction) {
-    auto& [bar, done] = *static_cast<Shown*>(user);
-    for (; done < static_cast<std::uint32_t>(fraction * steps); ++done) bar.step();
-    return true;
-  };
-  return centersOfRotation(mesh, jointCount, triangles, options);
+  samples::Progress bar("centres of rotation", steps);
+  std::uint32_t shown = 0;
+  return samples::solveCenters(solver, 0, [&](float fraction) {
+    for (; shown < static_cast<std::uint32_t>(fraction * steps); ++shown) bar.step();
+  });
 }
 
 Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
@@ -151,11 +144,10 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
   if (terms > termsLeft_)
     return tooMuch(mesh, fmt::format("{} terms, where {} are left", terms, termsLeft_));
   termsLeft_ -= terms;
-  const Result<std::vector<float>> all = solve(view, jointCount, joined.triangles());
-  if (!all) return all.error();
+  const std::vector<float> all = solve(*solver);
 
   Centers centers(mesh.primitives.size());
-  auto next = all->begin();
+  auto next = all.begin();
   for (std::size_t index = 0; index < centers.size(); ++index) {
     const gltf::Primitive& primitive = mesh.primitives[index];
     if (primitive.influences.empty()) continue;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "batch_runner.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 
 namespace dermis::cli {
 namespace {

@@ -126,11 +126,6 @@ struct PoseBatch {
   }
 };
 
-bool hasBox(const samples::OutputCase& output) {
-  return output.layout.positions == VertexFormat::snorm16x3 ||
-         output.layout.positions == VertexFormat::snorm16x4;
-}
-
 /// Positions, normals and tangents as float32, with every tuning: not a bit may change.
 Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
                            const PoseBatch& batch, std::vector<VerifiedCase>& cases) {
@@ -159,8 +154,8 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
         verified.comparison = firstComparisons[index];
       } else {
         const Result<Comparison> comparison =
-            compare(batch.expected[index], skinned.view(), requests[index].method,
-                    batch.instances[index].exemptions);
+            compareWithReference(batch.expected[index], skinned.view(), requests[index].method,
+                                 batch.instances[index].exemptions);
         if (!comparison) return comparison.error();
         verified.comparison = *comparison;
         if (!first.empty())
@@ -182,7 +177,8 @@ Result<void> verifyOutput(samples::Device& device, vulkan::Context& context, con
   for (std::size_t index = 0; index < batch.instances.size(); ++index) {
     if (std::ranges::count(output.methods, batch.instances[index].method) == 0) continue;
     // Every other box of positions in snorm16 is too small, so that some are clamped.
-    for (std::size_t copy = 0; copy < (hasBox(output.output) ? 2 : 1); ++copy) {
+    for (std::size_t copy = 0; copy < (isSnormPosition(output.output.layout.positions) ? 2 : 1);
+         ++copy) {
       instances.push_back(batch.instances[index]);
       indices.push_back(index);
     }
@@ -191,7 +187,7 @@ Result<void> verifyOutput(samples::Device& device, vulkan::Context& context, con
       samples::verifyBatch(device, context, instances, output.output);
   if (!verified) return verified.error();
   for (std::size_t place = 0; place < verified->size(); ++place) {
-    const bool clamps = hasBox(output.output) && place % 2 == 1;
+    const bool clamps = isSnormPosition(output.output.layout.positions) && place % 2 == 1;
     VerifiedCase& added = cases.emplace_back(
         batch.newCase(indices[place], output.output.name() + (clamps ? ", in a small box" : "")));
     added.comparison = (*verified)[place].comparison;

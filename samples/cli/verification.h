@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "dermis/accuracy.h"
 #include "dermis/method.h"
+#include "dermis/verify/accuracy.h"
 #include "skinned_scene.h"
 #include "verification_product.h"
 

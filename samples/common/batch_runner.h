@@ -10,9 +10,9 @@
 
 #include "batch_layout.h"
 #include "buffer.h"
-#include "dermis/accuracy.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/verify/accuracy.h"
 #include "dermis/vulkan/context.h"
 #include "device.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "random_rig.h"
 #include "stored_mesh.h"
 

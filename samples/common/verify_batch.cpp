@@ -4,15 +4,11 @@
 #include <limits>
 #include <optional>
 
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "verification_product.h"
 
 namespace dermis::samples {
 namespace {
-
-bool isSnormPosition(VertexFormat format) {
-  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
-}
 
 /// The box of all that is finite.
 Box boxOf(const std::vector<reference::Double3>& positions) {
@@ -160,8 +156,8 @@ class BatchVerifier {
 
   Result<void> compareAttributes(const SkinnedVertices& skinned, std::size_t index) {
     const InstanceToVerify& instance = instances_[index];
-    const Result<Comparison> comparison =
-        compare(*instance.expected, skinned.view(), instance.method, instance.exemptions);
+    const Result<Comparison> comparison = compareWithReference(
+        *instance.expected, skinned.view(), instance.method, instance.exemptions);
     if (!comparison) return comparison.error();
     results_[index].comparison = *comparison;
     results_[index].status = skinned.status;
@@ -184,8 +180,8 @@ class BatchVerifier {
     view.positions = frames.now.instances[index].attribute(Stream::previousPositions);
     view.box = boxes_[index];
     const InstanceToVerify& instance = instances_[index];
-    const Result<Comparison> comparison =
-        compare(*instance.expectedBefore, view, instance.method, instance.exemptionsBefore);
+    const Result<Comparison> comparison = compareWithReference(
+        *instance.expectedBefore, view, instance.method, instance.exemptionsBefore);
     if (!comparison) return comparison.error();
     if (comparison->exempt != comparison->expectedExempt)
       fail(index, "of the previous positions, " + std::to_string(comparison->compared) +

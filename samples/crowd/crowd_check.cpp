@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "barrier.h"
+#include "dermis/verify/accuracy.h"
 #include "frames.h"
 #include "in_parallel.h"
 
@@ -158,7 +159,7 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
   finding.passed = true;
   for (const auto& [view, key] : {std::pair{&current, pose.current}, {&previous, pose.previous}}) {
     const Result<Comparison> comparison =
-        compare(references_.of({instance.shown.part, key}), *view, Crowd::method);
+        compareWithReference(references_.of({instance.shown.part, key}), *view, Crowd::method);
     if (!comparison) {
       finding.done = comparison.error();
       return finding;

@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "in_parallel.h"
 
 using namespace dermis;

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "character.h"
-#include "dermis/reference.h"
 #include "dermis/result.h"
+#include "dermis/verify/reference.h"
 
 namespace crowd {
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "dermis/verify/accuracy.h"
 #include "skinned_crowd.h"
 
 namespace {
@@ -101,7 +102,7 @@ Result<Comparison> check(const embed::Crowd& crowd, const MeshView& mesh, std::u
   SkinnedView view;
   view.positions = attribute(offsetof(embed::SkinnedVertex, position), VertexFormat::float32x3);
   view.normals = attribute(offsetof(embed::SkinnedVertex, normal), VertexFormat::octahedral16x2);
-  return compare(*expected, view, Method::dualQuaternion);
+  return compareWithReference(*expected, view, Method::dualQuaternion);
 }
 
 Result<void> run(samples::Device& engine) {

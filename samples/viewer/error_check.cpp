@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "dermis/accuracy.h"
-#include "dermis/reference.h"
+#include "dermis/verify/accuracy.h"
+#include "dermis/verify/reference.h"
 
 namespace dermis::viewer {
 namespace {

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/centers_of_rotation.h"
 #include "models.h"
 #include "random_rig.h"
+#include "solve_centers.h"
 
 namespace dermis::bench {
 namespace {
@@ -62,12 +62,11 @@ Surface worst() {
 void measure(benchmark::State& state, Surface (*make)()) {
   Surface surface = make();
   const MeshView mesh = surface.mesh.view();
-  CentersOfRotationOptions options;
-  options.threadCount = static_cast<std::uint32_t>(state.range(0));
   for ([[maybe_unused]] auto iteration : state) {
-    const Result<std::vector<float>> centers =
-        centersOfRotation(mesh, surface.jointCount, surface.triangles, options);
-    if (!centers) state.SkipWithError(centers.error().message.c_str());
+    const Result<CenterOfRotationSolver> solver =
+        CenterOfRotationSolver::make(mesh, surface.jointCount, surface.triangles);
+    if (!solver) return state.SkipWithError(solver.error().message.c_str());
+    samples::solveCenters(*solver, static_cast<std::uint32_t>(state.range(0)));
   }
 }
 

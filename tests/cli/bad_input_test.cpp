@@ -19,9 +19,9 @@
 
 #include "batch_runner.h"
 #include "dermis/pack.h"
-#include "dermis/reference.h"
 #include "dermis/shader_compiler.h"
 #include "dermis/validate.h"
+#include "dermis/verify/reference.h"
 #include "dermis/vulkan/context.h"
 #include "dermis_command.h"
 #include "glb.h"

@@ -21,8 +21,8 @@
 #include "abi.h"
 #include "dermis/bounds.h"
 #include "dermis/pack.h"
-#include "dermis/reference.h"
 #include "dermis/validate.h"
+#include "dermis/verify/reference.h"
 #include "kernel_reads.h"
 
 using namespace dermis;

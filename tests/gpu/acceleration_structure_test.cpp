@@ -22,7 +22,7 @@
 #include "buffer.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "dermis/vulkan/scope.h"
 #include "random_rig.h"
 #include "ray_tracing.h"

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
 #include "dermis/pack.h"
+#include "dermis/verify/accuracy.h"
 #include "inexact_arithmetic.h"
 #include "intercepted_device.h"
 #include "test_device.h"
@@ -128,7 +128,8 @@ TEST_F(InexactTest, EveryVertexIsInsideItsBoundOnAnyConformingGpu) {
         ASSERT_TRUE(result.ok());
         const auto expected = reference::skin(mesh.view(), pose, method);
         const Exemptions exemptions{exemptionsOf(*expected, method).onlyFinite, 0};
-        const auto comparison = compare(*expected, result->instances[0].view(), method, exemptions);
+        const auto comparison =
+            compareWithReference(*expected, result->instances[0].view(), method, exemptions);
         ASSERT_TRUE(comparison.ok());
         EXPECT_TRUE(comparison->passed())
             << arithmetic.name << ", " << methodName(method) << ", " << static_cast<int>(rigidity)

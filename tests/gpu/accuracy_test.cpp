@@ -13,8 +13,8 @@
 #include <glm/mat3x3.hpp>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
 #include "dermis/pack.h"
+#include "dermis/verify/accuracy.h"
 #include "random_rig.h"
 #include "test_device.h"
 
@@ -46,7 +46,8 @@ Comparison skinAndCompare(samples::Device& device, vulkan::Context& context, Own
   EXPECT_TRUE(expected.ok());
   // All joints are finite: no vertex is without an answer.
   const Exemptions exemptions{exemptionsOf(*expected, method).onlyFinite, 0};
-  Result<Comparison> comparison = compare(*expected, skinned.view(), method, exemptions);
+  Result<Comparison> comparison =
+      compareWithReference(*expected, skinned.view(), method, exemptions);
   EXPECT_TRUE(comparison.ok());
   return *comparison;
 }
@@ -129,7 +130,7 @@ class JointsTest : public DeviceTest {
                       const samples::BatchResult& result) {
     const reference::SkinnedMesh expected = *reference::skin(mesh.view(), pose, method);
     const Exemptions exemptions{exemptionsOf(expected, method).onlyFinite, 0};
-    return *compare(expected, result.instances[0].view(), method, exemptions);
+    return *compareWithReference(expected, result.instances[0].view(), method, exemptions);
   }
 
  private:

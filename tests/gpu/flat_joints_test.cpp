@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "random_rig.h"
 #include "test_device.h"
 
@@ -63,7 +63,7 @@ TEST_P(FlatJointsTest, AreNotTakenForMirrors) {
   ASSERT_TRUE(expected.ok());
   const Exemptions exemptions{exemptionsOf(*expected, method).onlyFinite, 0};
   const Result<Comparison> comparison =
-      compare(*expected, result->instances[0].view(), method, exemptions);
+      compareWithReference(*expected, result->instances[0].view(), method, exemptions);
   ASSERT_TRUE(comparison.ok());
   EXPECT_TRUE(comparison->passed()) << "positions up to " << comparison->worstPosition
                                     << " of the bound, normals up to " << comparison->worstNormal;

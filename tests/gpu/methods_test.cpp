@@ -14,9 +14,9 @@
 #include <glm/matrix.hpp>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
-#include "dermis/dual_quat.h"
 #include "dermis/glm.h"
+#include "dermis/verify/accuracy.h"
+#include "dual_quat.h"
 #include "random_rig.h"
 #include "test_device.h"
 
@@ -60,7 +60,7 @@ class SomeMethodsTest : public DeviceTest {
     const samples::SkinnedVertices skinned = skin(mesh, pose, method);
     const Result<reference::SkinnedMesh> expected = reference::skin(mesh.view(), pose, method);
     EXPECT_TRUE(expected.ok());
-    return *compare(*expected, skinned.view(), method);
+    return *compareWithReference(*expected, skinned.view(), method);
   }
 };
 
@@ -418,7 +418,8 @@ TEST_P(MethodTest, SharesMayBeTheMeshsOwn) {
     const samples::SkinRequest request{&packedMesh, pose, true, GetParam()};
     samples::BatchResult result = run({&request, 1});
     const Result<reference::SkinnedMesh> expected = reference::skin(view, pose, GetParam());
-    EXPECT_TRUE(compare(*expected, result.instances[0].view(), GetParam())->passed()) << share;
+    EXPECT_TRUE(compareWithReference(*expected, result.instances[0].view(), GetParam())->passed())
+        << share;
     all.push_back(std::move(result.instances[0]));
   }
   const bool shares = GetParam() == Method::blended || GetParam() == Method::bulgeControlled;

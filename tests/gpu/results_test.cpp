@@ -8,7 +8,7 @@
 
 #include "batch_runner.h"
 #include "dermis/bounds.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "intercepted_device.h"
 #include "random_rig.h"
 #include "test_device.h"

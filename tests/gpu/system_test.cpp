@@ -3,9 +3,9 @@
 #include <cstring>
 
 #include "batch_runner.h"
-#include "dermis/accuracy.h"
-#include "dermis/reference.h"
-#include "reference/joint.h"
+#include "dermis/verify/accuracy.h"
+#include "dermis/verify/reference.h"
+#include "verify/joint.h"
 
 namespace dermis::test {
 namespace {
@@ -50,7 +50,8 @@ void expectReference(const samples::SkinnedVertices& skinned, const samples::Ski
   const reference::SkinnedMesh expected =
       must(reference::skin(source->second.view(), pose, request.method, request.morphs));
   const Exemptions exemptions{exemptionsOf(expected, request.method).onlyFinite, 0};
-  const Comparison comparison = must(compare(expected, skinned.view(), request.method, exemptions));
+  const Comparison comparison =
+      must(compareWithReference(expected, skinned.view(), request.method, exemptions));
   EXPECT_TRUE(comparison.passed())
       << "the first is vertex " << comparison.firstFailure << "; positions "
       << comparison.worstPosition << ", normals " << comparison.worstNormal << ", tangents "

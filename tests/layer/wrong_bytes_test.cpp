@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "dermis/pack.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "open_device.h"
 #include "random_rig.h"
 #include "test_device.h"

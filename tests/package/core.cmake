@@ -1,4 +1,4 @@
-# An engine that uses dermis::core alone, on a machine without Vulkan headers and glslang.
+# An engine that uses dermis::core and dermis::verify alone, on a machine without Vulkan headers and glslang.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(disabled)

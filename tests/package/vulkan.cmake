@@ -1,7 +1,7 @@
 # An engine that uses dermis::vulkan, and has no loader linked.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
-build_consumer(vulkan -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
+build_consumer(vulkan -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE)
 run(printed "Run vulkan_consumer" "${BUILD}/vulkan_consumer")
 say("${printed}")
 run(dynamic "Look at what it is linked with" "${readelf}" -d "${BUILD}/vulkan_consumer")

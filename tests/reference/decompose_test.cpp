@@ -1,6 +1,6 @@
 // Singular values and the polar decomposition that the reference rests on.
 
-#include "reference/joint.h"
+#include "verify/joint.h"
 
 #include <algorithm>
 

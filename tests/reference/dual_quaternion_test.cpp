@@ -2,7 +2,7 @@
 // decides the signs.
 
 #include <algorithm>
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 
 #include "reference_rig.h"
 

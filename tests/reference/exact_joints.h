@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "by_hand.h"
-#include "dermis/dual_quat.h"
-#include "reference/methods.h"
+#include "dual_quat.h"
 #include "reference_rig.h"
+#include "verify/methods.h"
 
 namespace dermis::test {
 

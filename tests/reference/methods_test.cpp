@@ -7,7 +7,7 @@
 #include <string>
 
 #include "by_hand.h"
-#include "dermis/dual_quat.h"
+#include "dual_quat.h"
 #include "reference_rig.h"
 
 namespace dermis::test {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -354,7 +354,7 @@ TEST_F(MorphTest, AFloatSumIsInsideTheBoundHoweverMuchCancels) {
   SkinnedView actual;
   actual.positions = {positions.data(), many, 12, VertexFormat::float32x3};
   actual.normals = {normals.data(), many, 12, VertexFormat::float32x3};
-  const Result<Comparison> comparison = compare(expected, actual, Method::linear);
+  const Result<Comparison> comparison = compareWithReference(expected, actual, Method::linear);
   ASSERT_TRUE(comparison.ok());
   EXPECT_TRUE(comparison->passed()) << comparison->failures;
   EXPECT_GT(comparison->worstPosition, 0.1);
@@ -362,7 +362,7 @@ TEST_F(MorphTest, AFloatSumIsInsideTheBoundHoweverMuchCancels) {
   for (reference::Conditioning& conditioning : expected.conditioning) {
     conditioning.positionRounding = conditioning.normalRounding = 0;
   }
-  EXPECT_GT(compare(expected, actual, Method::linear)->failures, many / 10);
+  EXPECT_GT(compareWithReference(expected, actual, Method::linear)->failures, many / 10);
   RecordProperty("position", std::to_string(comparison->worstPosition));
   RecordProperty("normal", std::to_string(comparison->worstNormal));
 }

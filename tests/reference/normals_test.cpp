@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {

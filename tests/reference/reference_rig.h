@@ -18,7 +18,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "random_rig.h"
 
 namespace dermis::test {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -345,7 +345,7 @@ TEST(ReferenceTangents, AFloatKernelIsInsideTheBound) {
     SkinnedView actual;
     actual.positions = {mesh.mesh.positions.data(), 20, 12, VertexFormat::float32x3};
     actual.tangents = {expectedInFloat.data(), 20, 16, VertexFormat::float32x4};
-    const Result<Comparison> comparison = compare(expected, actual, Method::linear);
+    const Result<Comparison> comparison = compareWithReference(expected, actual, Method::linear);
     ASSERT_TRUE(comparison.ok());
     EXPECT_TRUE(comparison->passed()) << rig << ": " << comparison->worstTangent;
     worst = std::max(worst, comparison->worstTangent);

@@ -14,7 +14,7 @@
 #include "built_in_scenes.h"
 #include "compared_figures.h"
 #include "comparison_picture.h"
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "drawing_device.h"
 #include "picture_sheet.h"
 #include "pictures.h"

@@ -72,10 +72,6 @@ inline bool isOctahedral(VertexFormat format) {
   return format == VertexFormat::octahedral16x2 || format == VertexFormat::octahedral8x2;
 }
 
-inline bool isSnorm16(VertexFormat format) {
-  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
-}
-
 inline bool hasFourComponents(VertexFormat format) {
   return formatName(format).ends_with("x4");
 }
@@ -94,7 +90,7 @@ inline EncodedVertex encodePosition(VertexFormat format, const std::array<double
   EncodedVertex encoded;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double value = position[axis];
-    if (isSnorm16(format)) {
+    if (isSnormPosition(format)) {
       const double low = double{box.min[axis]}, high = double{box.max[axis]};
       value = high > low ? (value - (low + high) / 2) / ((high - low) / 2) : 0;
     }

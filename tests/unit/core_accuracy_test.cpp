@@ -1,6 +1,6 @@
 // The accuracy contract: the bounds of TRUTHS.md, and a comparison that misses nothing.
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 
 #include <gtest/gtest.h>
 
@@ -196,7 +196,7 @@ struct CompareTest : public ::testing::Test {
   }
   Comparison compared(Method method = Method::dualQuaternion,
                       const Exemptions& exemptions = {}) const {
-    const Result<Comparison> result = compare(expected, view(), method, exemptions);
+    const Result<Comparison> result = compareWithReference(expected, view(), method, exemptions);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     return result ? *result : Comparison{};
   }
@@ -460,7 +460,7 @@ TEST(Compare, AZeroNormalMustStayZero) {
         SkinnedView actual;
         actual.positions = {positions.data(), 2, 12, VertexFormat::float32x3};
         actual.normals = {normals.data(), 2, 12, VertexFormat::float32x3};
-        return compare(*expected, actual, method)->passed();
+        return compareWithReference(*expected, actual, method)->passed();
       };
       EXPECT_TRUE(passes()) << methodName(method) << ", scale " << scale;
       normals[0] = 1;
@@ -475,13 +475,13 @@ TEST_F(CompareTest, DirectionsAreComparedWhereBothHaveThem) {
   EXPECT_FALSE(compared().passed());
   SkinnedView without = view();
   without.normals = {};
-  EXPECT_TRUE(compare(expected, without, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(expected, without, Method::linear)->passed());
   normals = normalsBefore;
   tangents.assign(tangents.size(), 5.0f);
   EXPECT_FALSE(compared().passed());
   without = view();
   without.tangents = {};
-  EXPECT_TRUE(compare(expected, without, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(expected, without, Method::linear)->passed());
   normals.assign(normals.size(), 5.0f);
   expected.normals.clear();
   expected.tangents.clear();
@@ -500,11 +500,11 @@ TEST_F(CompareTest, ReadsWithStrides) {
   strided.positions = {&bytes[1], count, stride, VertexFormat::float32x3};
   strided.normals = {&bytes[14], count, stride, VertexFormat::float32x3};
   strided.tangents = {&bytes[27], count, stride, VertexFormat::float32x4};
-  EXPECT_TRUE(compare(expected, strided, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(expected, strided, Method::linear)->passed());
   for (const std::size_t lastOfAttribute : {1u + 3, 14u + 11, 27u + 15}) {
     unsigned char& byte = bytes[lastOfAttribute + 19 * stride];
     byte ^= 0x80;
-    EXPECT_EQ(compare(expected, strided, Method::linear)->firstFailure, 19u);
+    EXPECT_EQ(compareWithReference(expected, strided, Method::linear)->firstFailure, 19u);
     byte ^= 0x80;
   }
 }
@@ -515,7 +515,7 @@ TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
     const auto refused = [&](const SkinnedAttribute& bad, std::string_view part) {
       SkinnedView skinned = view();
       skinned.*attribute = bad;
-      const Result<Comparison> result = compare(expected, skinned, Method::linear);
+      const Result<Comparison> result = compareWithReference(expected, skinned, Method::linear);
       ASSERT_FALSE(result.ok()) << part;
       EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
       EXPECT_NE(result.error().message.find(part), std::string::npos) << result.error().message;
@@ -535,13 +535,13 @@ TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
   }
   SkinnedView skinned = view();
   skinned.positions.format = VertexFormat::octahedral16x2;
-  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
   skinned = view();
   skinned.tangents.format = VertexFormat::float32x3;
-  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
   skinned = view();
   skinned.positions = {};
-  EXPECT_FALSE(compare(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
 }
 
 TEST_F(CompareTest, OneWrongTangentIsFound) {

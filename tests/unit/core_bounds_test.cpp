@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -17,8 +18,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "dermis/accuracy.h"
-#include "dermis/reference.h"
+#include "dermis/verify/accuracy.h"
+#include "dermis/verify/reference.h"
 #include "random_rig.h"
 
 namespace dermis {
@@ -715,6 +716,76 @@ TEST(Bounds, ReadEveryStoredForm) {
   EXPECT_TRUE(bounds.joints[0].alone.empty());
   EXPECT_EQ(bounds.joints[1].alone.reach[0], 10);
   EXPECT_TRUE(bounds.trios.empty());
+}
+
+// ---- As they are stored
+
+/// Bounds with joints alone, pairs, trios and vertices without weight.
+JointBounds storedBounds() {
+  OwnedMesh mesh = test::randomMesh(7, 300, 9, 4);
+  for (std::uint32_t slot = 0; slot < mesh.influencesPerVertex; ++slot) mesh.weights[slot] = 0;
+  return boundsOf(mesh.view(), 9);
+}
+
+bool same(const JointBounds& a, const JointBounds& b) {
+  return a.bytes() == b.bytes();
+}
+
+TEST(Bounds, ComeBackAsTheyWereStored) {
+  const JointBounds bounds = storedBounds();
+  ASSERT_FALSE(bounds.pairs.empty() || bounds.trios.empty() || bounds.joints.empty());
+  for (const JointBounds& stored : {bounds, JointBounds()}) {
+    const Result<JointBounds> read = JointBounds::fromBytes(stored.bytes());
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_TRUE(same(*read, stored));
+    EXPECT_EQ(read->joints.size(), stored.joints.size());
+    EXPECT_EQ(read->requiredJoints, stored.requiredJoints);
+  }
+  const std::vector<JointMatrix> pose = test::randomPose(1, 9, Rigidity::shear);
+  const Box a = skinnedBounds(bounds, pose, Method::dualQuaternion);
+  const Box b =
+      skinnedBounds(*JointBounds::fromBytes(bounds.bytes()), pose, Method::dualQuaternion);
+  EXPECT_EQ(std::memcmp(&a, &b, sizeof(a)), 0);
+}
+
+TEST(Bounds, DamagedBytesAreRefused) {
+  const std::vector<std::byte> good = storedBounds().bytes();
+  for (std::size_t place = 0; place < good.size(); ++place) {
+    std::vector<std::byte> damaged = good;
+    damaged[place] ^= std::byte{16};
+    EXPECT_FALSE(JointBounds::fromBytes(damaged).ok()) << place;
+  }
+  for (const std::size_t size : {std::size_t{0}, std::size_t{3}, std::size_t{55}, good.size() - 4})
+    EXPECT_FALSE(JointBounds::fromBytes(std::span(good).first(size)).ok()) << size;
+}
+
+// What only a program that knows the checksum can write.
+TEST(Bounds, WhatBreaksARuleIsRefused) {
+  const JointBounds good = storedBounds();
+  const auto refused = [&](auto change) {
+    JointBounds bounds = good;
+    change(bounds);
+    const Result<JointBounds> read = JointBounds::fromBytes(bounds.bytes());
+    return !read && read.error().code == ErrorCode::invalidData;
+  };
+  const float nan = std::nanf("");
+  const auto count = static_cast<std::uint32_t>(good.joints.size());
+  EXPECT_FALSE(refused([](JointBounds&) {}));
+  EXPECT_TRUE(refused([](JointBounds& b) { ++b.requiredJoints; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { b.joints.back().joint = 65536; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.joints[0], b.joints[1]); }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.joints[2].alone.reach[25] = nan; }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].second = count; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { b.pairs[0].second = b.pairs[0].first; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.pairs[0], b.pairs[1]); }));
+  EXPECT_TRUE(refused([](JointBounds& b) { b.pairs[0].influences = 1; }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].extent.reach[0] = nan; }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].leastSum = nan; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { b.pairs[0].firstOverSecond[0] = -1; }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.trios.back()[2] = count; }));
+  EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.trios[0][0], b.trios[0][1]); }));
+  EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.trios[0], b.trios[1]); }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.unweighted.max[1] = nan; }));
 }
 
 }  // namespace

@@ -23,9 +23,11 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "centers.h"
 #include "centers/pair_index.h"
 #include "dermis/types.h"
 #include "random_rig.h"
+#include "solve_centers.h"
 
 namespace dermis {
 namespace {
@@ -38,9 +40,9 @@ struct Surface {
   std::vector<std::uint32_t> triangles;
 };
 
-std::vector<float> solved(Surface& surface, const CentersOfRotationOptions& options = {}) {
+std::vector<float> solved(Surface& surface) {
   Result<std::vector<float>> result =
-      centersOfRotation(surface.mesh.view(), surface.jointCount, surface.triangles, options);
+      test::centersOf(surface.mesh.view(), surface.jointCount, surface.triangles);
   EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
   return result ? std::move(*result) : std::vector<float>{};
 }
@@ -326,17 +328,12 @@ TEST(CentersOfRotation, TakeNoNoticeOfTrianglesWithoutArea) {
 
 TEST(CentersOfRotation, AreTheSameToTheBitHoweverTheyAreCut) {
   Surface surface = randomSurface(1, 1000, 2000, 7, 4);
-  CentersOfRotationOptions options;
-  options.threadCount = 1;
-  const std::vector<float> expected = solved(surface, options);
-  for (const std::uint32_t threads : {0u, 2u, 3u, 7u, 100u}) {
-    options.threadCount = threads;
-    EXPECT_EQ(solved(surface, options), expected) << threads << " threads";
-  }
-
+  const std::vector<float> expected = solved(surface);
   Result<CenterOfRotationSolver> made =
       CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
   ASSERT_TRUE(made.ok());
+  for (const std::uint32_t threads : {0u, 1u, 2u, 3u, 7u, 100u})
+    EXPECT_EQ(samples::solveCenters(*made, threads), expected) << threads << " threads";
   surface = {};  // the solver has what it needs
   const CenterOfRotationSolver solver = std::move(*made);
   ASSERT_EQ(solver.vertexCount(), 1000u);
@@ -388,60 +385,24 @@ TEST(CentersOfRotation, RefusePiecesOutsideTheMesh) {
   EXPECT_TRUE(solver->solve(19, std::span(centers).first(3)));
 }
 
-/// What a progress function is told, and when it asks to stop.
-struct Listener {
-  std::vector<float> fractions;
-  std::vector<std::thread::id> threads;
-  std::size_t callsToStop = std::numeric_limits<std::size_t>::max();
-
-  CentersOfRotationOptions options(std::uint32_t threadCount) {
-    return {threadCount,
-            [](void* user, float fraction) {
-              auto& self = *static_cast<Listener*>(user);
-              self.fractions.push_back(fraction);
-              self.threads.push_back(std::this_thread::get_id());
-              return self.fractions.size() < self.callsToStop;
-            },
-            this};
-  }
-};
-
-TEST(CentersOfRotation, TellTheCallingThreadHowFarTheyAre) {
+TEST(CentersOfRotation, ToolsTellTheCallingThreadHowFarTheyAre) {
   Surface surface = randomSurface(4, 2000, 500, 5, 3);
+  const Result<CenterOfRotationSolver> solver =
+      CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
+  ASSERT_TRUE(solver.ok());
+  const std::thread::id caller = std::this_thread::get_id();
   for (const std::uint32_t threads : {1u, 3u}) {
-    Listener listener;
-    solved(surface, listener.options(threads));
-    ASSERT_GE(listener.fractions.size(), 2u);
-    // 2000 vertices are not one piece.
-    if (threads == 1) {
-      EXPECT_GE(listener.fractions.size(), 10u);
-    }
-    EXPECT_EQ(listener.fractions.front(), 0);
-    EXPECT_EQ(listener.fractions.back(), 1);
-    EXPECT_TRUE(std::is_sorted(listener.fractions.begin(), listener.fractions.end()));
-    EXPECT_EQ(std::count(listener.fractions.begin(), listener.fractions.end(), 1.0f), 1);
-    for (const std::thread::id id : listener.threads) EXPECT_EQ(id, std::this_thread::get_id());
+    std::vector<float> fractions;
+    samples::solveCenters(*solver, threads, [&](float fraction) {
+      fractions.push_back(fraction);
+      EXPECT_EQ(std::this_thread::get_id(), caller);
+    });
+    // 2000 vertices are many jobs.
+    EXPECT_GE(fractions.size(), threads == 1 ? 10u : 1u);
+    EXPECT_EQ(fractions.back(), 1);
+    EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+    EXPECT_EQ(std::count(fractions.begin(), fractions.end(), 1.0f), 1);
   }
-}
-
-TEST(CentersOfRotation, StopWhenAskedTo) {
-  Surface surface = randomSurface(4, 2000, 500, 5, 3);
-  Listener all;
-  solved(surface, all.options(1));
-  for (const std::size_t calls : {std::size_t{1}, std::size_t{5}, all.fractions.size()}) {
-    Listener listener;
-    listener.callsToStop = calls;
-    const Result<std::vector<float>> result = centersOfRotation(
-        surface.mesh.view(), surface.jointCount, surface.triangles, listener.options(1));
-    ASSERT_FALSE(result.ok());
-    EXPECT_EQ(result.error().code, ErrorCode::cancelled);
-    EXPECT_NE(result.error().message.find("mesh 'random'"), std::string::npos);
-    EXPECT_EQ(listener.fractions.size(), calls);
-  }
-  Listener listener;
-  listener.callsToStop = 1;
-  EXPECT_FALSE(centersOfRotation(surface.mesh.view(), surface.jointCount, surface.triangles,
-                                 listener.options(3)));
 }
 
 TEST(CentersOfRotation, SayWhatIsWrong) {
@@ -449,7 +410,7 @@ TEST(CentersOfRotation, SayWhatIsWrong) {
   surface.mesh.name = "Fox";
   const auto errorOf = [](Surface& wrong) {
     const Result<std::vector<float>> result =
-        centersOfRotation(wrong.mesh.view(), wrong.jointCount, wrong.triangles);
+        test::centersOf(wrong.mesh.view(), wrong.jointCount, wrong.triangles);
     EXPECT_FALSE(result.ok());
     return result ? Error{} : result.error();
   };
@@ -475,7 +436,7 @@ TEST(CentersOfRotation, SayWhatIsWrong) {
   wrong = surface;
   wrong.mesh.positions[3 * 11] = std::nanf("");
   expectError(wrong, ErrorCode::invalidMesh, "vertex 11");
-  EXPECT_EQ(centersOfRotation(MeshView{}, 1, {}).error().code, ErrorCode::invalidMesh);
+  EXPECT_EQ(test::centersOf(MeshView{}, 1, {}).error().code, ErrorCode::invalidMesh);
 }
 
 TEST(CentersOfRotation, ReadEveryStoredForm) {
@@ -510,7 +471,7 @@ TEST(CentersOfRotation, ReadEveryStoredForm) {
     plain.mesh.weights.insert(plain.mesh.weights.end(), {static_cast<float>(weights[i]),
                                                          static_cast<float>(otherWeights[i])});
   }
-  const Result<std::vector<float>> centers = centersOfRotation(stored, 9, triangles);
+  const Result<std::vector<float>> centers = test::centersOf(stored, 9, triangles);
   ASSERT_TRUE(centers.ok());
   EXPECT_EQ(*centers, solved(plain));
   EXPECT_NE(*centers, plain.mesh.positions);

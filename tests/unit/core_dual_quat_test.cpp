@@ -15,7 +15,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "dermis/dual_quat.h"
+#include "dual_quat.h"
 
 namespace dermis::test {
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 #include "vertex_encoder.h"
 
 namespace dermis::test {
@@ -248,7 +248,7 @@ struct OneVertex {
     view.normals = {normalBytes.data(), 1, formatSize(normalFormat), normalFormat};
     view.tangents = {tangentBytes.data(), 1, formatSize(tangentFormat), tangentFormat};
     view.box = box;
-    const Result<Comparison> result = compare(expected, view, method, exemptions);
+    const Result<Comparison> result = compareWithReference(expected, view, method, exemptions);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     return result ? *result : Comparison{};
   }
@@ -517,14 +517,14 @@ TEST(CompareBox, ABoxThatIsNoneIsRefused) {
   for (const Box& box :
        {Box{{0, 0, 1}, {1, 1, 0}}, Box{{0, nan, 0}, {1, 1, 1}}, Box{{0, 0, 0}, {1, infinity, 1}}}) {
     view.box = box;
-    const Result<Comparison> result = compare(vertex.expected, view, Method::linear);
+    const Result<Comparison> result = compareWithReference(vertex.expected, view, Method::linear);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
   }
   // Other formats have no use for it.
   vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::float32x4);
   view.positions = {vertex.positionBytes.data(), 1, 12, VertexFormat::float32x3};
-  EXPECT_TRUE(compare(vertex.expected, view, Method::linear).ok());
+  EXPECT_TRUE(compareWithReference(vertex.expected, view, Method::linear).ok());
 }
 
 }  // namespace

@@ -618,8 +618,7 @@ std::array<OutputAttribute, streamCount> attributesOf(const Job& job) {
 }
 
 bool wantsResult(const Job& job) {
-  return job.bounds || job.positions.format == VertexFormat::snorm16x3 ||
-         job.positions.format == VertexFormat::snorm16x4;
+  return job.bounds || isSnormPosition(job.positions.format);
 }
 
 std::vector<MorphWeight> activeMorphs(std::span<const MorphWeight> morphs) {

@@ -72,8 +72,7 @@ TEST(Result, EveryCodeHasItsName) {
       {ErrorCode::missingFeature, "missingFeature"},
       {ErrorCode::vulkanError, "vulkanError"},
       {ErrorCode::shaderError, "shaderError"},
-      {ErrorCode::ioError, "ioError"},
-      {ErrorCode::cancelled, "cancelled"}};
+      {ErrorCode::ioError, "ioError"}};
   for (const auto& [code, name] : names) EXPECT_EQ(errorCodeName(code), name);
   EXPECT_EQ(errorCodeName(static_cast<ErrorCode>(200)), "unknown");
 }

@@ -227,7 +227,8 @@ TEST(VertexFormats, AFormatThatAnAttributeMayNotHaveGivesZeros) {
   const EncodedVertex ones(16, 1);
   for (const VertexFormat format : allVertexFormats) {
     const bool position = isPositionFormat(format), tangent = isTangentFormat(format);
-    EXPECT_EQ(decodePosition(format, ones.data(), {}) == Three{}, !position || isSnorm16(format));
+    EXPECT_EQ(decodePosition(format, ones.data(), {}) == Three{},
+              !position || isSnormPosition(format));
     EXPECT_EQ(decodeTangent(format, ones.data()) == Four{}, !tangent);
     EXPECT_NE(decodeNormal(format, ones.data()), Three{});
   }

@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "dermis/centers_of_rotation.h"
+#include "centers.h"
 #include "models.h"
 
 namespace {
@@ -57,7 +57,7 @@ TEST(SampleModelCenters, OfTheFigureAreThoseOfTheDirectSum) {
   view.vertexCount = vertexCount;
   view.positions = dermis::floatAttribute(positions.data(), vertexCount, 3);
   view.influenceSets = {&set, 1};
-  const auto centers = dermis::centersOfRotation(view, 64, mesh.indices);
+  const auto centers = dermis::test::centersOf(view, 64, mesh.indices);
   ASSERT_TRUE(centers.ok()) << centers.error().message;
 
   std::vector<Weights> triangles;

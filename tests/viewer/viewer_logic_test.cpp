@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 #include "error_check.h"
 #include "joint_overlay.h"
 #include "keys.h"

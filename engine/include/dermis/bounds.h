@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -31,8 +32,8 @@ struct Extent {
 };
 
 /// Where the vertices lie in bind pose, by the joints that move them. Plain data, made once at
-/// import by `jointBounds`; it depends on no pose and on no method, and may be stored with the
-/// mesh.
+/// import by `jointBounds`. It depends on no pose and on no method, and may be stored with the
+/// mesh: `bytes`, `fromBytes`.
 struct JointBounds {
   /// A joint that moves vertices.
   struct Joint {
@@ -63,7 +64,13 @@ struct JointBounds {
   std::vector<std::array<std::uint32_t, 3>> trios;
   /// Of the vertices without weight, which stay in bind pose; min > max for none.
   Box unweighted{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-  std::uint32_t requiredJoints = 0;  ///< the fewest joints of a palette: the largest index + 1
+  std::uint32_t requiredJoints = 0;  ///< minimum joints of a palette: the largest index + 1
+
+  /// To be stored: little-endian words with a version and a checksum.
+  std::vector<std::byte> bytes() const;
+  /// Reads them back, checked so that `skinnedBounds` is safe with the result. Fails with
+  /// `invalidData` (damaged), or `unsupportedVersion`.
+  static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
 };
 
 /// The weights that a morph target is given, whatever the pose.

@@ -109,7 +109,8 @@ struct MeshView {
   /// little as `Method::centerOfRotation`.
   AttributeView bulgeStrengths;
   float bulgeStrength = 1;  ///< of every vertex, where those are absent
-  /// Points in bind space, float32 × 3, that `centersOfRotation` finds (centers_of_rotation.h).
+  /// Points in bind space, float32 × 3, that `CenterOfRotationSolver` finds
+  /// (centers_of_rotation.h).
   AttributeView centersOfRotation;
 };
 

@@ -24,7 +24,6 @@ enum class ErrorCode : std::uint8_t {
   vulkanError,         ///< A Vulkan call failed; `Error::vulkanResult` is what it returned.
   shaderError,         ///< GLSL that does not compile, or SPIR-V that is not valid.
   ioError,             ///< A file that cannot be opened, read or written.
-  cancelled,           ///< The caller's own progress function asked to stop.
 };
 
 /// The name of a code, as written above: for logs.

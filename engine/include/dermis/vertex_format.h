@@ -47,6 +47,10 @@ inline constexpr std::array<VertexFormat, 10> allVertexFormats{
 /// Bytes of one element; 0 for `none`.
 std::uint32_t formatSize(VertexFormat format);
 
+/// Bytes of one component: vertex fetch requires attributes to begin at multiples of them. 1 for
+/// `none`.
+std::uint32_t formatAlignment(VertexFormat format);
+
 /// The format's name in reports: "snorm16x4".
 std::string_view formatName(VertexFormat format);
 
@@ -55,6 +59,8 @@ std::string_view formatName(VertexFormat format);
 bool isPositionFormat(VertexFormat format);
 bool isNormalFormat(VertexFormat format);
 bool isTangentFormat(VertexFormat format);
+/// Whether positions in this format are relative to a box.
+bool isSnormPosition(VertexFormat format);
 
 /// What stands at `data`, in double precision: by the formulas above, for tests and tools. A
 /// direction that was stored octahedral is of unit length, any other as long as it was stored.

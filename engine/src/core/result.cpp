@@ -28,8 +28,6 @@ std::string_view errorCodeName(ErrorCode code) {
       return "shaderError";
     case ErrorCode::ioError:
       return "ioError";
-    case ErrorCode::cancelled:
-      return "cancelled";
   }
   return "unknown";
 }

@@ -142,6 +142,10 @@ std::uint32_t formatSize(VertexFormat format) {
   return layout.components * bytesOf(layout.storage);
 }
 
+std::uint32_t formatAlignment(VertexFormat format) {
+  return std::max(bytesOf(layoutOf(format).storage), 1u);
+}
+
 std::string_view formatName(VertexFormat format) {
   return layoutOf(format).name;
 }
@@ -160,11 +164,14 @@ bool isTangentFormat(VertexFormat format) {
   return layout.components == 4 || layout.octahedral;
 }
 
+bool isSnormPosition(VertexFormat format) {
+  return isPositionFormat(format) && layoutOf(format).storage == Storage::snorm16;
+}
+
 std::array<double, 3> decodePosition(VertexFormat format, const void* data, const Box& box) {
   if (!isPositionFormat(format)) return {};
-  const Layout layout = layoutOf(format);
-  std::array<double, 3> position = loadVector(layout, data);
-  if (layout.storage != Storage::snorm16) return position;
+  std::array<double, 3> position = loadVector(layoutOf(format), data);
+  if (!isSnormPosition(format)) return position;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto low = static_cast<double>(box.min[axis]), high = static_cast<double>(box.max[axis]);
     position[axis] = (low + high) / 2 + position[axis] * ((high - low) / 2);

@@ -17,7 +17,6 @@
 #include <glm/vector_relational.hpp>
 
 #include "bounds/extent.h"
-#include "dermis/accuracy.h"
 #include "dermis/bounds.h"
 
 namespace dermis::bounds {
@@ -412,7 +411,7 @@ class PoseBounds {
   }
 
   /// By how much a float32 position may be off, over its scale: `positionBound`.
-  double contract() const { return (exactJoints_ ? 6 : 24) * floatRounding; }
+  double contract() const { return (exactJoints_ ? 6 : 24) * 0x1p-24; }
 
   /// What float32 may add: the more where quaternions all but cancel, and as the square of that, as
   /// `positionBound` does, where they do so by more than a quarter. 1e-5 is for joints that are not

@@ -32,10 +32,6 @@ std::uint8_t storeUnit(const OutputStream& stream) {
   return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
 }
 
-bool isSnormPosition(VertexFormat format) {
-  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
-}
-
 bool hasResults(const Variant& variant) {
   return variant.bounds || isSnormPosition(variant.positions);
 }

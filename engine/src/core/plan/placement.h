@@ -32,9 +32,6 @@ const char* streamName(std::size_t stream);
 /// Bytes that one store may write: 4, 2 or 1.
 std::uint8_t storeUnit(const OutputStream& stream);
 
-/// Whether positions are stored relative to a box.
-bool isSnormPosition(VertexFormat format);
-
 /// Whether the kernel finds something out about the instance.
 bool hasResult(const Job& job);
 

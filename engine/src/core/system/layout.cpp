@@ -13,21 +13,6 @@ std::array<VertexFormat, streamCount> formatsOf(const VertexLayout& layout) {
           layout.previousPositions ? layout.positions : VertexFormat::none};
 }
 
-/// Vertex fetch wants components at multiples of their size.
-std::uint32_t componentSize(VertexFormat format) {
-  switch (format) {
-    case VertexFormat::float32x3:
-    case VertexFormat::float32x4:
-      return 4;
-    case VertexFormat::snorm8x3:
-    case VertexFormat::snorm8x4:
-    case VertexFormat::octahedral8x2:
-      return 1;
-    default:
-      return 2;
-  }
-}
-
 template <typename Number>
 Number roundUp(Number value, Number multiple) {
   return (value + multiple - 1) / multiple * multiple;
@@ -39,7 +24,7 @@ Result<LaidOutVertices> interleave(const VertexLayout& layout, std::uint32_t ver
   const std::array<VertexFormat, streamCount> formats = formatsOf(layout);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (formats[stream] == VertexFormat::none) continue;
-    size = roundUp(size, componentSize(formats[stream]));
+    size = roundUp(size, formatAlignment(formats[stream]));
     laidOut.attributes[stream] = {size, 0, formats[stream]};
     size += formatSize(formats[stream]);
   }

@@ -13,8 +13,8 @@
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
-#include "dermis/reference.h"
 #include "dermis/shader_compiler.h"
+#include "dermis/verify/reference.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "rigid.h"
+#include "verify/rigid.h"
 
 #include <cmath>
 

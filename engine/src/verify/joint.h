@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 
 #include "dermis/types.h"
-#include "rigid.h"
+#include "verify/rigid.h"
 
 namespace dermis::reference {
 

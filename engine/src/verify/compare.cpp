@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 
 namespace dermis {
 namespace {
@@ -26,10 +26,6 @@ bool isHalf(VertexFormat format) {
 /// answer.
 bool isArbitrary(const Conditioning& conditioning, Method method) {
   return method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate);
-}
-
-bool isBoxed(VertexFormat format) {
-  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
 }
 
 bool isOctahedral(VertexFormat format) {
@@ -110,7 +106,7 @@ PositionCheck checkPosition(Double3 expected, const SkinnedView& view, std::size
   if (!check.finite) return check;
   Double3 reach{};  // how large the float32 components can be
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (isBoxed(format)) {
+    if (isSnormPosition(format)) {
       const double inside = std::clamp(expected[axis], static_cast<double>(view.box.min[axis]),
                                        static_cast<double>(view.box.max[axis]));
       check.clamped |= inside != expected[axis];
@@ -273,8 +269,8 @@ Exemptions exemptionsOf(const SkinnedMesh& expected, Method method) {
   return exemptions;
 }
 
-Result<Comparison> compare(const SkinnedMesh& expected, const SkinnedView& actual, Method method,
-                           const Exemptions& exemptions) {
+Result<Comparison> compareWithReference(const SkinnedMesh& expected, const SkinnedView& actual,
+                                        Method method, const Exemptions& exemptions) {
   const std::size_t count = expected.positions.size();
   const bool withNormals = actual.normals.data != nullptr && !expected.normals.empty();
   const bool withTangents = actual.tangents.data != nullptr && !expected.tangents.empty();
@@ -285,7 +281,7 @@ Result<Comparison> compare(const SkinnedMesh& expected, const SkinnedView& actua
   if (wrong.empty() && withTangents) {
     wrong = complaint("tangents", actual.tangents, isTangentFormat, count);
   }
-  if (wrong.empty() && isBoxed(actual.positions.format) && !isUpright(actual.box)) {
+  if (wrong.empty() && isSnormPosition(actual.positions.format) && !isUpright(actual.box)) {
     wrong = "the box of the skinned positions is not finite or upside down";
   }
   if (!wrong.empty()) return Error{ErrorCode::invalidArgument, wrong};

@@ -1,4 +1,4 @@
-#include "bind_vertex.h"
+#include "verify/bind_vertex.h"
 
 #include <algorithm>
 #include <cmath>

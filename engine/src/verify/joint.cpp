@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "joint.h"
+#include "verify/joint.h"
 
 namespace dermis::reference {
 namespace {

@@ -1,4 +1,4 @@
-#include "dermis/reference.h"
+#include "dermis/verify/reference.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -9,10 +9,10 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "bind_vertex.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
-#include "methods.h"
+#include "verify/bind_vertex.h"
+#include "verify/methods.h"
 
 namespace dermis::reference {
 namespace {

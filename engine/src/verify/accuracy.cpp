@@ -1,4 +1,4 @@
-#include "dermis/accuracy.h"
+#include "dermis/verify/accuracy.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,11 +9,11 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "bind_vertex.h"
 #include "dermis/method.h"
-#include "dermis/reference.h"
-#include "joint.h"
-#include "rigid.h"
+#include "dermis/verify/reference.h"
+#include "verify/bind_vertex.h"
+#include "verify/joint.h"
+#include "verify/rigid.h"
 
 namespace dermis::reference {
 

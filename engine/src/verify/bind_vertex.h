@@ -10,8 +10,8 @@
 #include <glm/vec3.hpp>
 
 #include "dermis/mesh.h"
-#include "dermis/reference.h"
 #include "dermis/result.h"
+#include "dermis/verify/reference.h"
 
 namespace dermis::reference {
 

@@ -7,8 +7,8 @@
 
 #include "dermis/mesh.h"
 #include "dermis/method.h"
-#include "dermis/reference.h"
 #include "dermis/result.h"
+#include "dermis/verify/reference.h"
 #include "dermis/vertex_format.h"
 
 namespace dermis {
@@ -59,8 +59,8 @@ double normalFormatBound(VertexFormat format);
 /// (δ, η, δ + η) with η = 1 / (L − 1) + 12 u, times √3.
 double tangentFormatBound(VertexFormat format);
 
-/// The number of vertices that have no bound. The caller of `compare` states it; a comparison with
-/// any other number fails.
+/// The number of vertices that have no bound. The caller of `compareWithReference` states it; a
+/// comparison with any other number fails.
 struct Exemptions {
   std::uint64_t onlyFinite = 0;  ///< the answer is a matter of rounding: it is asked to be finite
   std::uint64_t skipped = 0;     ///< there is no answer (`Conditioning::undefined`): not looked at
@@ -125,7 +125,8 @@ struct SkinnedView {
 ///
 /// Fails with `invalidArgument` where the counts disagree, a format does not fit its attribute, a
 /// stride is less than its element, or the box of snorm16 is not finite or upside down.
-Result<Comparison> compare(const reference::SkinnedMesh& expected, const SkinnedView& actual,
-                           Method method, const Exemptions& exemptions = {});
+Result<Comparison> compareWithReference(const reference::SkinnedMesh& expected,
+                                        const SkinnedView& actual, Method method,
+                                        const Exemptions& exemptions = {});
 
 }  // namespace dermis

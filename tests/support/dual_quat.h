@@ -15,7 +15,7 @@
 #include <glm/mat4x3.hpp>
 #include <glm/vec3.hpp>
 
-namespace dermis {
+namespace dermis::test {
 
 /// A dual quaternion real + ε dual. It is a rigid transform where |real| = 1 and real · dual = 0;
 /// then q and -q are the same transform.
@@ -209,4 +209,4 @@ DualQuat<T> screwInterpolate(const DualQuat<T>& a, const DualQuat<T>& b, T t) {
   return a * exp(log(difference) * t);
 }
 
-}  // namespace dermis
+}  // namespace dermis::test

@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "joint.h"
-#include "methods.h"
+#include "verify/joint.h"
+#include "verify/methods.h"
 
 namespace dermis::reference {
 namespace {

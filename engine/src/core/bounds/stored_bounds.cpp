@@ -1,0 +1,154 @@
+// How `JointBounds` are stored: words, with the header of a packed mesh. What is read back is
+// checked, so that `skinnedBounds` reads nothing outside it and never meets a NaN.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/bounds.h"
+#include "dermis/types.h"
+#include "pack/check.h"
+
+namespace dermis {
+namespace {
+
+constexpr std::uint32_t magic = 0x42425344u;  // "DSBB"
+constexpr std::uint32_t version = 1;
+
+/// The first four words stand where those of a packed mesh do: the checksum is the same.
+struct Header {
+  std::uint32_t magic, version, checksum, wordCount;
+  std::uint32_t joints, pairs, trios, requiredJoints;
+  Box unweighted;
+};
+
+static_assert(sizeof(JointBounds::Joint) == 27 * 4 && sizeof(JointBounds::Pair) == 34 * 4);
+
+constexpr std::uint64_t wordsOf(std::uint64_t joints, std::uint64_t pairs, std::uint64_t trios) {
+  return sizeof(Header) / 4 + joints * sizeof(JointBounds::Joint) / 4 +
+         pairs * sizeof(JointBounds::Pair) / 4 + trios * 3;
+}
+
+Error damaged(const std::string& what) {
+  return {ErrorCode::invalidData, "joint bounds: " + what};
+}
+
+bool hasNan(std::span<const float> numbers) {
+  return std::ranges::any_of(numbers, [](float number) { return std::isnan(number); });
+}
+
+template <typename Element>
+void append(std::vector<std::byte>& bytes, const std::vector<Element>& elements) {
+  const auto from = std::as_bytes(std::span(elements));
+  bytes.insert(bytes.end(), from.begin(), from.end());
+}
+
+template <typename Element>
+void take(std::span<const std::byte>& bytes, std::size_t count, std::vector<Element>& elements) {
+  elements.resize(count);
+  const std::size_t size = count * sizeof(Element);
+  if (size != 0) std::memcpy(elements.data(), bytes.data(), size);
+  bytes = bytes.subspan(size);
+}
+
+Result<void> checkJoints(const JointBounds& bounds) {
+  std::uint32_t required = 0;
+  for (const JointBounds::Joint& joint : bounds.joints) {
+    if (joint.joint < required || joint.joint >= maxPaletteJoints || hasNan(joint.alone.reach))
+      return damaged("its joints are not in order, or not numbers");
+    required = joint.joint + 1;
+  }
+  if (required != bounds.requiredJoints) return damaged("the joints that it requires are others");
+  return {};
+}
+
+Result<void> checkPairs(const JointBounds& bounds) {
+  std::uint64_t next = 0;
+  for (const JointBounds::Pair& pair : bounds.pairs) {
+    const std::uint64_t key = std::uint64_t{pair.first} << 32 | pair.second;
+    const float ratios[] = {pair.firstOverSecond[0], pair.firstOverSecond[1],
+                            pair.secondOverFirst[0], pair.secondOverFirst[1], pair.leastSum};
+    if (pair.first >= pair.second || pair.second >= bounds.joints.size() || key < next ||
+        pair.influences < 2 || hasNan(pair.extent.reach) || hasNan(ratios) ||
+        std::ranges::any_of(ratios, [](float ratio) { return ratio < 0; }))
+      return damaged("its pairs of joints are not in order, or not numbers");
+    next = key + 1;
+  }
+  return {};
+}
+
+Result<void> checkTrios(const JointBounds& bounds) {
+  const std::array<std::uint32_t, 3>* before = nullptr;
+  for (const std::array<std::uint32_t, 3>& trio : bounds.trios) {
+    if (trio[0] >= trio[1] || trio[1] >= trio[2] || trio[2] >= bounds.joints.size() ||
+        (before != nullptr && !(*before < trio)))
+      return damaged("its trios of joints are not in order");
+    before = &trio;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::byte> JointBounds::bytes() const {
+  static_assert(std::endian::native == std::endian::little, "the words are little-endian");
+  std::vector<std::byte> bytes(sizeof(Header));
+  append(bytes, joints);
+  append(bytes, pairs);
+  append(bytes, trios);
+  Header header{magic,
+                version,
+                0,
+                static_cast<std::uint32_t>(bytes.size() / 4),
+                static_cast<std::uint32_t>(joints.size()),
+                static_cast<std::uint32_t>(pairs.size()),
+                static_cast<std::uint32_t>(trios.size()),
+                requiredJoints,
+                unweighted};
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  std::vector<std::uint32_t> words(bytes.size() / 4);
+  std::memcpy(words.data(), bytes.data(), bytes.size());
+  header.checksum = checksumOfBlob(words);
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  return bytes;
+}
+
+Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
+  Header header{};
+  if (bytes.size() >= sizeof(header)) std::memcpy(&header, bytes.data(), sizeof(header));
+  if (header.magic != magic) return damaged("the bytes do not begin with their header");
+  if (header.version != version) {
+    return Error{ErrorCode::unsupportedVersion,
+                 "joint bounds: version " + std::to_string(header.version) +
+                     ", this library reads version " + std::to_string(version)};
+  }
+  if (std::uint64_t{header.wordCount} * 4 != bytes.size() ||
+      wordsOf(header.joints, header.pairs, header.trios) != header.wordCount) {
+    return damaged("they have " + std::to_string(bytes.size()) +
+                   " bytes, which is not what their header says");
+  }
+  std::vector<std::uint32_t> words(header.wordCount);
+  std::memcpy(words.data(), bytes.data(), bytes.size());
+  if (checksumOfBlob(words) != header.checksum) return damaged("the checksum does not match");
+
+  JointBounds bounds;
+  bytes = bytes.subspan(sizeof(header));
+  take(bytes, header.joints, bounds.joints);
+  take(bytes, header.pairs, bounds.pairs);
+  take(bytes, header.trios, bounds.trios);
+  bounds.unweighted = header.unweighted;
+  bounds.requiredJoints = header.requiredJoints;
+  if (hasNan(bounds.unweighted.min) || hasNan(bounds.unweighted.max))
+    return damaged("the box of vertices without weight is not of numbers");
+  if (Result<void> good = checkJoints(bounds); !good) return good.error();
+  if (Result<void> good = checkPairs(bounds); !good) return good.error();
+  if (Result<void> good = checkTrios(bounds); !good) return good.error();
+  return bounds;
+}
+
+}  // namespace dermis
