@@ -2,7 +2,8 @@
 # Builds Dermis with every warning an error and runs its tests; installs what is missing first.
 #
 #   tests/run.sh [PRESET]          ci (the default), dev, release, asan or tsan: builds all, runs all tests
-#   tests/run.sh sanitized         address and undefined-behaviour sanitizers: what works on the CPU, and a small suite on a device
+#   tests/run.sh sanitized         Dermis and the samples with address and undefined-behaviour sanitizers: tests of what works on the
+#                                  CPU, and a small suite on a device
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, else in ../shared, and
@@ -21,10 +22,12 @@ fi
 preset=$run
 build_target=all
 tests="-LE nightly"
+options=
 if [ "$run" = sanitized ]; then
   preset=asan
   build_target=sanitized_tests
   tests="-L sanitized"
+  options=-DDERMIS_SANITIZE_TESTS=OFF
 fi
 
 # step NAME COMMAND...: runs it, and prints how long it took.
@@ -40,7 +43,8 @@ step() {
 }
 
 step install ./cmake/install-deps.sh
-step configure cmake --preset "$preset"
+# shellcheck disable=SC2086 # none or one
+step configure cmake --preset "$preset" $options
 step build cmake --build "build/$preset" --target "$build_target"
 
 # LLVM, inside lavapipe, keeps memory until the process ends.
