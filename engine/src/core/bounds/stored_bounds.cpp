@@ -44,8 +44,9 @@ bool hasNan(std::span<const float> numbers) {
 
 template <typename Element>
 void append(std::vector<std::byte>& bytes, const std::vector<Element>& elements) {
-  const auto from = std::as_bytes(std::span(elements));
-  bytes.insert(bytes.end(), from.begin(), from.end());
+  const std::size_t end = bytes.size(), size = elements.size() * sizeof(Element);
+  bytes.resize(end + size);
+  if (size != 0) std::memcpy(bytes.data() + end, elements.data(), size);
 }
 
 template <typename Element>
