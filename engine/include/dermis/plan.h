@@ -1,6 +1,6 @@
-// A batch of instances turned into dispatches, on the CPU, without Vulkan. An engine hands the plan
-// to `vulkan::Context::record`, or issues the dispatches with its own RHI: everything that it needs
-// for that is here and in vulkan/kernels.h.
+// Turns a batch of instances into dispatches, on the CPU, without Vulkan. An engine passes the plan
+// to `vulkan::Context::record`, or issues the dispatches with its own RHI. This header and
+// vulkan/kernels.h have all that it needs for that.
 #pragma once
 
 #include <array>
@@ -20,11 +20,12 @@
 
 namespace dermis {
 
-/// What an engine promises of its meshes and palettes, so that it needs fewer pipelines (see
-/// `everyVariant`). `makePlan`, `addMesh` and `addPalette` refuse what breaks a promise.
+/// What an engine promises about its meshes and palettes. Each promise reduces the number of
+/// pipelines (see `everyVariant`). `makePlan`, `addMesh` and `addPalette` fail if a promise is
+/// broken.
 struct Promises {
-  /// Maximum influences of a vertex: 1, 2 or 4. All meshes are then skinned by pipelines for that
-  /// number. 0: no promise; there are pipelines for 1, 2, 4 and any number.
+  /// Maximum influences per vertex: 1, 2 or 4. All meshes then use pipelines for that number.
+  /// 0: no promise; there are pipelines for 1, 2, 4 and any number.
   std::uint8_t maxInfluences = 0;
   bool noMorphTargets = false;  ///< no mesh has morph targets
   bool noScale = false;         ///< no palette has `mayScale`
@@ -32,128 +33,128 @@ struct Promises {
   friend bool operator==(const Promises&, const Promises&) = default;
 };
 
-/// The limits of a device, and what the engine promised, that a plan must keep to;
-/// `vulkan::Context::limits` fills them. The defaults are what every Vulkan device has.
+/// The device limits and the promises that a plan is made for. `vulkan::Context::limits` returns
+/// them. The defaults are the minimum that Vulkan guarantees.
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes
-  /// Bytes, a power of two; also that of texel buffers, where they are read.
+  /// Bytes, a power of two. With `texelBuffers`, the larger of this and the alignment of uniform
+  /// texel buffers.
   std::uint32_t minStorageBufferOffsetAlignment = 256;
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
-  /// Storage buffers that one kernel may see. With fewer than `storageBuffersWanted` all attributes
-  /// must go to one buffer, near to each other, in whole words, without bounds or snorm16
-  /// positions.
+  /// Maximum storage buffers of one kernel. With fewer than `storageBuffersWanted`, all attributes
+  /// of a job must go to one buffer, close to each other, at multiples of 4 bytes, and bounds and
+  /// snorm16 positions are not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
-  /// Whether kernels may store 2 bytes, 1 byte (VkPhysicalDevice16BitStorageFeatures::
-  /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
-  /// Without, attributes must fill whole words. A Dermis that was built without
-  /// `DERMIS_SUBWORD_STORES` stores neither.
+  /// Whether kernels may store 2 bytes and 1 byte (VkPhysicalDevice16BitStorageFeatures::
+  /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess). If
+  /// not, attributes must stand at multiples of 4 bytes. Both are false if Dermis was built without
+  /// `DERMIS_SUBWORD_STORES`.
   bool storage16Bit = false;
   bool storage8Bit = false;
   /// Whether kernels read tables, meshes and palettes through uniform texel buffers, which is
-  /// faster on lavapipe. A uniform texel buffer of 4-byte texels must then hold a whole storage
-  /// buffer range. Kernels that store less than a word do not.
+  /// faster on lavapipe. Requires that a uniform texel buffer of 4-byte texels can hold a whole
+  /// storage buffer range. Kernels that store less than 4 bytes at a time always read storage
+  /// buffers.
   bool texelBuffers = false;
-  /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64): to store two
-  /// words at a time, which is faster on lavapipe.
+  /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64) to store 8
+  /// bytes at a time, which is faster on lavapipe.
   bool shaderInt64 = false;
-  /// Whether there are kernels for methods that are there for comparison: not where Dermis was
-  /// built without `DERMIS_COMPARISON_METHODS`.
+  /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
   Promises promises;
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
 
-/// Tables, meshes, palettes, the four attributes, results.
+/// One each for tables, meshes, palettes, the four attributes, and results.
 inline constexpr std::uint32_t storageBuffersWanted = 8;
 
-/// How the work is cut up. It changes the speed, never a bit of the result.
+/// How work is divided among invocations. It affects speed only: results are equal to the bit.
 struct Tuning {
   std::uint32_t workgroupSize = 64;  ///< invocations; a power of two from 8 to 128
-  std::uint32_t instancesPerInvocation =
-      4;  ///< instances for which one invocation skins its vertex, 1 to 32
+  /// Maximum instances for which one invocation skins its vertex, 1 to 32.
+  std::uint32_t instancesPerInvocation = 4;
 };
 
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.
 struct Palette {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPaletteJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
-  /// Whether joints may scale or shear: many exporters leave a scale in their joints. It costs 32
-  /// bytes a joint of scratch, and on lavapipe time, whether or not a pose makes use of it.
-  /// Where it is denied, joints that do so all the same are skinned by their rotation alone, and
-  /// counted in `PaletteStatus`.
+  /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
+  /// of scratch memory per joint and, on lavapipe, more time even if no joint scales. If false,
+  /// scale and shear are ignored (rotation only) and counted in `PaletteStatus`.
   bool mayScale = true;
 };
 
-/// Where one attribute of the skinned vertices goes: vertex v to `offset + v * stride` in the
-/// output buffer of that attribute. Bytes between attributes are never touched.
+/// Where one attribute of the skinned vertices is written: vertex v at `offset + v * stride` in the
+/// output buffer of that attribute. Bytes between attributes are never written.
 ///
 /// If positions and normals are float32x3 with equal strides, a multiple of 8, and normals begin 12
 /// bytes behind positions, both must go to one buffer (`OutputSizes::isOneBuffer`) and positions
 /// must begin at a multiple of 8.
 ///
-/// Offset, stride and the format's size are multiples of 4. With `DeviceLimits::storage16Bit` they
-/// may be multiples of 2 and, where `storage8Bit` is there too, any number.
+/// Offset, stride and the format's size must be multiples of 4; with `DeviceLimits::storage16Bit`,
+/// of 2; with `storage8Bit` too, they may be any number.
 struct OutputAttribute {
   std::uint64_t offset = 0;                  ///< bytes
   std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`
   VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not wanted
 };
 
-/// Where previous positions, for motion vectors, come from.
+/// Where previous positions come from. They are for motion vectors.
 enum class Motion : std::uint8_t {
   none,
-  /// What stood in the output before: the positions of the last time that this instance was
-  /// skinned. Costs a read and a write; the output must live from frame to frame.
+  /// Copied from the output before it is overwritten: the positions from the last time that this
+  /// instance was skinned. Takes a read and a write; the output must persist between frames.
   kept,
-  /// Skinned again from the palette and morph weights of that time: costs a second skinning, but
-  /// nothing has to be kept but the pose.
+  /// Skinned again with the previous palette and morph weights. Takes a second skinning; only the
+  /// pose must persist.
   reskinned,
 };
 
-/// One instance: a mesh, a palette and the places its skinned vertices go to. No two jobs of a
-/// batch may write the same byte; that is not checked.
+/// One instance: a mesh, a palette, and where its skinned vertices are written. Two jobs of a batch
+/// must not write the same byte; this is not checked.
 struct Job {
-  MeshInfo mesh;  ///< `PackedMesh::info` of the mesh whose bytes stand in the mesh buffer
+  MeshInfo mesh;                 ///< `PackedMesh::info`; its bytes are in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
   std::uint32_t palette = 0;     ///< index into `Batch::palettes`
-  /// One that `needsCentersOfRotation`, only for a mesh that has them.
+  /// If `needsCentersOfRotation(method)`, the mesh must have centres of rotation.
   Method method = Method::dualQuaternion;
 
-  OutputAttribute positions;  ///< `isPositionFormat`; always wanted
-  OutputAttribute normals;    ///< of unit length; only for a mesh that has normals
-  OutputAttribute tangents;   ///< of unit length; only for a mesh that has tangents
-  /// The box that positions in snorm16 are relative to; its sides must be finite, and longer than
-  /// 1e-38. The engine's, or `skinnedBounds` of the pose (bounds.h).
+  OutputAttribute positions;  ///< required; `isPositionFormat`
+  OutputAttribute normals;    ///< unit length; the mesh must have normals
+  OutputAttribute tangents;   ///< unit length; the mesh must have tangents
+  /// The box that snorm16 positions are relative to: the engine's own, or `skinnedBounds` of the
+  /// pose (bounds.h). Its sides must be finite and longer than 1e-38.
   Box box;
 
-  /// Active morph targets in any order, none twice; those of weight 0 are skipped. `makePlan`
-  /// copies them. Only these cost time, however many the mesh has.
+  /// Active morph targets, in any order, each once. Weights of 0 are skipped. `makePlan` copies
+  /// them. Only active targets take time.
   std::span<const MorphWeight> morphs;
 
   Motion motion = Motion::none;
-  /// In the format of `positions`, whose own is not looked at. With `Motion::kept`, snorm16 keeps
-  /// the box of the time it was written in.
+  /// Its format is that of `positions`; `format` is ignored here. With `Motion::kept`, snorm16
+  /// values stay relative to the box that they were written with.
   OutputAttribute previousPositions;
-  /// reskinned: index into `Batch::palettes`, with as many joints as the mesh needs.
+  /// reskinned: index into `Batch::palettes`; with at least the joints that the mesh requires.
   std::uint32_t previousPalette = 0;
-  std::span<const MorphWeight> previousMorphs;  ///< reskinned: the weights of that time
-  /// Previous positions are the current ones: on an instance's first frame, and after a teleport.
+  std::span<const MorphWeight> previousMorphs;  ///< reskinned: the previous weights
+  /// Previous positions become the current ones. For the first frame of an instance, and for a
+  /// teleport.
   bool restartsMotion = false;
-  /// The instance is not skinned; its previous positions become those that stand in the output. For
-  /// the first frame in which an instance is not updated: it no longer moves.
+  /// The instance is not skinned; its previous positions become the positions in the output. For
+  /// the first frame in which an instance no longer moves.
   bool settles = false;
 
-  /// The box of the skinned positions is wanted: `Plan::resultOffset`.
+  /// Write the box of the skinned positions to the results buffer: `Plan::resultOffset`.
   bool bounds = false;
 };
 
-/// What the skin kernel finds out about one instance; it stands in the results buffer. Only for
-/// jobs that ask for bounds, or have positions in snorm16.
+/// What the skin kernel writes to the results buffer for a job with `bounds` or snorm16 positions.
 ///
-/// Extremes are reduced by integer atomics: they are stored as numbers in the order of the floats,
-/// to which `box` turns them. A shader does it with
+/// Minimum and maximum are reduced by integer atomics, so they are stored as integers that compare
+/// like the floats. `box` converts them; a shader does it with
 /// `uintBitsToFloat((n & 0x80000000u) != 0u ? n & 0x7fffffffu : ~n)`.
 struct InstanceResult {
   std::uint32_t orderedMin[3] = {0xffffffffu, 0xffffffffu, 0xffffffffu};
@@ -161,19 +162,19 @@ struct InstanceResult {
   std::uint32_t orderedMax[3] = {0, 0, 0};
   std::uint32_t reserved = 0;
 
-  /// The exact box of the skinned float32 positions, before conversion to their format, NaNs left
-  /// out. Nothing for an instance that has none, did not ask for bounds, or settled.
+  /// The exact box of the skinned float32 positions, before conversion to their format, without
+  /// NaNs. Nothing if all are NaN, if `Job::bounds` is false, or if the job settles.
   std::optional<Box> box() const;
 };
 static_assert(sizeof(InstanceResult) == 32);
 
-/// Bytes of the output buffers, by attribute. Several may be one buffer.
+/// Bytes of the output buffer of each attribute. Attributes may share a buffer.
 struct OutputSizes {
   std::uint64_t positions = 0;
   std::uint64_t normals = 0;
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
-  /// All attributes go to one and the same buffer. `record` checks the bindings if it matters
+  /// All attributes share one buffer. `record` checks the bindings if a variant depends on it
   /// (`Variant::pairs`).
   bool isOneBuffer = false;
 
@@ -182,7 +183,7 @@ struct OutputSizes {
   }
 };
 
-/// Everything that one `record` skins, and the sizes of the buffers it works on.
+/// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
   std::span<const Palette> palettes;
   std::span<const Job> jobs;
@@ -197,8 +198,8 @@ enum class Kernel : std::uint8_t { palette, skin };
 enum class Stream : std::uint8_t { positions, normals, tangents, previousPositions };
 inline constexpr std::size_t streamCount = 4;
 
-/// One specialisation of a kernel: what a pipeline is built from. All but `kernel` and
-/// `workgroupSize` is the skin kernel's.
+/// One specialisation of a kernel, from which a pipeline is built. All members but `kernel` and
+/// `workgroupSize` apply to the skin kernel only.
 struct Variant {
   Kernel kernel = Kernel::skin;
   Method method = Method::dualQuaternion;
@@ -209,16 +210,16 @@ struct Variant {
   std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
   Motion motion = Motion::none;
   bool bounds = false;
-  /// With `scales`, and influences for any vertex.
+  /// Whether instances have active morph targets.
   bool morphs = false;
-  /// Whether joints may scale or shear (`Palette::mayScale`). Never for linear blending, which does
-  /// not ask.
+  /// Whether joints may scale or shear (`Palette::mayScale`). Always false for linear blending,
+  /// which does not distinguish them.
   bool scales = false;
-  /// Tables, meshes and palettes are read as uniform texel buffers, not as storage buffers.
+  /// Tables, meshes and palettes are read through uniform texel buffers, not storage buffers.
   bool texels = false;
-  /// Positions and, right behind each, normals in the same buffer, float32x3 both and at multiples
-  /// of 8 bytes, are stored together, two words at a time. Only with `texels`, without motion and
-  /// results, and with `DeviceLimits::shaderInt64`.
+  /// Each position and the normal behind it are stored together, 8 bytes at a time
+  /// (`OutputAttribute`). Only with `texels` and `DeviceLimits::shaderInt64`, without motion and
+  /// results.
   bool pairs = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
@@ -226,18 +227,18 @@ struct Variant {
   std::uint16_t workgroupSize = 64;
 
   friend bool operator==(const Variant&, const Variant&) = default;
-  /// A number that is different for every variant.
+  /// A number that differs between any two variants.
   std::uint64_t key() const;
 };
 
 /// Whether the kernel writes `InstanceResult`: for bounds, and positions in snorm16.
 bool hasResults(const Variant& variant);
 
-/// Every variant that jobs with the method, outputs, motion and bounds of this one may need,
-/// whatever their mesh, palette and morph targets and whatever else is in their batch: for
-/// `Context::prepare`, while loading. The palette kernel; and the skin kernel for at most 1, 2 and
-/// 4 influences; for 4 with joints that scale; for any number; for any number with morph targets.
-/// Some methods need fewer, and `Promises` leave more out.
+/// All variants that jobs with the method, outputs, motion and bounds of this job can need,
+/// whatever their mesh, palette, morph targets and batch: for `Context::prepare`, while loading.
+/// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for 4 with
+/// joints that scale; for any number; and for any number with morph targets. Some methods need
+/// fewer. `Promises` reduce the number further.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The buffers of a batch.
@@ -255,13 +256,13 @@ enum class BufferRole : std::uint8_t {
 
 struct BufferRequirement {
   std::uint64_t size = 0;       ///< bytes, at least
-  std::uint32_t alignment = 0;  ///< of the offset at which it may stand in a larger VkBuffer
+  std::uint32_t alignment = 0;  ///< of its offset in a larger VkBuffer
   std::uint32_t usage = 0;      ///< VkBufferUsageFlags
-  bool perFrame = false;        ///< Rewritten every frame: needs a copy for each frame in flight.
-  bool hostWritten = false;     ///< The CPU writes it: mapped, or copied to before `record`.
+  bool perFrame = false;        ///< rewritten every frame: one copy for each frame in flight
+  bool hostWritten = false;     ///< written by the CPU: mapped, or copied to before `record`
 };
 
-/// Numbers of a dispatch that go into its push constants, in this order (shaders/abi.h).
+/// The push constants of a dispatch, in this order (shaders/abi.h).
 struct DispatchConstants {
   std::uint32_t firstRecord = 0;  ///< word offset of its records in the tables
   std::uint32_t recordCount = 0;
@@ -271,9 +272,9 @@ struct DispatchConstants {
 
 /// The part of an output buffer that a dispatch writes.
 struct OutputWindow {
-  std::uint32_t index = 0;   ///< counts the windows of that buffer
-  std::uint64_t offset = 0;  ///< bytes at which it begins; 0 unless the buffer is larger than a
-                             ///< storage buffer range may be
+  std::uint32_t index = 0;  ///< among the windows of that buffer
+  /// Bytes. 0 unless the buffer is larger than `maxStorageBufferRange`.
+  std::uint64_t offset = 0;
 };
 
 struct Dispatch {
@@ -281,31 +282,29 @@ struct Dispatch {
   std::uint32_t groupCountX = 0;
   std::uint32_t groupCountY = 0;
   DispatchConstants constants;
-  /// It reads what the palette kernel wrote, or may see results that the palette kernel cleared: a
-  /// memory barrier stands before this dispatch.
+  /// It reads what the palette kernel wrote, or adds to results that the palette kernel cleared.
+  /// A memory barrier is needed before the first such dispatch.
   bool afterPalettes = false;
   std::array<OutputWindow, streamCount> windows;
 };
 
-/// How many bytes lie between the beginnings of two output ranges on a device with these limits. A
-/// range is at most `maxStorageBufferRange` bytes; they overlap, so that an instance lies in one or
-/// is cut by vertices into pieces that do.
+/// Bytes from the beginning of one output window to the next. A window is at most
+/// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
+/// instance, lies in one window.
 std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
-/// What the palette kernel found out about one pose; it stands in the palettes buffer, where the
-/// engine may read it.
+/// What the palette kernel writes about one pose to the palettes buffer; the engine may read it.
 struct PaletteStatus {
-  std::uint32_t twoPhase = 0;        ///< 1 where the two-phase path was taken
-  std::uint32_t nonRigidJoints = 0;  ///< joints with scale, shear or a mirror
-  std::uint32_t undeclaredScale =
-      0;  ///< those in a palette that did not declare `mayScale`: their scale was lost
+  std::uint32_t twoPhase = 0;         ///< 1 if joints are skinned in two phases: scale, rotation
+  std::uint32_t nonRigidJoints = 0;   ///< joints with scale, shear or a mirror
+  std::uint32_t undeclaredScale = 0;  ///< those whose scale was ignored: `mayScale` is false
   std::uint32_t nonFiniteJoints = 0;  ///< joints with a NaN or an infinity
 };
 
 struct PlanData;
 
-/// The dispatches of a batch. Reuse one object: its memory is kept. Not thread-safe while
-/// `makePlan` fills it, immutable after.
+/// The dispatches of a batch. Reuse one object to reuse its memory. Not thread-safe while
+/// `makePlan` fills it, immutable afterwards.
 class Plan {
  public:
   Plan();
@@ -315,17 +314,17 @@ class Plan {
 
   /// In the order in which they must be issued.
   std::span<const Dispatch> dispatches() const;
-  /// The variants that the dispatches use, each once: what `Context::prepare` must have built.
+  /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
-  /// What the buffer of that role must be. Meshes, matrices and outputs: as large as the batch said
-  /// they are. Tables, palettes and results: as large as this plan needs.
+  /// Requirements of a buffer. Sizes of meshes, matrices and outputs are those that the batch
+  /// states; tables, palettes and results are as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
-  /// Bytes into the palettes buffer at which the `PaletteStatus` of a palette stands; `noStatus`
-  /// where only linear jobs use that palette.
+  /// Byte offset of a palette's `PaletteStatus` in the palettes buffer; `noStatus` if only linear
+  /// jobs use that palette.
   std::uint64_t statusOffset(std::uint32_t palette) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
-  /// Bytes into the results buffer at which the `InstanceResult` of a job stands; `noResult` where
-  /// it has none. Results stand in the order of their jobs, without gaps.
+  /// Byte offset of a job's `InstanceResult` in the results buffer; `noResult` if it has none.
+  /// Results are in the order of their jobs, without gaps.
   std::uint64_t resultOffset(std::uint32_t job) const;
   static constexpr std::uint64_t noResult = ~std::uint64_t{0};
 
@@ -336,27 +335,26 @@ class Plan {
   std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances
 
  private:
-  friend struct PlanData;  // what it consists of
+  friend struct PlanData;  // its contents
   friend Result<void> makePlan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
   std::unique_ptr<PlanData> data_;
 };
 
-/// Turns a batch into dispatches: one for all palettes, then one for each combination of method,
-/// formats, motion and the like (and output range). O(palettes + jobs + morph weights), no Vulkan
-/// call. An empty batch gives an empty plan.
+/// Turns a batch into dispatches: one for all palettes, then one for each variant and output
+/// window. O(palettes + jobs + morph weights). An empty batch gives an empty plan.
 ///
-/// Fails with `invalidArgument` where a job or palette breaks a rule written above (the sentence
-/// names it by its index), among them: a palette with fewer joints than the mesh needs, normals
-/// wanted of a mesh that has none, a range outside its buffer; with `missingFeature` where an
-/// attribute does not fill whole words and the device cannot store less; and with `limitExceeded`
-/// where a vertex' attribute, or a buffer, does not fit a device's storage buffer range. The plan
-/// is then empty.
+/// Fails with `invalidArgument` if a job or palette breaks a rule above (the message names it by
+/// its index), for example: a palette with fewer joints than the mesh requires, normals for a mesh
+/// without normals, a range outside its buffer, a broken promise. Fails with `missingFeature` if an
+/// attribute is not at multiples of 4 bytes and the device cannot store less, and with
+/// `limitExceeded` if an attribute or a buffer is larger than the device's storage buffer range.
+/// The plan is then empty.
 Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                       Plan& out);
 
-/// Writes the tables that the kernels read, `buffer(BufferRole::tables).size` bytes, to mapped
-/// memory. The memory is written once from front to back and never read. Fails with
-/// `invalidArgument` where `bytes` is too small.
+/// Writes the tables that the kernels read, `buffer(BufferRole::tables).size` bytes. `bytes` may be
+/// mapped memory: it is written once, front to back, and never read. Fails with `invalidArgument`
+/// if `bytes` is too small.
 Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes);
 
 }  // namespace dermis
