@@ -535,8 +535,8 @@ TEST_F(BadInput, NanInAPoseAffectsThatInstanceAlone) {
 
 /// Runs `info` with 1 GiB of address space, and expects it to refuse the file soon.
 void expectRefusedSoon(const std::string& model, const std::string& text) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  const std::string limit;  // their shadow memory is larger
+#ifdef DERMIS_SANITIZED
+  const std::string limit;  // a sanitizer's shadow memory is larger
 #else
   const std::string limit = "ulimit -v 1048576; ";
 #endif
