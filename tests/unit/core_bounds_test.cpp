@@ -427,8 +427,9 @@ struct Creature {
     std::vector<glm::dvec3> translations;
     std::vector<JointMatrix> result;
     for (std::size_t joint = 0; joint < origins.size(); ++joint) {
-      const glm::dmat3 turn = glm::mat3_cast(
-          glm::angleAxis(random.between(-mostAngle, mostAngle), glm::normalize(random.vector(1))));
+      const glm::dvec3 axis = glm::normalize(random.vector(1));
+      const glm::dmat3 turn =
+          glm::mat3_cast(glm::angleAxis(random.between(-mostAngle, mostAngle), axis));
       const std::size_t parent = parents[joint];
       const bool root = parent == joint;
       const glm::dmat3 base = root ? glm::dmat3(1.0) : rotations[parent];

@@ -19,7 +19,7 @@ FileBuilder textured(const Json& image) {
   file.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
   file.json["textures"] = {{{"source", 0}, {"sampler", 0}}};
   file.json["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}}};
-  file.json["images"] = {image};
+  file.json["images"] = Json::array({image});
   return file;
 }
 

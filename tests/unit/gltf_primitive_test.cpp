@@ -49,7 +49,7 @@ TEST(GltfPrimitive, RefusesMorphTargetsOfNothing) {
   expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
   bare.primitive()["indices"] = bare.add<std::uint16_t>({0, 1, 2}, "SCALAR", unsignedShortType);
   expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
-  bare.primitive()["targets"] = {Json::object()};
+  bare.primitive()["targets"] = Json::array({Json::object()});
   expectInvalid(bare, "mesh 0 primitive 0: it has morph targets, but no attribute");
   bare.attributes() = {{"_ANY", file.attributes()["POSITION"]}};
   EXPECT_EQ(loaded(bare).skinnedPrimitives.size(), 0u) << "no positions: left out, with a note";
