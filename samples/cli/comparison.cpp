@@ -89,11 +89,13 @@ double medianOf(std::vector<double> values) {
 Variant mainVariant(const Plan& plan) {
   Variant variant;
   std::uint32_t most = 0;
-  for (const Dispatch& dispatch : plan.dispatches()) {
-    if (dispatch.variant.kernel != Kernel::skin || dispatch.constants.workgroupCount < most)
+  for (const Command& command : plan.commands()) {
+    const auto* dispatch = std::get_if<DispatchCommand>(&command);
+    if (dispatch == nullptr || dispatch->variant.kernel != Kernel::skin ||
+        dispatch->workgroupCount < most)
       continue;
-    most = dispatch.constants.workgroupCount;
-    variant = dispatch.variant;
+    most = dispatch->workgroupCount;
+    variant = dispatch->variant;
   }
   return variant;
 }

@@ -147,7 +147,7 @@ void BatchRunner::countChangedBytes(BatchResult& result) const {
 BatchResult BatchRunner::readBack(const Plan& plan, const MappedBuffer& palettes,
                                   const MappedBuffer& results) const {
   BatchResult result;
-  result.dispatches = plan.dispatches().size();
+  result.dispatches = plan.dispatchCount();
   for (std::uint32_t index = 0; index < layout_.jobs.size(); ++index) {
     const Job& job = layout_.jobs[index];
     SkinnedVertices skinned;

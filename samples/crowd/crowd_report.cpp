@@ -49,12 +49,12 @@ std::string share(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:.1f} %", percent);
 }
 
-std::string mebibytes(const vulkan::StoreStatistics& store) {
+std::string mebibytes(const StoreStatistics& store) {
   return fmt::format("{:.1f} of {:.1f}", static_cast<double>(store.used) / mebibyte,
                      static_cast<double>(store.capacity) / mebibyte);
 }
 
-Json jsonOf(const vulkan::StoreStatistics& store) {
+Json jsonOf(const StoreStatistics& store) {
   return {{"capacity", store.capacity}, {"used", store.used}, {"largestFree", store.largestFree}};
 }
 

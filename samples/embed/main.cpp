@@ -130,10 +130,10 @@ Result<void> run(samples::Device& engine) {
     }
     worst = std::max({worst, comparison->worstPosition, comparison->worstNormal});
   }
-  std::printf("%s: %u frames of %u instances, %llu vertices in %zu dispatches each\n",
+  std::printf("%s: %u frames of %u instances, %llu vertices in %u dispatches each\n",
               engine.info().name.c_str(), frameCount, embed::instanceCount,
               static_cast<unsigned long long>(crowd->plan.vertexCount()),
-              crowd->plan.dispatches().size());
+              crowd->plan.dispatchCount());
   std::printf("every vertex is right: the largest error is %.0f %% of its bound\n", 100 * worst);
   return {};
 }

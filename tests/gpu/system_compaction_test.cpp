@@ -78,7 +78,7 @@ TEST_F(SystemCompactionTest, BytesComeAlong) {
   for (const std::uint32_t number : {1u, 3u, 4u, 5u}) expectPose(number, 10, 10);
   engine_->runFrame();
   EXPECT_TRUE(system().movedInstances().empty());
-  const vulkan::StoreStatistics outputs = system().statistics().outputs;
+  const StoreStatistics outputs = system().statistics().outputs;
   EXPECT_EQ(outputs.largestFree, outputs.capacity - outputs.used) << "one stretch";
 }
 
@@ -171,7 +171,7 @@ TEST_F(SystemCompactionTest, WhatGoesBeforeItMovesIsNoTrouble) {
   for (const std::uint32_t number : {2u, 3u}) expectPose(number, 0, 0);
   EXPECT_TRUE(engine_->read(instances_[4]) == alone(coarse, systemPose(4), instance_));
   for (int i = 0; i < 4; ++i) engine_->runFrame();
-  const vulkan::StoreStatistics outputs = system().statistics().outputs;
+  const StoreStatistics outputs = system().statistics().outputs;
   EXPECT_EQ(outputs.used, 2 * must(system().output(instances_[2])).size +
                               must(system().output(instances_[4])).size)
       << "no place is lost";

@@ -36,7 +36,10 @@ const std::vector<std::string> neededFunctions{"vkGetDeviceProcAddr",
                                                "vkCmdBindDescriptorSets",
                                                "vkCmdPushConstants",
                                                "vkCmdPipelineBarrier",
-                                               "vkCmdDispatch"};
+                                               "vkCmdDispatch",
+                                               "vkCmdDispatchIndirect",
+                                               "vkCmdCopyBuffer",
+                                               "vkCmdFillBuffer"};
 
 TEST(ContextTest, EveryMissingEntryPointIsNamed) {
   for (const std::string& name : neededFunctions) {

@@ -145,6 +145,18 @@ void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t x, std::uint32_t y, s
   mock->commands.push_back("dispatch");
 }
 
+void VKAPI_CALL cmdDispatchIndirect(VkCommandBuffer, VkBuffer, VkDeviceSize) {
+  mock->commands.push_back("indirect dispatch");
+}
+void VKAPI_CALL cmdCopyBuffer(VkCommandBuffer, VkBuffer, VkBuffer, std::uint32_t,
+                              const VkBufferCopy*) {
+  mock->commands.push_back("copy");
+}
+void VKAPI_CALL cmdFillBuffer(VkCommandBuffer, VkBuffer, VkDeviceSize, VkDeviceSize,
+                              std::uint32_t) {
+  mock->commands.push_back("fill");
+}
+
 PFN_vkVoidFunction find(const char* name) {
   mock->requested.insert(name);
   if (mock->missing.contains(name)) return nullptr;
@@ -172,6 +184,9 @@ PFN_vkVoidFunction find(const char* name) {
       MOCK_FUNCTION("vkCmdPushConstants", cmdPushConstants),
       MOCK_FUNCTION("vkCmdPipelineBarrier", cmdPipelineBarrier),
       MOCK_FUNCTION("vkCmdDispatch", cmdDispatch),
+      MOCK_FUNCTION("vkCmdDispatchIndirect", cmdDispatchIndirect),
+      MOCK_FUNCTION("vkCmdCopyBuffer", cmdCopyBuffer),
+      MOCK_FUNCTION("vkCmdFillBuffer", cmdFillBuffer),
   };
   const auto found = functions.find(name);
   return found == functions.end() ? nullptr : found->second;

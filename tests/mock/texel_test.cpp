@@ -12,6 +12,7 @@
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -52,7 +53,7 @@ TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
     ASSERT_TRUE(record(batch, buffers).ok());
     ASSERT_EQ(mock.dispatches.size(), 1 + allMethods.size());
     for (std::size_t index = 1; index < mock.dispatches.size(); ++index) {
-      const Variant& variant = batch.plan.dispatches()[index].variant;
+      const Variant variant = dispatchesOf(batch.plan)[index].variant;
       EXPECT_TRUE(variant.texels);
       const MockDescriptors& bound = mock.dispatches[index].descriptors;
       const vulkan::BufferRange& palettes =

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core_plan_simulation.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -31,7 +32,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInElevenDispatches) {
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
   // The palettes; then, for both methods with and without normals, a dispatch for each number of
   // influences, and for joints that scale.
-  EXPECT_LE(out.dispatches().size(), 11u);
+  EXPECT_LE(dispatchesOf(out).size(), 11u);
   EXPECT_EQ(out.instanceCount(), 1000u);
   // O(meshes) + O(instances) words: 4 a palette, 8 an instance; 12 a mesh, method, layout, and
   // whether joints may scale.
@@ -53,9 +54,9 @@ TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
   }
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
-  EXPECT_EQ(out.dispatches()[0].variant.kernel, Kernel::palette);
+  EXPECT_EQ(dispatchesOf(out)[0].variant.kernel, Kernel::palette);
   // One, two, four and eight influences; four with joints that scale.
-  EXPECT_EQ(out.dispatches().size(), 1u + 5u);
+  EXPECT_EQ(dispatchesOf(out).size(), 1u + 5u);
 }
 
 TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
@@ -65,7 +66,7 @@ TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
   batch.addJob(1, 2, Method::linear, false);
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
-  ASSERT_EQ(out.dispatches().size(), 1u);
+  ASSERT_EQ(dispatchesOf(out).size(), 1u);
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
   for (std::uint32_t palette = 0; palette < 4; ++palette) {
     EXPECT_EQ(out.statusOffset(palette), Plan::noStatus);
@@ -130,7 +131,7 @@ TEST(Plan, APaletteInTwoFormsHasAStatusInEither) {
   batch.addJob(0, 3, Method::linear, true);
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
-  EXPECT_EQ(out.dispatches()[0].constants.recordCount, 4u);
+  EXPECT_EQ(dispatchesOf(out)[0].palettePush().paletteCount, 4u);
   std::set<std::uint64_t> offsets;
   for (const std::uint32_t palette : {0u, 1u, 2u}) {
     EXPECT_LT(out.statusOffset(palette), out.buffer(BufferRole::palettes).size);
@@ -173,25 +174,26 @@ TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
     Plan out;
     ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
     const auto has = [&](int number) {
-      return std::ranges::any_of(out.dispatches(), [&](const Dispatch& dispatch) {
+      const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
+      return std::ranges::any_of(dispatches, [&](const PlannedDispatch& dispatch) {
         return dispatch.variant.influences == number;
       });
     };
-    EXPECT_EQ(out.dispatches().size(), influences == 1 ? 1u : 2u);
+    EXPECT_EQ(dispatchesOf(out).size(), influences == 1 ? 1u : 2u);
     EXPECT_TRUE(has(1) && has(expected)) << influences;
   }
 }
 
 TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
   Plan out;
-  EXPECT_TRUE(out.dispatches().empty());
+  EXPECT_TRUE(dispatchesOf(out).empty());
   EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
   OwnedBatch batch;
   addMeshes(batch);
   addPalettes(batch);
   for (const Batch& empty : {Batch{}, batch.batch()}) {
     ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
-    EXPECT_TRUE(out.dispatches().empty());
+    EXPECT_TRUE(dispatchesOf(out).empty());
     EXPECT_TRUE(out.variants().empty());
     EXPECT_EQ(out.instanceCount(), 0u);
     EXPECT_EQ(out.vertexCount(), 0u);
@@ -229,7 +231,7 @@ TEST_F(PlanFeatures, JobsOfDifferentFormatsGoToDifferentDispatches) {
     }
   }
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  EXPECT_EQ(out.dispatches().size(), 4u);
+  EXPECT_EQ(dispatchesOf(out).size(), 4u);
 }
 
 // Half a dispatch that stores halves would be a dispatch that stores halves.
@@ -240,9 +242,9 @@ TEST_F(PlanFeatures, JobsOfDifferentStoreUnitsGoToDifferentDispatches) {
     batch.place(job, Arrangement::separate, gap);
   }
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  ASSERT_EQ(out.dispatches().size(), 3u);
+  ASSERT_EQ(dispatchesOf(out).size(), 3u);
   std::multiset<int> units;
-  for (const Dispatch& dispatch : out.dispatches()) units.insert(dispatch.variant.units[1]);
+  for (const PlannedDispatch& dispatch : dispatchesOf(out)) units.insert(dispatch.variant.units[1]);
   EXPECT_EQ(units, (std::multiset<int>{1, 2, 4}));
 }
 
@@ -252,8 +254,8 @@ TEST_F(PlanFeatures, JobsWithAndWithoutActiveMorphTargetsGoToDifferentDispatches
   add(linear()).morphs = batch.keep({{0, -1.0f}, {1, 0.0f}});
   add(linear());
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  ASSERT_EQ(out.dispatches().size(), 2u);
-  EXPECT_NE(out.dispatches()[0].variant.morphs, out.dispatches()[1].variant.morphs);
+  ASSERT_EQ(dispatchesOf(out).size(), 2u);
+  EXPECT_NE(dispatchesOf(out)[0].variant.morphs, dispatchesOf(out)[1].variant.morphs);
 }
 
 TEST_F(PlanFeatures, TheOrderOfMorphTargetsAndThoseOfWeightZeroChangeNothing) {
@@ -285,8 +287,8 @@ TEST_F(PlanFeatures, PreviousMorphWeightsMatterWhereTheInstanceIsSkinnedAgain) {
     job.previousMorphs = batch.keep({{3, 1.0f}});
     add(job);
     ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-    ASSERT_EQ(out.dispatches().size(), 1u);
-    EXPECT_EQ(out.dispatches()[0].variant.morphs, motion == Motion::reskinned);
+    ASSERT_EQ(dispatchesOf(out).size(), 1u);
+    EXPECT_EQ(dispatchesOf(out)[0].variant.morphs, motion == Motion::reskinned);
   }
 }
 
@@ -315,7 +317,7 @@ TEST_F(PlanFeatures, InstancesThatRestartOrSettleShareADispatchWithTheOthers) {
       }
     }
     ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-    EXPECT_EQ(out.dispatches().size(), 1u);
+    EXPECT_EQ(dispatchesOf(out).size(), 1u);
   }
 }
 
@@ -327,13 +329,15 @@ TEST_F(PlanFeatures, ResultsOfLinearJobsAloneAreClearedByThePaletteKernel) {
   job.bounds = true;
   add(job);
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  ASSERT_EQ(out.dispatches().size(), 3u);
-  EXPECT_EQ(out.dispatches()[0].variant.kernel, Kernel::palette);
-  EXPECT_EQ(out.dispatches()[0].constants.recordCount, 0u);
-  EXPECT_EQ(out.dispatches()[0].constants.workgroupCount, 1u);
+  ASSERT_EQ(dispatchesOf(out).size(), 3u);
+  EXPECT_EQ(dispatchesOf(out)[0].variant.kernel, Kernel::palette);
+  EXPECT_EQ(dispatchesOf(out)[0].palettePush().paletteCount, 0u);
+  EXPECT_EQ(dispatchesOf(out)[0].palettePush().workgroupCount, 1u);
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
-  for (const Dispatch& dispatch : out.dispatches().subspan(1))
-    EXPECT_EQ(dispatch.afterPalettes, dispatch.variant.bounds);
+  for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
+    EXPECT_EQ(dispatch.isAfterBarrier,
+              dispatch.variant.kernel == Kernel::skin && dispatch.variant.bounds);
+  }
 }
 
 TEST_F(PlanFeatures, ResultsStandInTheOrderOfTheirJobsWithoutGaps) {
@@ -360,7 +364,7 @@ TEST_F(PlanFeatures, EnoughWorkgroupsClearTheResults) {
       job.bounds = true;
       for (std::uint32_t instance = 0; instance < count; ++instance) add(job);
       ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {size, 4}, out));
-      EXPECT_EQ(out.dispatches()[0].constants.workgroupCount, 1 + (count + size - 1) / size);
+      EXPECT_EQ(dispatchesOf(out)[0].workgroupCount, 1 + (count + size - 1) / size);
     }
   }
 }

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core_plan_simulation.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -43,7 +44,7 @@ struct PlanErrors : public ::testing::Test {
       EXPECT_NE(result.error().message.find(part), std::string::npos)
           << "'" << result.error().message << "' lacks '" << part << "'";
     }
-    EXPECT_TRUE(out.dispatches().empty());
+    EXPECT_TRUE(dispatchesOf(out).empty());
     EXPECT_TRUE(out.variants().empty());
     EXPECT_EQ(out.instanceCount(), 0u);
     EXPECT_EQ(out.vertexCount(), 0u);

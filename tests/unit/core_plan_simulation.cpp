@@ -11,6 +11,7 @@
 
 #include "abi.h"
 #include "random_rig.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -61,14 +62,14 @@ class Simulation {
   void run() {
     ASSERT_NO_FATAL_FAILURE(checkResults());
     std::vector<Variant> used;
-    for (const Dispatch& dispatch : plan_.dispatches()) {
+    for (const PlannedDispatch& dispatch : dispatchesOf(plan_)) {
       ASSERT_NO_FATAL_FAILURE(checkDispatch(dispatch));
       if (std::find(used.begin(), used.end(), dispatch.variant) == used.end())
         used.push_back(dispatch.variant);
       if (dispatch.variant.kernel == Kernel::palette) {
         ASSERT_FALSE(palettesDone_) << "one dispatch for all palettes";
         palettesDone_ = true;
-        ASSERT_FALSE(dispatch.afterPalettes);
+        ASSERT_FALSE(dispatch.isAfterBarrier);
         ASSERT_NO_FATAL_FAILURE(runPalettes(dispatch));
       } else {
         ASSERT_NO_FATAL_FAILURE(runSkin(dispatch));
@@ -124,14 +125,16 @@ class Simulation {
     ASSERT_EQ(plan_.instanceCount(), batch_.jobs.size());
   }
 
-  void checkDispatch(const Dispatch& dispatch) {
+  void checkDispatch(const PlannedDispatch& dispatch) {
     const std::uint64_t groups = std::uint64_t{dispatch.groupCountX} * dispatch.groupCountY;
     ASSERT_GE(dispatch.groupCountX, 1u);
     ASSERT_LE(dispatch.groupCountX, limits_.maxWorkgroupCountX);
     ASSERT_LE(dispatch.groupCountY, limits_.maxWorkgroupCountY);
-    ASSERT_GE(groups, dispatch.constants.workgroupCount);
+    ASSERT_EQ(dispatch.skinPush().workgroupCount, dispatch.workgroupCount);
+    ASSERT_EQ(dispatch.palettePush().workgroupCount, dispatch.workgroupCount);
+    ASSERT_GE(groups, dispatch.workgroupCount);
     // Hardly any workgroup is started in vain.
-    ASSERT_LT(groups, std::uint64_t{dispatch.constants.workgroupCount} + dispatch.groupCountY);
+    ASSERT_LT(groups, std::uint64_t{dispatch.workgroupCount} + dispatch.groupCountY);
     ASSERT_EQ(dispatch.variant.workgroupSize, tuning_.workgroupSize);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const OutputWindow& window = dispatch.windows[stream];
@@ -143,8 +146,8 @@ class Simulation {
     }
   }
 
-  void runPalettes(const Dispatch& dispatch) {
-    const DispatchConstants& constants = dispatch.constants;
+  void runPalettes(const PlannedDispatch& dispatch) {
+    const abi::PalettePush push = dispatch.palettePush();
     std::set<PaletteInForm> wanted;
     for (const Job& job : batch_.jobs) {
       if (job.method == Method::linear) continue;
@@ -152,14 +155,12 @@ class Simulation {
       if (job.motion == Motion::reskinned)
         wanted.insert({job.previousPalette, wantsLogarithms(job.method)});
     }
-    ASSERT_EQ(constants.recordCount, wanted.size());
-    ASSERT_EQ(constants.instanceRecords, resultCount_);
-    ASSERT_EQ(constants.workgroupCount,
-              wanted.size() + divideUp(resultCount_, tuning_.workgroupSize));
+    ASSERT_EQ(push.paletteCount, wanted.size());
+    ASSERT_EQ(push.resultCount, resultCount_);
+    ASSERT_EQ(push.workgroupCount, wanted.size() + divideUp(resultCount_, tuning_.workgroupSize));
     std::uint64_t end = 0;
-    for (std::uint32_t number = 0; number < constants.recordCount; ++number) {
-      const auto record =
-          at<abi::PaletteRecord>(constants.firstRecord + number * abi::PALETTE_WORDS);
+    for (std::uint32_t number = 0; number < push.paletteCount; ++number) {
+      const auto record = at<abi::PaletteRecord>(push.palettes + number * abi::PALETTE_WORDS);
       const std::uint64_t status = std::uint64_t{record.place} * 16;
       // No two palettes of a batch begin at the same matrix.
       const auto matrices = std::uint64_t{record.matrices} * 16;
@@ -204,25 +205,25 @@ class Simulation {
     }
   }
 
-  void runSkin(const Dispatch& dispatch) {
-    const DispatchConstants& constants = dispatch.constants;
+  void runSkin(const PlannedDispatch& dispatch) {
+    const abi::SkinPush push = dispatch.skinPush();
     ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
-    for (std::uint32_t number = 0; number < constants.workgroupCount; ++number) {
+    for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       // The first group whose end lies behind the workgroup's number.
       std::uint32_t index = 0, begin = 0, end = 0;
       for (;; ++index) {
-        ASSERT_LT(index, constants.recordCount) << "workgroup " << number << " has no group";
+        ASSERT_LT(index, push.groupCount) << "workgroup " << number << " has no group";
         begin = end;
-        end = groupAt(std::uint64_t{constants.firstRecord} + index * abi::GROUP_WORDS).workgroupEnd;
+        end = groupAt(std::uint64_t{push.groups} + index * abi::GROUP_WORDS).workgroupEnd;
         ASSERT_GT(end, begin) << "an empty group";
         if (number < end) break;
       }
       ASSERT_NO_FATAL_FAILURE(
-          runWorkgroup(dispatch, constants.firstRecord + index * abi::GROUP_WORDS, number - begin));
+          runWorkgroup(dispatch, push.groups + index * abi::GROUP_WORDS, number - begin));
     }
   }
 
-  void runWorkgroup(const Dispatch& dispatch, std::uint32_t group, std::uint32_t local) {
+  void runWorkgroup(const PlannedDispatch& dispatch, std::uint32_t group, std::uint32_t local) {
     const std::uint32_t vertexGroups = groupAt(group).vertexGroups;
     const std::uint32_t firstVertex = groupAt(group).firstVertex;
     const std::uint32_t vertexEnd = groupAt(group).vertexEnd;
@@ -236,7 +237,7 @@ class Simulation {
         std::min(firstRun + dispatch.variant.workgroupSize, vertexEnd - firstVertex);
     for (std::uint32_t instance = firstInstance;
          instance < std::min(firstInstance + instancesEach, instanceCount); ++instance) {
-      const std::uint64_t record = std::uint64_t{dispatch.constants.instanceRecords} +
+      const std::uint64_t record = std::uint64_t{dispatch.skinPush().instances} +
                                    (groupAt(group).firstInstance + instance) * abi::INSTANCE_WORDS;
       std::uint32_t job = 0;
       ASSERT_NO_FATAL_FAILURE(findJob(dispatch, record, firstVertex, job));
@@ -251,7 +252,7 @@ class Simulation {
   }
 
   /// The job whose positions the record points at.
-  void findJob(const Dispatch& dispatch, std::uint64_t record, std::uint32_t firstVertex,
+  void findJob(const PlannedDispatch& dispatch, std::uint64_t record, std::uint32_t firstVertex,
                std::uint32_t& index) {
     const std::uint64_t place = dispatch.windows[0].offset + instanceAt(record).positions;
     const auto behind =
@@ -262,7 +263,7 @@ class Simulation {
     ASSERT_EQ(place, positions.offset + std::uint64_t{firstVertex} * positions.stride);
   }
 
-  void checkVariant(const Dispatch& dispatch, const Job& job) {
+  void checkVariant(const PlannedDispatch& dispatch, const Job& job) {
     const Variant& variant = dispatch.variant;
     ASSERT_EQ(variant.method, job.method);
     ASSERT_EQ(variant.positions, job.positions.format);
@@ -289,7 +290,7 @@ class Simulation {
     // that may see results.
     const bool reads = job.method != Method::linear || wantsResult(job);
     const bool maySee = reads || job.motion != Motion::none;
-    ASSERT_EQ(dispatch.afterPalettes, maySee && palettesDone_);
+    ASSERT_TRUE(dispatch.isAfterBarrier || !(maySee && palettesDone_));
     ASSERT_TRUE(palettesDone_ || !reads);
   }
 
@@ -363,7 +364,7 @@ class Simulation {
     std::uint32_t begin, end;   ///< the workgroup's vertices, from there
   };
 
-  void writeStream(const Dispatch& dispatch, std::uint32_t group, std::uint64_t record,
+  void writeStream(const PlannedDispatch& dispatch, std::uint32_t group, std::uint64_t record,
                    std::uint32_t index, std::size_t stream, const Run& run) {
     const Job& job = batch_.jobs[index];
     const OutputAttribute attribute = attributesOf(job)[stream];

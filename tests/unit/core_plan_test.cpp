@@ -13,6 +13,7 @@
 
 #include "abi.h"
 #include "core_plan_simulation.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -61,20 +62,6 @@ TEST(Plan, StatusHasFourWords) {
   EXPECT_EQ(offsetof(PaletteStatus, nonRigidJoints), offsetof(abi::StatusRecord, nonRigidJoints));
   EXPECT_EQ(offsetof(PaletteStatus, undeclaredScale), offsetof(abi::StatusRecord, undeclaredScale));
   EXPECT_EQ(offsetof(PaletteStatus, nonFiniteJoints), offsetof(abi::StatusRecord, nonFiniteJoints));
-}
-
-TEST(Plan, PushConstantsStandInTheOrderOfAbiH) {
-  EXPECT_EQ(sizeof(DispatchConstants), sizeof(abi::PalettePush));
-  EXPECT_EQ(offsetof(DispatchConstants, firstRecord), offsetof(abi::PalettePush, palettes));
-  EXPECT_EQ(offsetof(DispatchConstants, recordCount), offsetof(abi::PalettePush, paletteCount));
-  EXPECT_EQ(offsetof(DispatchConstants, workgroupCount),
-            offsetof(abi::PalettePush, workgroupCount));
-  EXPECT_EQ(offsetof(DispatchConstants, instanceRecords), offsetof(abi::PalettePush, resultCount));
-  EXPECT_EQ(sizeof(DispatchConstants), sizeof(abi::SkinPush));
-  EXPECT_EQ(offsetof(DispatchConstants, firstRecord), offsetof(abi::SkinPush, groups));
-  EXPECT_EQ(offsetof(DispatchConstants, recordCount), offsetof(abi::SkinPush, groupCount));
-  EXPECT_EQ(offsetof(DispatchConstants, workgroupCount), offsetof(abi::SkinPush, workgroupCount));
-  EXPECT_EQ(offsetof(DispatchConstants, instanceRecords), offsetof(abi::SkinPush, instances));
 }
 
 TEST(Plan, ResultsAreLaidOutAsAbiHSays) {
@@ -323,8 +310,8 @@ TEST(Plan, AJobScalesIfAPaletteThatItReadsMay) {
     batch.jobs = {job};
     Plan out;
     EXPECT_TRUE(makePlan(batch.batch(), richLimits(), {}, out).ok());
-    EXPECT_EQ(out.dispatches().back().variant.kernel, Kernel::skin);
-    return out.dispatches().back().variant.scales;
+    EXPECT_EQ(dispatchesOf(out).back().variant.kernel, Kernel::skin);
+    return dispatchesOf(out).back().variant.scales;
   };
   for (const Method method : allMethods) {
     const Job rigid = batch.addJob(0, 0, method, true);
@@ -344,18 +331,18 @@ TEST(Plan, AJobScalesIfAPaletteThatItReadsMay) {
 // ---- Plans as objects
 
 bool samePlan(const Plan& a, const Plan& b) {
-  const auto sameDispatch = [](const Dispatch& x, const Dispatch& y) -> bool {
+  const auto sameDispatch = [](const PlannedDispatch& x, const PlannedDispatch& y) -> bool {
     return x.variant == y.variant && x.groupCountX == y.groupCountX &&
            x.groupCountY == y.groupCountY &&
            std::memcmp(&x.constants, &y.constants, sizeof(x.constants)) == 0 &&
-           x.afterPalettes == y.afterPalettes &&
+           x.isAfterBarrier == y.isAfterBarrier &&
            std::ranges::equal(x.windows, y.windows,
                               [](const OutputWindow& v, const OutputWindow& w) -> bool {
                                 return v.index == w.index && v.offset == w.offset;
                               });
   };
   return tablesOf(a) == tablesOf(b) &&
-         std::ranges::equal(a.dispatches(), b.dispatches(), sameDispatch) &&
+         std::ranges::equal(dispatchesOf(a), dispatchesOf(b), sameDispatch) &&
          std::ranges::equal(a.variants(), b.variants()) && a.instanceCount() == b.instanceCount() &&
          a.vertexCount() == b.vertexCount() && a.limits() == b.limits() &&
          a.buffer(BufferRole::results).size == b.buffer(BufferRole::results).size &&

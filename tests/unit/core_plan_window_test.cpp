@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core_plan_simulation.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -21,7 +22,7 @@ DeviceLimits limitsOf(std::uint64_t range, std::uint32_t alignment,
   return limits;
 }
 
-bool hasOneWindow(const Dispatch& dispatch) {
+bool hasOneWindow(const PlannedDispatch& dispatch) {
   return std::all_of(dispatch.windows.begin(), dispatch.windows.end(),
                      [&](const auto& window) { return window.index == dispatch.windows[0].index; });
 }
@@ -55,7 +56,7 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
       const DeviceLimits limits = limitsOf(range, alignment, storageBuffers);
       ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {16, 3}, out));
       std::set<std::uint32_t> windows;
-      for (const Dispatch& dispatch : out.dispatches()) {
+      for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
         windows.insert(dispatch.windows[0].index);
         EXPECT_TRUE(dispatch.variant.normals == VertexFormat::none ||
                     dispatch.windows[1].index == dispatch.windows[0].index)
@@ -63,7 +64,7 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
       }
       EXPECT_GT(windows.size(), 1u);
       // One more dispatch a range of output and a variant.
-      EXPECT_LE(out.dispatches().size(),
+      EXPECT_LE(dispatchesOf(out).size(),
                 1 + out.variants().size() * (batch.outputSize / outputWindowStep(limits) + 1));
       EXPECT_EQ(out.instanceCount(), batch.jobs.size());
     }
@@ -79,7 +80,7 @@ TEST_P(PlanWindows, SoDoesEveryWriteOfEveryFormatAndMotion) {
       const OwnedBatch batch = randomRichBatch(seed, 80, separate);
       Plan out;
       ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(range, alignment), {32, 2}, out));
-      for (const Dispatch& dispatch : out.dispatches()) {
+      for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
         windows.insert(dispatch.windows[0].index);
         differ = differ || !hasOneWindow(dispatch);
       }
@@ -105,7 +106,7 @@ TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {64, 4}, out));
   EXPECT_EQ(out.instanceCount(), 1u);
   EXPECT_EQ(out.vertexCount(), 800u);
-  EXPECT_GE(out.dispatches().size(), 1 + 9u);
+  EXPECT_GE(dispatchesOf(out).size(), 1 + 9u);
 }
 
 // One result, one extension's morph targets and one palette, however many pieces there are.
@@ -119,7 +120,7 @@ TEST(Plan, TheInstanceThatIsCutHasOneResult) {
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(65536, 256), {64, 4}, out));
   EXPECT_EQ(out.buffer(BufferRole::results).size, sizeof(InstanceResult));
-  EXPECT_GE(out.dispatches().size(), 1 + 9u);
+  EXPECT_GE(dispatchesOf(out).size(), 1 + 9u);
 }
 
 // With storage buffers for each attribute, however far apart a vertex' attributes lie, they fit;
@@ -136,8 +137,9 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
     job.normals.offset = job.positions.offset + apart;
     Plan out;
     ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(65536, 256), {64, 4}, out));
+    const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
     const bool sharesWindows =
-        std::all_of(out.dispatches().begin(), out.dispatches().end(), [](const Dispatch& dispatch) {
+        std::all_of(dispatches.begin(), dispatches.end(), [](const PlannedDispatch& dispatch) {
           return dispatch.windows[0].index == dispatch.windows[1].index;
         });
     differ += sharesWindows ? 0 : 1;
@@ -198,12 +200,12 @@ TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
   batch.jobs.push_back(job);
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  ASSERT_EQ(out.dispatches().size(), 1u);
+  ASSERT_EQ(dispatchesOf(out).size(), 1u);
   const std::uint64_t step = outputWindowStep(richLimits());
-  EXPECT_EQ(out.dispatches()[0].windows[0].index, 3 * gigabyte / step);
-  EXPECT_EQ(out.dispatches()[0].windows[1].index, gigabyte / step);
-  EXPECT_EQ(out.dispatches()[0].windows[2].index, 0u);
-  EXPECT_GT(out.dispatches()[0].windows[3].index, out.dispatches()[0].windows[0].index);
+  EXPECT_EQ(dispatchesOf(out)[0].windows[0].index, 3 * gigabyte / step);
+  EXPECT_EQ(dispatchesOf(out)[0].windows[1].index, gigabyte / step);
+  EXPECT_EQ(dispatchesOf(out)[0].windows[2].index, 0u);
+  EXPECT_GT(dispatchesOf(out)[0].windows[3].index, dispatchesOf(out)[0].windows[0].index);
 }
 
 TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
@@ -222,7 +224,7 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
   std::set<std::uint32_t> positions, normals;
-  for (const Dispatch& dispatch : out.dispatches()) {
+  for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
     positions.insert(dispatch.windows[0].index);
     normals.insert(dispatch.windows[1].index);
   }
@@ -238,10 +240,10 @@ TEST(Plan, AnOutputOfExactlyOneRangeIsNotCut) {
   const DeviceLimits limits = limitsOf(1234 * 68, 256);
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
-  EXPECT_EQ(out.dispatches().size(), 1u);
+  EXPECT_EQ(dispatchesOf(out).size(), 1u);
   batch.outputSize += 4;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
-  EXPECT_GT(out.dispatches().size(), 1u);
+  EXPECT_GT(dispatchesOf(out).size(), 1u);
 }
 
 // Farther into the output than 32 bits can count.
@@ -256,7 +258,7 @@ TEST(Plan, OutputOffsetsHave64Bits) {
   }
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
-  EXPECT_EQ(out.dispatches().size(), 3u);
+  EXPECT_EQ(dispatchesOf(out).size(), 3u);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/scene.h"
 #include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"

@@ -1,5 +1,5 @@
-// Turns a batch of instances into dispatches, on the CPU, without Vulkan. An engine passes the plan
-// to `vulkan::Context::record`, or issues the dispatches with its own RHI. This header and
+// Turns a batch of instances into commands, on the CPU, without Vulkan. An engine passes the plan
+// to `vulkan::Context::record`, or issues the commands with its own RHI. This header and
 // vulkan/kernels.h have all that it needs for that.
 #pragma once
 
@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "dermis/mesh.h"
@@ -192,7 +193,11 @@ struct Batch {
   OutputSizes outputs;
 };
 
-enum class Kernel : std::uint8_t { palette, skin };
+enum class Kernel : std::uint8_t {
+  palette,     ///< converts poses
+  skin,        ///< skins instances
+  visibility,  ///< of a scene: chooses instances that are culled on the GPU
+};
 
 /// The four attributes of an output, in the order of the arrays below.
 enum class Stream : std::uint8_t { positions, normals, tangents, previousPositions };
@@ -241,7 +246,7 @@ bool hasResults(const Variant& variant);
 /// fewer. `Promises` reduce the number further.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
-/// The buffers of a batch.
+/// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
   meshes,
   matrices,
@@ -251,8 +256,15 @@ enum class BufferRole : std::uint8_t {
   positions,
   normals,
   tangents,
-  previousPositions
+  previousPositions,
+  // Only of a scene (scene.h), whose attributes share one buffer.
+  upload,      ///< what `writeTables` writes; copied to `tables`
+  readBack,    ///< what `Scene::readBack` reads; copied from counters and results
+  visibility,  ///< a word for each instance; written by the engine's culling on the GPU
+  history,     ///< what the visibility kernel remembers
+  counters,    ///< what the visibility kernel counts
 };
+inline constexpr std::size_t bufferRoleCount = 14;
 
 struct BufferRequirement {
   std::uint64_t size = 0;       ///< bytes, at least
@@ -262,14 +274,6 @@ struct BufferRequirement {
   bool hostWritten = false;     ///< written by the CPU: mapped, or copied to before `record`
 };
 
-/// The push constants of a dispatch, in this order (shaders/abi.h).
-struct DispatchConstants {
-  std::uint32_t firstRecord = 0;  ///< word offset of its records in the tables
-  std::uint32_t recordCount = 0;
-  std::uint32_t workgroupCount = 0;   ///< before folding into y
-  std::uint32_t instanceRecords = 0;  ///< word offset of the instance records in the tables
-};
-
 /// The part of an output buffer that a dispatch writes.
 struct OutputWindow {
   std::uint32_t index = 0;  ///< among the windows of that buffer
@@ -277,16 +281,61 @@ struct OutputWindow {
   std::uint64_t offset = 0;
 };
 
-struct Dispatch {
+// -- Commands, in the words of Vulkan. An engine with its own RHI visits each and calls the command
+// of that name.
+
+/// vkCmdBindPipeline, vkCmdPushConstants and vkCmdDispatch or vkCmdDispatchIndirect.
+struct DispatchCommand {
   Variant variant;
-  std::uint32_t groupCountX = 0;
+  std::uint32_t groupCountX = 0;  ///< 0 if indirect
   std::uint32_t groupCountY = 0;
-  DispatchConstants constants;
-  /// It reads what the palette kernel wrote, or adds to results that the palette kernel cleared.
-  /// A memory barrier is needed before the first such dispatch.
-  bool afterPalettes = false;
-  std::array<OutputWindow, streamCount> windows;
+  /// Workgroups with something to do. The product of both counts may be a little larger. 0 if
+  /// indirect.
+  std::uint32_t workgroupCount = 0;
+  /// Byte offset of a VkDispatchIndirectCommand in the tables, if indirect.
+  std::optional<std::uint64_t> indirectOffset;
+  /// Push constants from offset 0, the first `constantCount` words: PalettePush, SkinPush or
+  /// VisibilityPush of shaders/abi.h.
+  std::array<std::uint32_t, 9> constants{};
+  std::uint32_t constantCount = 0;
+  std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel
 };
+
+/// vkCmdCopyBuffer. Consecutive copies do not depend on each other.
+struct CopyCommand {
+  BufferRole from, to;
+  std::uint64_t fromOffset = 0, toOffset = 0, size = 0;  ///< bytes
+};
+
+/// vkCmdFillBuffer with zeros.
+struct ClearCommand {
+  BufferRole buffer;
+  std::uint64_t offset = 0, size = 0;  ///< bytes
+};
+
+/// Kinds of access to the buffers of a plan. They are combined with `|`.
+enum class Access : std::uint8_t {
+  computeRead = 1,
+  computeWrite = 2,
+  copyRead = 4,
+  copyWrite = 8,  ///< by copies and clears
+  indirectRead = 16,
+  hostRead = 32,
+};
+constexpr Access operator|(Access a, Access b) {
+  return static_cast<Access>(static_cast<std::uint8_t>(a) | static_cast<std::uint8_t>(b));
+}
+constexpr bool includes(Access accesses, Access one) {
+  return (static_cast<std::uint8_t>(accesses) & static_cast<std::uint8_t>(one)) != 0;
+}
+
+/// vkCmdPipelineBarrier with a VkMemoryBarrier: accesses `before` happen, and are visible, before
+/// accesses `after`.
+struct BarrierCommand {
+  Access before, after;
+};
+
+using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, BarrierCommand>;
 
 /// Bytes from the beginning of one output window to the next. A window is at most
 /// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
@@ -303,8 +352,8 @@ struct PaletteStatus {
 
 struct PlanData;
 
-/// The dispatches of a batch. Reuse one object to reuse its memory. Not thread-safe while
-/// `makePlan` fills it, immutable afterwards.
+/// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. Not
+/// thread-safe while `makePlan` or `Scene::plan` fills it, immutable afterwards.
 class Plan {
  public:
   Plan();
@@ -312,8 +361,9 @@ class Plan {
   Plan(Plan&&) noexcept;
   Plan& operator=(Plan&&) noexcept;
 
-  /// In the order in which they must be issued.
-  std::span<const Dispatch> dispatches() const;
+  /// In the order in which they must be issued. For a batch: the palette kernel, a barrier, the
+  /// skin kernels. Barriers against what the engine does before and after are not among them.
+  std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
   /// Requirements of a buffer. Sizes of meshes, matrices and outputs are those that the batch
@@ -331,16 +381,16 @@ class Plan {
   /// The limits that the plan was made for.
   const DeviceLimits& limits() const;
 
+  std::uint32_t dispatchCount() const;
   std::uint32_t instanceCount() const;
   std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances
 
  private:
   friend struct PlanData;  // its contents
-  friend Result<void> makePlan(const Batch&, const DeviceLimits&, const Tuning&, Plan&);
   std::unique_ptr<PlanData> data_;
 };
 
-/// Turns a batch into dispatches: one for all palettes, then one for each variant and output
+/// Turns a batch into commands: one dispatch for all palettes, then one for each variant and output
 /// window. O(palettes + jobs + morph weights). An empty batch gives an empty plan.
 ///
 /// Fails with `invalidArgument` if a job or palette breaks a rule above (the message names it by

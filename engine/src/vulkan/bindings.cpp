@@ -111,6 +111,20 @@ BoundBuffers BindingsState::skinKernel(Method method, const Windows& windows) co
   return bound;
 }
 
+BoundBuffers BindingsState::visibilityKernel(const FrameBuffers& frame) const {
+  BoundBuffers bound;
+  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
+  bound.buffers[abi::BINDING_VISIBILITY] = infoOf(frame.visibility);
+  bound.buffers[abi::BINDING_HISTORY] = infoOf(frame.history);
+  bound.buffers[abi::BINDING_COUNTERS] = infoOf(frame.counters);
+  if (context->bindingCount() == abi::BINDING_COUNT) {
+    // Without bounds there is no such buffer, and no record that names one.
+    bound.buffers[abi::BINDING_RESULTS] =
+        infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : frame.counters);
+  }
+  return bound;
+}
+
 Result<void> BindingsState::createTexelViews() {
   if (context->texelBindingCount() == 0) return {};
   const auto create = [this](const BufferRange& range, VkFormat format, std::uint32_t texelSize,
@@ -169,7 +183,7 @@ bool writesStream(const Variant& variant, std::size_t stream) {
   }
 }
 
-std::optional<std::uint32_t> BindingsState::commonWindow(const Dispatch& dispatch) const {
+std::optional<std::uint32_t> BindingsState::commonWindow(const DispatchCommand& dispatch) const {
   std::uint32_t common = 0;
   for (const OutputWindow& window : dispatch.windows) common = std::max(common, window.index);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
@@ -180,38 +194,39 @@ std::optional<std::uint32_t> BindingsState::commonWindow(const Dispatch& dispatc
   return common;
 }
 
-/// Descriptor sets for every kernel and window.
-Result<void> BindingsState::createSets() {
-  const std::uint32_t windows = mostWindows();
-  const std::uint32_t setCount = 1 + windows * 2;
+Result<void> ContextState::allocateSets(std::uint32_t count, VkDescriptorPool& pool,
+                                        std::vector<VkDescriptorSet>& sets) const {
   const std::array<VkDescriptorPoolSize, 2> sizes{
-      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, setCount * context->bindingCount()},
-       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, setCount * context->texelBindingCount()}}};
+      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, count * bindingCount()},
+       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, count * texelBindingCount()}}};
   VkDescriptorPoolCreateInfo poolInfo{};
   poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-  poolInfo.maxSets = setCount;
-  poolInfo.poolSizeCount = context->texelBindingCount() != 0 ? 2 : 1;
+  poolInfo.maxSets = count;
+  poolInfo.poolSizeCount = texelBindingCount() != 0 ? 2 : 1;
   poolInfo.pPoolSizes = sizes.data();
-  if (const VkResult result = context->table.createDescriptorPool(context->device, &poolInfo,
-                                                                  context->allocator, &pool);
+  if (const VkResult result = table.createDescriptorPool(device, &poolInfo, allocator, &pool);
       result != VK_SUCCESS) {
     pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorPool", result);
   }
-  nameObject(context->table, context->device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
-  const std::vector<VkDescriptorSetLayout> layouts(setCount, context->setLayout);
-  sets.resize(setCount);
+  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
+  const std::vector<VkDescriptorSetLayout> layouts(count, setLayout);
+  sets.resize(count);
   VkDescriptorSetAllocateInfo allocateInfo{};
   allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
   allocateInfo.descriptorPool = pool;
-  allocateInfo.descriptorSetCount = setCount;
+  allocateInfo.descriptorSetCount = count;
   allocateInfo.pSetLayouts = layouts.data();
-  if (const VkResult result =
-          context->table.allocateDescriptorSets(context->device, &allocateInfo, sets.data());
-      result != VK_SUCCESS) {
+  if (const VkResult result = table.allocateDescriptorSets(device, &allocateInfo, sets.data());
+      result != VK_SUCCESS)
     return vulkanError("vkAllocateDescriptorSets", result);
-  }
+  return {};
+}
 
+/// Descriptor sets for every kernel and window.
+Result<void> BindingsState::createSets() {
+  const std::uint32_t windows = mostWindows();
+  if (Result<void> made = context->allocateSets(1 + windows * 2, pool, sets); !made) return made;
   const auto update = [&](const BoundBuffers& bound, VkDescriptorSet set) {
     const DescriptorWrites writes(bound, set);
     if (writes.count() != 0) {

@@ -93,7 +93,7 @@ Result<void> ContextState::createLayouts() {
     setLayout = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
     return vulkanError("vkCreateDescriptorSetLayout", result);
   }
-  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(abi::SkinPush)};
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(abi::VisibilityPush)};
   VkPipelineLayoutCreateInfo layoutInfo{};
   layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   layoutInfo.setLayoutCount = 1;

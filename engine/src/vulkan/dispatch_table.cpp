@@ -73,6 +73,9 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
   loader.deviceFunction("vkCmdPushConstants", table.cmdPushConstants);
   loader.deviceFunction("vkCmdPipelineBarrier", table.cmdPipelineBarrier);
   loader.deviceFunction("vkCmdDispatch", table.cmdDispatch);
+  loader.deviceFunction("vkCmdDispatchIndirect", table.cmdDispatchIndirect);
+  loader.deviceFunction("vkCmdCopyBuffer", table.cmdCopyBuffer);
+  loader.deviceFunction("vkCmdFillBuffer", table.cmdFillBuffer);
 
   if (loader.isEnabled(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME)) {
     loader.deviceFunction("vkCmdPushDescriptorSetKHR", table.cmdPushDescriptorSet);

@@ -36,6 +36,9 @@ struct DispatchTable {
   PFN_vkCmdPushConstants cmdPushConstants = nullptr;
   PFN_vkCmdPipelineBarrier cmdPipelineBarrier = nullptr;
   PFN_vkCmdDispatch cmdDispatch = nullptr;
+  PFN_vkCmdDispatchIndirect cmdDispatchIndirect = nullptr;
+  PFN_vkCmdCopyBuffer cmdCopyBuffer = nullptr;
+  PFN_vkCmdFillBuffer cmdFillBuffer = nullptr;
 
   // Null unless the engine enabled their extension.
   PFN_vkCmdPushDescriptorSetKHR cmdPushDescriptorSet = nullptr;

@@ -61,8 +61,6 @@ static_assert(
     offsetof(PaletteStatus, nonRigidJoints) == offsetof(abi::StatusRecord, nonRigidJoints) &&
     offsetof(PaletteStatus, undeclaredScale) == offsetof(abi::StatusRecord, undeclaredScale) &&
     offsetof(PaletteStatus, nonFiniteJoints) == offsetof(abi::StatusRecord, nonFiniteJoints));
-static_assert(sizeof(DispatchConstants) == sizeof(abi::PalettePush) &&
-              sizeof(DispatchConstants) == sizeof(abi::SkinPush));
 
 namespace {
 
@@ -70,6 +68,8 @@ namespace {
 std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (variant.kernel == Kernel::palette) return oneOutput ? "palette_one_output" : "palette";
+  if (variant.kernel == Kernel::visibility)
+    return oneOutput ? "visibility_one_output" : "visibility";
   std::string name = "skin";
   if (isForComparison(variant.method)) name += "_comparison";
   if (oneOutput) return name + "_one_output";

@@ -83,8 +83,9 @@ Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout la
       result != VK_SUCCESS) {
     return vulkanError("vkCreateComputePipelines", result);
   }
-  const std::string name = variant.kernel == Kernel::palette
-                               ? std::string("dermis palette")
+  const std::string name = variant.kernel == Kernel::palette ? std::string("dermis palette")
+                           : variant.kernel == Kernel::visibility
+                               ? std::string("dermis visibility")
                                : "dermis skin " + std::string(methodName(variant.method));
   nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
   return pipeline;

@@ -3,7 +3,9 @@
 #include <string>
 #include <tuple>
 #include <utility>
+#include <variant>
 
+#include "dermis/vulkan/scope.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
 
@@ -22,6 +24,8 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
 
 std::string describe(const Variant& variant) {
   if (variant.kernel == Kernel::palette) return "the palette kernel";
+  if (variant.kernel == Kernel::visibility)
+    return "the visibility kernel, for instances that are culled on the GPU,";
   std::string text = "the variant of " + std::string(methodName(variant.method)) +
                      " with positions as " + std::string(formatName(variant.positions));
   if (variant.normals != VertexFormat::none)
@@ -89,7 +93,7 @@ Result<void> BindingsState::checkVariants(const Plan& plan) const {
 
 Result<void> BindingsState::check(const Plan& plan) const {
   if (Result<void> good = checkBuffers(plan); !good) return good;
-  if (!plan.dispatches().empty() && plan.limits() != context->limits) {
+  if (!plan.commands().empty() && plan.limits() != context->limits) {
     return Error{
         ErrorCode::invalidArgument,
         "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
@@ -97,8 +101,9 @@ Result<void> BindingsState::check(const Plan& plan) const {
   if (Result<void> good = checkPairs(plan); !good) return good;
   if (Result<void> good = checkVariants(plan); !good) return good;
   if (context->pushesDescriptors()) return {};
-  for (const Dispatch& dispatch : plan.dispatches()) {
-    if (!commonWindow(dispatch)) {
+  for (const Command& command : plan.commands()) {
+    const auto* dispatch = std::get_if<DispatchCommand>(&command);
+    if (dispatch != nullptr && !commonWindow(*dispatch)) {
       return Error{ErrorCode::limitExceeded,
                    "the attributes of an instance lie in different windows of outputs that are "
                    "larger than a storage buffer range: that needs VK_KHR_push_descriptor"};
@@ -107,58 +112,174 @@ Result<void> BindingsState::check(const Plan& plan) const {
   return {};
 }
 
-void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
-                          const BatchBuffers& buffers) {
-  std::array<VkBufferMemoryBarrier, 2> barriers{};
-  std::uint32_t count = 0;
-  for (const auto& [range, accesses] :
-       {std::pair{&buffers.palettes, VkAccessFlags{VK_ACCESS_SHADER_READ_BIT}},
-        {&buffers.results, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}}) {
-    if (range->buffer == VK_NULL_HANDLE) continue;
-    VkBufferMemoryBarrier& barrier = barriers[count++];
-    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
-    barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
-    barrier.dstAccessMask = accesses;
-    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.buffer = range->buffer;
-    barrier.offset = range->offset;
-    barrier.size = range->size;
+namespace {
+
+Scope scopeOf(Access accesses) {
+  struct Part {
+    Access access;
+    Scope scope;
+  };
+  static constexpr std::array<Part, 6> parts{
+      {{Access::computeRead, {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT}},
+       {Access::computeWrite, {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT}},
+       {Access::copyRead, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT}},
+       {Access::copyWrite, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}},
+       {Access::indirectRead,
+        {VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, VK_ACCESS_INDIRECT_COMMAND_READ_BIT}},
+       {Access::hostRead, {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}}}};
+  Scope scope;
+  for (const Part& part : parts) {
+    if (!includes(accesses, part.access)) continue;
+    scope.stages |= part.scope.stages;
+    scope.accesses |= part.scope.accesses;
   }
-  table.cmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-                           VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 0, nullptr, count,
-                           barriers.data(), 0, nullptr);
+  return scope;
 }
 
-void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
-                    const BindingsState& bound, const IndirectArguments* arguments) {
-  const ContextState& context = *bound.context;
-  const DispatchTable& table = context.table;
-  const bool isPalette = dispatch.variant.kernel == Kernel::palette;
-  table.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                        context.pipelines->find(dispatch.variant));
-  if (context.pushesDescriptors()) {
+/// Records one command after the other.
+class Recorder {
+ public:
+  Recorder(VkCommandBuffer commandBuffer, const BindingsState& bound, const FrameBuffers* frame)
+      : commandBuffer_(commandBuffer),
+        bound_(bound),
+        context_(*bound.context),
+        table_(bound.context->table),
+        frame_(frame) {}
+
+  void operator()(const BarrierCommand& barrier) {
+    const Scope before = scopeOf(barrier.before), after = scopeOf(barrier.after);
+    // What was only read before need not become visible.
+    constexpr VkAccessFlags writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+    const VkMemoryBarrier memory =
+        memoryBarrier({{before.stages, before.accesses & writes}, after});
+    table_.cmdPipelineBarrier(commandBuffer_, before.stages, after.stages, 0, 1, &memory, 0,
+                              nullptr, 0, nullptr);
+  }
+
+  void operator()(const ClearCommand& clear) {
+    const BufferRange range = rangeOf(clear.buffer);
+    table_.cmdFillBuffer(commandBuffer_, range.buffer, range.offset + clear.offset, clear.size, 0);
+  }
+
+  /// As many at once as have the same buffers.
+  std::span<const Command> copy(std::span<const Command> commands) {
+    const auto& first = std::get<CopyCommand>(commands.front());
+    const BufferRange from = rangeOf(first.from), to = rangeOf(first.to);
+    std::array<VkBufferCopy, 64> regions;
+    std::uint32_t count = 0;
+    while (count < regions.size() && count < commands.size()) {
+      const auto* next = std::get_if<CopyCommand>(&commands[count]);
+      if (next == nullptr || next->from != first.from || next->to != first.to) break;
+      regions[count++] = {from.offset + next->fromOffset, to.offset + next->toOffset, next->size};
+    }
+    table_.cmdCopyBuffer(commandBuffer_, from.buffer, to.buffer, count, regions.data());
+    ++recorded_.copies;
+    return commands.subspan(count);
+  }
+
+  void operator()(const DispatchCommand& dispatch) {
+    table_.cmdBindPipeline(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
+                           context_.pipelines->find(dispatch.variant));
+    bindBuffers(dispatch);
+    table_.cmdPushConstants(commandBuffer_, context_.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                            dispatch.constantCount * 4, dispatch.constants.data());
+    ++recorded_.dispatches;
+    recorded_.workgroups += dispatch.workgroupCount;
+    if (dispatch.indirectOffset) {
+      const BufferRange& tables = bound_.buffers.tables;
+      table_.cmdDispatchIndirect(commandBuffer_, tables.buffer,
+                                 tables.offset + *dispatch.indirectOffset);
+    } else {
+      table_.cmdDispatch(commandBuffer_, dispatch.groupCountX, dispatch.groupCountY, 1);
+    }
+  }
+
+  const Recorded& recorded() const { return recorded_; }
+
+ private:
+  BufferRange rangeOf(BufferRole role) const {
+    switch (role) {
+      case BufferRole::tables:
+        return bound_.buffers.tables;
+      case BufferRole::results:
+        return bound_.buffers.results;
+      case BufferRole::positions:
+        return bound_.buffers.outputs.positions;
+      case BufferRole::upload:
+        return frame_->upload;
+      case BufferRole::readBack:
+        return frame_->readBack;
+      case BufferRole::history:
+        return frame_->history;
+      case BufferRole::counters:
+        return frame_->counters;
+      default:
+        return {};  // no command copies or clears it
+    }
+  }
+
+  BoundBuffers buffersOf(const DispatchCommand& dispatch) const {
+    if (dispatch.variant.kernel == Kernel::palette) return bound_.paletteKernel();
+    if (dispatch.variant.kernel == Kernel::visibility) return bound_.visibilityKernel(*frame_);
     Windows windows;
     for (std::size_t stream = 0; stream < streamCount; ++stream)
       windows[stream] = dispatch.windows[stream].index;
-    const BoundBuffers kernelBuffers =
-        isPalette ? bound.paletteKernel() : bound.skinKernel(dispatch.variant.method, windows);
-    const DescriptorWrites writes(kernelBuffers);
-    table.cmdPushDescriptorSet(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                               context.pipelineLayout, 0, writes.count(), writes.data());
-  } else {
-    const VkDescriptorSet set =
-        bound.sets[BindingsState::setIndex(dispatch.variant, *bound.commonWindow(dispatch))];
-    table.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                                context.pipelineLayout, 0, 1, &set, 0, nullptr);
+    return bound_.skinKernel(dispatch.variant.method, windows);
   }
-  table.cmdPushConstants(commandBuffer, context.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                         sizeof(dispatch.constants), &dispatch.constants);
-  if (arguments == nullptr) {
-    table.cmdDispatch(commandBuffer, dispatch.groupCountX, dispatch.groupCountY, 1);
-  } else {
-    arguments->cmdDispatchIndirect(commandBuffer, arguments->buffer, arguments->offset);
+
+  void bindBuffers(const DispatchCommand& dispatch) {
+    if (context_.pushesDescriptors()) {
+      const BoundBuffers buffers = buffersOf(dispatch);
+      const DescriptorWrites writes(buffers);
+      table_.cmdPushDescriptorSet(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
+                                  context_.pipelineLayout, 0, writes.count(), writes.data());
+      return;
+    }
+    VkDescriptorSet set = VK_NULL_HANDLE;
+    if (dispatch.variant.kernel == Kernel::visibility) {
+      set = frame_->visibilitySet;
+      if (!visibilityIsWritten_) {
+        const BoundBuffers buffers = buffersOf(dispatch);
+        const DescriptorWrites writes(buffers, set);
+        table_.updateDescriptorSets(context_.device, writes.count(), writes.data(), 0, nullptr);
+      }
+      visibilityIsWritten_ = true;
+    } else {
+      set = bound_.sets[BindingsState::setIndex(dispatch.variant, *bound_.commonWindow(dispatch))];
+    }
+    table_.cmdBindDescriptorSets(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
+                                 context_.pipelineLayout, 0, 1, &set, 0, nullptr);
   }
+
+  VkCommandBuffer commandBuffer_;
+  const BindingsState& bound_;
+  const ContextState& context_;
+  const DispatchTable& table_;
+  const FrameBuffers* frame_;
+  bool visibilityIsWritten_ = false;
+  Recorded recorded_;
+};
+
+}  // namespace
+
+Recorded recordCommands(VkCommandBuffer commandBuffer, const Plan& plan, const BindingsState& bound,
+                        const FrameBuffers* frame) {
+  Recorder recorder(commandBuffer, bound, frame);
+  for (std::span<const Command> commands = plan.commands(); !commands.empty();) {
+    if (std::holds_alternative<CopyCommand>(commands.front())) {
+      commands = recorder.copy(commands);
+      continue;
+    }
+    if (const auto* dispatch = std::get_if<DispatchCommand>(&commands.front())) {
+      recorder(*dispatch);
+    } else if (const auto* barrier = std::get_if<BarrierCommand>(&commands.front())) {
+      recorder(*barrier);
+    } else if (const auto* clear = std::get_if<ClearCommand>(&commands.front())) {
+      recorder(*clear);
+    }
+    commands = commands.subspan(1);
+  }
+  return recorder.recorded();
 }
 
 Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
@@ -167,19 +288,14 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
   if (bindings.state_ == nullptr || bindings.state_->context != &context) {
     return Error{ErrorCode::invalidArgument, "the bindings were not made by this context"};
   }
+  if (plan.buffer(BufferRole::readBack).size != 0) {
+    return Error{ErrorCode::invalidArgument,
+                 "the plan is of a scene: its commands use buffers that bindings do not have"};
+  }
   const BindingsState& bound = *bindings.state_;
   if (Result<void> good = bound.check(plan); !good) return good;
-
-  const DispatchTable& table = context.table;
-  const Label label(table, commandBuffer, "dermis: skin a batch");
-  bool palettesVisible = false;
-  for (const Dispatch& dispatch : plan.dispatches()) {
-    if (dispatch.afterPalettes && !palettesVisible) {
-      recordPaletteBarrier(table, commandBuffer, bound.buffers);
-      palettesVisible = true;
-    }
-    recordDispatch(commandBuffer, dispatch, bound, nullptr);
-  }
+  const Label label(context.table, commandBuffer, "dermis: skin a batch");
+  recordCommands(commandBuffer, plan, bound, nullptr);
   return {};
 }
 

@@ -33,6 +33,10 @@ struct ContextState {
   }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
+  /// Descriptor sets and the pool that has them, without push descriptors. The pool must be
+  /// destroyed even if it fails.
+  Result<void> allocateSets(std::uint32_t count, VkDescriptorPool& pool,
+                            std::vector<VkDescriptorSet>& sets) const;
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
   VkInstance instance;
@@ -58,6 +62,14 @@ struct BoundBuffers {
 /// The windows of the four outputs that a kernel sees.
 using Windows = std::array<std::uint32_t, streamCount>;
 
+/// What the commands of a scene use besides what is bound.
+struct FrameBuffers {
+  BufferRange upload, readBack, visibility, history, counters;
+  /// For the visibility kernel, without push descriptors. It is written when it is recorded: the
+  /// frame that used it last must be complete.
+  VkDescriptorSet visibilitySet = VK_NULL_HANDLE;
+};
+
 struct BindingsState {
   ~BindingsState();
 
@@ -78,6 +90,7 @@ struct BindingsState {
   /// uses: a descriptor that the module names must be valid.
   BoundBuffers paletteKernel() const;
   BoundBuffers skinKernel(Method method, const Windows& windows) const;
+  BoundBuffers visibilityKernel(const FrameBuffers& frame) const;
 
   Result<void> createTexelViews();
 
@@ -93,7 +106,7 @@ struct BindingsState {
   }
   /// The number of the windows in which a dispatch writes all that it writes; nothing where they
   /// differ.
-  std::optional<std::uint32_t> commonWindow(const Dispatch& dispatch) const;
+  std::optional<std::uint32_t> commonWindow(const DispatchCommand& dispatch) const;
 
   /// Whether a plan can be recorded with these buffers and the pipelines that there are.
   Result<void> check(const Plan& plan) const;
@@ -106,19 +119,17 @@ struct BindingsState {
   Result<void> checkVariants(const Plan& plan) const;
 };
 
-/// Where a dispatch has its workgroup counts from, where not from the plan.
-struct IndirectArguments {
-  PFN_vkCmdDispatchIndirect cmdDispatchIndirect = nullptr;
-  VkBuffer buffer = VK_NULL_HANDLE;
-  VkDeviceSize offset = 0;
+/// What was recorded.
+struct Recorded {
+  std::uint32_t dispatches = 0;
+  std::uint64_t workgroups = 0;  ///< of direct dispatches
+  std::uint32_t copies = 0;      ///< calls of vkCmdCopyBuffer
 };
 
-/// Records one dispatch of a plan that `BindingsState::check` has passed.
-void recordDispatch(VkCommandBuffer commandBuffer, const Dispatch& dispatch,
-                    const BindingsState& bound, const IndirectArguments* arguments);
-/// What the palette kernel wrote becomes visible to the skin kernel, which adds to the results.
-void recordPaletteBarrier(const DispatchTable& table, VkCommandBuffer commandBuffer,
-                          const BatchBuffers& buffers);
+/// Records the commands of a plan that `BindingsState::check` has passed. `frame` for those of a
+/// scene.
+Recorded recordCommands(VkCommandBuffer commandBuffer, const Plan& plan, const BindingsState& bound,
+                        const FrameBuffers* frame);
 
 /// Whether a kernel writes an attribute.
 bool writesStream(const Variant& variant, std::size_t stream);

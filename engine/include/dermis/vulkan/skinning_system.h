@@ -26,6 +26,7 @@
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/scene.h"
 #include "dermis/types.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/memory.h"
@@ -68,40 +69,19 @@ struct FrameDescription {
   VkDeviceSize visibilityOffset = 0;
 };
 
-/// Bytes of one of the system's stores.
-struct StoreStatistics {
-  std::uint64_t capacity = 0;
-  std::uint64_t used = 0;         ///< by what there is, and what frames in flight may still read
-  std::uint64_t largestFree = 0;  ///< the longest free stretch
-};
-
 /// What the last `record` did.
-struct FrameStatistics {
-  std::uint64_t frame = 0;
-  std::uint32_t instances = 0;         ///< that there are
-  std::uint32_t skinnedInstances = 0;  ///< without those culled on the GPU
-  std::uint32_t settledInstances = 0;  ///< those of which only previous positions were written
-  std::uint32_t convertedPalettes = 0;
-  std::uint64_t skinnedVertices = 0;
-  std::uint32_t culledCandidates = 0;  ///< instances handed to the visibility kernel
-  std::uint32_t dispatches = 0;        ///< all of them, indirect ones too
-  std::uint64_t workgroups = 0;        ///< of direct dispatches
-  std::uint32_t copies = 0;            ///< commands that copy: tables, meshes, moves, results
-  std::uint64_t movedBytes = 0;        ///< by `compact`
-  std::uint64_t uploadedBytes = 0;     ///< tables, meshes and joint matrices
-  std::uint64_t writtenBytes = 0;      ///< skinned vertices, without those culled on the GPU
-  double planSeconds = 0;              ///< CPU time: choosing, and writing the tables
-  double recordSeconds = 0;            ///< CPU time: the commands
+struct FrameStatistics : FrameWorkStatistics {
+  std::uint32_t dispatches = 0;     ///< all of them, indirect ones too
+  std::uint64_t workgroups = 0;     ///< of direct dispatches
+  std::uint32_t copies = 0;         ///< commands that copy: tables, meshes, moves, results
+  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and joint matrices
+  double planSeconds = 0;           ///< CPU time: choosing, and writing the tables
+  double recordSeconds = 0;         ///< CPU time: the commands
 };
 
-/// What the GPU did in a frame that is complete.
-struct GpuStatistics {
-  std::uint64_t frame = 0;
-  std::optional<double> seconds;       ///< where `measuresGpuTime`
-  std::uint32_t visibleInstances = 0;  ///< of those culled on the GPU …
-  std::uint32_t skinnedInstances = 0;
-  std::uint32_t settledInstances = 0;
-  std::uint32_t workgroups = 0;  ///< … and of their indirect dispatches
+/// What the GPU did in the newest complete frame.
+struct GpuStatistics : CullingStatistics {
+  std::optional<double> seconds;  ///< if `measuresGpuTime`
 };
 
 struct SystemStatistics {

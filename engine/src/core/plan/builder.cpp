@@ -136,39 +136,33 @@ void Groups::clear() {
 // -- Plans.
 
 void PlanData::clear() {
-  dispatches.clear();
+  commands.clear();
   variants.clear();
   tables.clear();
   for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
   results.clear();
-  resultCount = 0;
-  palettesSize = meshesSize = matricesSize = 0;
-  outputs = {};
+  sizes = {};
   instanceCount = 0;
   vertexCount = 0;
-  culled = {};
-  firstIndirect = 0;
+  candidateCount = 0;
 }
 
 void PlanBuilder::begin(PlanData& plan, Groups& groups, const DeviceLimits& limits,
-                        const Tuning& tuning, const Sizes& sizes) {
+                        const Tuning& tuning, const PlanSizes& sizes) {
   plan_ = &plan;
   groups_ = &groups;
   limits_ = limits;
   tuning_ = tuning;
   plan.clear();
   plan.limits = limits;
-  plan.meshesSize = sizes.meshes;
-  plan.matricesSize = sizes.matrices;
-  plan.palettesSize = sizes.palettes;
-  plan.resultCount = sizes.results;
-  plan.outputs = sizes.outputs;
+  plan.sizes = sizes;
   ++number_;
   paletteCount_ = 0;
   cleared_.clear();
   entries_.clear();
   candidates_.clear();
   planGroups_.clear();
+  dispatches_.clear();
 }
 
 void PlanBuilder::startGroup(Groups::Entry& entry) {
@@ -177,40 +171,64 @@ void PlanBuilder::startGroup(Groups::Entry& entry) {
   planGroups_.push_back(entry.group);
 }
 
-Result<void> PlanBuilder::finish() {
+Result<void> PlanBuilder::finish(const FrameWork* frame) {
   if (Result<void> good = addPaletteDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
   writeInstances();
-  plan_->firstIndirect = plan_->dispatches.size();
   if (!candidates_.empty()) {
     appendCandidates();
     appendCulledDispatches();
+    if (Result<void> good = addVisibilityDispatches(frame->frame); !good) return good;
+  } else {
+    plan_->sizes.slots = 0;
   }
   if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
     return Error{ErrorCode::limitExceeded,
                  "the tables of the batch are larger than a storage buffer range; split it"};
   }
   plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
-  listVariants();
+  plan_->candidateCount = static_cast<std::uint32_t>(candidates_.size());
+  if (frame != nullptr) {
+    listFrame(*frame);
+  } else {
+    listDispatches();
+  }
+  for (const Command& command : plan_->commands) {
+    const auto* dispatch = std::get_if<DispatchCommand>(&command);
+    if (dispatch != nullptr &&
+        std::ranges::find(plan_->variants, dispatch->variant) == plan_->variants.end())
+      plan_->variants.push_back(dispatch->variant);
+  }
   return {};
 }
 
-Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t workgroups,
-                                      const DispatchConstants& constants) {
+namespace {
+
+template <typename Push>
+void setConstants(DispatchCommand& dispatch, const Push& push) {
+  static_assert(sizeof(Push) <= sizeof(dispatch.constants));
+  dispatch.constantCount = sizeof(Push) / 4;
+  store(dispatch.constants, 0, push);
+}
+
+}  // namespace
+
+/// Sets the number of workgroups in the push constants too.
+template <typename Push>
+Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push) {
   if (workgroups > std::min(std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY,
                             maxWorkgroups)) {
     return Error{ErrorCode::limitExceeded,
                  "the batch needs " + std::to_string(workgroups) +
                      " workgroups in one dispatch, more than the device can count; split it"};
   }
-  Dispatch dispatch;
+  DispatchCommand& dispatch = dispatches_.emplace_back().command;
   dispatch.variant = variant;
-  dispatch.constants = constants;
-  dispatch.constants.workgroupCount = static_cast<std::uint32_t>(workgroups);
+  dispatch.workgroupCount = push.workgroupCount = static_cast<std::uint32_t>(workgroups);
+  setConstants(dispatch, push);
   dispatch.groupCountY =
       static_cast<std::uint32_t>(divideUp(workgroups, limits_.maxWorkgroupCountX));
   dispatch.groupCountX = static_cast<std::uint32_t>(divideUp(workgroups, dispatch.groupCountY));
-  plan_->dispatches.push_back(dispatch);
   return {};
 }
 
@@ -220,9 +238,9 @@ Result<void> PlanBuilder::addPaletteDispatch() {
   plan_->tables.insert(plan_->tables.end(), cleared_.begin(), cleared_.end());
   alignToUnit(plan_->tables);
   // Behind the workgroups of the palettes come those that clear the results.
-  return addDispatch(paletteVariant(tuning_),
-                     paletteCount_ + divideUp(cleared_.size(), tuning_.workgroupSize),
-                     {0, paletteCount_, 0, static_cast<std::uint32_t>(cleared_.size())});
+  return addDispatch(
+      paletteVariant(tuning_), paletteCount_ + divideUp(cleared_.size(), tuning_.workgroupSize),
+      abi::PalettePush{0, paletteCount_, 0, static_cast<std::uint32_t>(cleared_.size())});
 }
 
 /// A record for each group, and a dispatch for groups of one variant and output range.
@@ -241,7 +259,7 @@ Result<void> PlanBuilder::addDispatches() {
   const std::uint32_t groupRecords = wordsOf(tables);
   tables.resize(groupRecords + planGroups_.size() * abi::GROUP_WORDS);
   const std::uint32_t instanceRecords = wordsOf(tables);
-  const bool palettesRun = !plan_->dispatches.empty();
+  const bool palettesRun = !dispatches_.empty();
 
   std::uint32_t firstInstance = 0;
   for (std::size_t begin = 0; begin < order_.size();) {
@@ -272,18 +290,18 @@ Result<void> PlanBuilder::addDispatches() {
     }
     const Group& group = planGroups_[order_[begin]];
     const Variant& variant = group.variant;
-    const DispatchConstants constants{
-        static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
-        static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
-    if (Result<void> good = addDispatch(variant, workgroups, constants); !good) return good;
-    Dispatch& dispatch = plan_->dispatches.back();
+    const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
+                             static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
+    if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
+    Dispatch& dispatch = dispatches_.back();
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const std::uint32_t window = group.key.windows[stream];
-      dispatch.windows[stream] = {window, window * outputWindowStep(limits_)};
+      dispatch.command.windows[stream] = {window, window * outputWindowStep(limits_)};
     }
     // A kernel that may name the results counts as one that reads them.
-    dispatch.afterPalettes = palettesRun && (variant.method != Method::linear ||
-                                             variant.motion != Motion::none || hasResults(variant));
+    dispatch.isAfterPalettes =
+        palettesRun &&
+        (variant.method != Method::linear || variant.motion != Motion::none || hasResults(variant));
     begin = end;
   }
   return {};
@@ -336,60 +354,136 @@ void PlanBuilder::writeInstances() {
     if (candidate != candidates_.end() && candidate->entry == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;
   }
-  plan_->culled.instances = firstRecord;
+  culled_.instances = firstRecord;
 }
 
 /// In the order of the instance records, which are the last.
 void PlanBuilder::appendCandidates() {
   std::vector<std::uint32_t>& tables = plan_->tables;
-  CulledTables& culled = plan_->culled;
-  culled.candidateCount = static_cast<std::uint32_t>(candidates_.size());
-  culled.firstInstance = static_cast<std::uint32_t>(entries_.size() - candidates_.size());
-  culled.candidates = wordsOf(tables);
+  culled_.firstInstance = static_cast<std::uint32_t>(entries_.size() - candidates_.size());
+  culled_.candidates = wordsOf(tables);
   tables.resize(tables.size() + candidates_.size() * abi::CANDIDATE_WORDS);
   for (std::size_t index = 0; index < candidates_.size(); ++index) {
     const Candidate& candidate = candidates_[index].candidate;
-    const std::size_t number = culledPlaces_[index] - culled.firstInstance;
-    store(tables, culled.candidates + number * abi::CANDIDATE_WORDS,
+    const std::size_t number = culledPlaces_[index] - culled_.firstInstance;
+    store(tables, culled_.candidates + number * abi::CANDIDATE_WORDS,
           abi::CandidateRecord{candidate.slot, candidate.version});
   }
 }
 
+/// Groups that are culled come last, and so do their dispatches: these get their arguments from the
+/// GPU.
 void PlanBuilder::appendCulledDispatches() {
   std::vector<std::uint32_t>& tables = plan_->tables;
-  std::vector<Dispatch>& dispatches = plan_->dispatches;
-  CulledTables& culled = plan_->culled;
-  // Groups that are culled come last, and so do their dispatches.
-  const auto culledGroups = static_cast<std::uint32_t>(
+  culledGroups_ = static_cast<std::uint32_t>(
       std::ranges::count_if(planGroups_, [](const Group& group) { return group.key.isCulled; }));
-  const std::uint32_t groupsEnd = culled.instances;  // instance records follow the groups
-  culled.groupCount = culledGroups;
-  culled.groups = groupsEnd - culledGroups * abi::GROUP_WORDS;
-  std::size_t first = dispatches.size();
-  while (first > 0 && dispatches[first - 1].variant.kernel == Kernel::skin &&
-         dispatches[first - 1].constants.firstRecord >= culled.groups)
+  const std::uint32_t groupsEnd = culled_.instances;  // instance records follow the groups
+  culled_.groups = groupsEnd - culledGroups_ * abi::GROUP_WORDS;
+  const auto pushOf = [](const Dispatch& dispatch) {
+    return abi::load<abi::SkinPush>(dispatch.command.constants, 0);
+  };
+  std::size_t first = dispatches_.size();
+  while (first > 0 && dispatches_[first - 1].command.variant.kernel == Kernel::skin &&
+         pushOf(dispatches_[first - 1]).groups >= culled_.groups)
     --first;
-  plan_->firstIndirect = first;
-  culled.dispatchCount = static_cast<std::uint32_t>(dispatches.size() - first);
+  const std::size_t count = dispatches_.size() - first;
   alignToUnit(tables);
-  culled.dispatches = wordsOf(tables);
-  culled.arguments = culled.dispatches + culled.dispatchCount * abi::CULLED_DISPATCH_WORDS;
-  tables.resize(culled.arguments + std::size_t{culled.dispatchCount} * abi::INDIRECT_WORDS, 0u);
-  for (std::size_t index = first; index < dispatches.size(); ++index) {
-    Dispatch& dispatch = dispatches[index];
-    store(tables, culled.dispatches + (index - first) * abi::CULLED_DISPATCH_WORDS,
-          abi::CulledDispatchRecord{dispatch.constants.firstRecord, dispatch.constants.recordCount,
+  culled_.dispatches = wordsOf(tables);
+  culled_.arguments =
+      static_cast<std::uint32_t>(culled_.dispatches + count * abi::CULLED_DISPATCH_WORDS);
+  tables.resize(culled_.arguments + count * abi::INDIRECT_WORDS, 0u);
+  for (std::size_t index = 0; index < count; ++index) {
+    DispatchCommand& dispatch = dispatches_[first + index].command;
+    abi::SkinPush push = pushOf(dispatches_[first + index]);
+    store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
+          abi::CulledDispatchRecord{push.groups, push.groupCount,
                                     dispatch.variant.instancesPerInvocation, 0});
     // Only the GPU will know how many there are. Those too many find no instance in the last group.
-    dispatch.constants.workgroupCount = notUsed;
+    push.workgroupCount = notUsed;
+    setConstants(dispatch, push);
+    dispatch.groupCountX = dispatch.groupCountY = dispatch.workgroupCount = 0;
+    dispatch.indirectOffset = (culled_.arguments + index * abi::INDIRECT_WORDS) * 4;
+  }
+  visibility_[1].workgroupCount = static_cast<std::uint32_t>(count);
+}
+
+/// A workgroup for each group, then one for each indirect dispatch.
+Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
+  visibility_[0].workgroupCount = culledGroups_;
+  const std::uint32_t most = std::max(culledGroups_, visibility_[1].workgroupCount);
+  if (most > limits_.maxWorkgroupCountX) {
+    return Error{ErrorCode::limitExceeded,
+                 "instances that are culled on the GPU have " + std::to_string(most) +
+                     " meshes and layouts, more than the device can count workgroups"};
+  }
+  culled_.frame = frame;
+  culled_.mostWorkgroups = limits_.maxWorkgroupCountX;
+  for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
+    DispatchCommand& dispatch = visibility_[pass];
+    dispatch.variant = visibilityVariant(tuning_);
+    dispatch.groupCountX = dispatch.workgroupCount;
+    dispatch.groupCountY = 1;
+    culled_.pass = pass;
+    setConstants(dispatch, culled_);
+  }
+  return {};
+}
+
+// -- Commands.
+
+namespace {
+
+constexpr Access computeBoth = Access::computeRead | Access::computeWrite;
+
+}  // namespace
+
+void PlanBuilder::listDispatches() {
+  bool palettesAreVisible = false;
+  for (const Dispatch& dispatch : dispatches_) {
+    if (dispatch.isAfterPalettes && !palettesAreVisible) {
+      plan_->commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
+      palettesAreVisible = true;
+    }
+    plan_->commands.emplace_back(dispatch.command);
   }
 }
 
-void PlanBuilder::listVariants() {
-  for (const Dispatch& dispatch : plan_->dispatches) {
-    if (std::ranges::find(plan_->variants, dispatch.variant) == plan_->variants.end())
-      plan_->variants.push_back(dispatch.variant);
+void PlanBuilder::listFrame(const FrameWork& frame) {
+  if (dispatches_.empty() && frame.moves.empty()) return;
+  std::vector<Command>& commands = plan_->commands;
+  const bool culls = !candidates_.empty();
+  // Frames before this one have finished with what is overwritten, and what they wrote is seen.
+  commands.emplace_back(
+      BarrierCommand{computeBoth | Access::copyRead | Access::copyWrite | Access::indirectRead,
+                     computeBoth | Access::copyRead | Access::copyWrite});
+  if (!plan_->tables.empty()) {
+    commands.emplace_back(
+        CopyCommand{BufferRole::upload, BufferRole::tables, 0, 0, plan_->tables.size() * 4});
   }
+  commands.insert(commands.end(), frame.moves.begin(), frame.moves.end());
+  const auto sizeOf = [this](BufferRole role) {
+    return plan_->sizes.requirement(role, 0, limits_).size;
+  };
+  if (culls)
+    commands.emplace_back(ClearCommand{BufferRole::counters, 0, sizeOf(BufferRole::counters)});
+  if (culls && frame.clearsHistory)
+    commands.emplace_back(ClearCommand{BufferRole::history, 0, sizeOf(BufferRole::history)});
+  commands.emplace_back(BarrierCommand{Access::copyWrite, computeBoth});
+  if (culls) {
+    commands.emplace_back(visibility_[0]);
+    commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
+    commands.emplace_back(visibility_[1]);
+    commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth | Access::indirectRead});
+  }
+  listDispatches();
+  if (!culls && frame.results.empty()) return;
+  commands.emplace_back(BarrierCommand{Access::computeWrite, Access::copyRead});
+  if (culls) {
+    commands.emplace_back(CopyCommand{BufferRole::counters, BufferRole::readBack, 0,
+                                      readBackCounters, sizeOf(BufferRole::counters)});
+  }
+  commands.insert(commands.end(), frame.results.begin(), frame.results.end());
+  commands.emplace_back(BarrierCommand{Access::copyWrite, Access::hostRead});
 }
 
 }  // namespace dermis

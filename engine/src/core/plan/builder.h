@@ -148,31 +148,48 @@ struct Candidate {
   std::uint32_t version = 0;  ///< of what it should show; different for all instances and poses
 };
 
-/// Where the tables of a plan have what the visibility kernel works on, in words.
-struct CulledTables {
-  std::uint32_t groups = 0;  ///< the first group record
-  std::uint32_t groupCount = 0;
-  std::uint32_t instances = 0;   ///< the instance records that groups count from
-  std::uint32_t candidates = 0;  ///< a record for each, from the first culled instance on
-  std::uint32_t firstInstance = 0;
-  std::uint32_t dispatches = 0;
-  std::uint32_t dispatchCount = 0;
-  std::uint32_t arguments = 0;  ///< of the indirect dispatches
-  std::uint32_t candidateCount = 0;
-};
+/// Where a frame's results and counters stand in its read-back buffer.
+inline constexpr std::uint64_t readBackCounters = 0;
+inline constexpr std::uint64_t readBackResults = sizeof(abi::CounterRecord);
 
 // -- Plans.
 
 class PlanMaker;
 
+/// The sizes of the buffers that do not follow from a plan, in bytes.
+struct PlanSizes {
+  std::uint64_t meshes = 0, matrices = 0, palettes = 0;
+  std::uint32_t results = 0;  ///< their number
+  OutputSizes outputs;
+  bool isScene = false;  ///< there are the buffers of a scene
+  std::uint32_t slots =
+      0;  ///< of a scene: words of visibility, records of history; 0 where the GPU chooses nothing
+
+  /// Of one buffer, given those of the tables.
+  BufferRequirement requirement(BufferRole role, std::uint64_t tables,
+                                const DeviceLimits& limits) const;
+};
+
+/// What a frame of a scene does besides skinning.
+struct FrameWork {
+  std::uint32_t frame = 0;               ///< counts records, from 1
+  bool clearsHistory = false;            ///< it is the first that has the GPU choose
+  std::span<const CopyCommand> moves;    ///< of outputs
+  std::span<const CopyCommand> results;  ///< to the read-back buffer
+};
+
 struct PlanData {
   PlanData();
   ~PlanData();
-  static PlanData& of(Plan& plan) { return *plan.data_; }
+  /// Made again where the plan was moved from.
+  static PlanData& of(Plan& plan) {
+    if (plan.data_ == nullptr) plan.data_ = std::make_unique<PlanData>();
+    return *plan.data_;
+  }
   static const PlanData& of(const Plan& plan) { return *plan.data_; }
   void clear();
 
-  std::vector<Dispatch> dispatches;
+  std::vector<Command> commands;
   std::vector<Variant> variants;
   /// Palette records, the numbers of results to clear, group records, instance records, then
   /// extensions and active morph targets; at last what is culled on the GPU.
@@ -180,14 +197,11 @@ struct PlanData {
   /// Where each palette stands in the palettes buffer in each form, or notUsed.
   std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
   std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed
-  std::uint32_t resultCount = 0;
-  std::uint64_t palettesSize = 0, meshesSize = 0, matricesSize = 0;
-  OutputSizes outputs;
+  PlanSizes sizes;
   DeviceLimits limits;
   std::uint32_t instanceCount = 0;
   std::uint64_t vertexCount = 0;
-  CulledTables culled;
-  std::size_t firstIndirect = 0;  ///< dispatches from here on have their arguments from the GPU
+  std::uint32_t candidateCount = 0;  ///< instances that the GPU may choose
 
   std::unique_ptr<PlanMaker> maker;  ///< of `makePlan`, kept for its memory
 };
@@ -195,14 +209,8 @@ struct PlanData {
 /// Fills a plan: `begin`, what it consists of, `finish`.
 class PlanBuilder {
  public:
-  /// The sizes of the buffers that do not follow from the plan.
-  struct Sizes {
-    std::uint64_t meshes = 0, matrices = 0, palettes = 0;
-    std::uint32_t results = 0;
-    OutputSizes outputs;
-  };
   void begin(PlanData& plan, Groups& groups, const DeviceLimits& limits, const Tuning& tuning,
-             const Sizes& sizes);
+             const PlanSizes& sizes);
 
   /// A palette to be converted. All palettes come before `finish`, in any order with the rest.
   void addPalette(std::uint32_t matrixUnit, std::uint32_t outputUnit, std::uint32_t joints,
@@ -227,8 +235,9 @@ class PlanBuilder {
     candidates_.push_back({static_cast<std::uint32_t>(entries_.size() - 1), candidate});
   }
 
-  /// Fails with `limitExceeded` where the tables, or a dispatch, become too large.
-  Result<void> finish();
+  /// The commands of a batch; with `frame`, those of a scene. Fails with `limitExceeded` where the
+  /// tables, or a dispatch, become too large.
+  Result<void> finish(const FrameWork* frame = nullptr);
 
   std::uint32_t paletteCount() const { return paletteCount_; }
 
@@ -243,6 +252,11 @@ class PlanBuilder {
     std::uint32_t entry;
     Candidate candidate;
   };
+  struct Dispatch {
+    DispatchCommand command;
+    /// It reads what the palette kernel writes, or adds to results that the palette kernel clears.
+    bool isAfterPalettes = false;
+  };
 
   void count(std::uint32_t group) {
     Groups::Entry& entry = groups_->entries_[group];
@@ -252,14 +266,16 @@ class PlanBuilder {
   void startGroup(Groups::Entry& entry);
   Result<void> addPaletteDispatch();
   Result<void> addDispatches();
-  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups,
-                           const DispatchConstants& constants);
+  template <typename Push>
+  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
   void writeInstances();
   std::uint32_t appendMorphs(std::span<const MorphWeight> morphs);
   std::uint32_t appendExtension(const InstanceExtras& extras);
   void appendCandidates();
   void appendCulledDispatches();
-  void listVariants();
+  Result<void> addVisibilityDispatches(std::uint32_t frame);
+  void listDispatches();
+  void listFrame(const FrameWork& frame);
 
   PlanData* plan_ = nullptr;
   Groups* groups_ = nullptr;
@@ -273,6 +289,10 @@ class PlanBuilder {
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
   std::vector<Group> planGroups_;            ///< those in use, in the order of their first instance
   std::vector<std::uint32_t> order_;
+  std::vector<Dispatch> dispatches_;
+  std::array<DispatchCommand, 2> visibility_;  ///< the passes of the visibility kernel
+  abi::VisibilityPush culled_{};               ///< where the tables have what it works on
+  std::uint32_t culledGroups_ = 0;
 };
 
 }  // namespace dermis

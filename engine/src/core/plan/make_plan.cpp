@@ -136,9 +136,13 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   }
   firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
 
-  builder_.begin(
-      plan, groups_, limits, tuning,
-      {batch.meshesSize, batch.matricesSize, palettesSize_, resultCount_, batch.outputs});
+  PlanSizes sizes;
+  sizes.meshes = batch.meshesSize;
+  sizes.matrices = batch.matricesSize;
+  sizes.palettes = palettesSize_;
+  sizes.results = resultCount_;
+  sizes.outputs = batch.outputs;
+  builder_.begin(plan, groups_, limits, tuning, sizes);
   for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
     const std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
     for (std::size_t index = 0; index < units.size(); ++index) {
@@ -173,8 +177,7 @@ PlanData::~PlanData() = default;
 
 Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                       Plan& out) {
-  if (out.data_ == nullptr) out.data_ = std::make_unique<PlanData>();
-  PlanData& plan = *out.data_;
+  PlanData& plan = PlanData::of(out);
   if (plan.maker == nullptr) plan.maker = std::make_unique<PlanMaker>();
   Result<void> made = plan.maker->make(batch, limits, tuning, plan);
   if (!made) plan.clear();

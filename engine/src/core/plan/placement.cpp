@@ -131,11 +131,23 @@ Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
   return variant;
 }
 
-Variant paletteVariant(const Tuning& tuning) {
+namespace {
+
+Variant variantOf(Kernel kernel, const Tuning& tuning) {
   Variant variant;
-  variant.kernel = Kernel::palette;
+  variant.kernel = kernel;
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
   return variant;
+}
+
+}  // namespace
+
+Variant paletteVariant(const Tuning& tuning) {
+  return variantOf(Kernel::palette, tuning);
+}
+
+Variant visibilityVariant(const Tuning& tuning) {
+  return variantOf(Kernel::visibility, tuning);
 }
 
 std::uint64_t Variant::key() const {

@@ -38,6 +38,7 @@ bool hasResult(const Job& job);
 // -- Variants.
 
 Variant paletteVariant(const Tuning& tuning);
+Variant visibilityVariant(const Tuning& tuning);
 
 /// The skin kernel for a job. It depends on nothing else in the batch. `mayScale`: whether a
 /// palette that it reads may.

@@ -1,5 +1,6 @@
 #include "dermis/plan.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <string>
@@ -9,9 +10,11 @@
 namespace dermis {
 namespace {
 
-constexpr std::uint32_t storageBufferUsage = 0x20;   // VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
-constexpr std::uint32_t texelBufferUsage = 0x04;     // VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
-constexpr std::uint32_t transferTargetUsage = 0x02;  // VK_BUFFER_USAGE_TRANSFER_DST_BIT
+constexpr std::uint32_t copiedFrom = 0x01;   // VK_BUFFER_USAGE_TRANSFER_SRC_BIT
+constexpr std::uint32_t copiedTo = 0x02;     // VK_BUFFER_USAGE_TRANSFER_DST_BIT
+constexpr std::uint32_t texelBuffer = 0x04;  // VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
+constexpr std::uint32_t storage = 0x20;      // VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+constexpr std::uint32_t indirect = 0x100;    // VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT
 
 float fromOrdered(std::uint32_t bits) {
   return std::bit_cast<float>((bits & 0x80000000u) != 0 ? bits & 0x7fffffffu : ~bits);
@@ -34,14 +37,19 @@ Plan::~Plan() = default;
 Plan::Plan(Plan&&) noexcept = default;
 Plan& Plan::operator=(Plan&&) noexcept = default;
 
-std::span<const Dispatch> Plan::dispatches() const {
-  return data_->dispatches;
+std::span<const Command> Plan::commands() const {
+  return data_->commands;
 }
 std::span<const Variant> Plan::variants() const {
   return data_->variants;
 }
 const DeviceLimits& Plan::limits() const {
   return data_->limits;
+}
+std::uint32_t Plan::dispatchCount() const {
+  return static_cast<std::uint32_t>(std::ranges::count_if(
+      data_->commands,
+      [](const Command& command) { return std::holds_alternative<DispatchCommand>(command); }));
 }
 std::uint32_t Plan::instanceCount() const {
   return data_->instanceCount;
@@ -64,31 +72,53 @@ std::uint64_t Plan::resultOffset(std::uint32_t job) const {
 }
 
 BufferRequirement Plan::buffer(BufferRole role) const {
-  // What the host fills may be staged: written to another buffer, and copied.
-  constexpr std::uint32_t filled = storageBufferUsage | transferTargetUsage;
+  return data_->sizes.requirement(role, data_->tables.size() * 4, data_->limits);
+}
+
+BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
+                                         const DeviceLimits& limits) const {
   // Whether or not this plan reads texels: a later one that does may use the same buffers.
-  const std::uint32_t texels = data_->limits.texelBuffers ? texelBufferUsage : 0;
-  const std::uint32_t alignment = data_->limits.minStorageBufferOffsetAlignment;
+  const std::uint32_t read = storage | (limits.texelBuffers ? texelBuffer : 0);
+  const std::uint32_t written = storage | (isScene ? copiedFrom | copiedTo : 0);
+  const std::uint32_t alignment = limits.minStorageBufferOffsetAlignment;
+  const std::uint64_t resultBytes = results * std::uint64_t{sizeof(InstanceResult)};
   switch (role) {
+    // What the host fills may be staged: written to another buffer, and copied.
     case BufferRole::meshes:
-      return {data_->meshesSize, alignment, filled | texels, false, true};
+      return {meshes, alignment, read | copiedTo, false, true};
     case BufferRole::matrices:
-      return {data_->matricesSize, alignment, filled | texels, true, true};
+      return {matrices, alignment, read | copiedTo, !isScene, true};
     case BufferRole::tables:
-      return {data_->tables.size() * 4, alignment, filled | texels, true, true};
+      if (isScene) return {tables, alignment, read | copiedTo | indirect, false, false};
+      return {tables, alignment, read | copiedTo, true, true};
     case BufferRole::palettes:
-      return {data_->palettesSize, alignment, storageBufferUsage | texels, true, false};
+      return {palettes, alignment, read, !isScene, false};
     case BufferRole::results:
-      return {data_->resultCount * std::uint64_t{sizeof(InstanceResult)}, alignment,
-              storageBufferUsage, true, false};
+      return {resultBytes, alignment, storage | (isScene ? copiedFrom : 0), !isScene, false};
     case BufferRole::positions:
-      return {data_->outputs.positions, alignment, storageBufferUsage, false, false};
+      return {outputs.positions, alignment, written, false, false};
     case BufferRole::normals:
-      return {data_->outputs.normals, alignment, storageBufferUsage, false, false};
+      return {outputs.normals, alignment, written, false, false};
     case BufferRole::tangents:
-      return {data_->outputs.tangents, alignment, storageBufferUsage, false, false};
+      return {outputs.tangents, alignment, written, false, false};
     case BufferRole::previousPositions:
-      return {data_->outputs.previousPositions, alignment, storageBufferUsage, false, false};
+      return {outputs.previousPositions, alignment, written, false, false};
+    case BufferRole::upload:
+      if (isScene) return {tables, 4, copiedFrom, true, true};
+      break;
+    case BufferRole::readBack:
+      if (isScene) return {readBackResults + resultBytes, 4, copiedTo, true, false};
+      break;
+    case BufferRole::visibility:
+      return {slots * std::uint64_t{4}, alignment, storage, false, false};
+    case BufferRole::history:
+      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, storage | copiedTo,
+              false, false};
+    case BufferRole::counters:
+      if (slots != 0)
+        return {sizeof(abi::CounterRecord), alignment, storage | copiedTo | copiedFrom, false,
+                false};
+      break;
   }
   return {};
 }

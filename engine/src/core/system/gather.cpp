@@ -1,8 +1,11 @@
 // What a frame has to do, and what is done when it has been recorded.
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
+#include <string>
 
-#include "system/scene.h"
+#include "system/books.h"
 
 namespace dermis {
 namespace {
@@ -20,7 +23,7 @@ std::uint32_t culledFlags(const SceneInstance& instance) {
 
 /// In frames that are the same for all instances of a palette with one interval, also where the
 /// engine leaves frames out: a multiple of the interval lies between the last record and this one.
-bool Scene::isDue(const SceneInstance& instance) const {
+bool SceneBooks::isDue(const SceneInstance& instance) const {
   const bool cameBack = instance.visibleFrom == record_ + 1;
   if (instance.isUrgent || cameBack || instance.updateInterval == 1) return true;
   const std::uint64_t beat = instance.palette;
@@ -28,7 +31,7 @@ bool Scene::isDue(const SceneInstance& instance) const {
          (recordedFrame_ + beat) / instance.updateInterval;
 }
 
-std::uint32_t Scene::paletteUnit(const SceneInstance& instance) const {
+std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
   const ScenePalette& palette = palettes_.at(instance.palette);
   const std::optional<PaletteForm> form = paletteForm(instance.method);
   const std::uint64_t unit = form ? palette.forms[static_cast<std::size_t>(*form)].units->offset
@@ -37,7 +40,7 @@ std::uint32_t Scene::paletteUnit(const SceneInstance& instance) const {
 }
 
 /// Once for all instances that read it, and only where one does.
-void Scene::convertPalette(const SceneInstance& instance) {
+void SceneBooks::convertPalette(const SceneInstance& instance) {
   const std::optional<PaletteForm> form = paletteForm(instance.method);
   if (!form) return;
   ScenePalette& palette = palettes_.at(instance.palette);
@@ -50,8 +53,8 @@ void Scene::convertPalette(const SceneInstance& instance) {
                       *form, palette.mayScale);
 }
 
-void Scene::addRuns(const SceneInstance& instance, std::uint32_t flags,
-                    const Candidate* candidate) {
+void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
+                         const Candidate* candidate) {
   const InstanceExtras* extras = instance.extras.isNeeded() ? &instance.extras : nullptr;
   const std::uint32_t palette = paletteUnit(instance);
   const auto add = [&](const PlacedRun& run) {
@@ -65,7 +68,7 @@ void Scene::addRuns(const SceneInstance& instance, std::uint32_t flags,
   for (const PlacedRun& run : instance.furtherRuns) add(run);
 }
 
-void Scene::gatherPoses() {
+void SceneBooks::gatherPoses() {
   for (const PaletteHandle handle : posed_) {
     const ScenePalette* palette = palettes_.find(handle);
     if (palette == nullptr) continue;
@@ -76,7 +79,7 @@ void Scene::gatherPoses() {
   posed_.clear();
 }
 
-void Scene::addDue(std::uint32_t index) {
+void SceneBooks::addDue(std::uint32_t index) {
   SceneInstance& instance = instances_.at(index);
   instance.plannedIn = planNumber_;
   due_.push_back(index);
@@ -88,12 +91,12 @@ void Scene::addDue(std::uint32_t index) {
     builder_.clearResult(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
   }
-  plannedVertices_ += instance.vertexCount;
-  plannedBytes_ += std::uint64_t{instance.vertexCount} * attributeBytes(instance.layout);
+  planned_.skinnedVertices += instance.vertexCount;
+  planned_.writtenBytes += std::uint64_t{instance.vertexCount} * attributeBytes(instance.layout);
 }
 
 /// Those that have to wait stay in the list; so do those that are due, until `commit`.
-void Scene::gatherPending() {
+void SceneBooks::gatherPending() {
   std::size_t kept = 0;
   for (std::size_t entry = 0; entry < pending_.size(); ++entry) {
     const InstanceHandle handle = pending_[entry];
@@ -112,7 +115,7 @@ void Scene::gatherPending() {
 /// What moved when it was last displayed and is displayed without being skinned rests: its previous
 /// positions become the current ones. What leaves the view is left alone; mostly it is skinned when
 /// it returns.
-void Scene::gatherSettling() {
+void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
     const SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr || instance->plannedIn == planNumber_ || !instance->isVisible) continue;
@@ -122,7 +125,7 @@ void Scene::gatherSettling() {
 }
 
 /// All of them, in every frame: the CPU does not know which the GPU skinned.
-void Scene::gatherCulled() {
+void SceneBooks::gatherCulled() {
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
     if (!instance.isVisible) continue;
@@ -142,45 +145,86 @@ void Scene::gatherCulled() {
   }
 }
 
-void Scene::gatherMoves() {
+void SceneBooks::gatherMoves() {
   for (const InstanceHandle handle : shifting_) {
     const SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr || !instance->shown || instance->shown->mesh != instance->target.mesh ||
         instance->shown == instance->target)
       continue;
-    moves_.push_back({instance->shown->bytes.offset, instance->target.bytes.offset,
-                      instance->target.bytes.size});
+    moves_.push_back({BufferRole::positions, BufferRole::positions, instance->shown->bytes.offset,
+                      instance->target.bytes.offset, instance->target.bytes.size});
+    planned_.movedBytes += instance->target.bytes.size;
   }
 }
 
-Result<void> Scene::plan() {
+/// The results that the frame writes, each as far into the read-back behind the counters. What lies
+/// between two near each other is copied too.
+void SceneBooks::gatherResults() {
+  constexpr std::uint32_t bits = 64;
+  std::vector<std::uint64_t>& marks = resultMarks_;
+  marks.clear();
+  for (const std::uint32_t result : plannedResults_) {
+    if (result / bits >= marks.size()) marks.resize(result / bits + std::size_t{1});
+    marks[result / bits] |= std::uint64_t{1} << result % bits;
+  }
+  for (std::size_t begin = 0; begin < marks.size(); ++begin) {
+    if (marks[begin] == 0) continue;
+    std::size_t last = begin;
+    while (last + 1 < marks.size() && marks[last + 1] != 0) ++last;
+    const std::uint64_t first =
+        begin * bits + static_cast<std::uint64_t>(std::countr_zero(marks[begin]));
+    const std::uint64_t end =
+        (last + 1) * bits - static_cast<std::uint64_t>(std::countl_zero(marks[last]));
+    resultCopies_.push_back(
+        {BufferRole::results, BufferRole::readBack, first * sizeof(InstanceResult),
+         readBackResults + first * sizeof(InstanceResult), (end - first) * sizeof(InstanceResult)});
+    begin = last;
+  }
+}
+
+Result<void> SceneBooks::plan(Plan& out) {
   if (!hasBegun_) {
-    return Error{ErrorCode::invalidArgument, "record comes once after each beginFrame"};
+    return Error{ErrorCode::invalidArgument, "a frame is planned once after each beginFrame"};
   }
   ++planNumber_;
+  isPlanned_ = false;
   due_.clear();
   settling_.clear();
   versioned_.clear();
   conversions_.clear();
   moves_.clear();
   plannedResults_.clear();
-  plannedVertices_ = plannedBytes_ = plannedPoseBytes_ = 0;
-  const OutputSizes outputs = OutputSizes::oneBuffer(description_.outputBudget);
-  builder_.begin(PlanData::of(plan_), groups_, description_.limits, description_.tuning,
-                 {description_.meshBudget, description_.matricesSize(), description_.palettesSize(),
-                  description_.boundsBudget, outputs});
+  resultCopies_.clear();
+  planned_ = {};
+  PlanData& data = PlanData::of(out);
+  builder_.begin(data, groups_, description_.limits, description_.tuning, sceneSizes(description_));
   gatherPoses();
   gatherMoves();
   gatherPending();
   gatherSettling();
   gatherCulled();
+  gatherResults();
   for (const Conversion& conversion : conversions_)
-    plannedPoseBytes_ += palettes_.at(conversion.palette).jointCount * sizeof(JointMatrix);
-  return builder_.finish();
+    planned_.poseBytes += palettes_.at(conversion.palette).jointCount * sizeof(JointMatrix);
+  const auto record = static_cast<std::uint32_t>(record_ + 1);
+  const FrameWork frame{record, !historyIsClear_, moves_, resultCopies_};
+  if (Result<void> good = builder_.finish(&frame); !good) {
+    data.clear();
+    return good;
+  }
+  data.vertexCount = planned_.skinnedVertices;
+  planned_.frame = frame_;
+  planned_.instances = instances_.size();
+  planned_.skinnedInstances = static_cast<std::uint32_t>(due_.size());
+  planned_.settledInstances = static_cast<std::uint32_t>(settling_.size());
+  planned_.convertedPalettes = builder_.paletteCount();
+  planned_.culledCandidates = data.candidateCount;
+  isPlanned_ = true;
+  return {};
 }
 
 /// Whether `target` has now been recorded, and so is shown.
-bool Scene::commitShift(SceneInstance& instance, InstanceHandle handle) {
+bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
   if (instance.shown && instance.shown != instance.target) {
@@ -192,10 +236,19 @@ bool Scene::commitShift(SceneInstance& instance, InstanceHandle handle) {
   return true;
 }
 
-void Scene::commit() {
+Result<void> SceneBooks::commit() {
+  if (!isPlanned_) return invalid("there is no plan to commit, or the scene has changed since");
+  isPlanned_ = false;
   ++record_;
   recordedFrame_ = frame_;
   hasBegun_ = false;
+  committed_ = planned_;
+  const bool culls = planned_.culledCandidates != 0;
+  historyIsClear_ |= culls;
+  ReadBack& readBack = readBacks_[record_ % readBacks_.size()];
+  readBack.frame = frame_;
+  readBack.hasCounters = culls;
+  std::swap(readBack.results, resultCopies_);
   skinned_.clear();
   settled_.clear();
   moved_.clear();
@@ -228,6 +281,47 @@ void Scene::commit() {
     SceneInstance* instance = instances_.find(handle);
     return instance == nullptr || commitShift(*instance, handle);
   });
+  return {};
+}
+
+Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
+  const auto found = std::ranges::find(readBacks_, frame, &ReadBack::frame);
+  if (found == readBacks_.end() || frame == 0) {
+    return invalid("frame " + std::to_string(frame) +
+                   " cannot be read back: it is not one of the last frames committed");
+  }
+  if ((found->hasCounters || !found->results.empty()) &&
+      bytes.size() < readBackResults + sceneSizes(description_).results * sizeof(InstanceResult)) {
+    return invalid("the read-back buffer of a frame has " + std::to_string(bytes.size()) +
+                   " bytes, fewer than Scene::buffer says");
+  }
+  culling_ = {};
+  culling_.frame = frame;
+  if (found->hasCounters) {
+    abi::CounterRecord counted;
+    std::memcpy(&counted, bytes.data() + readBackCounters, sizeof(counted));
+    culling_.visibleInstances = counted.visible;
+    culling_.skinnedInstances = counted.skinned;
+    culling_.settledInstances = counted.settled;
+    culling_.workgroups = counted.workgroups;
+  }
+  // A frame that found nothing out about an instance does not take away what an earlier one did.
+  if (!found->results.empty()) latestResultsFrame_ = frame;
+  for (const CopyCommand& copy : found->results) {
+    const std::size_t first = copy.fromOffset / sizeof(InstanceResult);
+    latestResults_.resize(
+        std::max(latestResults_.size(), first + copy.size / sizeof(InstanceResult)));
+    std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, copy.size);
+  }
+  return {};
+}
+
+Result<std::optional<Box>> SceneBooks::bounds(InstanceHandle handle) const {
+  const SceneInstance* instance = instances_.find(handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
+  if (!instance->bounds || instance->firstFrame == 0 || instance->firstFrame > latestResultsFrame_)
+    return std::optional<Box>();
+  return latestResults_[instance->extras.result].box();
 }
 
 }  // namespace dermis

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "plan/check.h"
-#include "system/scene.h"
+#include "system/books.h"
 
 namespace dermis {
 namespace {
@@ -35,7 +35,7 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVer
 }  // namespace
 
 /// Whether it could be skinned, were there room.
-Result<void> Scene::check(const SceneInstance& instance) const {
+Result<void> SceneBooks::check(const SceneInstance& instance) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
   if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
   const ScenePalette* palette = palettes_.find(instance.paletteHandle);
@@ -60,7 +60,7 @@ Result<void> Scene::check(const SceneInstance& instance) const {
   return checkJob(batch, jobOf(instance, *mesh, *laidOut, 0), theInstance, description_.limits);
 }
 
-Result<void> Scene::takeResult(SceneInstance& instance) {
+Result<void> SceneBooks::takeResult(SceneInstance& instance) {
   if (!instance.bounds && !isSnormPosition(instance.layout.positions)) return {};
   if (!freeResults_.empty()) {
     instance.extras.result = freeResults_.back();
@@ -77,7 +77,7 @@ Result<void> Scene::takeResult(SceneInstance& instance) {
 }
 
 /// The palette's place in the form that the method reads; it stays until the palette is removed.
-Result<void> Scene::reserveUnits(const SceneInstance& instance) {
+Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
   const std::optional<PaletteForm> form = paletteForm(instance.method);
   if (!form) return {};
   ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
@@ -96,7 +96,7 @@ Result<void> Scene::reserveUnits(const SceneInstance& instance) {
 }
 
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
-Result<void> Scene::findRoom(SceneInstance& instance) {
+Result<void> SceneBooks::findRoom(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
@@ -115,7 +115,7 @@ Result<void> Scene::findRoom(SceneInstance& instance) {
   return made;
 }
 
-Result<void> Scene::makeRuns(SceneInstance& instance) {
+Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
   const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
@@ -137,19 +137,19 @@ Result<void> Scene::makeRuns(SceneInstance& instance) {
   return {};
 }
 
-void Scene::releaseRuns(SceneInstance& instance) {
+void SceneBooks::releaseRuns(SceneInstance& instance) {
   groups_.release(instance.run.group);
   for (const PlacedRun& run : instance.furtherRuns) groups_.release(run.group);
   instance.furtherRuns.clear();
 }
 
 /// What was recorded is still drawn from, and stays `shown`; what never was is free at once.
-void Scene::releaseTarget(SceneInstance& instance) {
+void SceneBooks::releaseTarget(SceneInstance& instance) {
   releaseRuns(instance);
   if (instance.shown != instance.target) outputStore_.free(instance.target.bytes);
 }
 
-void Scene::link(std::uint32_t index) {
+void SceneBooks::link(std::uint32_t index) {
   SceneInstance& instance = instances_.at(index);
   ScenePalette& palette = palettes_.at(instance.palette);
   instance.previousOfPalette = notUsed;
@@ -160,7 +160,7 @@ void Scene::link(std::uint32_t index) {
   ++palette.users;
 }
 
-void Scene::unlink(std::uint32_t index) {
+void SceneBooks::unlink(std::uint32_t index) {
   const SceneInstance& instance = instances_.at(index);
   ScenePalette& palette = palettes_.at(instance.palette);
   if (instance.previousOfPalette != notUsed) {
@@ -173,7 +173,7 @@ void Scene::unlink(std::uint32_t index) {
   --palette.users;
 }
 
-Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
+Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& description) {
   SceneInstance instance;
   instance.palette = description.palette.index;
   instance.updateInterval = description.updateInterval;
@@ -212,7 +212,7 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   return handle;
 }
 
-Result<void> Scene::removeInstance(InstanceHandle handle) {
+Result<void> SceneBooks::removeInstance(InstanceHandle handle) {
   SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   unlink(handle.index);
@@ -230,7 +230,7 @@ Result<void> Scene::removeInstance(InstanceHandle handle) {
 }
 
 /// `target` has become another than `shown`; the next plan that skins or moves it makes up for it.
-void Scene::shift(InstanceHandle handle) {
+void SceneBooks::shift(InstanceHandle handle) {
   SceneInstance& instance = instances_.at(handle.index);
   if (instance.isShifting) return;
   instance.isShifting = true;
@@ -238,14 +238,14 @@ void Scene::shift(InstanceHandle handle) {
 }
 
 /// Room for an instance that gets another mesh: if it is still shown with that mesh, it stays.
-Result<void> Scene::takeBackOrFindRoom(SceneInstance& changed) {
+Result<void> SceneBooks::takeBackOrFindRoom(SceneInstance& changed) {
   if (!changed.shown || changed.shown->mesh != changed.mesh) return findRoom(changed);
   changed.target = *changed.shown;
   changed.vertexCount = changed.shown->vertexCount;
   return makeRuns(changed);
 }
 
-Result<void> Scene::setMesh(InstanceHandle handle, MeshHandle mesh) {
+Result<void> SceneBooks::setMesh(InstanceHandle handle, MeshHandle mesh) {
   SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   if (instance->mesh == mesh && meshes_.contains(mesh)) return {};
@@ -270,7 +270,7 @@ Result<void> Scene::setMesh(InstanceHandle handle, MeshHandle mesh) {
   return {};
 }
 
-std::uint64_t Scene::compact(std::uint64_t maxBytes) {
+std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
   std::vector<InstanceHandle> fromEnd;
   for (std::uint32_t index = 0; index < instances_.capacity(); ++index) {
     if (!instances_.isUsed(index)) continue;
@@ -306,7 +306,7 @@ std::uint64_t Scene::compact(std::uint64_t maxBytes) {
   return moved;
 }
 
-Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
+Result<InstanceOutput> SceneBooks::output(InstanceHandle handle) const {
   const SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   InstanceOutput output;

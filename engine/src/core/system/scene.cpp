@@ -1,252 +1,198 @@
-// What comes and goes, and what engines set.
+// The interface of Scene, and the checks of its description.
 
-#include "system/scene.h"
+#include "dermis/scene.h"
 
+#include <array>
 #include <string>
+#include <utility>
 
 #include "plan/check.h"
-#include "system/slot_map.h"
+#include "system/books.h"
 
 namespace dermis {
 namespace {
 
-Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
-  return {ErrorCode::invalidArgument, std::string(kind) + " " + std::to_string(index) +
-                                          " is used by " + std::to_string(users) + " instance" +
-                                          (users == 1 ? "" : "s")};
+Result<void> checkDescription(const SceneDescription& description) {
+  for (const auto& [field, value] :
+       {std::pair{"framesInFlight", std::uint64_t{description.framesInFlight}},
+        {"meshBudget", description.meshBudget},
+        {"jointBudget", description.jointBudget},
+        {"outputBudget", description.outputBudget},
+        {"instanceBudget", description.instanceBudget}}) {
+    if (value == 0) return invalid(std::string("the scene's ") + field + " is 0");
+  }
+  if (Result<void> good = checkLimits(description.limits); !good) return good;
+  const std::uint64_t most = description.limits.maxStorageBufferRange;
+  // Their product, in bytes, might not fit 64 bits.
+  if (description.framesInFlight > most / sizeof(JointMatrix) / description.jointBudget) {
+    return Error{ErrorCode::limitExceeded,
+                 "the joint matrices of the scene's jointBudget, for each of framesInFlight, take "
+                 "more than this device's storage buffer range of " +
+                     std::to_string(most) + " bytes"};
+  }
+  const PlanSizes sizes = sceneSizes(description);
+  for (const auto& [field, role] : {std::pair{"meshBudget", BufferRole::meshes},
+                                    {"jointBudget (palettes)", BufferRole::palettes},
+                                    {"boundsBudget", BufferRole::results},
+                                    {"instanceBudget", BufferRole::history}}) {
+    const std::uint64_t bytes = sizes.requirement(role, 0, description.limits).size;
+    if (bytes <= most) continue;
+    return Error{
+        ErrorCode::limitExceeded,
+        std::string("the scene's ") + field + " makes a buffer of " + std::to_string(bytes) +
+            " bytes, more than this device's storage buffer range of " + std::to_string(most)};
+  }
+  return checkTuning(description.tuning);
 }
 
-Error noRoom(const std::string& what, const RangeAllocator& store, const char* unit) {
-  return {ErrorCode::limitExceeded,
-          what + ", of " + std::to_string(store.capacity()) + " " + unit + " of the budget " +
-              std::to_string(store.capacity() - store.used()) + " are free, " +
-              std::to_string(store.largestFree()) + " in one piece"};
+/// The largest multiple that there is, if the next one is larger.
+std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
+  const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
+  return up <= ~value ? value + up : value / multiple * multiple;
 }
 
 }  // namespace
 
 Scene::Scene(const SceneDescription& description)
-    : description_(description),
-      meshStore_(description.meshBudget),
-      jointStore_(description.jointBudget),
-      unitStore_(description.paletteUnits()),
-      outputStore_(description.outputBudget) {}
+    : books_(std::make_unique<SceneBooks>(description)) {}
+Scene::~Scene() = default;
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
 
-// -- Meshes and palettes.
+Result<Scene> Scene::create(const SceneDescription& description) {
+  SceneDescription rounded = description;
+  rounded.meshBudget = roundUp(description.meshBudget, packedMeshAlignment);
+  rounded.outputBudget = roundUp(description.outputBudget, 4);
+  if (description.limits.maxStorageBuffersPerStage < storageBuffersWanted)
+    rounded.boundsBudget = 0;  // there are no results
+  if (Result<void> good = checkDescription(rounded); !good) return good.error();
+  return Scene(rounded);
+}
+
+BufferRequirement Scene::buffer(BufferRole role) const {
+  return sceneSizes(description()).requirement(role, 0, description().limits);
+}
+const SceneDescription& Scene::description() const {
+  return books_->description();
+}
+
+SceneBooks& Scene::change() {
+  books_->unplan();
+  return *books_;
+}
+
+// -- Meshes, palettes, instances.
 
 Result<MeshHandle> Scene::addMesh(const MeshInfo& info) {
-  if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
-      !kept)
-    return kept.error();
-  const std::optional<Range> bytes = meshStore_.allocate(info.byteSize, packedMeshAlignment);
-  if (!bytes) {
-    return noRoom("a packed mesh takes " + std::to_string(info.byteSize) + " bytes", meshStore_,
-                  "bytes");
-  }
-  return meshes_.add({info, *bytes, 0});
+  return change().addMesh(info);
 }
-
-Result<void> Scene::removeMesh(MeshHandle handle) {
-  const SceneMesh* mesh = meshes_.find(handle);
+Result<std::uint64_t> Scene::meshOffset(MeshHandle handle) const {
+  const SceneMesh* mesh = books_->meshes().find(handle);
   if (mesh == nullptr) return unknownHandle("mesh", handle);
-  if (mesh->users != 0) return isUsed("mesh", handle.index, mesh->users);
-  retire(Retired::Store::meshes, mesh->bytes);
-  meshes_.remove(handle);
-  return {};
+  return mesh->bytes.offset;
 }
-
+Result<void> Scene::removeMesh(MeshHandle mesh) {
+  return change().removeMesh(mesh);
+}
 Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale) {
-  if (jointCount == 0 || jointCount > maxPaletteJoints) {
-    return Error{ErrorCode::invalidArgument, "a palette has 1 to " +
-                                                 std::to_string(maxPaletteJoints) +
-                                                 " joints, not " + std::to_string(jointCount)};
-  }
-  if (Result<void> kept =
-          checkPromisedPalette(mayScale, description_.limits.promises, {"the palette"});
-      !kept)
-    return kept.error();
-  const std::optional<Range> joints = jointStore_.allocate(jointCount, 1);
-  if (!joints) {
-    return noRoom("a palette takes " + std::to_string(jointCount) + " joints", jointStore_,
-                  "joints");
-  }
-  ScenePalette palette;
-  palette.jointCount = jointCount;
-  palette.mayScale = mayScale;
-  palette.joints = *joints;
-  return palettes_.add(palette);
+  return change().addPalette(jointCount, mayScale);
+}
+Result<PosePlace> Scene::pose(PaletteHandle handle) const {
+  const ScenePalette* palette = books_->palettes().find(handle);
+  if (palette == nullptr) return unknownHandle("palette", handle);
+  return PosePlace{books_->poseOffset(*palette), palette->jointCount};
+}
+Result<void> Scene::removePalette(PaletteHandle palette) {
+  return change().removePalette(palette);
+}
+Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
+  return change().addInstance(description);
+}
+Result<void> Scene::removeInstance(InstanceHandle instance) {
+  return change().removeInstance(instance);
 }
 
-Result<void> Scene::removePalette(PaletteHandle handle) {
-  const ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return unknownHandle("palette", handle);
-  if (palette->users != 0) return isUsed("palette", handle.index, palette->users);
-  retire(Retired::Store::joints, palette->joints);
-  for (const ScenePalette::Form& form : palette->forms) {
-    if (form.units) retire(Retired::Store::units, *form.units);
-  }
-  palettes_.remove(handle);
-  return {};
+Result<std::vector<Variant>> Scene::everyVariant(const InstanceDescription& description) const {
+  Job job;
+  const Result<LaidOutVertices> laidOut = layOut(description.layout, 1);
+  if (!laidOut) return laidOut.error();
+  job.method = description.method;
+  job.positions = laidOut->attributes[0];
+  job.normals = laidOut->attributes[1];
+  job.tangents = laidOut->attributes[2];
+  job.previousPositions = laidOut->attributes[3];
+  job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
+  job.bounds = description.bounds;
+  const SceneDescription& own = books_->description();
+  std::vector<Variant> variants = dermis::everyVariant(job, own.limits, own.tuning);
+  if (description.culledOnGpu) variants.push_back(visibilityVariant(own.tuning));
+  return variants;
+}
+
+// -- What changes.
+
+Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
+  return change().beginFrame(frame, completedFrame);
+}
+Result<PosePlace> Scene::writePose(PaletteHandle palette) {
+  const Result<std::uint64_t> offset = change().writePose(palette);
+  if (!offset) return offset.error();
+  return PosePlace{*offset, books_->palettes().find(palette)->jointCount};
+}
+Result<void> Scene::setVisible(InstanceHandle instance, bool isVisible) {
+  return change().setVisible(instance, isVisible);
+}
+Result<void> Scene::setUpdateInterval(InstanceHandle instance, std::uint32_t interval) {
+  return change().setUpdateInterval(instance, interval);
+}
+Result<void> Scene::teleport(InstanceHandle instance) {
+  return change().teleport(instance);
+}
+Result<void> Scene::setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs) {
+  return change().setMorphWeights(instance, morphs);
+}
+Result<void> Scene::setMesh(InstanceHandle instance, MeshHandle mesh) {
+  return change().setMesh(instance, mesh);
+}
+std::uint64_t Scene::compact(std::uint64_t maxBytes) {
+  return change().compact(maxBytes);
 }
 
 // -- Frames.
 
-Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
-  if (frame <= frame_ || completedFrame < completed_ || completedFrame >= frame) {
-    return Error{ErrorCode::invalidArgument,
-                 "frame " + std::to_string(frame) + ", with " + std::to_string(completedFrame) +
-                     " complete, cannot follow frame " + std::to_string(frame_) + ", with " +
-                     std::to_string(completed_) + " complete"};
-  }
-  if (frame - completedFrame > description_.framesInFlight) {
-    return Error{ErrorCode::invalidArgument,
-                 "frame " + std::to_string(frame) + " begins while the GPU has completed frame " +
-                     std::to_string(completedFrame) + ": that makes more than the " +
-                     std::to_string(description_.framesInFlight) + " frames in flight described"};
-  }
-  frame_ = frame;
-  completed_ = completedFrame;
-  hasBegun_ = true;
-  while (!retired_.empty() && retired_.front().frame <= completed_) {
-    free(retired_.front());
-    retired_.pop_front();
-  }
-  return {};
+Result<void> Scene::plan(Plan& out) {
+  return books_->plan(out);
+}
+Result<void> Scene::commit() {
+  return books_->commit();
+}
+Result<void> Scene::readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
+  return books_->readBack(frame, bytes);
 }
 
-void Scene::retire(Retired::Store store, const Range& range) {
-  retired_.push_back({frame_, store, range});
-  // What no frame has seen, or only complete ones, is free at once.
-  while (!retired_.empty() && retired_.front().frame <= completed_) {
-    free(retired_.front());
-    retired_.pop_front();
-  }
+// -- Results.
+
+Result<InstanceOutput> Scene::output(InstanceHandle instance) const {
+  return books_->output(instance);
 }
-
-void Scene::free(const Retired& retired) {
-  switch (retired.store) {
-    case Retired::Store::meshes:
-      return meshStore_.free(retired.range);
-    case Retired::Store::joints:
-      return jointStore_.free(retired.range);
-    case Retired::Store::units:
-      return unitStore_.free(retired.range);
-    case Retired::Store::output:
-      return outputStore_.free(retired.range);
-  }
+std::span<const InstanceHandle> Scene::skinnedInstances() const {
+  return books_->skinned();
 }
-
-std::uint64_t Scene::poseOffset(const ScenePalette& palette) const {
-  return (std::uint64_t{palette.slot} * description_.jointBudget + palette.joints.offset) *
-         sizeof(JointMatrix);
+std::span<const InstanceHandle> Scene::settledInstances() const {
+  return books_->settled();
 }
-
-Result<std::uint64_t> Scene::writePose(PaletteHandle handle) {
-  if (!hasBegun_) {
-    return Error{ErrorCode::invalidArgument,
-                 "a pose is written between beginFrame and record, so that it is known which "
-                 "memory the GPU is done with"};
-  }
-  ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return unknownHandle("palette", handle);
-  if (palette->poseFrame != frame_) {
-    // The next of its slots: the GPU is done with it, since it was superseded at least as many
-    // frames ago as there may be in flight.
-    palette->slot = (palette->slot + 1) % description_.framesInFlight;
-    palette->poseFrame = frame_;
-    ++palette->version;
-    posed_.push_back(handle);
-  }
-  return poseOffset(*palette);
+std::span<const InstanceHandle> Scene::movedInstances() const {
+  return books_->moved();
 }
-
-// -- What engines set.
-
-void Scene::makeStale(std::uint32_t index) {
-  SceneInstance& instance = instances_.at(index);
-  instance.isStale = true;
-  makePending(index);
+Result<std::optional<Box>> Scene::bounds(InstanceHandle instance) const {
+  return books_->bounds(instance);
 }
-
-void Scene::makePending(std::uint32_t index) {
-  SceneInstance& instance = instances_.at(index);
-  if (instance.isListed || !instance.isVisible || instance.isCulled) return;
-  instance.isListed = true;
-  pending_.push_back(instances_.handleOf(index));
+Result<std::uint32_t> Scene::visibilityIndex(InstanceHandle instance) const {
+  if (books_->instances().find(instance) == nullptr) return unknownHandle("instance", instance);
+  return instance.index;
 }
-
-Result<void> Scene::setVisible(InstanceHandle handle, bool isVisible) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  if (instance->isVisible == isVisible) return {};
-  instance->isVisible = isVisible;
-  if (!isVisible) {
-    instance->hiddenAfter = record_;
-    return {};
-  }
-  if (instance->hiddenAfter != record_) {
-    // Not displayed by the last record: what it showed before is no motion.
-    instance->visibleFrom = record_ + 1;
-    if (instance->isMoving) moving_.push_back(handle);
-  }
-  if (instance->isStale) {
-    instance->isUrgent = true;
-    makePending(handle.index);
-  }
-  return {};
-}
-
-Result<void> Scene::setUpdateInterval(InstanceHandle handle, std::uint32_t interval) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  if (interval == 0) {
-    return Error{ErrorCode::invalidArgument, "instance " + std::to_string(handle.index) +
-                                                 ": an update interval is 1 or more frames, not 0"};
-  }
-  instance->updateInterval = interval;
-  return {};
-}
-
-Result<void> Scene::teleport(InstanceHandle handle) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  instance->restartsMotion = true;
-  instance->isUrgent = true;
-  makeStale(handle.index);
-  return {};
-}
-
-Result<void> Scene::setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  const SceneMesh& mesh = meshes_.at(instance->mesh.index);
-  if (Result<void> good =
-          checkMorphs(morphs, mesh.info.morphTargetCount, {"instance", handle.index});
-      !good)
-    return good;
-  std::vector<MorphWeight>& active = instance->extras.morphs;
-  const bool hadMorphs = !active.empty();
-  assignActive(morphs, active);
-  // With and without are two kernels.
-  if (hadMorphs == active.empty()) {
-    releaseRuns(*instance);
-    if (Result<void> good = makeRuns(*instance); !good) return good;
-  }
-  makeStale(handle.index);
-  return {};
-}
-
-Scene::Counts Scene::counts() const {
-  Counts counts;
-  counts.instances = instances_.size();
-  counts.skinned = static_cast<std::uint32_t>(skinned_.size());
-  counts.settled = static_cast<std::uint32_t>(settled_.size());
-  counts.palettes = builder_.paletteCount();
-  counts.culled = culled().candidateCount;
-  counts.vertices = plannedVertices_;
-  counts.writtenBytes = plannedBytes_;
-  counts.poseBytes = plannedPoseBytes_;
-  return counts;
+SceneStatistics Scene::statistics() const {
+  return books_->statistics();
 }
 
 }  // namespace dermis

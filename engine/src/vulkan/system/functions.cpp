@@ -25,9 +25,6 @@ Result<SystemFunctions> loadSystemFunctions(const ContextState& context) {
   load("vkCreateQueryPool", functions.createQueryPool);
   load("vkDestroyQueryPool", functions.destroyQueryPool);
   load("vkGetQueryPoolResults", functions.getQueryPoolResults);
-  load("vkCmdCopyBuffer", functions.cmdCopyBuffer);
-  load("vkCmdFillBuffer", functions.cmdFillBuffer);
-  load("vkCmdDispatchIndirect", functions.cmdDispatchIndirect);
   load("vkCmdResetQueryPool", functions.cmdResetQueryPool);
   load("vkCmdWriteTimestamp", functions.cmdWriteTimestamp);
   if (functions.getPhysicalDeviceMemoryProperties == nullptr)

@@ -20,9 +20,6 @@ struct SystemFunctions {
   PFN_vkCreateQueryPool createQueryPool = nullptr;
   PFN_vkDestroyQueryPool destroyQueryPool = nullptr;
   PFN_vkGetQueryPoolResults getQueryPoolResults = nullptr;
-  PFN_vkCmdCopyBuffer cmdCopyBuffer = nullptr;
-  PFN_vkCmdFillBuffer cmdFillBuffer = nullptr;
-  PFN_vkCmdDispatchIndirect cmdDispatchIndirect = nullptr;
   PFN_vkCmdResetQueryPool cmdResetQueryPool = nullptr;
   PFN_vkCmdWriteTimestamp cmdWriteTimestamp = nullptr;
 };

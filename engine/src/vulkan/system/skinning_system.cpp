@@ -7,8 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "abi.h"
-#include "plan/check.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {
@@ -18,54 +16,16 @@ Error wrongField(const std::string& what) {
   return {ErrorCode::invalidArgument, "SkinningSystemDescription::" + what};
 }
 
-Error tooLarge(const char* field, std::uint64_t bytes, const DeviceLimits& limits) {
-  return {ErrorCode::limitExceeded, std::string("SkinningSystemDescription::") + field +
-                                        " makes a buffer of " + std::to_string(bytes) +
-                                        " bytes, more than this device's storage buffer range of " +
-                                        std::to_string(limits.maxStorageBufferRange)};
-}
-
-Result<void> checkBudgets(const SkinningSystemDescription& description,
-                          const SceneDescription& scene) {
-  const DeviceLimits& limits = scene.limits;
-  if (description.framesInFlight == 0) return wrongField("framesInFlight is 0");
-  if (description.meshBudget == 0) return wrongField("meshBudget is 0");
-  if (description.jointBudget == 0) return wrongField("jointBudget is 0");
-  if (description.outputBudget == 0) return wrongField("outputBudget is 0");
-  if (description.instanceBudget == 0) return wrongField("instanceBudget is 0");
-  if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
-    return wrongField("memory has one of its two functions only");
-  for (const auto& [field, bytes] :
-       {std::pair{"framesInFlight", description.framesInFlight * sizeof(JointMatrix)},
-        {"meshBudget", scene.meshBudget},
-        {"jointBudget (matrices)", scene.matricesSize()},
-        {"jointBudget (palettes)", scene.palettesSize()},
-        {"boundsBudget", scene.resultsSize()},
-        {"instanceBudget", std::uint64_t{scene.instanceBudget} * sizeof(abi::HistoryRecord)}}) {
-    if (bytes > limits.maxStorageBufferRange) return tooLarge(field, bytes, limits);
-  }
-  if (Result<void> good = checkLimits(limits); !good) return good;
-  return checkTuning(scene.tuning);
-}
-
-/// The largest multiple that there is, if the next one is larger.
-std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
-  const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
-  return up <= ~value ? value + up : value / multiple * multiple;
-}
-
 SceneDescription sceneOf(const SkinningSystemDescription& description,
                          const ContextState& context) {
-  const DeviceLimits& limits = context.limits;
   SceneDescription scene;
   scene.framesInFlight = description.framesInFlight;
-  scene.meshBudget = roundUp(description.meshBudget, packedMeshAlignment);
+  scene.meshBudget = description.meshBudget;
   scene.jointBudget = description.jointBudget;
-  scene.outputBudget = roundUp(description.outputBudget, 4);
+  scene.outputBudget = description.outputBudget;
   scene.instanceBudget = description.instanceBudget;
-  scene.boundsBudget =
-      limits.maxStorageBuffersPerStage < storageBuffersWanted ? 0 : description.boundsBudget;
-  scene.limits = limits;
+  scene.boundsBudget = description.boundsBudget;
+  scene.limits = context.limits;
   scene.tuning = description.tuning.value_or(context.tuning);
   return scene;
 }
@@ -77,65 +37,64 @@ SkinningSystem::~SkinningSystem() = default;
 SkinningSystem::SkinningSystem(SkinningSystem&&) noexcept = default;
 SkinningSystem& SkinningSystem::operator=(SkinningSystem&&) noexcept = default;
 
-SkinningSystem::State::State(ContextState& contextState, const SceneDescription& sceneDescription)
-    : context(&contextState), scene(sceneDescription) {}
+SkinningSystem::State::State(ContextState& contextState, Scene&& ownScene)
+    : context(&contextState), scene(std::move(ownScene)) {}
 
-/// Of what kernels read, through texel buffers where the device has them.
-VkBufferUsageFlags SkinningSystem::State::readUsage() const {
-  return VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
-         (context->limits.texelBuffers ? VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT : 0);
+SkinningSystem::State::~State() {
+  context->table.destroyDescriptorPool(context->device, visibilityPool, context->allocator);
 }
 
-std::span<JointMatrix> SkinningSystem::State::poseAt(std::uint64_t offset,
-                                                     std::uint32_t jointCount) {
-  return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + offset), jointCount};
+std::span<JointMatrix> SkinningSystem::State::poseAt(const PosePlace& place) {
+  return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + place.offset), place.jointCount};
 }
 
 Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage) {
-  const VkBufferUsageFlags read = readUsage();
-  constexpr VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
-  constexpr VkBufferUsageFlags to = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-  constexpr VkBufferUsageFlags from = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  const SceneDescription& sizes = scene.description();
   struct Wanted {
-    SystemBuffer* buffer;
-    SystemBuffer::Description description;
+    SystemBuffer& buffer;
+    BufferRole role;
+    MemoryUse use;
+    const char* name;
+    VkBufferUsageFlags usage = 0;  ///< besides what the scene needs
+  };
+  const auto create = [&](const Wanted& wanted) -> Result<void> {
+    const BufferRequirement needed = scene.buffer(wanted.role);
+    if (needed.size == 0) return {};
+    Result<SystemBuffer> made = SystemBuffer::create(
+        source, {needed.size, needed.usage | wanted.usage, wanted.use, wanted.name});
+    if (!made) return made.error();
+    wanted.buffer = std::move(*made);
+    return {};
   };
   for (const Wanted& wanted :
-       {Wanted{&meshes, {sizes.meshBudget, read | to, MemoryUse::device, "dermis meshes"}},
-        {&matrices, {sizes.matricesSize(), read, MemoryUse::upload, "dermis matrices"}},
-        {&palettes, {sizes.palettesSize(), read, MemoryUse::device, "dermis palettes"}},
-        {&output,
-         {sizes.outputBudget, storage | to | from | outputUsage, MemoryUse::device,
-          "dermis output"}},
-        {&counters,
-         {sizeof(abi::CounterRecord), storage | to | from, MemoryUse::device, "dermis counters"}},
-        {&results, {sizes.resultsSize(), storage | from, MemoryUse::device, "dermis results"}}}) {
-    if (wanted.description.size == 0) continue;
-    Result<SystemBuffer> made = SystemBuffer::create(source, wanted.description);
-    if (!made) return made.error();
-    *wanted.buffer = std::move(*made);
+       {Wanted{meshes, BufferRole::meshes, MemoryUse::device, "dermis meshes"},
+        {matrices, BufferRole::matrices, MemoryUse::upload, "dermis matrices"},
+        {palettes, BufferRole::palettes, MemoryUse::device, "dermis palettes"},
+        {output, BufferRole::positions, MemoryUse::device, "dermis output", outputUsage},
+        {counters, BufferRole::counters, MemoryUse::device, "dermis counters"},
+        {results, BufferRole::results, MemoryUse::device, "dermis results"}}) {
+    if (Result<void> made = create(wanted); !made) return made;
   }
   for (FrameSlot& frameSlot : slots) {
-    Result<SystemBuffer> made =
-        SystemBuffer::create(source, {sizeof(abi::CounterRecord) + sizes.resultsSize(), to,
-                                      MemoryUse::readBack, "dermis read-back"});
-    if (!made) return made.error();
-    frameSlot.readBack = std::move(*made);
+    if (Result<void> made = create(
+            {frameSlot.readBack, BufferRole::readBack, MemoryUse::readBack, "dermis read-back"});
+        !made)
+      return made;
   }
   return {};
 }
 
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
   if (description.context == nullptr) return wrongField("context is null");
+  if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
+    return wrongField("memory has one of its two functions only");
   ContextState& context = *description.context->state_;
-  const SceneDescription scene = sceneOf(description, context);
-  if (Result<void> good = checkBudgets(description, scene); !good) return good.error();
+  Result<Scene> scene = Scene::create(sceneOf(description, context));
+  if (!scene) return scene.error();
   Result<SystemFunctions> functions = loadSystemFunctions(context);
   if (!functions) return functions.error();
 
   SkinningSystem system;
-  system.state_ = std::make_unique<State>(context, scene);
+  system.state_ = std::make_unique<State>(context, std::move(*scene));
   State& state = *system.state_;
   state.functions = *functions;
   state.source.context = &context;
@@ -147,6 +106,12 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   }
   state.slots.resize(description.framesInFlight);
   if (Result<void> made = state.createBuffers(description.outputUsage); !made) return made.error();
+  if (!context.pushesDescriptors()) {
+    if (Result<void> made = context.allocateSets(description.framesInFlight, state.visibilityPool,
+                                                 state.visibilitySets);
+        !made)
+      return made.error();
+  }
   if (description.measuresGpuTime) {
     if (Result<void> made =
             state.timestamps.create(context, state.functions, description.framesInFlight);
@@ -169,7 +134,7 @@ Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
     return staging.error();
   }
   std::memcpy(staging->bytes().data(), mesh.bytes().data(), mesh.bytes().size());
-  state_->uploads.push_back({*handle, std::move(*staging)});
+  state_->uploads.push_back({*handle, *state_->scene.meshOffset(*handle), std::move(*staging)});
   return handle;
 }
 
@@ -185,8 +150,7 @@ Result<PaletteHandle> SkinningSystem::addPalette(std::uint32_t jointCount, bool 
   Result<PaletteHandle> added = state_->scene.addPalette(jointCount, mayScale);
   if (!added) return added;
   // No frame under way reads its memory: that of a palette before it was free.
-  const ScenePalette& palette = *state_->scene.palettes().find(*added);
-  std::ranges::fill(state_->poseAt(state_->scene.poseOffset(palette), jointCount), JointMatrix{});
+  std::ranges::fill(state_->poseAt(*state_->scene.pose(*added)), JointMatrix{});
   return added;
 }
 Result<void> SkinningSystem::removePalette(PaletteHandle palette) {
@@ -200,30 +164,22 @@ Result<void> SkinningSystem::removeInstance(InstanceHandle instance) {
 }
 
 Result<void> SkinningSystem::prepare(const InstanceDescription& description) const {
-  Job job;
-  const Result<LaidOutVertices> laidOut = layOut(description.layout, 1);
-  if (!laidOut) return laidOut.error();
-  job.method = description.method;
-  job.positions = laidOut->attributes[0];
-  job.normals = laidOut->attributes[1];
-  job.tangents = laidOut->attributes[2];
-  job.previousPositions = laidOut->attributes[3];
-  job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
-  job.bounds = description.bounds;
-  for (const Variant& variant :
-       everyVariant(job, state_->context->limits, state_->scene.description().tuning)) {
+  const Result<std::vector<Variant>> variants = state_->scene.everyVariant(description);
+  if (!variants) return variants.error();
+  for (const Variant& variant : *variants) {
     if (Result<void> built =
             state_->context->pipelines->build(variant, state_->context->pipelineLayout);
         !built)
       return built;
   }
-  return description.culledOnGpu ? state_->prepareVisibility() : Result<void>();
+  return {};
 }
 
 // -- What changes.
 
 Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
   if (Result<void> begun = state_->scene.beginFrame(frame, completedFrame); !begun) return begun;
+  state_->frameNumber = frame;
   state_->readBackUpTo(completedFrame);
   while (!state_->retired.empty() && state_->retired.front().frame <= completedFrame)
     state_->retired.pop_front();
@@ -231,9 +187,9 @@ Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t compl
 }
 
 Result<std::span<JointMatrix>> SkinningSystem::writePose(PaletteHandle palette) {
-  const Result<std::uint64_t> offset = state_->scene.writePose(palette);
-  if (!offset) return offset.error();
-  return state_->poseAt(*offset, state_->scene.palettes().find(palette)->jointCount);
+  const Result<PosePlace> place = state_->scene.writePose(palette);
+  if (!place) return place.error();
+  return state_->poseAt(*place);
 }
 
 Result<void> SkinningSystem::setVisible(InstanceHandle instance, bool isVisible) {
@@ -269,85 +225,47 @@ Result<InstanceOutput> SkinningSystem::output(InstanceHandle instance) const {
   return state_->scene.output(instance);
 }
 std::span<const InstanceHandle> SkinningSystem::skinnedInstances() const {
-  return state_->scene.skinned();
+  return state_->scene.skinnedInstances();
 }
 std::span<const InstanceHandle> SkinningSystem::settledInstances() const {
-  return state_->scene.settled();
+  return state_->scene.settledInstances();
 }
 std::span<const InstanceHandle> SkinningSystem::movedInstances() const {
-  return state_->scene.moved();
+  return state_->scene.movedInstances();
 }
 std::uint32_t SkinningSystem::instanceCapacity() const {
   return state_->scene.description().instanceBudget;
 }
 Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) const {
-  const Result<InstanceOutput> known = state_->scene.output(instance);
-  if (!known) return known.error();
-  return instance.index;
+  return state_->scene.visibilityIndex(instance);
 }
 
 SystemStatistics SkinningSystem::statistics() const {
-  const auto storeOf = [](const RangeAllocator& store, std::uint64_t unit) {
-    return StoreStatistics{store.capacity() * unit, store.used() * unit,
-                           store.largestFree() * unit};
-  };
-  SystemStatistics statistics;
-  statistics.lastFrame = state_->frameStatistics;
-  statistics.lastCompletedFrame = state_->gpuStatistics;
-  statistics.meshes = storeOf(state_->scene.meshStore(), 1);
-  statistics.palettes = storeOf(state_->scene.unitStore(), unitBytes);
-  statistics.outputs = storeOf(state_->scene.outputStore(), 1);
-  statistics.deviceMemory = state_->source.allocatedBytes;
-  return statistics;
+  const SceneStatistics scene = state_->scene.statistics();
+  return {state_->frameStatistics, state_->gpuStatistics, scene.meshes,
+          scene.palettes,          scene.outputs,         state_->source.allocatedBytes};
 }
 
-/// Slots are used again soon: what is in those of complete frames is copied, the oldest first.
+Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle instance) const {
+  return state_->scene.bounds(instance);
+}
+
+/// Slots are used again soon: what is in those of complete frames is read, the oldest first.
 void SkinningSystem::State::readBackUpTo(std::uint64_t completedFrame) {
   std::vector<const FrameSlot*>& complete = completeScratch;
   complete.clear();
-  for (const FrameSlot& slot : slots) {
-    if (slot.frame > gpuStatistics.frame && slot.frame <= completedFrame) complete.push_back(&slot);
+  for (const FrameSlot& frameSlot : slots) {
+    if (frameSlot.frame > gpuStatistics.frame && frameSlot.frame <= completedFrame)
+      complete.push_back(&frameSlot);
   }
   std::ranges::sort(complete, {}, &FrameSlot::frame);
-  for (const FrameSlot* slot : complete) readResults(*slot);
-  if (!complete.empty()) readStatistics(*complete.back());
-}
-
-/// A frame that found nothing out about an instance does not take away what an earlier one did.
-void SkinningSystem::State::readResults(const FrameSlot& slot) {
-  if (slot.results.empty()) return;
-  latestResultsFrame = slot.frame;
-  for (const VkBufferCopy& region : slot.results) {
-    const std::size_t first = region.srcOffset / sizeof(InstanceResult);
-    const std::size_t count = region.size / sizeof(InstanceResult);
-    latestResults.resize(std::max(latestResults.size(), first + count));
-    std::memcpy(&latestResults[first], slot.readBack.bytes().data() + region.dstOffset,
-                region.size);
+  for (const FrameSlot* frameSlot : complete) {
+    if (!scene.readBack(frameSlot->frame, frameSlot->readBack.bytes())) continue;
+    gpuStatistics = {scene.statistics().lastCompletedFrame, std::nullopt};
+    if (frameSlot->hasTimestamps)
+      gpuStatistics.seconds =
+          timestamps.seconds(static_cast<std::uint32_t>(frameSlot - slots.data()));
   }
-}
-
-void SkinningSystem::State::readStatistics(const FrameSlot& slot) {
-  gpuStatistics = {};
-  gpuStatistics.frame = slot.frame;
-  if (slot.hasTimestamps)
-    gpuStatistics.seconds = timestamps.seconds(static_cast<std::uint32_t>(&slot - slots.data()));
-  if (!slot.hasCounters) return;
-  abi::CounterRecord counted;
-  std::memcpy(&counted, slot.readBack.bytes().data(), sizeof(counted));
-  gpuStatistics.visibleInstances = counted.visible;
-  gpuStatistics.skinnedInstances = counted.skinned;
-  gpuStatistics.settledInstances = counted.settled;
-  gpuStatistics.workgroups = counted.workgroups;
-}
-
-Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle handle) const {
-  const Result<InstanceOutput> known = state_->scene.output(handle);
-  if (!known) return known.error();
-  const SceneInstance& instance = *state_->scene.instances().find(handle);
-  if (!instance.bounds || instance.firstFrame == 0 ||
-      instance.firstFrame > state_->latestResultsFrame)
-    return std::optional<Box>();
-  return state_->latestResults[instance.extras.result].box();
 }
 
 }  // namespace dermis::vulkan

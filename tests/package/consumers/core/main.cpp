@@ -122,8 +122,10 @@ void printSizes() {
                                  sizeof(Job),
                                  sizeof(Batch),
                                  sizeof(Variant),
-                                 sizeof(Dispatch),
+                                 sizeof(Command),
                                  sizeof(Plan),
+                                 sizeof(SceneDescription),
+                                 sizeof(InstanceDescription),
                                  sizeof(InstanceResult),
                                  sizeof(JointBounds),
                                  sizeof(SkinnedView),
@@ -199,7 +201,7 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   if (Result<void> done = makePlan(batch, limits, tuning, plan); !done) return done;
   std::vector<std::byte> tables(plan.buffer(BufferRole::tables).size);
   if (Result<void> done = writeTables(plan, tables); !done) return done;
-  std::printf("%zu dispatches of %zu variants, results at %llu\n", plan.dispatches().size(),
+  std::printf("%u dispatches of %zu variants, results at %llu\n", plan.dispatchCount(),
               plan.variants().size(), static_cast<unsigned long long>(plan.resultOffset(1)));
   print("tables", hashOf(tables));
 

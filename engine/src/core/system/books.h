@@ -1,5 +1,5 @@
-// The books of a SkinningSystem: what there is, where it stands, and what of it has to be skinned.
-// No Vulkan: buffers are byte counts here.
+// What a Scene consists of: its things by handle, the free ranges of its buffers, and what the next
+// frame has to do.
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include "dermis/instance.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/scene.h"
 #include "plan/builder.h"
 #include "system/layout.h"
 #include "system/range_allocator.h"
@@ -20,25 +21,8 @@
 
 namespace dermis {
 
-struct SceneDescription {
-  std::uint32_t framesInFlight = 2;
-  std::uint64_t meshBudget = 0;    ///< bytes
-  std::uint32_t jointBudget = 0;   ///< joints
-  std::uint64_t outputBudget = 0;  ///< bytes
-  std::uint32_t instanceBudget = 0;
-  std::uint32_t boundsBudget = 0;
-  DeviceLimits limits;
-  Tuning tuning;
-
-  /// Bytes of the buffers that stay.
-  std::uint64_t matricesSize() const {
-    return std::uint64_t{jointBudget} * framesInFlight * sizeof(JointMatrix);
-  }
-  std::uint64_t palettesSize() const { return paletteUnits() * unitBytes; }
-  /// Room for the largest form of every joint, and the status of every palette of two joints.
-  std::uint64_t paletteUnits() const { return std::uint64_t{jointBudget} * 6; }
-  std::uint64_t resultsSize() const { return std::uint64_t{boundsBudget} * sizeof(InstanceResult); }
-};
+/// The sizes of a scene's buffers.
+PlanSizes sceneSizes(const SceneDescription& description);
 
 struct SceneMesh {
   MeshInfo info;
@@ -117,14 +101,9 @@ struct SceneInstance {
   std::optional<Place> shown;  ///< where it was last recorded
 };
 
-/// Bytes of the output that move.
-struct OutputMove {
-  std::uint64_t from = 0, to = 0, size = 0;
-};
-
-class Scene {
+class SceneBooks {
  public:
-  explicit Scene(const SceneDescription& description);
+  explicit SceneBooks(const SceneDescription& description);
 
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<void> removeMesh(MeshHandle mesh);
@@ -144,40 +123,24 @@ class Scene {
   std::uint64_t compact(std::uint64_t maxBytes);
 
   /// Plans all that has to be done; nothing of it counts as done before `commit`.
-  Result<void> plan();
-  void commit();
-
-  /// What `plan` made; behind it, what is culled on the GPU.
-  const Plan& currentPlan() const { return plan_; }
-  const CulledTables& culled() const { return PlanData::of(plan_).culled; }
-  /// Dispatches of the plan from here on have their arguments from the GPU.
-  std::size_t firstIndirect() const { return PlanData::of(plan_).firstIndirect; }
-  std::span<const OutputMove> moves() const { return moves_; }
-  std::uint64_t frameNumber() const { return frame_; }
-  std::uint64_t recordNumber() const { return record_; }
+  Result<void> plan(Plan& out);
+  Result<void> commit();
+  /// Something changes: what was planned cannot be committed.
+  void unplan() { isPlanned_ = false; }
+  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
   const SlotMap<ScenePalette, PaletteHandle>& palettes() const { return palettes_; }
   const SlotMap<SceneInstance, InstanceHandle>& instances() const { return instances_; }
   std::uint64_t poseOffset(const ScenePalette& palette) const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
+  Result<std::optional<Box>> bounds(InstanceHandle instance) const;
   const SceneDescription& description() const { return description_; }
-  /// The numbers of the results that the plan writes, in no order; those that the GPU may write
-  /// among them.
-  std::span<const std::uint32_t> plannedResults() const { return plannedResults_; }
-
-  const RangeAllocator& meshStore() const { return meshStore_; }
-  const RangeAllocator& unitStore() const { return unitStore_; }
-  const RangeAllocator& outputStore() const { return outputStore_; }
+  SceneStatistics statistics() const;
 
   std::span<const InstanceHandle> skinned() const { return skinned_; }
   std::span<const InstanceHandle> settled() const { return settled_; }
   std::span<const InstanceHandle> moved() const { return moved_; }
-  struct Counts {
-    std::uint32_t instances = 0, skinned = 0, settled = 0, palettes = 0, culled = 0;
-    std::uint64_t vertices = 0, writtenBytes = 0, poseBytes = 0;
-  };
-  Counts counts() const;
 
  private:
   struct Retired {
@@ -213,6 +176,7 @@ class Scene {
   void gatherSettling();
   void gatherCulled();
   void gatherMoves();
+  void gatherResults();
   void addDue(std::uint32_t index);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
   bool isDue(const SceneInstance& instance) const;
@@ -228,7 +192,6 @@ class Scene {
   std::vector<std::uint32_t> freeResults_;
   std::uint32_t nextResult_ = 0;
   Groups groups_;
-  Plan plan_;
   PlanBuilder builder_;
   std::deque<Retired> retired_;
 
@@ -246,6 +209,7 @@ class Scene {
   std::vector<InstanceHandle> moving_;    ///< to settle if they are not skinned: in view
 
   // Of the plan.
+  bool isPlanned_ = false;
   std::uint64_t planNumber_ = 0;
   std::vector<std::uint32_t> due_;
   std::vector<std::uint32_t> settling_;
@@ -255,10 +219,24 @@ class Scene {
     std::size_t form;
   };
   std::vector<Conversion> conversions_;
-  std::vector<OutputMove> moves_;
-  std::vector<std::uint32_t> plannedResults_;
+  std::vector<CopyCommand> moves_;
+  std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
+  std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them
+  std::vector<CopyCommand> resultCopies_;
   std::vector<InstanceHandle> skinned_, settled_, moved_;
-  std::uint64_t plannedVertices_ = 0, plannedBytes_ = 0, plannedPoseBytes_ = 0;
+  FrameWorkStatistics planned_, committed_;
+
+  // What came back.
+  bool historyIsClear_ = false;
+  struct ReadBack {
+    std::uint64_t frame = 0;
+    bool hasCounters = false;
+    std::vector<CopyCommand> results;
+  };
+  std::vector<ReadBack> readBacks_;  ///< of the frames in flight
+  CullingStatistics culling_;
+  std::vector<InstanceResult> latestResults_;  ///< each of the newest complete frame that wrote it
+  std::uint64_t latestResultsFrame_ = 0;
 };
 
 }  // namespace dermis

@@ -1,0 +1,221 @@
+// The books of a scene: which meshes, palettes and instances there are, where each stands in its
+// buffer, and what a frame has to do. No Vulkan: `plan` makes a list of commands (plan.h).
+// `vulkan::SkinningSystem` keeps a Scene and executes its commands in buffers of its own; an engine
+// that uses it does not need this header. An engine with its own RHI uses Scene directly:
+//
+//   scene.beginFrame(frame, completedFrame);
+//   scene.readBack(completedFrame, bytes);          // of that frame's read-back buffer
+//   write joint matrices at scene.writePose(palette)->offset of the matrices buffer
+//   ... add, remove, setVisible, setMorphWeights ...
+//   scene.plan(plan);
+//   writeTables(plan, mapped upload buffer of this frame);
+//   for (const Command& command : plan.commands()) ...
+//   scene.commit();
+//   draw from the output buffer at scene.output(instance)
+//
+// Each buffer has the size and usage that `buffer` or, for tables and upload, `Plan::buffer`
+// returns.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dermis/handle.h"
+#include "dermis/instance.h"
+#include "dermis/pack.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace dermis {
+
+struct SceneDescription {
+  /// Frames that the engine records ahead of the GPU: `beginFrame(f)` comes after frame
+  /// f - framesInFlight is complete. 1 or more.
+  std::uint32_t framesInFlight = 2;
+  std::uint64_t meshBudget = std::uint64_t{32} << 20;  ///< bytes of packed meshes; at most a
+                                                       ///< storage buffer range
+  std::uint32_t jointBudget = 65536;  ///< joints of all palettes together
+  /// Bytes of skinned vertices. May be more than a storage buffer range.
+  std::uint64_t outputBudget = std::uint64_t{64} << 20;
+  std::uint32_t instanceBudget = 65536;  ///< instances at one time
+  /// Instances at one time with bounds or snorm16 positions.
+  std::uint32_t boundsBudget = 16384;
+  DeviceLimits limits;
+  Tuning tuning;
+};
+
+/// Bytes of one buffer of a scene.
+struct StoreStatistics {
+  std::uint64_t capacity = 0;
+  std::uint64_t used = 0;         ///< including what frames in flight may still read
+  std::uint64_t largestFree = 0;  ///< the longest free range
+};
+
+/// What a frame does, as of the last `commit`. Instances culled on the GPU count as candidates
+/// only.
+struct FrameWorkStatistics {
+  std::uint64_t frame = 0;
+  std::uint32_t instances = 0;  ///< in the scene
+  std::uint32_t skinnedInstances = 0;
+  std::uint32_t settledInstances = 0;  ///< only their previous positions were written
+  std::uint32_t convertedPalettes = 0;
+  std::uint32_t culledCandidates = 0;  ///< instances given to the visibility kernel
+  std::uint64_t skinnedVertices = 0;
+  std::uint64_t writtenBytes = 0;  ///< of skinned vertices
+  std::uint64_t movedBytes = 0;    ///< by `compact`
+  std::uint64_t poseBytes = 0;     ///< joint matrices read by the palette kernel
+};
+
+/// What the visibility kernel counted in a complete frame.
+struct CullingStatistics {
+  std::uint64_t frame = 0;
+  std::uint32_t visibleInstances = 0;
+  std::uint32_t skinnedInstances = 0;
+  std::uint32_t settledInstances = 0;
+  std::uint32_t workgroups = 0;  ///< of the indirect dispatches
+};
+
+struct SceneStatistics {
+  FrameWorkStatistics lastFrame;
+  CullingStatistics lastCompletedFrame;
+  StoreStatistics meshes, palettes, outputs;
+};
+
+/// Where to write the joint matrices of a palette.
+struct PosePlace {
+  std::uint64_t offset = 0;  ///< bytes into the matrices buffer
+  std::uint32_t jointCount = 0;
+};
+
+class SceneBooks;
+
+/// Not thread-safe.
+class Scene {
+ public:
+  /// Fails with `invalidArgument` if a field makes no sense, and with `limitExceeded` if a budget
+  /// needs a buffer larger than a storage buffer range.
+  static Result<Scene> create(const SceneDescription& description);
+  ~Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+
+  /// Size and usage of a buffer, for as long as the scene lives. `tables` and `upload` have the
+  /// size that `Plan::buffer` returns, which differs from frame to frame; `upload` and `readBack`
+  /// exist once for each frame in flight. `history`, `counters` and `visibility` are needed only if
+  /// instances are culled on the GPU.
+  BufferRequirement buffer(BufferRole role) const;
+  const SceneDescription& description() const;
+
+  // -- Meshes, palettes, instances. They may come and go at any time. Memory of what is removed is
+  // free again when the frame that was last begun is complete. Calls with a stale handle fail with
+  // `invalidArgument`.
+
+  /// Finds room for a packed mesh. The engine copies its bytes to `meshOffset` of the mesh buffer
+  /// before the commands of the next plan. Fails with `limitExceeded` if the budget has no room,
+  /// and with `invalidArgument` if a promise is broken.
+  Result<MeshHandle> addMesh(const MeshInfo& info);
+  Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes
+  /// Fails with `invalidArgument` while an instance uses it.
+  Result<void> removeMesh(MeshHandle mesh);
+
+  /// `mayScale` as in `Palette`. The engine writes identity matrices to `pose`, unless it calls
+  /// `writePose` before the next `plan`. Fails as `addMesh`.
+  Result<PaletteHandle> addPalette(std::uint32_t jointCount, bool mayScale = true);
+  /// Where the current pose stands.
+  Result<PosePlace> pose(PaletteHandle palette) const;
+  /// Fails with `invalidArgument` while an instance uses it.
+  Result<void> removePalette(PaletteHandle palette);
+
+  /// The next `plan` skins it. Fails with `invalidArgument` if the description breaks a rule of
+  /// `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with `limitExceeded`
+  /// if a budget has no room for it; nothing changes then. `compact` may make room in the output.
+  Result<InstanceHandle> addInstance(const InstanceDescription& description);
+  Result<void> removeInstance(InstanceHandle instance);
+
+  /// All variants that instances like this one can need: to build pipelines while loading. Handles
+  /// are ignored. Fails with `invalidArgument` if the layout breaks a rule.
+  Result<std::vector<Variant>> everyVariant(const InstanceDescription& description) const;
+
+  // -- What changes.
+
+  /// Begins a frame. `frame` is larger than the last one; `completedFrame` is the newest frame that
+  /// the GPU has completed, 0 if none. Frames count from 1. Fails with `invalidArgument` if more
+  /// frames are in flight than described, or if numbers run backwards.
+  Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
+
+  /// Where to write the joint matrices of this frame; all instances of the palette are skinned
+  /// again. Only between `beginFrame` and `plan`. The GPU no longer reads that memory.
+  Result<PosePlace> writePose(PaletteHandle palette);
+
+  /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
+  /// positions are its current ones. Instances begin visible.
+  Result<void> setVisible(InstanceHandle instance, bool isVisible);
+  /// As `InstanceDescription::updateInterval`.
+  Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
+  /// The next `plan` skins the instance, whatever its interval; previous positions are the current
+  /// ones then.
+  Result<void> teleport(InstanceHandle instance);
+  /// The active targets, as `Job::morphs`. They are copied.
+  Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
+  /// Gives an instance another mesh (a level of detail): its output moves, its motion restarts. Its
+  /// morph weights stay if both meshes have the same number of targets, otherwise they are removed.
+  /// The old output stays until frames in flight are complete, so there must be room for both:
+  /// otherwise it fails with `limitExceeded`, and the instance keeps its mesh.
+  Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
+
+  /// Moves outputs from the end of the output buffer into free ranges before them, at most
+  /// `maxBytes` bytes, with the next `plan`. Returns how many bytes it will move. The old output
+  /// stays until frames in flight are complete.
+  std::uint64_t compact(std::uint64_t maxBytes);
+
+  // -- Frames.
+
+  /// Lists the commands for everything that changed since the last `commit`; none if nothing
+  /// changed. After `beginFrame`, any number of times. Fails with `invalidArgument` without
+  /// `beginFrame`, and with `limitExceeded` if the tables are larger than a storage buffer range.
+  Result<void> plan(Plan& out);
+  /// The commands of the last `plan` have been recorded, and will be executed in the order of
+  /// frames. Without it, the next `plan` lists the same work again. Fails with `invalidArgument` if
+  /// the scene was changed since `plan`.
+  Result<void> commit();
+
+  /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
+  /// frame in rising order, before its buffer is used again. Fails with `invalidArgument` if
+  /// `bytes` is smaller than `buffer(BufferRole::readBack).size`. Frames that had nothing to read
+  /// back may be given an empty span.
+  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
+
+  // -- Results, as of the last `commit`.
+
+  /// Before the first `commit` that shows the instance, its size is 0.
+  Result<InstanceOutput> output(InstanceHandle instance) const;
+  /// Instances that were skinned, in no order, without those culled on the GPU.
+  std::span<const InstanceHandle> skinnedInstances() const;
+  /// Instances of which only previous positions changed: they came to rest, or came back into view
+  /// in the pose in which they left it.
+  std::span<const InstanceHandle> settledInstances() const;
+  /// Instances whose output stands elsewhere than before.
+  std::span<const InstanceHandle> movedInstances() const;
+
+  /// The exact box of the positions in the newest frame that was read back. Nothing before the
+  /// first one, without `InstanceDescription::bounds`, and if there is none
+  /// (`InstanceResult::box`).
+  Result<std::optional<Box>> bounds(InstanceHandle instance) const;
+
+  /// The instance's word in the visibility buffer.
+  Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
+
+  SceneStatistics statistics() const;
+
+ private:
+  explicit Scene(const SceneDescription& description);
+  SceneBooks& change();
+  std::unique_ptr<SceneBooks> books_;
+};
+
+}  // namespace dermis

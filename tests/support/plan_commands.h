@@ -1,0 +1,30 @@
+// The dispatches of a plan, for tests that look at nothing else.
+#pragma once
+
+#include <variant>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/plan.h"
+
+namespace dermis::test {
+
+struct PlannedDispatch : DispatchCommand {
+  bool isAfterBarrier = false;  ///< a barrier of the plan stands before it
+
+  abi::PalettePush palettePush() const { return abi::load<abi::PalettePush>(constants, 0); }
+  abi::SkinPush skinPush() const { return abi::load<abi::SkinPush>(constants, 0); }
+};
+
+inline std::vector<PlannedDispatch> dispatchesOf(const Plan& plan) {
+  std::vector<PlannedDispatch> dispatches;
+  bool isAfterBarrier = false;
+  for (const Command& command : plan.commands()) {
+    if (const auto* dispatch = std::get_if<DispatchCommand>(&command))
+      dispatches.push_back({*dispatch, isAfterBarrier});
+    isAfterBarrier |= std::holds_alternative<BarrierCommand>(command);
+  }
+  return dispatches;
+}
+
+}  // namespace dermis::test
