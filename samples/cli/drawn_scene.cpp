@@ -136,7 +136,8 @@ InstanceDescription DrawnScene::instanceOf(std::size_t part, Method method) cons
 Result<void> DrawnScene::prepare(Method method) {
   for (std::size_t part = 0; part < shared_.size(); ++part) {
     if (!shared_[part].mesh) continue;
-    if (Result<void> done = system_->prepare(instanceOf(part, method)); !done) return done;
+    if (Result<void> done = system_->prepare(pipelineNeeds(instanceOf(part, method))); !done)
+      return done;
   }
   return {};
 }

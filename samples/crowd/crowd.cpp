@@ -19,7 +19,7 @@ VertexLayout layoutOf(const Part& part) {
   VertexLayout layout;
   layout.positions = VertexFormat::float32x3;
   if (part.packed.info().hasNormals) layout.normals = VertexFormat::octahedral16x2;
-  layout.previousPositions = true;  // for motion vectors
+  layout.motion = Motion::kept;  // for motion vectors
   return layout;
 }
 
@@ -69,7 +69,7 @@ Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
     Result<MeshHandle> mesh = crowd.system_.addMesh(part.packed);
     if (!mesh) return mesh.error();
     crowd.meshes_.push_back(*mesh);
-    if (Result<void> built = crowd.system_.prepare(crowd.describe(part)); !built)
+    if (Result<void> built = crowd.system_.prepare(pipelineNeeds(crowd.describe(part))); !built)
       return built.error();
   }
   return crowd;

@@ -10,6 +10,12 @@ namespace embed {
 namespace {
 
 // [plan]
+/// What is written for each vertex, and by which rule: known while loading, so pipelines are, too.
+const PipelineNeeds needs{.method = Method::dualQuaternion,
+                          .layout = {.positions = VertexFormat::float32x3,
+                                     .normals = VertexFormat::octahedral16x2,
+                                     .stride = sizeof(SkinnedVertex)}};
+
 /// Says who is skinned by which pose, and to where: as often as that changes.
 Result<void> planCrowd(Crowd& crowd) {
   const std::uint64_t poseSize = crowd.jointCount * sizeof(JointMatrix);
@@ -21,15 +27,14 @@ Result<void> planCrowd(Crowd& crowd) {
     palette.jointCount = crowd.jointCount;
     palette.matrixOffset = instance * poseSize;
 
-    const std::uint64_t firstVertex = instance * instanceSize;
+    const Result<VertexPlaces> places =
+        placeVertices(needs.layout, crowd.mesh.vertexCount(), instance * instanceSize);
+    if (!places) return places.error();
     Job& job = crowd.jobs[instance];
     job.mesh = crowd.mesh.info();
     job.palette = instance;
-    job.method = Method::dualQuaternion;
-    job.positions = {firstVertex + offsetof(SkinnedVertex, position), sizeof(SkinnedVertex),
-                     VertexFormat::float32x3};
-    job.normals = {firstVertex + offsetof(SkinnedVertex, normal), sizeof(SkinnedVertex),
-                   VertexFormat::octahedral16x2};
+    job.method = needs.method;
+    job.place(*places);
   }
   Batch batch;
   batch.palettes = crowd.palettes;
@@ -44,11 +49,11 @@ Result<void> planCrowd(Crowd& crowd) {
 /// The engine makes its buffers as large, and for what use, as the plan says.
 Result<void> makeBuffer(samples::Device& engine, const Plan& plan, BufferRole role,
                         samples::MappedBuffer& buffer) {
-  const BufferRequirement needs = plan.buffer(role);
+  const BufferRequirement wanted = plan.buffer(role);
   const VkBufferUsageFlags ownUsage =
       role == BufferRole::positions ? VK_BUFFER_USAGE_VERTEX_BUFFER_BIT : 0;
   Result<samples::MappedBuffer> made =
-      samples::MappedBuffer::create(engine, needs.size, needs.usage | ownUsage);
+      samples::MappedBuffer::create(engine, wanted.size, wanted.usage | ownUsage);
   if (!made) return made.error();
   buffer = std::move(*made);
   return {};
@@ -73,10 +78,9 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
   if (!packed) return packed.error();
   Crowd crowd{std::move(*context), std::move(*packed), jointCount, {}, {}, {}, {}, {}, {}};
 
-  // The plan of the largest batch there will be says what buffers to make. Pipelines depend on the
-  // method and the vertex layout, which all jobs share.
+  // The plan of the largest batch there will be says what buffers to make.
   if (Result<void> done = planCrowd(crowd); !done) return done.error();
-  if (Result<void> done = crowd.context.prepare(crowd.jobs.front()); !done) return done.error();
+  if (Result<void> done = crowd.context.prepare(needs); !done) return done.error();
 
   for (const auto& [role, buffer] :
        {std::pair{BufferRole::meshes, &crowd.meshes}, {BufferRole::positions, &crowd.output}}) {

@@ -135,18 +135,17 @@ void add(const std::string& name, const std::function<Scene()>& make) {
 
 /// Everything that instances of one method and layout may need, built while loading.
 void measurePrepare(benchmark::State& state, Method method) {
-  Job job;
-  job.method = method;
-  job.positions = {0, 24, VertexFormat::float32x3};
-  job.normals = {12, 24, VertexFormat::float32x3};
+  PipelineNeeds needs;
+  needs.method = method;
+  needs.layout.normals = VertexFormat::float32x3;
   std::size_t pipelines = 0;
   for (auto _ : state) {
     state.PauseTiming();
     Result<vulkan::Context> context = vulkan::Context::create(benchDevice()->device->description());
     if (!context) return state.SkipWithError(context.error().message.c_str());
-    pipelines = everyVariant(job, context->limits(), context->tuning()).size();
+    pipelines = everyVariant(needs, context->limits(), context->tuning())->size();
     state.ResumeTiming();
-    if (Result<void> built = context->prepare(job); !built)
+    if (Result<void> built = context->prepare(needs); !built)
       return state.SkipWithError(built.error().message.c_str());
     state.PauseTiming();
     context = Error{};

@@ -83,7 +83,7 @@ class Scene {
       instance.mesh = meshes[i % meshes.size()];
       vertexCount_ += engine_.vertexCount(instance.mesh);
       instance.palette = palettes_.emplace_back(engine_.addPalette(poses_[0], false));
-      if (i == 0) must(engine_->prepare(instance));
+      if (i == 0) must(engine_->prepare(pipelineNeeds(instance)));
       must(engine_->addInstance(instance));
     }
     engine_.submit();

@@ -96,7 +96,7 @@ class PipelineCacheTest : public DeviceTest {
     InstanceDescription instance;
     instance.method = Method::linear;
     instance.culledOnGpu = true;
-    must(must(vulkan::SkinningSystem::create(system)).prepare(instance));
+    must(must(vulkan::SkinningSystem::create(system)).prepare(pipelineNeeds(instance)));
   }
 };
 

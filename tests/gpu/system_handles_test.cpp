@@ -334,7 +334,7 @@ TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
   // So many that new tables are needed.
   engine.begin();
   instance.culledOnGpu = true;
-  must(engine->prepare(instance));
+  must(engine->prepare(pipelineNeeds(instance)));
   instance.culledOnGpu = false;
   while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
   engine.submit();
@@ -357,7 +357,7 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   instance.palette = unprepared.addPalette(systemPose(2));
   const InstanceHandle handle = must(unprepared->addInstance(instance));
   expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared, "record");
-  must(unprepared->prepare(instance));
+  must(unprepared->prepare(pipelineNeeds(instance)));
   unprepared.runFrame();
   EXPECT_EQ(unprepared.lastFrame().skinnedInstances, 1u);
   EXPECT_TRUE(unprepared.read(handle) == alone(one_->packed, systemPose(2), instance));

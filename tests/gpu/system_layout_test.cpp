@@ -16,7 +16,7 @@ VertexLayout layoutOf(VertexFormat positions, VertexFormat normals, VertexFormat
                       Arrangement arrangement = Arrangement::interleaved,
                       std::uint32_t stride = 0) {
   VertexLayout layout{positions, normals, tangents};
-  layout.previousPositions = true;
+  layout.motion = Motion::kept;
   layout.arrangement = arrangement;
   layout.stride = stride;
   return layout;

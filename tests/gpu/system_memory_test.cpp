@@ -259,8 +259,7 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
   EXPECT_EQ(statistics.meshes.used, 0u);
   EXPECT_EQ(statistics.palettes.used, 0u);
   EXPECT_EQ(statistics.outputs.used, 0u);
-  for (const StoreStatistics& store :
-       {statistics.meshes, statistics.palettes, statistics.outputs})
+  for (const StoreStatistics& store : {statistics.meshes, statistics.palettes, statistics.outputs})
     EXPECT_EQ(store.largestFree, store.capacity);
 }
 

@@ -92,7 +92,7 @@ bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lis
 
 void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
   const bool comesBack = !instance.wasDisplayed;
-  const bool hasPrevious = instance.description.layout.previousPositions;
+  const bool hasPrevious = instance.description.layout.motion != Motion::none;
   const bool isCulled = instance.description.culledOnGpu;
   const bool isSettled = lists.settled.contains(instance.handle.index);
   lists.gpu.visible += isCulled;

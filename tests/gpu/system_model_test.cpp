@@ -155,7 +155,7 @@ void SystemModelTest::addInstance() {
   description.layout = someLayouts()[below(3)];
   description.culledOnGpu = chance(25);
   if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
-  must(system().prepare(description));
+  must(system().prepare(pipelineNeeds(description)));
   const Result<InstanceHandle> added = system().addInstance(description);
   if (!added) {
     expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
@@ -270,7 +270,7 @@ void SystemModelTest::expectOutputs() {
     const Streams streams = engine_->read(bytes, instance.handle);
     expectSkinned(streams, expected(instance, *instance.shown));
     ++checkedInstances_;
-    if (!instance.description.layout.previousPositions || !instance.before) continue;
+    if (instance.description.layout.motion == Motion::none || !instance.before) continue;
     EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
         << "previous positions";
   }

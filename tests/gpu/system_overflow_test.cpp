@@ -32,7 +32,7 @@ class SystemOverflowTest : public SystemTest {
 
   Result<InstanceHandle> tryAdd(std::uint32_t pose) {
     instance_.palette = palettes_.emplace_back(engine_->addPalette(systemPose(pose)));
-    must(system().prepare(instance_));
+    must(system().prepare(pipelineNeeds(instance_)));
     return system().addInstance(instance_);
   }
   InstanceHandle add(std::uint32_t pose) { return must(tryAdd(pose)); }

@@ -118,7 +118,7 @@ class BusyScene {
     instance_.mesh = meshes_[below(meshes_.size())];
     instance_.culledOnGpu = below(2) == 0;
     instance_.method = below(2) == 0 ? Method::linear : Method::dualQuaternion;
-    must(engine_->prepare(instance_));
+    must(engine_->prepare(pipelineNeeds(instance_)));
     const Result<InstanceHandle> added = engine_->addInstance(instance_);
     if (added) instances_.push_back(*added);
   }

@@ -80,7 +80,7 @@ VertexLayout plainLayout() {
 
 VertexLayout motionLayout() {
   VertexLayout layout = plainLayout();
-  layout.previousPositions = true;
+  layout.motion = Motion::kept;
   return layout;
 }
 
@@ -119,7 +119,7 @@ Streams SystemTest::alone(const PackedMesh& mesh, std::span<const JointMatrix> p
       must(samples::runBatch(device(), context(), {&request, 1}, options));
   expectReference(result.instances[0], request);
   Streams streams = std::move(result.instances[0].streams);
-  if (description.layout.previousPositions) streams[previousStream] = streams[positionStream];
+  if (description.layout.motion != Motion::none) streams[previousStream] = streams[positionStream];
   return streams;
 }
 

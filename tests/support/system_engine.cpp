@@ -52,7 +52,7 @@ PaletteHandle SystemEngine::addPalette(std::span<const JointMatrix> pose, bool m
 }
 
 InstanceHandle SystemEngine::addInstance(const InstanceDescription& description) {
-  must(system_.prepare(description));
+  must(system_.prepare(pipelineNeeds(description)));
   return must(system_.addInstance(description));
 }
 

@@ -5,6 +5,7 @@
 #include "dermis/centers_of_rotation.h"
 #include "dermis/handle.h"
 #include "dermis/instance.h"
+#include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/pack.h"

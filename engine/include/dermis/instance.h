@@ -4,41 +4,21 @@
 #include <cstdint>
 
 #include "dermis/handle.h"
+#include "dermis/layout.h"
 #include "dermis/method.h"
 #include "dermis/plan.h"
 #include "dermis/types.h"
-#include "dermis/vertex_format.h"
 
 namespace dermis {
 
-enum class Arrangement : std::uint8_t {
-  interleaved,  ///< vertex after vertex: positions, normals, tangents, previous positions
-  planar,       ///< attribute after attribute, each beginning at a multiple of 16 bytes
-};
-
-/// The skinned vertices of an instance, as the engine draws them.
-struct VertexLayout {
-  VertexFormat positions = VertexFormat::float32x3;
-  VertexFormat normals = VertexFormat::none;
-  VertexFormat tangents = VertexFormat::none;
-  /// Positions of the last frame in which the instance was displayed, for motion vectors; in the
-  /// format of positions. Right by themselves on first frames, when poses rest or are skipped, and
-  /// when an instance comes back into view; `teleport` for jumps.
-  bool previousPositions = false;
-  Arrangement arrangement = Arrangement::interleaved;
-  /// Interleaved: bytes from vertex to vertex, for attributes of the engine's own behind those of
-  /// Dermis, which leaves them alone. 0: no more than is needed, rounded up to a multiple of 4.
-  std::uint32_t stride = 0;
-
-  friend bool operator==(const VertexLayout&, const VertexLayout&) = default;
-};
-
 struct InstanceDescription {
-  MeshHandle mesh;
-  PaletteHandle palette;  ///< Any number of instances may share one: body, clothes, hair.
+  MeshHandle mesh = {};
+  PaletteHandle palette = {};  ///< Any number of instances may share one: body, clothes, hair.
   Method method = Method::dualQuaternion;
-  VertexLayout layout;
-  Box box;  ///< for positions in snorm16, as `Job::box`
+  /// Previous positions are right on first frames, when poses rest or are skipped, and when an
+  /// instance comes back into view; `teleport` for jumps. `Motion::reskinned` is not possible.
+  VertexLayout layout = {};
+  Box box = {};  ///< for positions in snorm16, as `Job::box`
   bool bounds =
       false;  ///< the exact box of the skinned positions is wanted: `SkinningSystem::bounds`
   /// Skinned in one frame of so many, 1 or more. Instances of one palette take the same frames;
@@ -48,6 +28,11 @@ struct InstanceDescription {
   /// output must lie in one storage buffer range; one of up to a 32nd of that always does.
   bool culledOnGpu = false;
 };
+
+/// What `prepare` must be given before such an instance is recorded.
+inline PipelineNeeds pipelineNeeds(const InstanceDescription& description) {
+  return {description.method, description.layout, description.bounds, description.culledOnGpu};
+}
 
 /// Where the vertices of an instance stand in `SkinningSystem::outputBuffer`.
 struct InstanceOutput {

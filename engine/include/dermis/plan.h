@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/pack.h"
@@ -88,32 +89,6 @@ struct Palette {
   bool mayScale = true;
 };
 
-/// Where one attribute of the skinned vertices is written: vertex v at `offset + v * stride` in the
-/// output buffer of that attribute. Bytes between attributes are never written.
-///
-/// If positions and normals are float32x3 with equal strides, a multiple of 8, and normals begin 12
-/// bytes behind positions, both must go to one buffer (`OutputSizes::isOneBuffer`) and positions
-/// must begin at a multiple of 8.
-///
-/// Offset, stride and the format's size must be multiples of 4; with `DeviceLimits::storage16Bit`,
-/// of 2; with `storage8Bit` too, they may be any number.
-struct OutputAttribute {
-  std::uint64_t offset = 0;                  ///< bytes
-  std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`
-  VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not wanted
-};
-
-/// Where previous positions come from. They are for motion vectors.
-enum class Motion : std::uint8_t {
-  none,
-  /// Copied from the output before it is overwritten: the positions from the last time that this
-  /// instance was skinned. Takes a read and a write; the output must persist between frames.
-  kept,
-  /// Skinned again with the previous palette and morph weights. Takes a second skinning; only the
-  /// pose must persist.
-  reskinned,
-};
-
 /// One instance: a mesh, a palette, and where its skinned vertices are written. Two jobs of a batch
 /// must not write the same byte; this is not checked.
 struct Job {
@@ -150,6 +125,9 @@ struct Job {
 
   /// Write the box of the skinned positions to the results buffer: `Plan::resultOffset`.
   bool bounds = false;
+
+  /// Sets where the attributes are written, and `motion`.
+  void place(const VertexPlaces& places);
 };
 
 /// What the skin kernel writes to the results buffer for a job with `bounds` or snorm16 positions.
@@ -245,6 +223,18 @@ bool hasResults(const Variant& variant);
 /// joints that scale; for any number; and for any number with morph targets. Some methods need
 /// fewer. `Promises` reduce the number further.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
+
+/// What pipelines depend on, known while loading.
+struct PipelineNeeds {
+  Method method = Method::dualQuaternion;
+  VertexLayout layout = {};
+  bool bounds = false;       ///< `Job::bounds`
+  bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
+};
+
+/// The same for jobs that stand as `placeVertices` says. Fails as it does.
+Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
+                                          const Tuning& tuning);
 
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {

@@ -22,7 +22,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "dermis/handle.h"
 #include "dermis/instance.h"
@@ -39,7 +38,7 @@ struct SceneDescription {
   std::uint32_t framesInFlight = 2;
   std::uint64_t meshBudget = std::uint64_t{32} << 20;  ///< bytes of packed meshes; at most a
                                                        ///< storage buffer range
-  std::uint32_t jointBudget = 65536;  ///< joints of all palettes together
+  std::uint32_t jointBudget = 65536;                   ///< joints of all palettes together
   /// Bytes of skinned vertices. May be more than a storage buffer range.
   std::uint64_t outputBudget = std::uint64_t{64} << 20;
   std::uint32_t instanceBudget = 65536;  ///< instances at one time
@@ -136,10 +135,6 @@ class Scene {
   /// if a budget has no room for it; nothing changes then. `compact` may make room in the output.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
-
-  /// All variants that instances like this one can need: to build pipelines while loading. Handles
-  /// are ignored. Fails with `invalidArgument` if the layout breaks a rule.
-  Result<std::vector<Variant>> everyVariant(const InstanceDescription& description) const;
 
   // -- What changes.
 

@@ -174,16 +174,25 @@ Tuning Context::tuning() const {
   return state_->tuning;
 }
 
-Result<void> Context::prepare(const Job& job) {
-  return prepare(everyVariant(job, state_->limits, state_->tuning));
-}
-
-Result<void> Context::prepare(std::span<const Variant> variants) {
+Result<void> ContextState::prepare(std::span<const Variant> variants) const {
   for (const Variant& variant : variants) {
-    if (Result<void> built = state_->pipelines->build(variant, state_->pipelineLayout); !built)
-      return built;
+    if (Result<void> built = pipelines->build(variant, pipelineLayout); !built) return built;
   }
   return {};
+}
+
+Result<void> ContextState::prepare(const PipelineNeeds& needs, const Tuning& withTuning) const {
+  const Result<std::vector<Variant>> variants = everyVariant(needs, limits, withTuning);
+  if (!variants) return variants.error();
+  return prepare(*variants);
+}
+
+Result<void> Context::prepare(const PipelineNeeds& needs) const {
+  return state_->prepare(needs, state_->tuning);
+}
+
+Result<void> Context::prepare(std::span<const Variant> variants) const {
+  return state_->prepare(variants);
 }
 
 }  // namespace dermis::vulkan

@@ -33,6 +33,8 @@ struct ContextState {
   }
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
+  Result<void> prepare(std::span<const Variant> variants) const;
+  Result<void> prepare(const PipelineNeeds& needs, const Tuning& withTuning) const;
   /// Descriptor sets and the pool that has them, without push descriptors. The pool must be
   /// destroyed even if it fails.
   Result<void> allocateSets(std::uint32_t count, VkDescriptorPool& pool,

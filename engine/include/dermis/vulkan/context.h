@@ -72,15 +72,15 @@ class Context {
   /// How to cut up the work on this device.
   Tuning tuning() const;
 
-  /// Builds every pipeline that jobs with the method, outputs, motion and bounds of this one may
-  /// need (`everyVariant`). Once all methods and layouts are prepared, `record` needs no other
-  /// pipeline, whatever meshes, palettes and morph targets a batch has. May take long: call it from
-  /// a loading thread. If it fails (`missingFeature`, `vulkanError`), what was built before stays
-  /// built.
-  Result<void> prepare(const Job& job);
+  /// Builds every pipeline that instances with this method and layout may need, whatever their mesh,
+  /// pose and morph targets. Once all methods and layouts are prepared, `record` needs no other
+  /// pipeline. May take long: call it from a loading thread. If it fails (`invalidArgument`,
+  /// `missingFeature`, `vulkanError`), what was built before stays built.
+  Result<void> prepare(const PipelineNeeds& needs) const;
 
-  /// Builds the pipelines of these variants only. Those that exist are skipped.
-  Result<void> prepare(std::span<const Variant> variants);
+  /// Builds the pipelines of these variants only. Those that exist are skipped. For jobs that stand
+  /// otherwise than in a `VertexLayout`: `everyVariant`.
+  Result<void> prepare(std::span<const Variant> variants) const;
 
   /// Makes the descriptor sets and buffer views for a set of buffers. Fails with `invalidArgument`
   /// (misaligned, no size), `limitExceeded` (larger than a storage buffer range where that is not

@@ -130,10 +130,8 @@ class SkinningSystem {
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
 
-  /// Builds the pipelines of every variant that such instances may need, as `Context::prepare`: on
-  /// a loading thread, before the first is recorded. The mesh is not looked at. May be called by
-  /// any thread at any time.
-  Result<void> prepare(const InstanceDescription& description) const;
+  /// As `Context::prepare`, with the system's tuning. May be called by any thread at any time.
+  Result<void> prepare(const PipelineNeeds& needs) const;
 
   // -- What changes.
 

@@ -192,6 +192,19 @@ std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
   return variants;
 }
 
+Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
+                                          const Tuning& tuning) {
+  const Result<VertexPlaces> places = placeVertices(needs.layout, 1);
+  if (!places) return places.error();
+  Job job;
+  job.method = needs.method;
+  job.bounds = needs.bounds;
+  job.place(*places);
+  std::vector<Variant> variants = everyVariant(job, limits, tuning);
+  if (needs.culledOnGpu) variants.push_back(visibilityVariant(tuning));
+  return variants;
+}
+
 // -- Windows.
 
 namespace {

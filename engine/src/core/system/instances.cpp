@@ -11,21 +11,13 @@ namespace {
 
 constexpr Subject theInstance{"the instance"};
 
-/// The job that skins an instance, but for what changes from frame to frame; its attributes
-/// `offset` bytes into the output.
-Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const LaidOutVertices& laidOut,
-          std::uint64_t offset) {
+/// The job that skins an instance, but for what changes from frame to frame.
+Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlaces& places) {
   Job job;
   job.mesh = mesh.info;
   job.meshOffset = mesh.bytes.offset;
   job.method = instance.method;
-  std::array<OutputAttribute, streamCount> attributes = laidOut.attributes;
-  for (OutputAttribute& attribute : attributes) attribute.offset += offset;
-  job.positions = attributes[0];
-  job.normals = attributes[1];
-  job.tangents = attributes[2];
-  job.previousPositions = attributes[3];
-  job.motion = instance.hasMotion ? Motion::kept : Motion::none;
+  job.place(places);
   job.box = instance.box;
   job.bounds = instance.bounds;
   job.morphs = instance.extras.morphs;
@@ -43,9 +35,9 @@ Result<void> SceneBooks::check(const SceneInstance& instance) const {
   if (instance.updateInterval == 0) {
     return invalid("the instance's update interval is 1 or more frames, not 0");
   }
-  if (instance.layout.arrangement > Arrangement::planar)
-    return invalid("the instance's arrangement is not one of Arrangement");
-  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh->info.vertexCount);
+  if (instance.layout.motion == Motion::reskinned)
+    return invalid("the instance's layout says Motion::reskinned, a scene has Motion::kept only");
+  const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
   if (!laidOut) return laidOut.error();
   if (laidOut->size > description_.outputBudget) {
     return Error{ErrorCode::limitExceeded, "the instance takes " + std::to_string(laidOut->size) +
@@ -57,7 +49,7 @@ Result<void> SceneBooks::check(const SceneInstance& instance) const {
   batch.palettes = {&own, 1};
   batch.meshesSize = description_.meshBudget;
   batch.outputs = OutputSizes::oneBuffer(description_.outputBudget);
-  return checkJob(batch, jobOf(instance, *mesh, *laidOut, 0), theInstance, description_.limits);
+  return checkJob(batch, jobOf(instance, *mesh, *laidOut), theInstance, description_.limits);
 }
 
 Result<void> SceneBooks::takeResult(SceneInstance& instance) {
@@ -98,7 +90,7 @@ Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
 Result<void> SceneBooks::findRoom(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
-  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
   const std::optional<Range> bytes = outputStore_.allocate(laidOut->size, laidOut->alignment);
   if (!bytes) {
@@ -118,7 +110,8 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance) {
 Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
-  const Result<LaidOutVertices> laidOut = layOut(instance.layout, mesh.info.vertexCount);
+  const Result<VertexPlaces> laidOut =
+      placeVertices(instance.layout, mesh.info.vertexCount, instance.target.bytes.offset);
   if (!laidOut) return laidOut.error();
   Placing placing;
   placing.subject = theInstance;
@@ -127,9 +120,8 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   placing.mayScale = instance.method != Method::linear && palette.mayScale;
   placing.isCulled = instance.isCulled;
   runsScratch_.clear();
-  if (Result<void> placed =
-          groups_.place(jobOf(instance, mesh, *laidOut, instance.target.bytes.offset), placing,
-                        description_.limits, description_.tuning, runsScratch_);
+  if (Result<void> placed = groups_.place(jobOf(instance, mesh, *laidOut), placing,
+                                          description_.limits, description_.tuning, runsScratch_);
       !placed)
     return placed;
   instance.run = runsScratch_.front();
@@ -179,7 +171,7 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   instance.updateInterval = description.updateInterval;
   instance.method = description.method;
   instance.isCulled = description.culledOnGpu;
-  instance.hasMotion = description.layout.previousPositions;
+  instance.hasMotion = description.layout.motion != Motion::none;
   instance.mesh = description.mesh;
   instance.paletteHandle = description.palette;
   instance.layout = description.layout;
@@ -287,7 +279,7 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
     SceneInstance& instance = instances_.at(handle.index);
     const Range from = instance.target.bytes;
     if (moved + from.size > maxBytes) continue;
-    const Result<LaidOutVertices> laidOut = layOut(instance.layout, instance.vertexCount);
+    const Result<VertexPlaces> laidOut = placeVertices(instance.layout, instance.vertexCount);
     const std::optional<Range> to =
         outputStore_.allocateBelow(from.size, laidOut->alignment, from.offset);
     if (!to) continue;
@@ -312,19 +304,16 @@ Result<InstanceOutput> SceneBooks::output(InstanceHandle handle) const {
   InstanceOutput output;
   if (!instance->shown) return output;
   const Place& place = *instance->shown;
-  const Result<LaidOutVertices> laidOut = layOut(instance->layout, place.vertexCount);
-  if (!laidOut) return laidOut.error();
+  const Result<VertexPlaces> places =
+      placeVertices(instance->layout, place.vertexCount, place.bytes.offset);
+  if (!places) return places.error();
   output.mesh = place.mesh;
   output.offset = place.bytes.offset;
   output.size = place.bytes.size;
-  std::array<OutputAttribute, streamCount> attributes = laidOut->attributes;
-  for (OutputAttribute& attribute : attributes) {
-    if (attribute.format != VertexFormat::none) attribute.offset += output.offset;
-  }
-  output.positions = attributes[0];
-  output.normals = attributes[1];
-  output.tangents = attributes[2];
-  output.previousPositions = attributes[3];
+  output.positions = places->positions;
+  output.normals = places->normals;
+  output.tangents = places->tangents;
+  output.previousPositions = places->previousPositions;
   return output;
 }
 

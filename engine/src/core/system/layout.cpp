@@ -1,7 +1,11 @@
 #include "system/layout.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
+
+#include "dermis/plan.h"
+#include "plan/check.h"
 
 namespace dermis {
 namespace {
@@ -10,7 +14,7 @@ constexpr std::uint64_t planarAlignment = 16;
 
 std::array<VertexFormat, streamCount> formatsOf(const VertexLayout& layout) {
   return {layout.positions, layout.normals, layout.tangents,
-          layout.previousPositions ? layout.positions : VertexFormat::none};
+          layout.motion != Motion::none ? layout.positions : VertexFormat::none};
 }
 
 template <typename Number>
@@ -18,41 +22,47 @@ Number roundUp(Number value, Number multiple) {
   return (value + multiple - 1) / multiple * multiple;
 }
 
-Result<LaidOutVertices> interleave(const VertexLayout& layout, std::uint32_t vertexCount) {
-  LaidOutVertices laidOut;
+/// The attributes of places, by `Stream`.
+std::array<OutputAttribute*, streamCount> attributesOf(VertexPlaces& places) {
+  return {&places.positions, &places.normals, &places.tangents, &places.previousPositions};
+}
+
+Result<VertexPlaces> interleave(const VertexLayout& layout, std::uint32_t vertexCount,
+                                std::uint64_t offset) {
+  VertexPlaces places;
   std::uint32_t size = 0;
   const std::array<VertexFormat, streamCount> formats = formatsOf(layout);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (formats[stream] == VertexFormat::none) continue;
     size = roundUp(size, formatAlignment(formats[stream]));
-    laidOut.attributes[stream] = {size, 0, formats[stream]};
+    *attributesOf(places)[stream] = {offset + size, 0, formats[stream]};
     size += formatSize(formats[stream]);
   }
   const std::uint32_t stride = layout.stride != 0 ? layout.stride : roundUp(size, 4u);
   if (stride < size) {
-    return Error{ErrorCode::invalidArgument, "the instance's stride of " + std::to_string(stride) +
+    return Error{ErrorCode::invalidArgument, "the layout's stride of " + std::to_string(stride) +
                                                  " bytes is less than the " + std::to_string(size) +
                                                  " of its attributes"};
   }
-  for (OutputAttribute& attribute : laidOut.attributes) {
-    if (attribute.format != VertexFormat::none) attribute.stride = stride;
+  for (OutputAttribute* attribute : attributesOf(places)) {
+    if (attribute->format != VertexFormat::none) attribute->stride = stride;
   }
-  laidOut.size = std::uint64_t{stride} * vertexCount;
-  laidOut.alignment = stride;
-  return laidOut;
+  places.size = std::uint64_t{stride} * vertexCount;
+  places.alignment = stride;
+  return places;
 }
 
-LaidOutVertices separate(const VertexLayout& layout, std::uint32_t vertexCount) {
-  LaidOutVertices laidOut;
-  laidOut.alignment = planarAlignment;
+VertexPlaces separate(const VertexLayout& layout, std::uint32_t vertexCount, std::uint64_t offset) {
+  VertexPlaces places;
+  places.alignment = planarAlignment;
   const std::array<VertexFormat, streamCount> formats = formatsOf(layout);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     const std::uint32_t size = formatSize(formats[stream]);
     if (size == 0) continue;
-    laidOut.attributes[stream] = {laidOut.size, size, formats[stream]};
-    laidOut.size = roundUp(laidOut.size + std::uint64_t{size} * vertexCount, planarAlignment);
+    *attributesOf(places)[stream] = {offset + places.size, size, formats[stream]};
+    places.size = roundUp(places.size + std::uint64_t{size} * vertexCount, planarAlignment);
   }
-  return laidOut;
+  return places;
 }
 
 }  // namespace
@@ -63,14 +73,33 @@ std::uint32_t attributeBytes(const VertexLayout& layout) {
   return bytes;
 }
 
-Result<LaidOutVertices> layOut(const VertexLayout& layout, std::uint32_t vertexCount) {
-  if (layout.arrangement == Arrangement::interleaved) return interleave(layout, vertexCount);
-  if (layout.stride != 0) {
-    return Error{ErrorCode::invalidArgument,
-                 "the instance's layout is planar: attributes stand without gaps, a stride is for "
-                 "interleaved ones"};
+Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t vertexCount,
+                                   std::uint64_t offset) {
+  if (layout.arrangement > Arrangement::planar)
+    return invalid("the layout's arrangement is not one of Arrangement");
+  if (layout.motion > Motion::reskinned) return invalid("the layout's motion is not one of Motion");
+  const bool isPlanar = layout.arrangement == Arrangement::planar;
+  if (isPlanar && layout.stride != 0) {
+    return invalid(
+        "the layout is planar: attributes stand without gaps, a stride is for interleaved ones");
   }
-  return separate(layout, vertexCount);
+  Result<VertexPlaces> places =
+      isPlanar ? separate(layout, vertexCount, offset) : interleave(layout, vertexCount, offset);
+  if (!places) return places;
+  places->motion = layout.motion;
+  if (offset % places->alignment != 0) {
+    return invalid("vertices of the layout begin at a multiple of " +
+                   std::to_string(places->alignment) + " bytes, not at " + std::to_string(offset));
+  }
+  return places;
+}
+
+void Job::place(const VertexPlaces& places) {
+  positions = places.positions;
+  normals = places.normals;
+  tangents = places.tangents;
+  previousPositions = places.previousPositions;
+  motion = places.motion;
 }
 
 }  // namespace dermis

@@ -112,23 +112,6 @@ Result<void> Scene::removeInstance(InstanceHandle instance) {
   return change().removeInstance(instance);
 }
 
-Result<std::vector<Variant>> Scene::everyVariant(const InstanceDescription& description) const {
-  Job job;
-  const Result<LaidOutVertices> laidOut = layOut(description.layout, 1);
-  if (!laidOut) return laidOut.error();
-  job.method = description.method;
-  job.positions = laidOut->attributes[0];
-  job.normals = laidOut->attributes[1];
-  job.tangents = laidOut->attributes[2];
-  job.previousPositions = laidOut->attributes[3];
-  job.motion = description.layout.previousPositions ? Motion::kept : Motion::none;
-  job.bounds = description.bounds;
-  const SceneDescription& own = books_->description();
-  std::vector<Variant> variants = dermis::everyVariant(job, own.limits, own.tuning);
-  if (description.culledOnGpu) variants.push_back(visibilityVariant(own.tuning));
-  return variants;
-}
-
 // -- What changes.
 
 Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {

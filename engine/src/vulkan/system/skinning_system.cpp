@@ -163,16 +163,8 @@ Result<void> SkinningSystem::removeInstance(InstanceHandle instance) {
   return state_->scene.removeInstance(instance);
 }
 
-Result<void> SkinningSystem::prepare(const InstanceDescription& description) const {
-  const Result<std::vector<Variant>> variants = state_->scene.everyVariant(description);
-  if (!variants) return variants.error();
-  for (const Variant& variant : *variants) {
-    if (Result<void> built =
-            state_->context->pipelines->build(variant, state_->context->pipelineLayout);
-        !built)
-      return built;
-  }
-  return {};
+Result<void> SkinningSystem::prepare(const PipelineNeeds& needs) const {
+  return state_->context->prepare(needs, state_->scene.description().tuning);
 }
 
 // -- What changes.

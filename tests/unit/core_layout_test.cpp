@@ -1,0 +1,104 @@
+// A vertex layout places the attributes of any number of vertices, and foresees their pipelines.
+
+#include "dermis/layout.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "dermis/plan.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr VertexLayout full{.positions = VertexFormat::float32x3,
+                            .normals = VertexFormat::octahedral16x2,
+                            .tangents = VertexFormat::snorm8x4,
+                            .motion = Motion::kept};
+
+void expectPlace(const OutputAttribute& attribute, std::uint64_t offset, std::uint32_t stride,
+                 VertexFormat format) {
+  EXPECT_EQ(attribute.offset, offset);
+  EXPECT_EQ(attribute.stride, stride);
+  EXPECT_EQ(attribute.format, format);
+}
+
+TEST(Layout, PlacesAttributesVertexByVertex) {
+  const Result<VertexPlaces> places = placeVertices(full, 10, 320);
+  ASSERT_TRUE(places.ok());
+  expectPlace(places->positions, 320, 32, VertexFormat::float32x3);
+  expectPlace(places->normals, 332, 32, VertexFormat::octahedral16x2);
+  expectPlace(places->tangents, 336, 32, VertexFormat::snorm8x4);
+  expectPlace(places->previousPositions, 340, 32, VertexFormat::float32x3);
+  EXPECT_EQ(places->size, 320u);
+  EXPECT_EQ(places->alignment, 32u);
+  Job job;
+  job.place(*places);
+  EXPECT_EQ(job.motion, Motion::kept);
+  EXPECT_EQ(job.tangents.offset, 336u);
+}
+
+TEST(Layout, PlacesAttributesOneAfterTheOther) {
+  VertexLayout layout = full;
+  layout.arrangement = Arrangement::planar;
+  const Result<VertexPlaces> places = placeVertices(layout, 5, 16);
+  ASSERT_TRUE(places.ok());
+  expectPlace(places->positions, 16, 12, VertexFormat::float32x3);  // 60 bytes
+  expectPlace(places->normals, 80, 4, VertexFormat::octahedral16x2);
+  expectPlace(places->tangents, 112, 4, VertexFormat::snorm8x4);
+  expectPlace(places->previousPositions, 144, 12, VertexFormat::float32x3);
+  EXPECT_EQ(places->size, 192u);
+}
+
+TEST(Layout, RefusesWhatCannotStandSo) {
+  const auto expectRefused = [](const VertexLayout& layout, std::uint64_t offset,
+                                const std::string& text) {
+    const Result<VertexPlaces> places = placeVertices(layout, 3, offset);
+    ASSERT_FALSE(places.ok()) << text;
+    EXPECT_EQ(places.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(places.error().message.find(text), std::string::npos) << places.error().message;
+  };
+  expectRefused(full, 16, "multiple of 32 bytes, not at 16");
+  VertexLayout bad = full;
+  bad.stride = 31;
+  expectRefused(bad, 0, "stride of 31");
+  bad.arrangement = Arrangement::planar;
+  expectRefused(bad, 0, "planar");
+  bad.arrangement = static_cast<Arrangement>(2);
+  expectRefused(bad, 0, "arrangement");
+  bad = full;
+  bad.motion = static_cast<Motion>(3);
+  expectRefused(bad, 0, "motion");
+  EXPECT_FALSE(everyVariant(PipelineNeeds{.layout = bad}, {}, {}).ok());
+}
+
+// Wherever `placeVertices` lets them begin, jobs need no other pipelines.
+TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.texelBuffers = limits.shaderInt64 = limits.storage16Bit = limits.storage8Bit = true;
+  for (const VertexFormat normals : {VertexFormat::none, VertexFormat::float32x3,
+                                     VertexFormat::snorm8x3, VertexFormat::octahedral8x2}) {
+    for (const std::uint32_t stride : {0u, 24u, 36u, 37u, 50u}) {
+      const PipelineNeeds needs{.layout = {.normals = normals, .stride = stride}};
+      const std::vector<Variant> foreseen = *everyVariant(needs, limits, {});
+      for (std::uint64_t place = 0; place < 9; ++place) {
+        const std::uint64_t alignment = placeVertices(needs.layout, 1)->alignment;
+        Job job;
+        job.method = needs.method;
+        job.place(*placeVertices(needs.layout, 7, place * alignment));
+        for (const Variant& variant : everyVariant(job, limits, {})) {
+          EXPECT_TRUE(std::ranges::find(foreseen, variant) != foreseen.end())
+              << stride << " bytes, at " << place * alignment;
+        }
+      }
+    }
+  }
+  const std::vector<Variant> culled = *everyVariant(PipelineNeeds{.culledOnGpu = true}, {}, {});
+  EXPECT_EQ(std::ranges::count(culled, Kernel::visibility, &Variant::kernel), 1);
+}
+
+}  // namespace
+}  // namespace dermis::test
