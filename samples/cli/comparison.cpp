@@ -52,7 +52,7 @@ bool isRigid(const JointMatrix& joint) {
 std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose& pose) {
   std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
   for (samples::SkinRequest& request : requests)
-    request.mayScale = !std::ranges::all_of(request.palette, isRigid);
+    request.mayScale = !std::ranges::all_of(request.pose, isRigid);
   return requests;
 }
 
@@ -74,7 +74,7 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
   // Joint matrices, and the largest palettes of all the methods.
   std::uint64_t bytes = 0;
   for (const samples::SkinRequest& part : instance)
-    bytes += part.palette.size() * (48 + 80 * (allMethods.size() - 1));
+    bytes += part.pose.size() * (48 + 80 * (allMethods.size() - 1));
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(std::min(wanted, mostPaletteBytes / bytes), 1, mostInstances));
 }
@@ -130,7 +130,7 @@ class MethodComparer {
       comparison_.vertices += request.mesh->vertexCount();
       comparison_.scales = comparison_.scales || request.mayScale;
     }
-    for (const std::vector<JointMatrix>& palette : pose.palettes)
+    for (const std::vector<JointMatrix>& palette : pose.poses)
       comparison_.joints += static_cast<std::uint32_t>(palette.size());
     for (ComparedMethod& compared : comparison_.methods)
       compared.bytesPerJoint = bytesPerJoint(compared.method, comparison_.scales);
@@ -161,7 +161,7 @@ class MethodComparer {
       const ScenePart& part = scene_.parts[index];
       if (part.mesh == nullptr) continue;
       const Result<reference::SkinnedMesh> skinned =
-          reference::skin(part.mesh->view(), pose_.palette(part), method, pose_.morphs[index]);
+          reference::skin(part.mesh->view(), pose_.pose(part), method, pose_.morphs[index]);
       if (!skinned) return skinned.error();
       positions.insert(positions.end(), skinned->positions.begin(), skinned->positions.end());
     }

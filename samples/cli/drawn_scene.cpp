@@ -145,15 +145,15 @@ Result<void> DrawnScene::prepare(Method method) {
 Result<void> DrawnScene::addFigure(Method method) {
   Figure figure;
   figure.parts.resize(shared_.size());
-  figure.palettes.resize(scene_->model->skins.size());
-  std::vector<bool> isUsed(figure.palettes.size());
+  figure.poses.resize(scene_->model->skins.size());
+  std::vector<bool> isUsed(figure.poses.size());
   for (std::size_t index = 0; index < shared_.size(); ++index) {
     const std::uint32_t skin = scene_->parts[index].source.skin;
     if (!shared_[index].mesh || isUsed[skin]) continue;
     const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
-    Result<PaletteHandle> palette = system_->addPalette(joints);
+    Result<PoseHandle> palette = system_->addPose(joints);
     if (!palette) return palette.error();
-    figure.palettes[skin] = *palette;
+    figure.poses[skin] = *palette;
     isUsed[skin] = true;
   }
   if (Result<void> added = addInstances(figure, method); !added) return added;
@@ -165,7 +165,7 @@ Result<void> DrawnScene::addInstances(Figure& figure, Method method) {
   for (std::size_t index = 0; index < shared_.size(); ++index) {
     if (!shared_[index].mesh) continue;
     InstanceDescription description = instanceOf(index, method);
-    description.palette = figure.palettes[scene_->parts[index].source.skin];
+    description.pose = figure.poses[scene_->parts[index].source.skin];
     Result<InstanceHandle> instance = system_->addInstance(description);
     if (!instance) return instance.error();
     figure.parts[index].instance = *instance;
@@ -193,7 +193,7 @@ Result<void> DrawnScene::beginFrame() {
 
 Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
   Figure& figure = figures_[index];
-  std::vector<bool> isWritten(figure.palettes.size());
+  std::vector<bool> isWritten(figure.poses.size());
   for (std::size_t i = 0; i < scene_->parts.size(); ++i) {
     const ScenePart& part = scene_->parts[i];
     FigurePart& posed = figure.parts[i];
@@ -202,11 +202,11 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
         return placed;
       continue;
     }
-    const std::vector<JointMatrix>& palette = pose.palette(part);
+    const std::vector<JointMatrix>& palette = pose.pose(part);
     posed.isMirrored = samples::isMirrored(palette);
     if (!isWritten[part.source.skin]) {
       isWritten[part.source.skin] = true;
-      Result<std::span<JointMatrix>> place = system_->writePose(figure.palettes[part.source.skin]);
+      Result<std::span<JointMatrix>> place = system_->writePose(figure.poses[part.source.skin]);
       if (!place) return place.error();
       std::ranges::copy(palette, place->begin());
     }

@@ -61,7 +61,7 @@ class DrawnScene {
     bool isMirrored = false;
   };
   struct Figure {
-    std::vector<PaletteHandle> palettes;  ///< by skin; a null handle where no part uses it
+    std::vector<PoseHandle> poses;  ///< by skin; a null handle where no part uses it
     std::vector<FigurePart> parts;
   };
   /// What all figures share.

@@ -39,7 +39,7 @@ std::vector<samples::SkinRequest> skinRequests(const Scene& scene, const ScenePo
     if (part.mesh == nullptr) continue;
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = &part.mesh->packed();
-    request.palette = pose.palette(part);
+    request.pose = pose.pose(part);
     request.morphs = pose.morphs[index];
   }
   return requests;
@@ -55,7 +55,7 @@ SkinParts referenceSkinner(const Scene& scene, Method method) {
         continue;
       }
       const Result<reference::SkinnedMesh> skinned =
-          reference::skin(part.mesh->view(), pose.palette(part), method, pose.morphs[index]);
+          reference::skin(part.mesh->view(), pose.pose(part), method, pose.morphs[index]);
       if (!skinned) return skinned.error();
       all.push_back(
           {toFloats(skinned->positions), toFloats(skinned->normals), toFloats(skinned->tangents)});

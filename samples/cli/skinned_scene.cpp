@@ -178,9 +178,9 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
   const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
   ScenePose pose;
-  pose.palettes.resize(scene.model->skins.size());
+  pose.poses.resize(scene.model->skins.size());
   for (const ScenePart& part : scene.parts) {
-    std::vector<JointMatrix>& palette = pose.palettes[part.source.skin];
+    std::vector<JointMatrix>& palette = pose.poses[part.source.skin];
     if (palette.empty()) palette = gltf::palette(*scene.model, part.source.skin, globals);
     std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
     // A primitive may have fewer targets than its mesh names.

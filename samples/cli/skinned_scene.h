@@ -50,11 +50,11 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
 
 /// A scene at one time.
 struct ScenePose {
-  std::vector<std::vector<JointMatrix>> palettes;  ///< by skin; empty where no part uses it
-  std::vector<std::vector<MorphWeight>> morphs;    ///< by part: the active morph targets
+  std::vector<std::vector<JointMatrix>> poses;   ///< by skin; empty where no part uses it
+  std::vector<std::vector<MorphWeight>> morphs;  ///< by part: the active morph targets
 
-  const std::vector<JointMatrix>& palette(const ScenePart& part) const {
-    return palettes[part.source.skin];
+  const std::vector<JointMatrix>& pose(const ScenePart& part) const {
+    return poses[part.source.skin];
   }
 };
 

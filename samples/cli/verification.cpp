@@ -85,11 +85,11 @@ Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> 
   for (const Figure& figure : figures) {
     const ScenePart& part = scene.parts[figure.part];
     Result<reference::SkinnedMesh> mesh =
-        reference::skin(part.mesh->view(), skinned.pose.palette(part), figure.method,
+        reference::skin(part.mesh->view(), skinned.pose.pose(part), figure.method,
                         skinned.pose.morphs[figure.part]);
     if (!mesh) return mesh.error();
     if (Result<void> checked = checkReach(part, pose, *mesh); !checked) return checked.error();
-    skinned.exemptions.push_back(exemptionsIn(skinned.pose.palette(part), *mesh, figure.method));
+    skinned.exemptions.push_back(exemptionsIn(skinned.pose.pose(part), *mesh, figure.method));
     skinned.figures.push_back(std::move(*mesh));
   }
   return skinned;
@@ -108,8 +108,8 @@ struct PoseBatch {
     for (std::size_t index = 0; index < figures.size(); ++index) {
       const auto& [part, method] = figures[index];
       parts.push_back(&scene.parts[part]);
-      instances.push_back({&parts.back()->mesh->packed(), now.pose.palette(*parts.back()),
-                           before.pose.palette(*parts.back()), now.pose.morphs[part],
+      instances.push_back({&parts.back()->mesh->packed(), now.pose.pose(*parts.back()),
+                           before.pose.pose(*parts.back()), now.pose.morphs[part],
                            before.pose.morphs[part], method, &now.figures[index],
                            &before.figures[index], now.exemptions[index],
                            before.exemptions[index]});
@@ -133,7 +133,7 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
   for (const samples::InstanceToVerify& instance : batch.instances) {
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = instance.packed;
-    request.palette = instance.palette;
+    request.pose = instance.pose;
     request.method = instance.method;
     request.morphs = instance.morphs;
   }

@@ -20,7 +20,7 @@ struct VerifiedCase {
   std::string pose;     ///< "rest pose", "clip 0 'walk' at 0.341 s"
   std::string variant;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
   Comparison comparison;
-  PaletteStatus status;
+  PoseStatus status;
   std::string wrong;  ///< what else is wrong; empty where nothing is
 
   bool passed() const {

@@ -46,15 +46,15 @@ class OutputPlacer {
   OutputSizes& sizes_;
 };
 
-std::uint32_t addPalette(BatchLayout& layout, std::span<const JointMatrix> pose, bool mayScale) {
-  Palette palette;
+std::uint32_t addPose(BatchLayout& layout, std::span<const JointMatrix> pose, bool mayScale) {
+  PoseDescription palette;
   palette.jointCount = static_cast<std::uint32_t>(pose.size());
-  palette.matrixOffset = layout.matricesSize;
+  palette.matrixOffset = layout.posesSize;
   palette.mayScale = mayScale;
-  layout.matricesSize += pose.size_bytes();
-  layout.palettes.push_back(palette);
+  layout.posesSize += pose.size_bytes();
+  layout.poseDescriptions.push_back(palette);
   layout.poses.push_back(pose);
-  return static_cast<std::uint32_t>(layout.palettes.size() - 1);
+  return static_cast<std::uint32_t>(layout.poses.size() - 1);
 }
 
 }  // namespace
@@ -86,7 +86,7 @@ BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayou
     Job job;
     job.mesh = request.mesh->info();
     job.meshOffset = entry->second;
-    job.palette = addPalette(layout, request.palette, request.mayScale);
+    job.pose = addPose(layout, request.pose, request.mayScale);
     job.method = request.method;
     job.morphs = request.morphs;
     job.box = request.box;
@@ -94,10 +94,10 @@ BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayou
     job.motion = output.motion;
     job.restartsMotion = request.restartsMotion;
     job.settles = request.settles;
-    job.previousPalette = job.palette;
+    job.previousPose = job.pose;
     job.previousMorphs = request.previousMorphs;
-    if (output.motion == Motion::reskinned && !request.previousPalette.empty())
-      job.previousPalette = addPalette(layout, request.previousPalette, request.mayScale);
+    if (output.motion == Motion::reskinned && !request.previousPose.empty())
+      job.previousPose = addPose(layout, request.previousPose, request.mayScale);
     job.positions.format = output.positions;
     if (job.mesh.hasNormals) job.normals.format = output.normals;
     if (job.mesh.hasTangents) job.tangents.format = output.tangents;

@@ -1,4 +1,4 @@
-// Where everything of a batch stands: meshes, palettes, and skinned vertices in any format and
+// Where everything of a batch stands: meshes, poses, and skinned vertices in any format and
 // arrangement.
 #pragma once
 
@@ -16,13 +16,13 @@ namespace dermis::samples {
 /// One instance: its mesh, pose and method. Spans refer to the caller's memory.
 struct SkinRequest {
   const PackedMesh* mesh = nullptr;
-  std::span<const JointMatrix> palette;
+  std::span<const JointMatrix> pose;
   bool mayScale = true;
   Method method = Method::dualQuaternion;
   std::span<const MorphWeight> morphs = {};
   Box box = {};  ///< where positions are stored as snorm16
   // Where there is motion.
-  std::span<const JointMatrix> previousPalette = {};  ///< empty: the same palette
+  std::span<const JointMatrix> previousPose = {};  ///< empty: the same pose
   std::span<const MorphWeight> previousMorphs = {};
   bool restartsMotion = false;
   bool settles = false;
@@ -48,14 +48,14 @@ struct OutputLayout {
 struct BatchLayout {
   std::map<const PackedMesh*, std::uint64_t>
       meshOffsets;  ///< Meshes that are one object stand once.
-  std::vector<Palette> palettes;
-  std::vector<std::span<const JointMatrix>> poses;  ///< of the palettes
+  std::vector<PoseDescription> poseDescriptions;
+  std::vector<std::span<const JointMatrix>> poses;  ///< in the same order
   std::vector<Job> jobs;                            ///< of the requests
-  std::uint64_t meshesSize = 0, matricesSize = 0;
+  std::uint64_t meshesSize = 0, posesSize = 0;
   OutputSizes outputs;
   bool oneOutput = true;
 
-  Batch batch() const { return {palettes, jobs, meshesSize, matricesSize, outputs}; }
+  Batch batch() const { return {poseDescriptions, jobs, meshesSize, posesSize, outputs}; }
 };
 
 BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output);

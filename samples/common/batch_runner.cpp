@@ -17,13 +17,13 @@ constexpr std::array<const char*, streamCount> outputNames{
     "the previous positions' buffer"};
 
 struct Buffers {
-  MappedBuffer meshes, matrices, tables, palettes, results;
+  MappedBuffer meshes, poses, tables, palettes, results;
 };
 
 Result<Buffers> makeBuffers(Device& device, const Plan& plan) {
   Buffers buffers;
   for (const auto& [buffer, role] : {std::pair{&buffers.meshes, BufferRole::meshes},
-                                     {&buffers.matrices, BufferRole::matrices},
+                                     {&buffers.poses, BufferRole::poses},
                                      {&buffers.tables, BufferRole::tables},
                                      {&buffers.palettes, BufferRole::palettes},
                                      {&buffers.results, BufferRole::results}}) {
@@ -41,8 +41,8 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
   for (const auto& [mesh, offset] : layout.meshOffsets) {
     std::memcpy(buffers.meshes.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
   }
-  for (std::size_t index = 0; index < layout.palettes.size(); ++index) {
-    std::memcpy(buffers.matrices.bytes().data() + layout.palettes[index].matrixOffset,
+  for (std::size_t index = 0; index < layout.poses.size(); ++index) {
+    std::memcpy(buffers.poses.bytes().data() + layout.poseDescriptions[index].matrixOffset,
                 layout.poses[index].data(), layout.poses[index].size_bytes());
   }
 }
@@ -160,7 +160,7 @@ BatchResult BatchRunner::readBack(const Plan& plan, const MappedBuffer& palettes
     skinned.positions = floatsOf(skinned.streams[0], skinned.formats[0]);
     skinned.normals = floatsOf(skinned.streams[1], skinned.formats[1]);
     skinned.box = job.box;
-    if (const std::uint64_t status = plan.statusOffset(job.palette); status != Plan::noStatus)
+    if (const std::uint64_t status = plan.statusOffset(job.pose); status != Plan::noStatus)
       std::memcpy(&skinned.status, palettes.bytes().data() + status, sizeof(skinned.status));
     if (const std::uint64_t place = plan.resultOffset(index); place != Plan::noResult)
       std::memcpy(&skinned.result, results.bytes().data() + place, sizeof(skinned.result));
@@ -185,7 +185,7 @@ Result<BatchResult> BatchRunner::run(std::span<const SkinRequest> requests) {
   if (Result<void> written = writeTables(plan, buffers->tables.bytes()); !written)
     return written.error();
   Result<vulkan::Bindings> bindings = context_.createBindings(
-      {buffers->meshes.range(), buffers->matrices.range(), buffers->tables.range(),
+      {buffers->meshes.range(), buffers->poses.range(), buffers->tables.range(),
        buffers->palettes.range(), outputRanges(), buffers->results.range()});
   if (!bindings) return bindings.error();
   if (Result<void> done = submit(device_, context_, plan, *bindings); !done) return done.error();

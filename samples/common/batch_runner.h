@@ -22,7 +22,7 @@ namespace dermis::samples {
 struct SkinnedVertices {
   std::vector<float> positions;  ///< 3 a vertex; empty where they are not stored as float32
   std::vector<float> normals;    ///< likewise, or where the mesh has none
-  PaletteStatus status;          ///< all 0 for linear
+  PoseStatus status;             ///< all 0 for linear
   InstanceResult result;         ///< where it was asked for
   /// The attributes as they are stored, tightly packed, by `Stream`.
   std::array<std::vector<std::byte>, streamCount> streams;

@@ -31,7 +31,7 @@ Result<MappedBuffer> TimedBatches::makeBuffer(const Plan& plan, BufferRole role)
 
 Result<void> TimedBatches::makeShared(const BatchLayout& layout, const Plan& plan) {
   for (const auto& [buffer, role] : {std::pair{&meshes_, BufferRole::meshes},
-                                     {&matrices_, BufferRole::matrices},
+                                     {&matrices_, BufferRole::poses},
                                      {&output_, BufferRole::positions}}) {
     Result<MappedBuffer> made = makeBuffer(plan, role);
     if (!made) return made.error();
@@ -39,8 +39,8 @@ Result<void> TimedBatches::makeShared(const BatchLayout& layout, const Plan& pla
   }
   for (const auto& [mesh, offset] : layout.meshOffsets)
     std::memcpy(meshes_.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
-  for (std::size_t index = 0; index < layout.palettes.size(); ++index) {
-    std::memcpy(matrices_.bytes().data() + layout.palettes[index].matrixOffset,
+  for (std::size_t index = 0; index < layout.poses.size(); ++index) {
+    std::memcpy(matrices_.bytes().data() + layout.poseDescriptions[index].matrixOffset,
                 layout.poses[index].data(), layout.poses[index].size_bytes());
   }
   return {};

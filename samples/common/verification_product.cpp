@@ -206,8 +206,8 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
   for (std::size_t instance = 0; instance < 3; ++instance) {
     InstanceToVerify& verified = instances.emplace_back();
     verified.packed = &*packed;
-    verified.palette = poses[instance];
-    verified.previousPalette = poses[instance + 3];
+    verified.pose = poses[instance];
+    verified.previousPose = poses[instance + 3];
     verified.morphs = morphs;
     verified.previousMorphs = previousMorphs;
     verified.method = random.method;
@@ -219,10 +219,10 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
     InstanceToVerify& verified = instances[instance];
     const MeshView view = stored.view();
     Result<reference::SkinnedMesh> now =
-        reference::skin(view, verified.palette, verified.method, verified.morphs);
+        reference::skin(view, verified.pose, verified.method, verified.morphs);
     if (!now) return now.error();
     Result<reference::SkinnedMesh> before =
-        reference::skin(view, verified.previousPalette, verified.method, verified.previousMorphs);
+        reference::skin(view, verified.previousPose, verified.method, verified.previousMorphs);
     if (!before) return before.error();
     expected[instance] = std::move(*now);
     expected[instance + 3] = std::move(*before);

@@ -42,7 +42,7 @@ std::vector<OutputCase> outputCases(const DeviceLimits& limits);
 /// One instance to verify. Spans and views refer to the caller's memory.
 struct InstanceToVerify {
   const PackedMesh* packed = nullptr;
-  std::span<const JointMatrix> palette, previousPalette;
+  std::span<const JointMatrix> pose, previousPose;
   std::span<const MorphWeight> morphs, previousMorphs;
   Method method = Method::dualQuaternion;
   /// What must come out, in this pose and the previous one.
@@ -55,7 +55,7 @@ struct InstanceToVerify {
 /// What came out for one instance.
 struct VerifiedInstance {
   Comparison comparison;  ///< of the skinned vertices
-  PaletteStatus status;
+  PoseStatus status;
   std::string wrong;  ///< what is wrong besides; empty where nothing is
 
   bool passed() const { return comparison.passed() && wrong.empty(); }

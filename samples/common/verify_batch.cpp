@@ -111,10 +111,10 @@ class BatchVerifier {
     const InstanceToVerify& instance = instances_[index];
     SkinRequest request;
     request.mesh = instance.packed;
-    request.palette = instance.palette;
+    request.pose = instance.pose;
     request.method = instance.method;
     request.morphs = instance.morphs;
-    request.previousPalette = instance.previousPalette;
+    request.previousPose = instance.previousPose;
     request.previousMorphs = instance.previousMorphs;
     request.box = boxes_[index];
     return request;
@@ -131,7 +131,7 @@ class BatchVerifier {
     for (const std::size_t index : indices) {
       now.push_back(requestOf(index));
       before.push_back(now.back());
-      before.back().palette = now.back().previousPalette;
+      before.back().pose = now.back().previousPose;
       before.back().morphs = now.back().previousMorphs;
       before.back().restartsMotion = moves;
       settled.push_back(now.back());

@@ -50,7 +50,7 @@ class Character {
 
   const dermis::gltf::Model& model() const { return *model_; }
   const std::vector<Part>& parts() const { return parts_; }
-  /// By skin: of those that parts hang on. Parts of one skin share its palette.
+  /// By skin: of those that parts hang on. Parts of one skin share its pose.
   const std::vector<std::uint32_t>& jointCounts() const { return jointCounts_; }
   std::uint64_t vertexCount() const;  ///< of all parts
 

@@ -88,15 +88,15 @@ InstanceDescription Crowd::describe(const Part& part) const {
 /// A figure is a pose and some meshes that share it: body, hair, clothes.
 Result<void> Crowd::add(CrowdFigure& figure) {
   for (const std::uint32_t jointCount : character_->jointCounts()) {
-    Result<PaletteHandle> palette = system_.addPalette(jointCount);
-    if (!palette) return palette.error();
-    figure.palettes.push_back(*palette);
+    Result<PoseHandle> pose = system_.addPose(jointCount);
+    if (!pose) return pose.error();
+    figure.poses.push_back(*pose);
   }
   for (std::size_t index = 0; index < meshes_.size(); ++index) {
     const Part& part = character_->parts()[index];
     InstanceDescription description = describe(part);
     description.mesh = meshes_[index];
-    description.palette = figure.palettes[part.skin];
+    description.pose = figure.poses[part.skin];
     Result<InstanceHandle> instance = system_.addInstance(description);
     if (!instance) return instance.error();
     figure.instances.push_back(*instance);
@@ -109,8 +109,8 @@ Result<void> Crowd::remove(CrowdFigure& figure) {
   for (const InstanceHandle instance : std::exchange(figure.instances, {})) {
     if (Result<void> removed = system_.removeInstance(instance); !removed) return removed;
   }
-  for (const PaletteHandle palette : std::exchange(figure.palettes, {})) {
-    if (Result<void> removed = system_.removePalette(palette); !removed) return removed;
+  for (const PoseHandle pose : std::exchange(figure.poses, {})) {
+    if (Result<void> removed = system_.removePose(pose); !removed) return removed;
   }
   return {};
 }
@@ -165,8 +165,8 @@ Result<void> Crowd::move(const CrowdFigure& figure) {
   const FigureFrame& now = figure.now;
   // Where it is the CPU that knows who is out of view, he need not be animated.
   const bool isAnimated = now.isInView || options_.culledOnGpu;
-  for (std::uint32_t skin = 0; isAnimated && skin < figure.palettes.size(); ++skin) {
-    const Result<std::span<JointMatrix>> pose = system_.writePose(figure.palettes[skin]);
+  for (std::uint32_t skin = 0; isAnimated && skin < figure.poses.size(); ++skin) {
+    const Result<std::span<JointMatrix>> pose = system_.writePose(figure.poses[skin]);
     if (!pose) return pose.error();
     std::ranges::copy(character_->pose(now.pose, skin), pose->begin());
   }

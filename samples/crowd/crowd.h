@@ -30,7 +30,7 @@ struct CrowdOptions {
 
 /// A figure as the engine knows it.
 struct CrowdFigure {
-  std::vector<dermis::PaletteHandle> palettes;    ///< by skin; empty: it is not there
+  std::vector<dermis::PoseHandle> poses;          ///< by skin; empty: it is not there
   std::vector<dermis::InstanceHandle> instances;  ///< by part
   FigureFrame now;
 

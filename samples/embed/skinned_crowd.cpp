@@ -20,27 +20,27 @@ const PipelineNeeds needs{.method = Method::dualQuaternion,
 Result<void> planCrowd(Crowd& crowd) {
   const std::uint64_t poseSize = crowd.jointCount * sizeof(JointMatrix);
   const std::uint64_t instanceSize = crowd.mesh.vertexCount() * sizeof(SkinnedVertex);
-  crowd.palettes.resize(instanceCount);
+  crowd.poses.resize(instanceCount);
   crowd.jobs.resize(instanceCount);
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
-    Palette& palette = crowd.palettes[instance];
-    palette.jointCount = crowd.jointCount;
-    palette.matrixOffset = instance * poseSize;
+    PoseDescription& pose = crowd.poses[instance];
+    pose.jointCount = crowd.jointCount;
+    pose.matrixOffset = instance * poseSize;
 
     const Result<VertexPlaces> places =
         placeVertices(needs.layout, crowd.mesh.vertexCount(), instance * instanceSize);
     if (!places) return places.error();
     Job& job = crowd.jobs[instance];
     job.mesh = crowd.mesh.info();
-    job.palette = instance;
+    job.pose = instance;
     job.method = needs.method;
     job.place(*places);
   }
   Batch batch;
-  batch.palettes = crowd.palettes;
+  batch.poses = crowd.poses;
   batch.jobs = crowd.jobs;
   batch.meshesSize = crowd.mesh.bytes().size();
-  batch.matricesSize = instanceCount * poseSize;
+  batch.posesSize = instanceCount * poseSize;
   batch.outputs = OutputSizes::oneBuffer(instanceCount * instanceSize);
   return makePlan(batch, crowd.context.limits(), crowd.context.tuning(), crowd.plan);
 }
@@ -90,7 +90,7 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
   std::ranges::copy(crowd.mesh.bytes(), crowd.meshes.bytes().begin());
 
   for (Frame& frame : crowd.frames) {
-    for (const auto& [role, buffer] : {std::pair{BufferRole::matrices, &frame.matrices},
+    for (const auto& [role, buffer] : {std::pair{BufferRole::poses, &frame.poses},
                                        {BufferRole::tables, &frame.tables},
                                        {BufferRole::palettes, &frame.palettes}}) {
       if (Result<void> done = makeBuffer(engine, crowd.plan, role, *buffer); !done)
@@ -98,7 +98,7 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
     }
     Result<vulkan::Bindings> bindings =
         crowd.context.createBindings({crowd.meshes.range(),
-                                      frame.matrices.range(),
+                                      frame.poses.range(),
                                       frame.tables.range(),
                                       frame.palettes.range(),
                                       vulkan::OutputBuffers::oneBuffer(crowd.output.range()),
@@ -113,7 +113,7 @@ Result<Crowd> setUp(samples::Device& engine, const MeshView& mesh, std::uint32_t
 // [frame]
 Result<void> skinFrame(const samples::Device& engine, Crowd& crowd, Frame& frame,
                        std::span<const JointMatrix> matrices, VkCommandBuffer commandBuffer) {
-  std::ranges::copy(std::as_bytes(matrices), frame.matrices.bytes().begin());
+  std::ranges::copy(std::as_bytes(matrices), frame.poses.bytes().begin());
   if (Result<void> done = planCrowd(crowd); !done) return done;
   if (Result<void> done = writeTables(crowd.plan, frame.tables.bytes()); !done) return done;
 

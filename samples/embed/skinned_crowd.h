@@ -28,7 +28,7 @@ struct SkinnedVertex {
 
 /// What is rewritten each frame, and so needed once for every frame in flight.
 struct Frame {
-  dermis::samples::MappedBuffer matrices, tables, palettes;
+  dermis::samples::MappedBuffer poses, tables, palettes;
   dermis::vulkan::Bindings bindings;
 };
 
@@ -40,7 +40,7 @@ struct Crowd {
   dermis::samples::MappedBuffer output;  ///< The vertex buffer that the engine draws from.
   std::array<Frame, framesInFlight> frames;
   // Reused from frame to frame, to keep their memory.
-  std::vector<dermis::Palette> palettes;
+  std::vector<dermis::PoseDescription> poses;
   std::vector<dermis::Job> jobs;
   dermis::Plan plan;
 };
@@ -49,10 +49,10 @@ struct Crowd {
 dermis::Result<Crowd> setUp(dermis::samples::Device& engine, const dermis::MeshView& mesh,
                             std::uint32_t jointCount);
 
-/// Each frame, when the GPU is done with what it last did with `frame`. `matrices` has the poses of
+/// Each frame, when the GPU is done with what it last did with `frame`. `poses` has the poses of
 /// all instances, one after the other. Outside a render pass.
 dermis::Result<void> skinFrame(const dermis::samples::Device& engine, Crowd& crowd, Frame& frame,
-                               std::span<const dermis::JointMatrix> matrices,
+                               std::span<const dermis::JointMatrix> poses,
                                VkCommandBuffer commandBuffer);
 
 }  // namespace embed

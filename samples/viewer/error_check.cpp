@@ -31,7 +31,7 @@ Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const Chec
   const std::vector<float>& positions = figure.positions[index];
   if (part.mesh == nullptr || positions.empty()) return {};
   const Result<reference::SkinnedMesh> expected = reference::skin(
-      part.mesh->view(), request.pose.palette(part), figure.method, request.pose.morphs[index]);
+      part.mesh->view(), request.pose.pose(part), figure.method, request.pose.morphs[index]);
   if (!expected) return expected.error();
   for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
     const reference::Conditioning& conditioning = expected->conditioning[vertex];

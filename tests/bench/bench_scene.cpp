@@ -57,15 +57,15 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
     return orStop(samples::MappedBuffer::create(*open.device, requirement.size, requirement.usage));
   };
   meshes_ = make(BufferRole::meshes);
-  matrices_ = make(BufferRole::matrices);
+  matrices_ = make(BufferRole::poses);
   tables_ = make(BufferRole::tables);
   palettes_ = make(BufferRole::palettes);
   results_ = make(BufferRole::results);
   output_ = make(BufferRole::positions);
   for (const auto& [mesh, offset] : layout_.meshOffsets)
     std::memcpy(meshes_.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
-  for (std::size_t index = 0; index < layout_.palettes.size(); ++index) {
-    std::memcpy(matrices_.bytes().data() + layout_.palettes[index].matrixOffset,
+  for (std::size_t index = 0; index < layout_.poses.size(); ++index) {
+    std::memcpy(matrices_.bytes().data() + layout_.poseDescriptions[index].matrixOffset,
                 layout_.poses[index].data(), layout_.poses[index].size_bytes());
   }
   orStop(writeTables(plan_, tables_.bytes()));

@@ -73,7 +73,7 @@ std::vector<samples::SkinRequest> Crowd::requests(Method method) const {
   for (const std::vector<JointMatrix>& pose : poses) {
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = &*mesh;
-    request.palette = pose;
+    request.pose = pose;
     request.mayScale = false;  // nor does the plain kernel know of scale
     request.method = method;
   }

@@ -88,11 +88,11 @@ void measure(benchmark::State& state, Scene scene) {
   for (const std::vector<JointMatrix>& pose : poses) {
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = &packed;
-    request.palette = pose;
+    request.pose = pose;
     request.mayScale = scene.mayScale;
     request.method = scene.method;
     request.morphs = scene.morphs;
-    request.previousPalette = pose;
+    request.previousPose = pose;
     request.box = {{-4, -4, -4}, {4, 4, 4}};
   }
   BenchScene bench(*open, requests, scene.output, open->context.tuning());

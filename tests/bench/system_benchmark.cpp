@@ -82,7 +82,7 @@ class Scene {
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
       instance.mesh = meshes[i % meshes.size()];
       vertexCount_ += engine_.vertexCount(instance.mesh);
-      instance.palette = palettes_.emplace_back(engine_.addPalette(poses_[0], false));
+      instance.pose = palettes_.emplace_back(engine_.addPose(poses_[0], false));
       if (i == 0) must(engine_->prepare(pipelineNeeds(instance)));
       must(engine_->addInstance(instance));
     }
@@ -139,7 +139,7 @@ class Scene {
       samples::randomPose(1, jointCount, samples::Rigidity::rigid),
       samples::randomPose(2, jointCount, samples::Rigidity::rigid)};
   test::SystemEngine engine_;
-  std::vector<PaletteHandle> palettes_;
+  std::vector<PoseHandle> palettes_;
   std::uint64_t vertexCount_ = 0;
   vulkan::FrameStatistics lastFrame_;
 };

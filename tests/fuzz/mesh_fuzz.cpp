@@ -65,8 +65,7 @@ class MeshMaker {
   }
 
   std::uint32_t jointCount() {
-    constexpr std::array<std::uint32_t, 4> odd{0, maxPaletteJoints, maxPaletteJoints + 1,
-                                               0xffffffffu};
+    constexpr std::array<std::uint32_t, 4> odd{0, maxPoseJoints, maxPoseJoints + 1, 0xffffffffu};
     return seldom() ? data_.PickValueInArray(odd)
                     : data_.ConsumeIntegralInRange<std::uint32_t>(1, mostJointsToSkin);
   }
@@ -287,7 +286,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
   const MeshReport report = validate(mesh, jointCount);
   checkReport(report);
 
-  const bool isPalette = jointCount >= 1 && jointCount <= maxPaletteJoints;
+  const bool isPalette = jointCount >= 1 && jointCount <= maxPoseJoints;
   const Result<PackedMesh> packed = pack(mesh, jointCount);
   require(packed.ok() == (report.packable() && isPalette));
   const Result<JointBounds> bounds = jointBounds(mesh, jointCount);

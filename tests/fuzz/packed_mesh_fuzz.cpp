@@ -95,7 +95,7 @@ void putChecksumRight(std::vector<std::uint32_t>& words) {
 
 /// A job with all attributes that the mesh claims to have, and its first and last morph target.
 void planWith(const MeshInfo& info) {
-  const Palette palette{info.requiredJoints, 0, true};
+  const PoseDescription palette{info.requiredJoints, 0, true};
   std::vector<MorphWeight> morphs;
   if (info.morphTargetCount > 1) morphs.push_back({info.morphTargetCount - 1, 0.5f});
   if (info.morphTargetCount > 0) morphs.push_back({0, -2});
@@ -107,10 +107,10 @@ void planWith(const MeshInfo& info) {
   if (info.hasTangents) job.tangents = {24, stride, VertexFormat::float32x4};
   job.morphs = morphs;
   Batch batch;
-  batch.palettes = {&palette, 1};
+  batch.poses = {&palette, 1};
   batch.jobs = {&job, 1};
   batch.meshesSize = info.byteSize;
-  batch.matricesSize = std::uint64_t{info.requiredJoints} * sizeof(JointMatrix);
+  batch.posesSize = std::uint64_t{info.requiredJoints} * sizeof(JointMatrix);
   batch.outputs = OutputSizes::oneBuffer(std::uint64_t{info.vertexCount} * stride);
   Plan plan;
   require(makePlan(batch, {}, {}, plan).ok());

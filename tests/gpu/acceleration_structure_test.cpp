@@ -167,16 +167,16 @@ class AccelerationStructureTest : public DeviceTest,
   void preparePose(Pose& pose, std::uint32_t seed) {
     pose.joints = randomPose(seed, jointCount, Rigidity::rigid);
     addExpectations(pose, mesh_);
-    const Palette palette{jointCount, 0, false};
+    const PoseDescription palette{jointCount, 0, false};
     Job job;
     job.mesh = packed_->info();
     job.positions = GetParam().attribute;
     job.box = pose.box;
     Batch batch;
-    batch.palettes = {&palette, 1};
+    batch.poses = {&palette, 1};
     batch.jobs = {&job, 1};
     batch.meshesSize = meshes_.bytes().size();
-    batch.matricesSize = pose.joints.size() * sizeof(JointMatrix);
+    batch.posesSize = pose.joints.size() * sizeof(JointMatrix);
     batch.outputs = OutputSizes::oneBuffer(job.positions.offset +
                                            std::uint64_t{vertexCount} * job.positions.stride);
     const Result<void> planned = makePlan(batch, context().limits(), {}, pose.plan);
@@ -190,7 +190,7 @@ class AccelerationStructureTest : public DeviceTest,
       const BufferRequirement requirement = pose.plan.buffer(role);
       return makeBuffer(requirement.size, requirement.usage | more);
     };
-    pose.matrices = make(BufferRole::matrices);
+    pose.matrices = make(BufferRole::poses);
     pose.tables = make(BufferRole::tables);
     pose.palettes = make(BufferRole::palettes);
     pose.results = make(BufferRole::results);

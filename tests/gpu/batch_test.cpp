@@ -92,7 +92,7 @@ TEST_F(BatchTest, EveryInstanceAgreesWithTheReference) {
     const samples::SkinRequest& request = crowd.requests[instance];
     OwnedMesh& mesh = crowd.meshes[instance % 3];
     const reference::SkinnedMesh expected =
-        *reference::skin(mesh.view(), request.palette, request.method);
+        *reference::skin(mesh.view(), request.pose, request.method);
     const samples::SkinnedVertices& skinned = batch.instances[instance];
     const Comparison comparison = *compareWithReference(expected, skinned.view(), request.method);
     EXPECT_TRUE(comparison.passed()) << "instance " << instance << ": " << comparison.worstPosition
@@ -195,7 +195,7 @@ TEST_F(BatchTest, SingularJointsGiveFiniteVertices) {
   }
 }
 
-TEST_F(BatchTest, TheStatusTellsWhatAPaletteHolds) {
+TEST_F(BatchTest, TheStatusTellsWhatAPoseHolds) {
   OwnedMesh mesh = randomMesh(9, 100, 20, 4);
   const PackedMesh packedMesh = packed(mesh, 20);
   const std::vector<JointMatrix> rigid = randomPose(10, 20, Rigidity::rigid),
@@ -207,7 +207,7 @@ TEST_F(BatchTest, TheStatusTellsWhatAPaletteHolds) {
   const samples::BatchResult result = run(requests);
   const auto expectStatus = [&](std::size_t index, std::uint32_t twoPhase, std::uint32_t nonRigid,
                                 std::uint32_t undeclared) {
-    const PaletteStatus& status = result.instances[index].status;
+    const PoseStatus& status = result.instances[index].status;
     EXPECT_EQ(status.twoPhase, twoPhase) << index;
     EXPECT_EQ(status.nonRigidJoints, nonRigid) << index;
     EXPECT_EQ(status.undeclaredScale, undeclared) << index;
@@ -232,13 +232,13 @@ TEST_F(BatchTest, AVertexWithoutWeightStaysInBindPose) {
   }
 }
 
-TEST_F(BatchTest, TheMostJointsAPaletteMayHave) {
-  OwnedMesh mesh = randomMesh(13, 2000, maxPaletteJoints, 4);
-  mesh.joints[0] = maxPaletteJoints - 1;
+TEST_F(BatchTest, TheMostJointsAPoseMayHave) {
+  OwnedMesh mesh = randomMesh(13, 2000, maxPoseJoints, 4);
+  mesh.joints[0] = maxPoseJoints - 1;
   mesh.weights[0] = 1;
-  const PackedMesh packedMesh = packed(mesh, maxPaletteJoints);
-  EXPECT_EQ(packedMesh.info().requiredJoints, maxPaletteJoints);
-  const std::vector<JointMatrix> pose = randomPose(14, maxPaletteJoints, Rigidity::rigid);
+  const PackedMesh packedMesh = packed(mesh, maxPoseJoints);
+  EXPECT_EQ(packedMesh.info().requiredJoints, maxPoseJoints);
+  const std::vector<JointMatrix> pose = randomPose(14, maxPoseJoints, Rigidity::rigid);
   for (const Method method : allMethods) {
     const samples::SkinRequest request{&packedMesh, pose, false, method};
     const samples::SkinnedVertices skinned = run({&request, 1}).instances[0];

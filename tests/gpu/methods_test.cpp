@@ -434,7 +434,7 @@ TEST_P(MethodTest, APoseInTwoFormsIsTheSamePose) {
   for (const samples::SkinRequest& request : crowd.requests) {
     requests.push_back(request);
     requests.push_back(
-        {request.mesh, request.palette, true,
+        {request.mesh, request.pose, true,
          GetParam() == Method::logMatrix ? Method::dualQuaternion : Method::logMatrix});
   }
   const samples::BatchResult alone = run(crowd.requests), both = run(requests);

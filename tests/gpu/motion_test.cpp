@@ -33,8 +33,8 @@ class MotionTest : public DeviceTest, public ::testing::WithParamInterface<Motio
   samples::SkinRequest request(std::size_t pose, std::size_t before) const {
     samples::SkinRequest request;
     request.mesh = &packed_;
-    request.palette = poses_[pose];
-    request.previousPalette = poses_[before];
+    request.pose = poses_[pose];
+    request.previousPose = poses_[before];
     return request;
   }
 

@@ -143,14 +143,14 @@ class Rhi {
   static std::array<BufferRole, storageBuffersWanted> rolesOf(const Variant& variant) {
     constexpr BufferRole out = BufferRole::positions, tables = BufferRole::tables;
     if (variant.kernel == Kernel::palette)
-      return {tables, BufferRole::matrices, BufferRole::palettes, out, out, out,
+      return {tables, BufferRole::poses,  BufferRole::palettes, out, out, out,
               out,    BufferRole::results};
     if (variant.kernel == Kernel::visibility)
       return {tables, BufferRole::visibility, BufferRole::history, BufferRole::counters, out, out,
               out,    BufferRole::results};
     return {tables,
             BufferRole::meshes,
-            variant.method == Method::linear ? BufferRole::matrices : BufferRole::palettes,
+            variant.method == Method::linear ? BufferRole::poses : BufferRole::palettes,
             out,
             out,
             out,
@@ -264,14 +264,14 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
   const MeshHandle mesh = must(scene.addMesh(packed.info()));
   std::ranges::copy(packed.bytes(), rhi.bytes(BufferRole::meshes).begin() +
                                         static_cast<std::ptrdiff_t>(must(scene.meshOffset(mesh))));
-  std::vector<PaletteHandle> palettes;
+  std::vector<PoseHandle> palettes;
   std::vector<InstanceHandle> instances;
   std::vector<InstanceDescription> descriptions;
   for (std::uint32_t index = 0; index < count; ++index) {
-    palettes.push_back(must(scene.addPalette(jointCount)));
+    palettes.push_back(must(scene.addPose(jointCount)));
     InstanceDescription instance;
     instance.mesh = mesh;
-    instance.palette = palettes.back();
+    instance.pose = palettes.back();
     instance.method = index % 3 == 0 ? Method::linear : Method::dualQuaternion;
     instance.layout = motionLayout();
     instance.bounds = index % 4 == 0;
@@ -300,7 +300,7 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
       const PosePlace place = must(scene.writePose(palettes[index]));
       const Pose pose = poseOf(frame, index);
       ASSERT_EQ(place.jointCount, pose.size());
-      std::memcpy(rhi.bytes(BufferRole::matrices).data() + place.offset, pose.data(),
+      std::memcpy(rhi.bytes(BufferRole::poses).data() + place.offset, pose.data(),
                   pose.size() * sizeof(JointMatrix));
     }
     must(scene.plan(plan));

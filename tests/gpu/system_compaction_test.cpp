@@ -23,7 +23,7 @@ class SystemCompactionTest : public SystemTest {
     instance_.mesh = engine_->addMesh(packed_);
     instance_.layout = motionLayout();
     for (std::uint32_t i = 0; i < 6; ++i) {
-      instance_.palette = palettes_.emplace_back(engine_->addPalette(systemPose(i)));
+      instance_.pose = palettes_.emplace_back(engine_->addPose(systemPose(i)));
       instances_.push_back(engine_->addInstance(instance_));
     }
     engine_->submit();
@@ -57,7 +57,7 @@ class SystemCompactionTest : public SystemTest {
   PackedMesh packed_ = systemMesh(1, 100);
   std::optional<SystemEngine> engine_;
   InstanceDescription instance_;
-  std::vector<PaletteHandle> palettes_;
+  std::vector<PoseHandle> palettes_;
   std::vector<InstanceHandle> instances_;
 };
 

@@ -41,7 +41,7 @@ class SystemCrowdTest : public SystemTest {
                      std::uint32_t member) {
     InstanceDescription instance;
     instance.mesh = meshes[member % meshCount];
-    instance.palette = engine.addPalette(systemPose(poseOf(member)));
+    instance.pose = engine.addPose(systemPose(poseOf(member)));
     instance.method = methodOf(member);
     instance.layout = plainLayout();
     return engine.addInstance(instance);

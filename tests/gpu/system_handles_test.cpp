@@ -93,34 +93,34 @@ TEST_F(SystemHandlesTest, MeshesThatAreGoneAreNoticed) {
   }
 }
 
-TEST_F(SystemHandlesTest, PalettesThatAreGoneAreNoticed) {
-  const PaletteHandle old = must(engine()->addPalette(8));
-  must(engine()->removePalette(old));
+TEST_F(SystemHandlesTest, PosesThatAreGoneAreNoticed) {
+  const PoseHandle old = must(engine()->addPose(8));
+  must(engine()->removePose(old));
   for (int i = 0; i < 4; ++i) {
-    for (const PaletteHandle palette : {old, PaletteHandle{}, PaletteHandle{1000, 1}}) {
+    for (const PoseHandle palette : {old, PoseHandle{}, PoseHandle{1000, 1}}) {
       InstanceDescription instance = one_->description;
-      instance.palette = palette;
+      instance.pose = palette;
       expectInvalid(engine()->addInstance(instance), "addInstance");
       expectInvalid(engine()->writePose(palette), "writePose");
-      expectInvalid(engine()->removePalette(palette), "removePalette");
+      expectInvalid(engine()->removePose(palette), "removePose");
     }
     engine().submit();
     engine().begin();
-    EXPECT_NE(must(engine()->addPalette(8)), old);
+    EXPECT_NE(must(engine()->addPose(8)), old);
   }
 }
 
 TEST_F(SystemHandlesTest, WhatAnInstanceUsesStays) {
   const MeshHandle first = one_->description.mesh;
   expectInvalid(engine()->removeMesh(first), "removeMesh");
-  expectInvalid(engine()->removePalette(one_->description.palette), "removePalette");
+  expectInvalid(engine()->removePose(one_->description.pose), "removePose");
   const MeshHandle second = engine().addMesh(systemMesh(2, 30));
   must(engine()->setMesh(one_->instance, second));
   must(engine()->removeMesh(first));
   expectInvalid(engine()->removeMesh(second), "removeMesh");
   must(engine()->removeInstance(one_->instance));
   must(engine()->removeMesh(second));
-  must(engine()->removePalette(one_->description.palette));
+  must(engine()->removePose(one_->description.pose));
   engine().submit();
 }
 
@@ -130,11 +130,11 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
     OwnedMesh mesh = randomMesh(1, 20, 8, 4, false);
     return pack(mesh.view(), 8);
   }()));
-  const PaletteHandle narrow = must(engine()->addPalette(1));
+  const PoseHandle narrow = must(engine()->addPose(1));
   const float infinity = std::numeric_limits<float>::infinity();
   const std::pair<const char*, Change> changes[] = {
       {"updateInterval", [](InstanceDescription& d) { d.updateInterval = 0; }},
-      {"too few joints", [&](InstanceDescription& d) { d.palette = narrow; }},
+      {"too few joints", [&](InstanceDescription& d) { d.pose = narrow; }},
       {"no positions", [](InstanceDescription& d) { d.layout.positions = VertexFormat::none; }},
       {"octahedral positions",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::octahedral16x2; }},
@@ -173,8 +173,8 @@ TEST_F(SystemHandlesTest, ChangesThatBreakARuleAreRefused) {
   expectInvalid(engine()->setMorphWeights(one_->instance, twice), "a target twice");
   expectInvalid(engine()->setMorphWeights(one_->instance, {&infinite, 1}), "weight");
   expectInvalid(engine()->setUpdateInterval(one_->instance, 0), "interval");
-  expectInvalid(engine()->addPalette(0), "addPalette");
-  EXPECT_FALSE(engine()->addPalette(maxPaletteJoints + 1).ok());
+  expectInvalid(engine()->addPose(0), "addPose");
+  EXPECT_FALSE(engine()->addPose(maxPoseJoints + 1).ok());
   const MeshHandle wide = engine().addMesh(systemMesh(2, 30, 50));
   expectInvalid(engine()->setMesh(one_->instance, wide), "setMesh");
   engine().submit();
@@ -191,22 +191,22 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
   full.begin();
   const MeshHandle first = full.addMesh(mesh);
   expectRefused(full->addMesh(mesh), ErrorCode::limitExceeded, "addMesh");
-  const PaletteHandle palette = must(full->addPalette(12));
-  expectRefused(full->addPalette(12), ErrorCode::limitExceeded, "addPalette");
+  const PoseHandle palette = must(full->addPose(12));
+  expectRefused(full->addPose(12), ErrorCode::limitExceeded, "addPose");
   must(full->removeMesh(first));
-  must(full->removePalette(palette));
+  must(full->removePose(palette));
   full.submit();
   full.begin();
   full.submit();
   full.begin();
   full.addMesh(mesh);
-  must(full->addPalette(12));
+  must(full->addPose(12));
   full.submit();
 }
 
 // Whatever another palette has left in its memory, and whether or not the frame in which it was
 // added had anything else to do.
-TEST_F(SystemHandlesTest, APaletteRestsInTheIdentityUntilItIsWritten) {
+TEST_F(SystemHandlesTest, APoseRestsInTheIdentityUntilItIsWritten) {
   SkinningSystemDescription small = description();
   small.jointBudget = 8;
   for (const bool hasWork : {false, true}) {
@@ -214,15 +214,15 @@ TEST_F(SystemHandlesTest, APaletteRestsInTheIdentityUntilItIsWritten) {
     one.engine.submit();
     for (std::uint32_t frame = 0; frame < small.framesInFlight; ++frame) {
       one.engine.begin();
-      one.engine.writePose(one.description.palette, systemPose(3 + frame));
+      one.engine.writePose(one.description.pose, systemPose(3 + frame));
       one.engine.submit();
     }
     one.engine.begin();
     must(one.engine->removeInstance(one.instance));
-    must(one.engine->removePalette(one.description.palette));
+    must(one.engine->removePose(one.description.pose));
     one.engine.submit();
     one.engine.begin();
-    one.description.palette = must(one.engine->addPalette(8));
+    one.description.pose = must(one.engine->addPose(8));
     if (!hasWork) {
       one.engine.submit();
       EXPECT_EQ(one.engine.lastFrame().dispatches, 0u);
@@ -256,7 +256,7 @@ TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
 TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
   SkinningSystem system = must(SkinningSystem::create(description()));
   expectInvalid(system.record(VK_NULL_HANDLE), "record before any frame");
-  const PaletteHandle palette = must(system.addPalette(4));
+  const PoseHandle palette = must(system.addPose(4));
   expectInvalid(system.writePose(palette), "writePose before any frame");
   expectInvalid(system.beginFrame(0, 0), "frames count from 1");
   must(system.beginFrame(1, 0));
@@ -273,7 +273,7 @@ TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
 TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
   engine().submit();
   expectInvalid(engine()->record(VK_NULL_HANDLE), "record without another beginFrame");
-  expectInvalid(engine()->writePose(one_->description.palette), "writePose after record");
+  expectInvalid(engine()->writePose(one_->description.pose), "writePose after record");
 }
 
 TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
@@ -326,7 +326,7 @@ TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
   instance.layout = plainLayout();
   const PackedMesh packed = systemMesh(1, 20);
   instance.mesh = engine.addMesh(packed);
-  instance.palette = engine.addPalette(systemPose(1));
+  instance.pose = engine.addPose(systemPose(1));
   std::vector<InstanceHandle> instances{engine.addInstance(instance)};
   engine.submit();
   second.emplace(std::move(*first));
@@ -354,7 +354,7 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   unprepared.begin();
   InstanceDescription instance = one_->description;
   instance.mesh = unprepared.addMesh(one_->packed);
-  instance.palette = unprepared.addPalette(systemPose(2));
+  instance.pose = unprepared.addPose(systemPose(2));
   const InstanceHandle handle = must(unprepared->addInstance(instance));
   expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared, "record");
   must(unprepared->prepare(pipelineNeeds(instance)));
@@ -366,12 +366,12 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
 
 TEST_F(SystemHandlesTest, ASystemCanBeMoved) {
   SkinningSystem first = must(SkinningSystem::create(description()));
-  const PaletteHandle palette = must(first.addPalette(4));
+  const PoseHandle palette = must(first.addPose(4));
   SkinningSystem second = std::move(first);
   must(second.beginFrame(1, 0));
   EXPECT_EQ(must(second.writePose(palette)).size(), 4u);
   second = must(SkinningSystem::create(description()));
-  expectInvalid(second.removePalette(palette), "a handle of another system");
+  expectInvalid(second.removePose(palette), "a handle of another system");
 }
 
 }  // namespace

@@ -31,14 +31,14 @@ class SystemLayoutTest : public SystemTest {
     instance.box = {{-6, -6, -6}, {6, 6, 6}};
     for (std::uint32_t i = 0; i < 3; ++i) {
       instance.mesh = meshHandles_[i];
-      instance.palette = palette_;
+      instance.pose = palette_;
       instances_.push_back({engine.addInstance(instance), instance, i});
     }
   }
   void fillEngine(SystemEngine& engine, std::span<const VertexLayout> layouts) {
     engine.fillOutput(poison);
     engine.begin();
-    palette_ = engine.addPalette(pose_);
+    palette_ = engine.addPose(pose_);
     for (const PackedMesh& mesh : meshes_) meshHandles_.push_back(engine.addMesh(mesh));
     for (const VertexLayout& layout : layouts) addInstances(engine, layout);
     engine.submit();
@@ -56,7 +56,7 @@ class SystemLayoutTest : public SystemTest {
   std::vector<PackedMesh> meshes_{systemMesh(1, 33), systemMesh(2, 100), systemMesh(3, 7)};
   std::vector<MeshHandle> meshHandles_;
   Pose pose_ = systemPose(3);
-  PaletteHandle palette_;
+  PoseHandle palette_;
   std::vector<Placed> instances_;
 };
 
@@ -151,11 +151,11 @@ TEST_F(SystemLayoutTest, FormatsOfTwoBytesAndOneStandSideBySide) {
 TEST_F(SystemLayoutTest, EachInstanceHasABoxOfItsOwn) {
   SystemEngine engine(device(), description());
   engine.begin();
-  palette_ = engine.addPalette(pose_);
+  palette_ = engine.addPose(pose_);
   InstanceDescription instance;
   instance.layout.positions = VertexFormat::snorm16x4;
   instance.mesh = engine.addMesh(meshes_[1]);
-  instance.palette = palette_;
+  instance.pose = palette_;
   for (const float half : {4.0f, 9.0f}) {
     instance.box = {{-half, -half, -half}, {half, half, half}};
     instances_.push_back({engine.addInstance(instance), instance, 1});

@@ -19,7 +19,7 @@ class SystemLimitsTest : public SystemTest {
   struct Member {
     InstanceHandle handle;
     InstanceDescription description;
-    PaletteHandle palette;
+    PoseHandle poseHandle;
     std::uint32_t mesh = 0, pose = 0;
   };
   void addCrowd(SystemEngine& engine, std::uint32_t count, const VertexLayout& layout) {
@@ -29,9 +29,9 @@ class SystemLimitsTest : public SystemTest {
       Member member;
       member.mesh = i % 2;
       member.pose = i % 10;
-      member.palette = engine.addPalette(systemPose(member.pose));
+      member.poseHandle = engine.addPose(systemPose(member.pose));
       member.description.mesh = handles[member.mesh];
-      member.description.palette = member.palette;
+      member.description.pose = member.poseHandle;
       member.description.layout = layout;
       member.description.method = i % 3 == 0 ? Method::linear : Method::dualQuaternion;
       member.handle = engine.addInstance(member.description);
@@ -42,7 +42,7 @@ class SystemLimitsTest : public SystemTest {
     engine.begin();
     for (Member& member : crowd_) {
       member.pose += by;
-      engine.writePose(member.palette, systemPose(member.pose));
+      engine.writePose(member.poseHandle, systemPose(member.pose));
     }
     engine.submit();
   }
@@ -59,7 +59,7 @@ class SystemLimitsTest : public SystemTest {
     instance.layout = plainLayout();
     instance.culledOnGpu = true;
     instance.mesh = engine.addMesh(meshes_[1]);
-    instance.palette = engine.addPalette(systemPose(1));
+    instance.pose = engine.addPose(systemPose(1));
     std::vector<InstanceHandle> instances;
     for (int i = 0; i < count; ++i) instances.push_back(engine.addInstance(instance));
     const samples::MappedBuffer words = must(samples::MappedBuffer::create(
@@ -126,7 +126,7 @@ TEST_F(SystemLimitsTest, OutputLargerThanTheDevicesRange) {
   InstanceDescription instance;
   instance.layout = plainLayout();
   instance.mesh = engine.addMesh(packed);
-  instance.palette = engine.addPalette(systemPose(1));
+  instance.pose = engine.addPose(systemPose(1));
   std::vector<InstanceHandle> instances;
   const std::uint64_t size = std::uint64_t{vertexCount} * 24;
   while ((instances.size() + 1) * size <= large.outputBudget)
@@ -174,7 +174,7 @@ TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
       EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
     };
     expectRefused(engine->addMesh(*pack(randomMesh(1, 200, 8, 5).view(), 8)), "5 influences");
-    expectRefused(engine->addPalette(8, true), "noScale");
+    expectRefused(engine->addPose(8, true), "noScale");
     const PackedMesh packed = systemMesh(3, 1234);
     ASSERT_NE(packed.info().morphTargetCount, 0u);
     if (noMorphTargets) {
@@ -187,7 +187,7 @@ TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
     instance.layout = plainLayout();
     instance.mesh = engine.addMesh(packed);
     const std::vector<JointMatrix> pose = randomPose(1, 8, Rigidity::rigid);
-    instance.palette = engine.addPalette(pose, false);
+    instance.pose = engine.addPose(pose, false);
     const InstanceHandle added = engine.addInstance(instance);
     engine.submit();
     expectSkinned(engine.read(engine.readOutput(), added), alone(packed, pose, instance));

@@ -85,14 +85,14 @@ class SystemMemoryTest : public SystemTest {
     instance.layout = motionLayout();
     instance.bounds = true;
     instance.mesh = engine.addMesh(packed);
-    instance.palette = engine.addPalette(systemPose(1));
+    instance.pose = engine.addPose(systemPose(1));
     for (int frame = 0; frame < 4; ++frame) {
       if (frame != 0) engine.begin(1);
       for (int i = 0; i < 40; ++i) {
         instance.culledOnGpu = i % 2 == 0;
         engine.addInstance(instance);
       }
-      engine.writePose(instance.palette, systemPose(2));
+      engine.writePose(instance.pose, systemPose(2));
       engine.submit({visibility.handle(), 0});
     }
     engine.finish();
@@ -182,11 +182,11 @@ TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   InstanceDescription instance;
   instance.layout = motionLayout();
   instance.mesh = engine.addMesh(packed);
-  instance.palette = engine.addPalette(systemPose(1));
+  instance.pose = engine.addPose(systemPose(1));
   std::vector<InstanceHandle> instances{engine.addInstance(instance)};
   engine.submit();
   engine.begin();
-  engine.writePose(instance.palette, systemPose(2));
+  engine.writePose(instance.pose, systemPose(2));
   while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
   const std::uint32_t before = memory.allocations;
   for (std::uint32_t failed = 0; failed < 2; ++failed) {
@@ -241,13 +241,13 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
     InstanceDescription instance;
     instance.layout = motionLayout();
     instance.mesh = engine.addMesh(packed);
-    instance.palette = engine.addPalette(systemPose(1));
+    instance.pose = engine.addPose(systemPose(1));
     std::vector<InstanceHandle> instances;
     for (int i = 0; i < 50; ++i) instances.push_back(engine.addInstance(instance));
     engine.submit();
     engine.begin(1);
     for (const InstanceHandle handle : instances) must(engine->removeInstance(handle));
-    must(engine->removePalette(instance.palette));
+    must(engine->removePose(instance.pose));
     must(engine->removeMesh(instance.mesh));
     engine.submit();
     if (round == 10) allocations = log.count("vkAllocateMemory");

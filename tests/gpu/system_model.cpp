@@ -4,9 +4,9 @@
 
 namespace dermis::test {
 
-bool SystemModel::isPaletteUsed(std::uint32_t palette) const {
+bool SystemModel::isPoseUsed(std::uint32_t palette) const {
   return std::ranges::any_of(
-      instances, [&](const ModelInstance& instance) { return instance.palette == palette; });
+      instances, [&](const ModelInstance& instance) { return instance.pose == palette; });
 }
 
 bool SystemModel::isMeshUsed(std::uint32_t mesh) const {
@@ -14,10 +14,10 @@ bool SystemModel::isMeshUsed(std::uint32_t mesh) const {
                              [&](const ModelInstance& instance) { return instance.mesh == mesh; });
 }
 
-void SystemModel::writePose(std::uint32_t palette, std::uint32_t pose) {
-  palettes.at(palette).pose = pose;
+void SystemModel::writePose(std::uint32_t number, std::uint32_t pose) {
+  poses.at(number).pose = pose;
   for (ModelInstance& instance : instances) {
-    if (instance.palette == palette) instance.isChanged = true;
+    if (instance.pose == number) instance.isChanged = true;
   }
 }
 
@@ -83,7 +83,7 @@ bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lis
   } else if (!instance.isChanged && !comesBack) {
     EXPECT_FALSE(isSkinned) << "it did not change";
   } else if (!comesBack) {
-    const std::pair beat{instance.palette, instance.description.updateInterval};
+    const std::pair beat{instance.pose, instance.description.updateInterval};
     EXPECT_EQ(lists.beats.emplace(beat, isSkinned).first->second, isSkinned)
         << "instances of one palette take the same frames";
   }

@@ -21,15 +21,15 @@ struct ShownPose {
   friend auto operator<=>(const ShownPose&, const ShownPose&) = default;
 };
 
-struct ModelPalette {
-  PaletteHandle handle;
+struct ModelPose {
+  PoseHandle handle;
   std::uint32_t pose = 0;
 };
 
 struct ModelInstance {
   InstanceHandle handle;
   InstanceDescription description;
-  std::uint32_t mesh = 0, palette = 0, morphs = 0;
+  std::uint32_t mesh = 0, pose = 0, morphs = 0;
   std::uint32_t vertexCount = 0;
   bool isVisible = true;
   bool isShownByGpu = true;  ///< the word of the frame, where it is culled on the GPU
@@ -54,12 +54,12 @@ class SystemModel {
  public:
   explicit SystemModel(SystemEngine& engine) : engine_(engine) {}
 
-  std::map<std::uint32_t, ModelPalette> palettes;
+  std::map<std::uint32_t, ModelPose> poses;
   std::vector<ModelInstance> instances;
 
-  bool isPaletteUsed(std::uint32_t palette) const;
+  bool isPoseUsed(std::uint32_t pose) const;
   bool isMeshUsed(std::uint32_t mesh) const;
-  void writePose(std::uint32_t palette, std::uint32_t pose);
+  void writePose(std::uint32_t number, std::uint32_t pose);
   /// The instance was removed in the frame that was begun last.
   void remove(std::size_t index);
 
@@ -85,7 +85,7 @@ class SystemModel {
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> beats;
   };
   ShownPose wantedPose(const ModelInstance& instance) const {
-    return {instance.mesh, palettes.at(instance.palette).pose, instance.morphs};
+    return {instance.mesh, poses.at(instance.pose).pose, instance.morphs};
   }
   void lock(const InstanceOutput& output);
   void checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed);

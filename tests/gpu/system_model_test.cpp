@@ -67,14 +67,14 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   bool chance(std::uint32_t percent) { return below(100) < percent; }
   ModelInstance& anyInstance() { return model_->instances[below(model_->instances.size())]; }
-  auto anyPalette() { return std::next(model_->palettes.begin(), below(model_->palettes.size())); }
+  auto anyPalette() { return std::next(model_->poses.begin(), below(model_->poses.size())); }
   auto anyMesh() { return std::next(meshes_.begin(), below(meshes_.size())); }
 
   // The steps.
   void addMesh();
   void removeMesh();
-  void addPalette();
-  void removePalette();
+  void addPose();
+  void removePose();
   void addInstance();
   void removeInstance();
   void changeInstance();
@@ -116,21 +116,21 @@ void SystemModelTest::removeMesh() {
   if (removed) meshes_.erase(mesh);
 }
 
-void SystemModelTest::addPalette() {
-  if (model_->palettes.size() >= 30) return;
+void SystemModelTest::addPose() {
+  if (model_->poses.size() >= 30) return;
   const std::uint32_t pose = below(poseCount);
-  const Result<PaletteHandle> added = system().addPalette(8);
+  const Result<PoseHandle> added = system().addPose(8);
   if (!added) return;  // places of palettes that went are not free yet
-  model_->palettes[nextNumber_++] = {*added, pose};
+  model_->poses[nextNumber_++] = {*added, pose};
   engine_->writePose(*added, systemPose(pose));
 }
 
-void SystemModelTest::removePalette() {
-  if (model_->palettes.size() < 3) return;
+void SystemModelTest::removePose() {
+  if (model_->poses.size() < 3) return;
   const auto palette = anyPalette();
-  const Result<void> removed = system().removePalette(palette->second.handle);
-  EXPECT_NE(removed.ok(), model_->isPaletteUsed(palette->first));
-  if (removed) model_->palettes.erase(palette);
+  const Result<void> removed = system().removePose(palette->second.handle);
+  EXPECT_NE(removed.ok(), model_->isPoseUsed(palette->first));
+  if (removed) model_->poses.erase(palette);
 }
 
 /// Refused where there is no room, and only there.
@@ -141,16 +141,16 @@ void SystemModelTest::expectRoomIsMissing(const Error& error, std::uint64_t size
 }
 
 void SystemModelTest::addInstance() {
-  if (meshes_.empty() || model_->palettes.empty()) return;
+  if (meshes_.empty() || model_->poses.empty()) return;
   const auto mesh = anyMesh();
   const auto palette = anyPalette();
   ModelInstance instance;
   instance.mesh = mesh->first;
-  instance.palette = palette->first;
+  instance.pose = palette->first;
   instance.vertexCount = kinds_[mesh->second.kind].vertexCount();
   InstanceDescription& description = instance.description;
   description.mesh = mesh->second.handle;
-  description.palette = palette->second.handle;
+  description.pose = palette->second.handle;
   description.method = methods[below(methods.size())];
   description.layout = someLayouts()[below(3)];
   description.culledOnGpu = chance(25);
@@ -233,7 +233,7 @@ void SystemModelTest::showSome(std::span<std::byte> words) {
 }
 
 void SystemModelTest::runFrame() {
-  for (auto& [number, palette] : model_->palettes) {
+  for (auto& [number, palette] : model_->poses) {
     if (!chance(60)) continue;
     const std::uint32_t pose = below(poseCount);
     engine_->writePose(palette.handle, systemPose(pose));
@@ -281,8 +281,8 @@ void SystemModelTest::step() {
   const bool isCrowded = model_->instances.size() > 60;
   if (kind < 4) return addMesh();
   if (kind < 7) return removeMesh();
-  if (kind < 13) return addPalette();
-  if (kind < 17) return removePalette();
+  if (kind < 13) return addPose();
+  if (kind < 17) return removePose();
   if (kind < 38) return isCrowded ? removeInstance() : addInstance();
   if (kind < 50) return removeInstance();
   if (kind < 75) return changeInstance();

@@ -21,7 +21,7 @@ class SystemMotionTest : public SystemTest {
   }
 
   SystemEngine& engine() { return one_->engine; }
-  void move(std::uint32_t pose) { engine().writePose(one_->description.palette, systemPose(pose)); }
+  void move(std::uint32_t pose) { engine().writePose(one_->description.pose, systemPose(pose)); }
   void moveInFrame(std::uint32_t pose) {
     engine().begin();
     move(pose);
@@ -303,7 +303,7 @@ TEST_F(SystemMotionTest, ASkippedPoseIsSkinnedWithinItsInterval) {
 class SystemIntervalTest : public SystemTest {};
 
 // A body and its clothes rest until the face alone moves: whatever follows, they show one pose.
-TEST_F(SystemIntervalTest, InstancesOfAPaletteKeepTogetherWhenOneChangesAlone) {
+TEST_F(SystemIntervalTest, InstancesOfAPoseKeepTogetherWhenOneChangesAlone) {
   SingleInstance body(device(), description(), plainLayout());
   body.description.updateInterval = 4;
   must(body.engine->setUpdateInterval(body.instance, 4));
@@ -317,7 +317,7 @@ TEST_F(SystemIntervalTest, InstancesOfAPaletteKeepTogetherWhenOneChangesAlone) {
     body.engine.submit();
     for (std::uint32_t pose = 0; pose < 8; ++pose) {
       body.engine.begin();
-      body.engine.writePose(body.description.palette, systemPose(pose));
+      body.engine.writePose(body.description.pose, systemPose(pose));
       body.engine.submit();
       const std::set<std::uint32_t> skinned = indicesOf(body.engine->skinnedInstances());
       EXPECT_EQ(skinned.contains(body.instance.index), skinned.contains(clothes.index));
@@ -339,7 +339,7 @@ TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
       for (std::uint32_t frame = 1; frame < away; ++frame) one.engine.runFrame();
       one.engine.begin();
       if (!poseFirst) must(one.engine->setVisible(one.instance, true));
-      one.engine.writePose(one.description.palette, systemPose(away));
+      one.engine.writePose(one.description.pose, systemPose(away));
       if (poseFirst) must(one.engine->setVisible(one.instance, true));
       one.engine.submit();
       EXPECT_EQ(one.engine.lastFrame().skinnedInstances, 1u);
@@ -349,18 +349,18 @@ TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
   }
 }
 
-TEST_F(SystemIntervalTest, PalettesAreSpreadOverTheFramesAndTheirInstancesKeepTogether) {
+TEST_F(SystemIntervalTest, PosesAreSpreadOverTheFramesAndTheirInstancesKeepTogether) {
   SystemEngine engine(device(), description());
   engine.begin();
   const MeshHandle mesh = engine.addMesh(systemMesh(1, 20));
-  std::vector<PaletteHandle> palettes;
+  std::vector<PoseHandle> palettes;
   std::vector<std::pair<InstanceHandle, InstanceHandle>> pairs;
   InstanceDescription instance;
   instance.mesh = mesh;
   instance.layout = plainLayout();
   instance.updateInterval = 4;
   for (std::uint32_t i = 0; i < 16; ++i) {
-    instance.palette = palettes.emplace_back(engine.addPalette(systemPose(i)));
+    instance.pose = palettes.emplace_back(engine.addPose(systemPose(i)));
     const InstanceHandle body = engine.addInstance(instance);
     pairs.push_back({body, engine.addInstance(instance)});
   }

@@ -25,11 +25,11 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
   for (std::uint32_t mesh = 0; mesh < meshCount; ++mesh)
     meshes.push_back(engine.addMesh(systemMesh(mesh, 40 + mesh, 4)));
   const Pose pose = systemPose(1, 4);
-  std::vector<PaletteHandle> palettes;
+  std::vector<PoseHandle> palettes;
   for (std::uint32_t i = 0; i < 10'000; ++i) {
     InstanceDescription instance;
     instance.mesh = meshes[i % meshCount];
-    instance.palette = palettes.emplace_back(engine.addPalette(pose));
+    instance.pose = palettes.emplace_back(engine.addPose(pose));
     instance.method = i % 3 == 0 ? Method::linear : Method::dualQuaternion;
     instance.layout = motionLayout();
     engine.addInstance(instance);
@@ -44,7 +44,7 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
       break;
     }
     engine.begin();
-    for (const PaletteHandle palette : palettes) engine.writePose(palette, pose);
+    for (const PoseHandle palette : palettes) engine.writePose(palette, pose);
     engine.submit();
   }
 }
@@ -63,17 +63,17 @@ TEST_F(SystemOutputTest, NothingIsRecordedWhereNothingChanged) {
   EXPECT_EQ(frame.skinnedInstances, 0u);
   EXPECT_EQ(frame.settledInstances, 0u);
   EXPECT_EQ(frame.skinnedVertices, 0u);
-  EXPECT_EQ(frame.convertedPalettes, 0u);
+  EXPECT_EQ(frame.convertedPoses, 0u);
   EXPECT_EQ(frame.uploadedBytes, 0u);
   EXPECT_EQ(frame.writtenBytes, 0u);
   EXPECT_TRUE(one.engine->skinnedInstances().empty());
 }
 
-TEST_F(SystemOutputTest, APaletteThatManyMeshesShareIsConvertedOnce) {
+TEST_F(SystemOutputTest, APoseThatManyMeshesShareIsConvertedOnce) {
   SystemEngine engine(device(), description());
   engine.begin();
   const Pose first = systemPose(1), second = systemPose(2);
-  const PaletteHandle shared = engine.addPalette(first), own = engine.addPalette(second);
+  const PoseHandle shared = engine.addPose(first), own = engine.addPose(second);
   std::vector<PackedMesh> meshes;
   std::vector<InstanceHandle> instances;
   InstanceDescription instance;
@@ -81,17 +81,17 @@ TEST_F(SystemOutputTest, APaletteThatManyMeshesShareIsConvertedOnce) {
   for (std::uint32_t i = 0; i < 5; ++i) {
     meshes.push_back(systemMesh(i, 50 + 10 * i));
     instance.mesh = engine.addMesh(meshes.back());
-    instance.palette = i < 4 ? shared : own;
+    instance.pose = i < 4 ? shared : own;
     instances.push_back(engine.addInstance(instance));
   }
   engine.submit();
-  EXPECT_EQ(engine.lastFrame().convertedPalettes, 2u);
+  EXPECT_EQ(engine.lastFrame().convertedPoses, 2u);
   for (std::size_t i = 0; i < 5; ++i)
     expectSkinned(engine.read(instances[i]), alone(meshes[i], i < 4 ? first : second, instance));
   engine.begin();
   engine.writePose(shared, second);
   engine.submit();
-  EXPECT_EQ(engine.lastFrame().convertedPalettes, 1u);
+  EXPECT_EQ(engine.lastFrame().convertedPoses, 1u);
   EXPECT_EQ(engine.lastFrame().skinnedInstances, 4u);
   EXPECT_EQ(engine.lastFrame().skinnedVertices, 50u + 60 + 70 + 80);
   for (std::size_t i = 0; i < 5; ++i)
@@ -104,24 +104,24 @@ TEST_F(SystemOutputTest, AnUnwrittenPoseIsTheIdentity) {
   InstanceDescription instance;
   instance.layout = plainLayout();
   instance.mesh = engine.addMesh(packed);
-  instance.palette = must(engine->addPalette(8));
+  instance.pose = must(engine->addPose(8));
   const InstanceHandle handle = engine.addInstance(instance);  // all of it before any frame
   engine.runFrame();
   expectSkinned(engine.read(handle), alone(packed, Pose(8), instance));
 }
 
 // A palette's place is given to another: nothing of the old pose must show.
-TEST_F(SystemOutputTest, ThePoseOfANewPaletteIsTheIdentityAgain) {
+TEST_F(SystemOutputTest, ANewPoseIsTheIdentityAgain) {
   vulkan::SkinningSystemDescription small = description();
   small.jointBudget = 8;
   SingleInstance one(device(), small, plainLayout());
   one.engine.submit();
   must(one.engine->removeInstance(one.instance));
-  must(one.engine->removePalette(one.description.palette));
+  must(one.engine->removePose(one.description.pose));
   one.engine.runFrame();
   one.engine.runFrame();
   one.engine.begin();
-  one.description.palette = must(one.engine->addPalette(8));
+  one.description.pose = must(one.engine->addPose(8));
   one.instance = one.engine.addInstance(one.description);
   one.engine.submit();
   expectSkinned(one.engine.read(one.instance), alone(one.packed, Pose(8), one.description));
@@ -136,7 +136,7 @@ TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
   instance.layout = plainLayout();
   instance.mesh = engine.addMesh(packed);
   for (const bool mayScale : {true, false}) {
-    instance.palette = engine.addPalette(pose, mayScale);
+    instance.pose = engine.addPose(pose, mayScale);
     const InstanceHandle handle = engine.addInstance(instance);
     if (mayScale) engine.submit();
     if (!mayScale) engine.submit();
@@ -196,7 +196,7 @@ TEST_F(SystemOutputTest, BoundsAreThoseOfTheNewestCompleteFrame) {
   one.engine.begin();
   ASSERT_NO_FATAL_FAILURE(expectBox(boxOf(systemPose(1))));
   EXPECT_FALSE(must(one.engine->bounds(one.instance)).has_value()) << "it did not ask for one";
-  one.engine.writePose(bounded.palette, systemPose(2));
+  one.engine.writePose(bounded.pose, systemPose(2));
   one.engine.submit();
   one.engine.begin();
   ASSERT_NO_FATAL_FAILURE(expectBox(boxOf(systemPose(2))));

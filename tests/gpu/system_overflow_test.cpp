@@ -31,7 +31,7 @@ class SystemOverflowTest : public SystemTest {
   vulkan::SkinningSystem& system() { return engine_->system(); }
 
   Result<InstanceHandle> tryAdd(std::uint32_t pose) {
-    instance_.palette = palettes_.emplace_back(engine_->addPalette(systemPose(pose)));
+    instance_.pose = palettes_.emplace_back(engine_->addPose(systemPose(pose)));
     must(system().prepare(pipelineNeeds(instance_)));
     return system().addInstance(instance_);
   }
@@ -54,7 +54,7 @@ class SystemOverflowTest : public SystemTest {
   PackedMesh packed_ = systemMesh(1, vertexCount);
   std::optional<SystemEngine> engine_;
   InstanceDescription instance_;
-  std::vector<PaletteHandle> palettes_;
+  std::vector<PoseHandle> palettes_;
 };
 
 TEST_F(SystemOverflowTest, RefusedIsAsIfItHadNotBeenAskedFor) {
@@ -67,7 +67,7 @@ TEST_F(SystemOverflowTest, RefusedIsAsIfItHadNotBeenAskedFor) {
   EXPECT_EQ(engine_->lastFrame().instances, 2u);
   expectPose(first, packed_, 0, 0);
   expectPose(second, packed_, 1, 1);
-  must(system().removePalette(palettes_[2]));
+  must(system().removePose(palettes_[2]));
 }
 
 TEST_F(SystemOverflowTest, RoomIsGivenBackOnceTheFrameIsComplete) {

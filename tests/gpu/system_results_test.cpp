@@ -65,7 +65,7 @@ TEST_F(SystemResultsTest, WhatTheGpuChoosesHasTheBoxOfItsNewestPose) {
   const Pose small = smallPose();
   const Box shrunk = boxOf(alone(packed_, small, instance_)[positionStream]);
   show(0, 10);
-  for (const PaletteHandle palette : palettes_) engine_->writePose(palette, small);
+  for (const PoseHandle palette : palettes_) engine_->writePose(palette, small);
   submit();
   engine_->begin();
   for (std::uint32_t i = 0; i < instanceCount; ++i)
@@ -85,7 +85,7 @@ TEST_F(SystemResultsTest, ANewInstanceHasNoBoxUntilItsFirstFrameIsComplete) {
   engine_->begin();
   ASSERT_TRUE(boundsOf(3).has_value());
   must((*engine_)->removeInstance(instances_[3]));
-  instance_.palette = palettes_[7];
+  instance_.pose = palettes_[7];
   instances_[3] = engine_->addInstance(instance_);
   EXPECT_FALSE(boundsOf(3).has_value()) << "not recorded";
   engine_->submit();
@@ -105,7 +105,7 @@ TEST_F(SystemResultsTest, WhatTheGpuHasNotSeenYetHasNoBox) {
   submit();
   engine_->begin();
   must((*engine_)->removeInstance(instances_[3]));
-  instance_.palette = palettes_[7];
+  instance_.pose = palettes_[7];
   instances_[3] = engine_->addInstance(instance_);
   show(10, 1);
   for (int frame = 0; frame < 3; ++frame) {
@@ -161,9 +161,9 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
   instance_.layout = plainLayout();
   instance_.bounds = true;
   std::vector<InstanceHandle> instances;
-  std::vector<PaletteHandle> palettes;
+  std::vector<PoseHandle> palettes;
   for (std::uint32_t i = 0; i < count; ++i) {
-    palettes.push_back(instance_.palette = engine.addPalette(systemPose(i % 20)));
+    palettes.push_back(instance_.pose = engine.addPose(systemPose(i % 20)));
     instances.push_back(engine.addInstance(instance_));
   }
   engine.submit();
@@ -195,7 +195,7 @@ TEST_F(SystemResultsTest, AnInstanceThatIsRefusedKeepsNoSlot) {
   SystemEngine engine(device(), small);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);
-  instance_.palette = engine.addPalette(systemPose(1));
+  instance_.pose = engine.addPose(systemPose(1));
   instance_.layout = plainLayout();
   instance_.bounds = true;
   const InstanceHandle first = engine.addInstance(instance_);
@@ -209,7 +209,7 @@ TEST_F(SystemResultsTest, AnInstanceThatIsRefusedKeepsNoSlot) {
   engine.submit();
   must(engine->removeInstance(first));
   engine.begin();
-  instance_.palette = engine.addPalette(systemPose(2));
+  instance_.pose = engine.addPose(systemPose(2));
   const InstanceHandle second = engine.addInstance(instance_);
   engine.submit();
   engine.begin();

@@ -112,9 +112,9 @@ class BusyScene {
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   void add() {
     const std::uint32_t seed = below(100);
-    if (palettes_.size() < 12) palettes_.push_back(engine_.addPalette(systemPose(seed)));
+    if (palettes_.size() < 12) palettes_.push_back(engine_.addPose(systemPose(seed)));
     if (meshes_.size() < 4) meshes_.push_back(engine_.addMesh(systemMesh(seed, 30 + seed)));
-    instance_.palette = palettes_[below(palettes_.size())];
+    instance_.pose = palettes_[below(palettes_.size())];
     instance_.mesh = meshes_[below(meshes_.size())];
     instance_.culledOnGpu = below(2) == 0;
     instance_.method = below(2) == 0 ? Method::linear : Method::dualQuaternion;
@@ -124,7 +124,7 @@ class BusyScene {
   }
   void change() {
     for (int i = 0; i < 3; ++i) add();
-    for (const PaletteHandle palette : palettes_)
+    for (const PoseHandle palette : palettes_)
       if (below(3) != 0) engine_.writePose(palette, systemPose(below(100)));
     for (int i = 0; i < 2 && instances_.size() > 5; ++i) {
       std::swap(instances_[below(instances_.size())], instances_.back());
@@ -145,7 +145,7 @@ class BusyScene {
   std::array<samples::MappedBuffer, framesInFlight> drawn_;
   std::uint64_t size_ = 0, mostUnderWay_ = 0;
   InstanceDescription instance_;
-  std::vector<PaletteHandle> palettes_;
+  std::vector<PoseHandle> palettes_;
   std::vector<MeshHandle> meshes_;
   std::vector<InstanceHandle> instances_;
   std::mt19937 random_{1};
@@ -213,7 +213,7 @@ TEST_F(SystemSynchronizationTest, WithoutTheEnginesBarriersTheLayerSpeaks) {
   one.engine.submit();
   EXPECT_TRUE(strictDevice().takeValidationMessages().empty());
   one.engine.begin();
-  one.engine.writePose(one.description.palette, systemPose(2));
+  one.engine.writePose(one.description.pose, systemPose(2));
   one.engine.recordsBarriers = false;
   one.engine.submit();
   one.engine.finish();
@@ -233,7 +233,7 @@ TEST_F(SystemSynchronizationTest, WithoutBarriersBetweenSubmissionsTheLayerSpeak
   one.engine.submit();
   const auto move = [&](std::uint32_t pose) {
     one.engine.begin(framesInFlight - 1);
-    one.engine.writePose(one.description.palette, systemPose(pose));
+    one.engine.writePose(one.description.pose, systemPose(pose));
     one.engine.submit();
   };
   for (std::uint32_t pose = 0; pose < 5; ++pose) move(pose);

@@ -64,7 +64,7 @@ class SystemTablesTest : public SystemTest {
       engine.begin(framesInFlight - 1);
       std::erase_if(underWay,
                     [&](const auto& entry) { return entry.first <= engine.completedFrame(); });
-      engine.writePose(instance.palette, systemPose(pose));
+      engine.writePose(instance.pose, systemPose(pose));
       while (instances.size() < std::size_t{4} << pose)
         instances.push_back(must(engine->addInstance(instance)));
       copied.clear();
@@ -99,7 +99,7 @@ TEST_F(SystemTablesTest, OldTablesStayUntilTheirFramesAreComplete) {
       instance.method = Method::linear;
       instance.layout = plainLayout();
       instance.mesh = engine.addMesh(packed);
-      instance.palette = engine.addPalette(systemPose(0));
+      instance.pose = engine.addPose(systemPose(0));
       std::vector<InstanceHandle> instances{engine.addInstance(instance)};
       engine.submit();
       const std::size_t before = alive.size();

@@ -45,8 +45,8 @@ void expectReference(const samples::SkinnedVertices& skinned, const samples::Ski
   const auto source = sources().find(blobOf(*request.mesh));
   ASSERT_NE(source, sources().end()) << "not a mesh of systemMesh";
   const bool isTurnedOnly = !request.mayScale && request.method != Method::linear;
-  const Pose rotations = isTurnedOnly ? rotationsOf(request.palette) : Pose();
-  const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.palette;
+  const Pose rotations = isTurnedOnly ? rotationsOf(request.pose) : Pose();
+  const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.pose;
   const reference::SkinnedMesh expected =
       must(reference::skin(source->second.view(), pose, request.method, request.morphs));
   const Exemptions exemptions{exemptionsOf(expected, request.method).onlyFinite, 0};
@@ -134,7 +134,7 @@ SingleInstance::SingleInstance(samples::Device& device,
     : packed(systemMesh(1, vertexCount)), engine(device, system) {
   engine.begin();
   description.mesh = engine.addMesh(packed);
-  description.palette = engine.addPalette(systemPose(1));
+  description.pose = engine.addPose(systemPose(1));
   description.layout = layout;
   instance = engine.addInstance(description);
 }

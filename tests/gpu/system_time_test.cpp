@@ -76,7 +76,7 @@ TEST_F(SystemTimeTest, TheGpusTimeIsTicksTimesTheirPeriod) {
   system.context = &context;
   SingleInstance one(device(), system, plainLayout());
   const auto measure = [&](std::uint32_t pose) {
-    one.engine.writePose(one.description.palette, systemPose(pose));
+    one.engine.writePose(one.description.pose, systemPose(pose));
     written.clear();
     one.engine.submit();
     one.engine.begin();
@@ -111,7 +111,7 @@ TEST_F(SystemTimeTest, TheGpusTimeIsAPartOfTheWait) {
   SingleInstance one(device(), measured(), plainLayout(), 20000);
   one.engine.submit();
   one.engine.begin();
-  one.engine.writePose(one.description.palette, systemPose(2));
+  one.engine.writePose(one.description.pose, systemPose(2));
   const Stopwatch wait;
   one.engine.submit();
   one.engine.finish();
@@ -145,7 +145,7 @@ TEST_F(SystemTimeTest, PlanningAndRecordingAreThePartsOfTheCall) {
   one.engine.afterRecord = [&](VkCommandBuffer) { called = call.seconds(); };
   double largestPart = 0;
   for (std::uint32_t frame = 0; frame < 10; ++frame) {
-    one.engine.writePose(one.description.palette, systemPose(frame));
+    one.engine.writePose(one.description.pose, systemPose(frame));
     one.engine.submit();
     const vulkan::FrameStatistics statistics = one.engine.lastFrame();
     EXPECT_GT(statistics.planSeconds, 0.0);

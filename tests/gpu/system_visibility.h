@@ -26,7 +26,7 @@ class SystemVisibilityTest : public SystemTest {
     instance_.layout = layout;
     instance_.culledOnGpu = culledOnGpu;
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
-      instance_.palette = palettes_.emplace_back(engine_->addPalette(systemPose(i)));
+      instance_.pose = palettes_.emplace_back(engine_->addPose(systemPose(i)));
       instances_.push_back(engine_->addInstance(instance_));
     }
     if (!culledOnGpu) return;
@@ -94,7 +94,7 @@ class SystemVisibilityTest : public SystemTest {
   std::optional<SystemEngine> engine_;
   samples::MappedBuffer words_;
   InstanceDescription instance_;
-  std::vector<PaletteHandle> palettes_;
+  std::vector<PoseHandle> palettes_;
   std::vector<InstanceHandle> instances_;
   std::map<std::uint32_t, std::vector<std::byte>> expected_;
 };

@@ -19,7 +19,7 @@ TEST_F(SystemVisibilityTest, OnlyWhatMovesIsDispatched) {
   EXPECT_EQ(few.skinnedInstances, 6u);
   EXPECT_EQ(few.skinnedVertices, 6u * vertexCount);
   EXPECT_EQ(few.writtenBytes, 6u * vertexCount * 24u);
-  EXPECT_EQ(few.convertedPalettes, 6u);
+  EXPECT_EQ(few.convertedPoses, 6u);
   // Several instances share an invocation, so that the last group may hold fewer than it could.
   EXPECT_LE(few.workgroups * 5, all.workgroups);
 }
@@ -39,7 +39,7 @@ TEST_F(SystemVisibilityTest, HiddenInstancesAreNotDispatched) {
   EXPECT_EQ(few.skinnedInstances, 10u);
   EXPECT_EQ(few.skinnedVertices, 10u * vertexCount);
   EXPECT_LE(few.workgroups * 4, allWorkgroups);
-  EXPECT_EQ(few.convertedPalettes, 10u) << "nobody looks at the others";
+  EXPECT_EQ(few.convertedPoses, 10u) << "nobody looks at the others";
   const std::vector<std::byte> bytes = engine_->readOutput();
   for (std::uint32_t i = 0; i < instanceCount; ++i) {
     if (i % 6 == 0) {
@@ -264,7 +264,7 @@ TEST_F(SystemVisibilityTest, ANewInstanceIsNotTakenForTheOneBefore) {
     engine_->begin();
     for (std::uint32_t i = 0; i < 10; ++i) {
       must((*engine_)->removeInstance(instances_[i]));
-      instance_.palette = palettes_[i + 20];
+      instance_.pose = palettes_[i + 20];
       instances_[i] = engine_->addInstance(instance_);
     }
     std::uint32_t by = 100 * away + 60;

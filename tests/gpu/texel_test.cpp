@@ -51,8 +51,8 @@ struct Rigs {
     for (std::uint32_t i = 0; i < poses.size(); ++i) {
       samples::SkinRequest& request = requests.emplace_back();
       request.mesh = &packed[i % packed.size()];
-      request.palette = poses[i];
-      request.previousPalette = poses[(i + 1) % poses.size()];
+      request.pose = poses[i];
+      request.previousPose = poses[(i + 1) % poses.size()];
       request.method = method;
       request.box = {{-4, -4, -4}, {4, 4, 4}};
       if (i % 2 == 0) request.morphs = morphs;

@@ -126,23 +126,23 @@ class ThreadsTest : public DeviceTest {
   /// All but the bindings.
   void prepareWork(Work& work, const PackedMesh& mesh, std::uint32_t seed) {
     const std::vector<JointMatrix> pose = randomPose(seed, 10, Rigidity::rigid);
-    const Palette palette{10, 0, false};
+    const PoseDescription palette{10, 0, false};
     Job job;
     job.mesh = mesh.info();
     job.positions = {0, 24, VertexFormat::float32x3};
     job.normals = {12, 24, VertexFormat::float32x3};
     Batch batch;
-    batch.palettes = {&palette, 1};
+    batch.poses = {&palette, 1};
     batch.jobs = {&job, 1};
     batch.meshesSize = mesh.bytes().size();
-    batch.matricesSize = pose.size() * sizeof(JointMatrix);
+    batch.posesSize = pose.size() * sizeof(JointMatrix);
     batch.outputs = OutputSizes::oneBuffer(std::uint64_t{mesh.vertexCount()} * 24);
     ASSERT_TRUE(makePlan(batch, context().limits(), {}, work.plan).ok());
     const auto make = [&](BufferRole role) {
       const BufferRequirement requirement = work.plan.buffer(role);
       return *samples::MappedBuffer::create(device(), requirement.size, requirement.usage, true);
     };
-    work.matrices = make(BufferRole::matrices);
+    work.matrices = make(BufferRole::poses);
     work.tables = make(BufferRole::tables);
     work.palettes = make(BufferRole::palettes);
     work.output = make(BufferRole::positions);
@@ -273,10 +273,10 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   const PackedMesh packed = *pack(mesh.view(), 10);
   InstanceDescription instance;
   instance.mesh = engine.addMesh(packed);
-  std::array<PaletteHandle, threadCount> palettes;
+  std::array<PoseHandle, threadCount> palettes;
   std::vector<InstanceHandle> instances;
-  for (PaletteHandle& palette : palettes) {
-    instance.palette = palette = must(engine->addPalette(10));
+  for (PoseHandle& palette : palettes) {
+    instance.pose = palette = must(engine->addPose(10));
     instances.push_back(engine.addInstance(instance));
   }
   std::atomic<int> failures = 0;
@@ -309,7 +309,7 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   std::ranges::fill(visibility.bytes(), std::byte{1});
   engine.begin();
   instance.culledOnGpu = true;
-  instance.palette = palettes[3];
+  instance.pose = palettes[3];
   const InstanceHandle culled = must(engine->addInstance(instance));
   engine.submit({visibility.handle(), 0});
   const std::vector<std::byte> bytes = engine.readOutput();

@@ -102,8 +102,8 @@ class WrongBytesTest : public ::testing::Test {
     std::vector<samples::InstanceToVerify> instances(instanceCount);
     for (std::size_t index = 0; index < instanceCount; ++index) {
       instances[index].packed = packed_.get();
-      instances[index].palette = poses_[index];
-      instances[index].previousPalette = poses_[instanceCount + index];
+      instances[index].pose = poses_[index];
+      instances[index].previousPose = poses_[instanceCount + index];
       instances[index].method = Method::dualQuaternion;
       instances[index].expected = &expected_[index];
       instances[index].expectedBefore = &expected_[instanceCount + index];
@@ -127,7 +127,7 @@ class WrongBytesTest : public ::testing::Test {
       std::vector<samples::SkinRequest> requests(instanceCount);
       for (samples::SkinRequest& request : requests) {
         request.mesh = packed_.get();
-        request.palette = poses_[0];
+        request.pose = poses_[0];
       }
       const samples::BatchLayout layout = samples::layOutBatch(requests, output_.layout);
       const OutputAttribute attribute =

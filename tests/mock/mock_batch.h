@@ -27,7 +27,7 @@ struct MockBatch {
   /// A mesh with everything and a palette.
   MockBatch() {
     batch.addMesh(meshOf(100, 4, 4, MeshParts{true, true, 2}));
-    batch.addPalette(4, true);
+    batch.addPose(4, true);
   }
   /// Positions and normals of one instance for each method, in one buffer.
   static MockBatch withAllMethods(const DeviceLimits& limits) {
@@ -54,7 +54,7 @@ struct MockBatch {
                  range(BufferRole::tangents), range(BufferRole::previousPositions)};
     }
     return {range(BufferRole::meshes),
-            range(BufferRole::matrices),
+            range(BufferRole::poses),
             range(BufferRole::tables),
             range(BufferRole::palettes),
             outputs,

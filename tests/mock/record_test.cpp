@@ -84,8 +84,8 @@ BufferRange& rangeOf(BatchBuffers& buffers, BufferRole role) {
   switch (role) {
     case BufferRole::meshes:
       return buffers.meshes;
-    case BufferRole::matrices:
-      return buffers.matrices;
+    case BufferRole::poses:
+      return buffers.poses;
     case BufferRole::tables:
       return buffers.tables;
     case BufferRole::palettes:
@@ -105,7 +105,7 @@ BufferRange& rangeOf(BatchBuffers& buffers, BufferRole role) {
 
 const std::pair<BufferRole, const char*> roles[] = {
     {BufferRole::meshes, "meshes"},
-    {BufferRole::matrices, "matrices"},
+    {BufferRole::poses, "poses"},
     {BufferRole::tables, "tables"},
     {BufferRole::palettes, "palettes"},
     {BufferRole::results, "results"},
@@ -261,7 +261,7 @@ TEST_F(RecordTest, EachKernelSeesItsBuffers) {
     ASSERT_EQ(mock.dispatches.size(), 3u);
     const MockDispatch& palette = mock.dispatches[0];
     expectBound(palette, abi::BINDING_TABLES, BufferRole::tables);
-    expectBound(palette, abi::BINDING_MESHES, BufferRole::matrices);
+    expectBound(palette, abi::BINDING_MESHES, BufferRole::poses);
     expectBound(palette, abi::BINDING_PALETTES, BufferRole::palettes);
     expectBound(palette, abi::BINDING_RESULTS, BufferRole::results);
     for (std::size_t index = 1; index < 3; ++index) {
@@ -269,8 +269,7 @@ TEST_F(RecordTest, EachKernelSeesItsBuffers) {
       const bool linear = dispatchesOf(batch.plan)[index].variant.method == Method::linear;
       expectBound(skin, abi::BINDING_TABLES, BufferRole::tables);
       expectBound(skin, abi::BINDING_MESHES, BufferRole::meshes);
-      expectBound(skin, abi::BINDING_PALETTES,
-                  linear ? BufferRole::matrices : BufferRole::palettes);
+      expectBound(skin, abi::BINDING_PALETTES, linear ? BufferRole::poses : BufferRole::palettes);
       expectBound(skin, abi::BINDING_POSITIONS, BufferRole::positions);
       expectBound(skin, abi::BINDING_NORMALS, BufferRole::normals);
       expectBound(skin, abi::BINDING_TANGENTS, BufferRole::tangents);
@@ -411,7 +410,7 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
   ASSERT_NO_FATAL_FAILURE(create());
   MockBatch batch;
   batch.batch.addMesh(meshOf(10, 5, 5, MeshParts{false, false, 1}));
-  batch.batch.addPalette(5, false);
+  batch.batch.addPose(5, false);
   batch.batch.addJob(1, 1, Method::linear, false).morphs = batch.batch.keep({{0, 1.0f}});
   batch.makePlan(context->limits());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
@@ -445,7 +444,7 @@ struct KnownLayouts {
       const std::uint32_t morphTargets = promises.noMorphTargets ? 0 : 3;
       owned.addMesh(
           meshOf(1 + below(200), 1 + below(most), 5, MeshParts{true, true, morphTargets}));
-      owned.addPalette(5 + below(4), !promises.noScale && below(2) == 0);
+      owned.addPose(5 + below(4), !promises.noScale && below(2) == 0);
     }
     for (std::uint32_t count = below(30); count > 0; --count) {
       const Job& layout = layouts[below(static_cast<std::uint32_t>(layouts.size()))];
@@ -460,7 +459,7 @@ struct KnownLayouts {
       job.tangents = attribute(layout.tangents);
       job.previousPositions = attribute(layout.previousPositions);
       job.motion = layout.motion;
-      job.previousPalette = below(4);
+      job.previousPose = below(4);
       job.bounds = layout.bounds;
       job.box = {{0, 0, 0}, {1, 1, 1}};
       if (!promises.noMorphTargets && below(2) == 0)

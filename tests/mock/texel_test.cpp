@@ -57,7 +57,7 @@ TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
       EXPECT_TRUE(variant.texels);
       const MockDescriptors& bound = mock.dispatches[index].descriptors;
       const vulkan::BufferRange& palettes =
-          variant.method == Method::linear ? buffers.matrices : buffers.palettes;
+          variant.method == Method::linear ? buffers.poses : buffers.palettes;
       const auto expectBound = [&](std::uint32_t binding, const vulkan::BufferRange& range,
                                    VkDeviceSize texel) {
         ASSERT_TRUE(bound.contains(binding)) << binding;

@@ -270,7 +270,7 @@ TEST(Property, Truth08_SoAreTheOtherMethodsThatBlendRotations) {
 
 // 100,000 vertices, four of them to a rigid body; joints in float32 are rigid but for rounding, and
 // what is blended of them is no less so.
-TEST(Property, Truth08_ThroughPalettesTheBlendIsAsRigidAsItsJoints) {
+TEST(Property, Truth08_ThroughPosesTheBlendIsAsRigidAsItsJoints) {
   RigRandom random(9);
   constexpr std::uint32_t bodies = caseCount / 4, jointCount = 1000;
   std::vector<JointMatrix> pose;
@@ -311,7 +311,7 @@ TEST(Property, Truth08_ThroughPalettesTheBlendIsAsRigidAsItsJoints) {
 }
 
 // From the left by transforms that float32 and its products hold exactly.
-TEST(Property, Truth04_ThroughPalettesItIsInvariantFromTheLeft) {
+TEST(Property, Truth04_ThroughPosesItIsInvariantFromTheLeft) {
   RigRandom random(10);
   constexpr std::uint32_t jointCount = 500;
   const auto exactly = [](const glm::dvec3& v) { return glm::round(v * 1024.0) / 1024.0; };

@@ -199,7 +199,7 @@ TEST(ReferenceTruths, Truth04_WhoIsInvariantUnderWhat) {
 }
 
 // In the palettes' own float32, where g and its product with the joints are exact.
-TEST(ReferenceTruths, Truth04_ThroughPalettes) {
+TEST(ReferenceTruths, Truth04_ThroughPoses) {
   RigRandom random(5);
   const auto exactly = [](const glm::dvec3& v) { return glm::round(v * 1024.0) / 1024.0; };
   for (const auto& [method, left, right, frame] : invariances) {

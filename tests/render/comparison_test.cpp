@@ -184,7 +184,7 @@ TEST_F(ComparisonTest, DistancesAreThoseOfTheReference) {
   const cli::ComparedFigures figures = figuresOf(strip, methods);
   const cli::ScenePart& part = strip.scene->parts[0];
   const auto skinned = [&](Method method) {
-    return reference::skin(part.mesh->view(), strip.pose.palette(part), method)->positions;
+    return reference::skin(part.mesh->view(), strip.pose.pose(part), method)->positions;
   };
   const std::vector<reference::Double3> base = skinned(Method::dualQuaternion);
   for (std::size_t method = 0; method < methods.size(); ++method) {

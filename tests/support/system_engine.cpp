@@ -44,9 +44,9 @@ MeshHandle SystemEngine::addMesh(const PackedMesh& mesh) {
   return handle;
 }
 
-PaletteHandle SystemEngine::addPalette(std::span<const JointMatrix> pose, bool mayScale) {
-  const PaletteHandle handle =
-      must(system_.addPalette(static_cast<std::uint32_t>(pose.size()), mayScale));
+PoseHandle SystemEngine::addPose(std::span<const JointMatrix> pose, bool mayScale) {
+  const PoseHandle handle =
+      must(system_.addPose(static_cast<std::uint32_t>(pose.size()), mayScale));
   writePose(handle, pose);
   return handle;
 }
@@ -56,7 +56,7 @@ InstanceHandle SystemEngine::addInstance(const InstanceDescription& description)
   return must(system_.addInstance(description));
 }
 
-void SystemEngine::writePose(PaletteHandle palette, std::span<const JointMatrix> pose) {
+void SystemEngine::writePose(PoseHandle palette, std::span<const JointMatrix> pose) {
   const std::span<JointMatrix> mapped = must(system_.writePose(palette));
   if (mapped.size() != pose.size()) throw std::runtime_error("the pose has another size");
   std::ranges::copy(pose, mapped.begin());

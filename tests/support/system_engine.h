@@ -53,9 +53,9 @@ class SystemEngine {
 
   // -- What is in it. Vertices are counted, and pipelines prepared.
   MeshHandle addMesh(const PackedMesh& mesh);
-  PaletteHandle addPalette(std::span<const JointMatrix> pose, bool mayScale = true);
+  PoseHandle addPose(std::span<const JointMatrix> pose, bool mayScale = true);
   InstanceHandle addInstance(const InstanceDescription& description);
-  void writePose(PaletteHandle palette, std::span<const JointMatrix> pose);
+  void writePose(PoseHandle palette, std::span<const JointMatrix> pose);
 
   // -- Frames.
   /// Begins the next one, once at most `underWay` of those before are not complete.

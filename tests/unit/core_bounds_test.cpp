@@ -674,8 +674,7 @@ TEST(Bounds, GrowByWhatMorphTargetsDisplace) {
 TEST(Bounds, RefuseWhatPackRefuses) {
   OwnedMesh mesh = test::randomMesh(1, 10, 4, 2, false);
   EXPECT_EQ(jointBounds(mesh.view(), 0).error().code, ErrorCode::invalidArgument);
-  EXPECT_EQ(jointBounds(mesh.view(), maxPaletteJoints + 1).error().code,
-            ErrorCode::invalidArgument);
+  EXPECT_EQ(jointBounds(mesh.view(), maxPoseJoints + 1).error().code, ErrorCode::invalidArgument);
   EXPECT_EQ(jointBounds(mesh.view(), 1).error().code, ErrorCode::invalidMesh);
   EXPECT_EQ(jointBounds(MeshView{}, 1).error().code, ErrorCode::invalidMesh);
   const std::array one{MorphRange{}};

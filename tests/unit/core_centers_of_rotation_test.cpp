@@ -429,7 +429,7 @@ TEST(CentersOfRotation, SayWhatIsWrong) {
   wrong = surface;
   wrong.jointCount = 0;
   expectError(wrong, ErrorCode::invalidArgument, "not 0");
-  wrong.jointCount = maxPaletteJoints + 1;
+  wrong.jointCount = maxPoseJoints + 1;
   expectError(wrong, ErrorCode::invalidArgument, "not 65537");
   wrong.jointCount = 1;
   expectError(wrong, ErrorCode::invalidMesh, "vertex");

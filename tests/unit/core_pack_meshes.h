@@ -62,7 +62,7 @@ inline PackedMesh packed(const MeshView& mesh, std::uint32_t jointCount) {
 inline std::vector<BlobInfluence> packedInfluences(std::vector<std::uint32_t> joints,
                                                    std::vector<float> weights) {
   OwnedMesh mesh = oneVertex(std::move(joints), std::move(weights));
-  return Blob(packed(mesh.view(), maxPaletteJoints).bytes()).influences(0);
+  return Blob(packed(mesh.view(), maxPoseJoints).bytes()).influences(0);
 }
 
 inline bool sameBytes(const PackedMesh& a, const PackedMesh& b) {

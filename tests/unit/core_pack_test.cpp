@@ -111,7 +111,7 @@ TEST_P(PackCounts, StoresEveryVertexAsAbiHSays) {
   const auto [vertices, influences, joints] = GetParam();
   OwnedMesh mesh = slottedMesh(vertices * 131 + influences, vertices, influences, joints);
   expectPacked(mesh, joints);
-  expectPacked(mesh, maxPaletteJoints);
+  expectPacked(mesh, maxPoseJoints);
 }
 
 INSTANTIATE_TEST_SUITE_P(Pack, PackCounts,
@@ -455,7 +455,7 @@ TEST(Pack, RefusesWhatValidateRefuses) {
   refused(OwnedMesh{}, 24, "mesh 'random': it has no vertices");
 }
 
-TEST(Pack, RefusesPalettesThatCannotBe) {
+TEST(Pack, RefusesPosesThatCannotBe) {
   OwnedMesh mesh = slottedMesh(1, 65, 2, 10);
   for (const std::uint32_t jointCount : {0u, 65537u, 0xffffffffu}) {
     const Result<PackedMesh> result = pack(mesh.view(), jointCount);

@@ -315,7 +315,7 @@ TEST_F(DamagedBlob, DisplacementsOutsideTheBlobAreRefused) {
 }
 
 // Without any weight there is no joint index to compare it with.
-TEST(PackedBlob, APaletteOfNoJointsIsRefused) {
+TEST(PackedBlob, APoseOfNoJointsIsRefused) {
   OwnedMesh mesh = slottedMesh(1, 10, 4, 10);
   std::fill(mesh.weights.begin(), mesh.weights.end(), 0.0f);
   Blob blob(packed(mesh.view(), 10).bytes());

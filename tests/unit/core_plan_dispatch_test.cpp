@@ -22,7 +22,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInElevenDispatches) {
   batch.addMesh(meshOf(777, 4, 4, true));
   batch.addMesh(meshOf(64, 6, 4, true));
   for (std::uint32_t instance = 0; instance < 1000; ++instance) {
-    batch.addPalette(4, instance % 5 == 0);
+    batch.addPose(4, instance % 5 == 0);
   }
   for (std::uint32_t instance = 0; instance < 1000; ++instance) {
     batch.addJob(instance % 3, instance,
@@ -44,7 +44,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInElevenDispatches) {
 TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   for (int repetition = 0; repetition < 20; ++repetition) {
     for (std::uint32_t mesh = 0; mesh < 5; ++mesh) {
       for (std::uint32_t palette = 0; palette < 4; ++palette) {
@@ -62,7 +62,7 @@ TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
 TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   batch.addJob(1, 2, Method::linear, false);
   Plan out;
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
@@ -73,10 +73,10 @@ TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
   }
 }
 
-TEST(Plan, PalettesThatNoDualQuaternionJobUsesAreLeftOut) {
+TEST(Plan, PosesThatNoDualQuaternionJobUsesAreLeftOut) {
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   batch.addJob(0, 3, Method::dualQuaternion, true);
   batch.addJob(0, 2, Method::linear, true);
   batch.addJob(0, 1, Method::dualQuaternion, true);
@@ -93,11 +93,11 @@ TEST(Plan, PalettesThatNoDualQuaternionJobUsesAreLeftOut) {
 }
 
 // Dual quaternions serve all methods but one, which wants logarithms.
-TEST(Plan, APaletteIsConvertedOnceForEachFormThatIsRead) {
+TEST(Plan, APoseIsConvertedOnceForEachFormThatIsRead) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 2, 5, true));
-  batch.addPalette(5, false);
-  batch.addPalette(7, true);
+  batch.addPose(5, false);
+  batch.addPose(7, true);
   const auto sizeOf = [&](std::initializer_list<Method> methods, std::uint32_t palette) {
     batch.jobs.clear();
     batch.outputSize = 0;
@@ -120,10 +120,10 @@ TEST(Plan, APaletteIsConvertedOnceForEachFormThatIsRead) {
   }
 }
 
-TEST(Plan, APaletteInTwoFormsHasAStatusInEither) {
+TEST(Plan, APoseInTwoFormsHasAStatusInEither) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 2, 5, true));
-  for (int palette = 0; palette < 4; ++palette) batch.addPalette(5, palette % 2 == 0);
+  for (int palette = 0; palette < 4; ++palette) batch.addPose(5, palette % 2 == 0);
   batch.addJob(0, 0, Method::logMatrix, true);
   batch.addJob(0, 1, Method::logMatrix, true);
   batch.addJob(0, 1, Method::blended, true);
@@ -143,15 +143,15 @@ TEST(Plan, APaletteInTwoFormsHasAStatusInEither) {
 }
 
 // The palette of the last frame, as logarithms, beside the same as dual quaternions.
-TEST(Plan, PreviousPalettesAreConvertedToTheFormOfTheirJob) {
+TEST(Plan, PreviousPosesAreConvertedToTheFormOfTheirJob) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 2, 5, true));
-  batch.addPalette(5, true);
-  batch.addPalette(5, false);
+  batch.addPose(5, true);
+  batch.addPose(5, false);
   for (const Method method : {Method::logMatrix, Method::sphericalBlend}) {
     Job job = batch.jobOf(0, 0, method);
     job.motion = Motion::reskinned;
-    job.previousPalette = 1;
+    job.previousPose = 1;
     batch.place(job, Arrangement::planar);
   }
   Plan out;
@@ -167,7 +167,7 @@ TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
     OwnedBatch batch;
     batch.addMesh(meshOf(10, 1, 8, false));
     batch.addMesh(meshOf(10, influences, 8, false));
-    batch.addPalette(8, false);
+    batch.addPose(8, false);
     batch.addJob(0, 0, Method::linear, false);
     batch.addJob(1, 0, Method::linear, false);
     batch.addJob(0, 0, Method::linear, false);
@@ -190,7 +190,7 @@ TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
   EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   for (const Batch& empty : {Batch{}, batch.batch()}) {
     ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
     EXPECT_TRUE(dispatchesOf(out).empty());
@@ -209,8 +209,8 @@ TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
 struct PlanFeatures : public ::testing::Test {
   PlanFeatures() {
     batch.addMesh(meshOf(100, 2, 4, MeshParts{true, true, 4}));
-    batch.addPalette(4, false);
-    batch.addPalette(4, false);
+    batch.addPose(4, false);
+    batch.addPose(4, false);
   }
   Job& add(Job job) { return batch.place(job, Arrangement::separate); }
   Job linear() const { return batch.jobOf(0, 0, Method::linear); }
@@ -292,10 +292,10 @@ TEST_F(PlanFeatures, PreviousMorphWeightsMatterWhereTheInstanceIsSkinnedAgain) {
   }
 }
 
-TEST_F(PlanFeatures, ThePreviousPaletteIsConvertedToo) {
+TEST_F(PlanFeatures, ThePreviousPoseIsConvertedToo) {
   Job job = batch.jobOf(0, 0, Method::dualQuaternion);
   job.motion = Motion::reskinned;
-  job.previousPalette = 1;
+  job.previousPose = 1;
   add(job);
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
   EXPECT_NE(out.statusOffset(1), Plan::noStatus);

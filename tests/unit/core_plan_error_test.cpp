@@ -25,7 +25,7 @@ struct PlanErrors : public ::testing::Test {
   PlanErrors() {
     batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 5}));
     batch.addMesh(meshOf(10, 2, 7, false));
-    for (int palette = 0; palette < 3; ++palette) batch.addPalette(8, true);
+    for (int palette = 0; palette < 3; ++palette) batch.addPose(8, true);
     for (std::uint32_t job = 0; job < 3; ++job) {
       batch.addJob(0, job, Method::dualQuaternion, true);
     }
@@ -100,8 +100,8 @@ TEST_F(PlanErrors, BrokenPromises) {
   limits.promises = {0, true, false};
   expectInvalid({"job 0", "morph targets", "noMorphTargets"});
   limits.promises = {0, false, true};
-  expectInvalid({"palette 0", "may scale", "noScale"});
-  for (Palette& palette : batch.palettes) palette.mayScale = false;
+  expectInvalid({"pose 0", "may scale", "noScale"});
+  for (PoseDescription& palette : batch.poses) palette.mayScale = false;
   expectGood();
 }
 
@@ -132,39 +132,39 @@ TEST_F(PlanErrors, PairsOfPositionsAndNormals) {
   }
 }
 
-TEST_F(PlanErrors, PaletteIndices) {
-  job().palette = 3;
-  expectInvalid({"job 1", "palette 3", "3"});
-  job().palette = 0xffffffffu;
+TEST_F(PlanErrors, PoseIndices) {
+  job().pose = 3;
+  expectInvalid({"job 1", "pose 3", "3"});
+  job().pose = 0xffffffffu;
   expectInvalid({"job 1", "4294967295"});
 }
 
-TEST_F(PlanErrors, PalettesThatAreTooShortForTheMesh) {
-  batch.palettes[1].jointCount = 7;
+TEST_F(PlanErrors, PosesThatAreTooShortForTheMesh) {
+  batch.poses[1].jointCount = 7;
   expectGood();
-  batch.palettes[1].jointCount = 6;
-  expectInvalid({"job 1", "7 joints", "palette 1", "6"});
+  batch.poses[1].jointCount = 6;
+  expectInvalid({"job 1", "7 joints", "pose 1", "6"});
 }
 
-TEST_F(PlanErrors, PaletteCounts) {
-  batch.addPalette(0, false);
-  batch.matricesSize += 65537 * 48;  // room enough
-  expectInvalid({"palette 3", "0 joints", "65536"});
-  batch.palettes[3].jointCount = 65537;
-  expectInvalid({"palette 3", "65537"});
-  batch.palettes[3].jointCount = 65536;
+TEST_F(PlanErrors, PoseCounts) {
+  batch.addPose(0, false);
+  batch.posesSize += 65537 * 48;  // room enough
+  expectInvalid({"pose 3", "0 joints", "65536"});
+  batch.poses[3].jointCount = 65537;
+  expectInvalid({"pose 3", "65537"});
+  batch.poses[3].jointCount = 65536;
   expectGood();
 }
 
 TEST_F(PlanErrors, MatrixOffsets) {
-  batch.palettes[1].matrixOffset += 8;
-  expectInvalid({"palette 1", "8 matrices"});
-  batch.palettes[1].matrixOffset = batch.matricesSize - 8 * 48;
+  batch.poses[1].matrixOffset += 8;
+  expectInvalid({"pose 1", "8 matrices"});
+  batch.poses[1].matrixOffset = batch.posesSize - 8 * 48;
   expectGood();
-  batch.palettes[1].matrixOffset += 16;
-  expectInvalid({"palette 1"});
-  batch.palettes[1].matrixOffset = ~std::uint64_t{15};
-  expectInvalid({"palette 1"});
+  batch.poses[1].matrixOffset += 16;
+  expectInvalid({"pose 1"});
+  batch.poses[1].matrixOffset = ~std::uint64_t{15};
+  expectInvalid({"pose 1"});
 }
 
 TEST_F(PlanErrors, UnknownMethods) {
@@ -505,16 +505,16 @@ TEST_F(PlanErrors, SettlingAndRestartingNeedPreviousPositions) {
   }
 }
 
-TEST_F(PlanErrors, PreviousPalettesAreLookedAtWhereTheyAreUsed) {
+TEST_F(PlanErrors, PreviousPosesAreLookedAtWhereTheyAreUsed) {
   job().previousPositions = {0, 12};
-  batch.addPalette(6, true);
+  batch.addPose(6, true);
   for (const std::uint32_t palette : {3u, 4u, 0xffffffffu}) {
-    job().previousPalette = palette;
+    job().previousPose = palette;
     job().motion = Motion::kept;
     expectGood();
     job().motion = Motion::reskinned;
     if (palette == 3) {
-      expectInvalid({"job 1", "7 joints", "palette 3", "6"});
+      expectInvalid({"job 1", "7 joints", "pose 3", "6"});
     } else {
       expectInvalid({"job 1", std::to_string(palette).c_str()});
     }
@@ -600,22 +600,22 @@ TEST_F(PlanErrors, MoreWorkgroupsThanKernelsCount) {
 TEST_F(PlanErrors, BuffersLargerThanARange) {
   batch.addMesh(meshOf(30, 1, 1, true));
   limits.maxStorageBufferRange = batch.meshesSize;
-  ASSERT_GT(batch.meshesSize, batch.matricesSize);
+  ASSERT_GT(batch.meshesSize, batch.posesSize);
   expectGood();
   limits.maxStorageBufferRange = batch.meshesSize - 16;
   expectRefused(ErrorCode::limitExceeded, {"range"});
   limits.maxStorageBufferRange = batch.meshesSize;
-  batch.matricesSize = batch.meshesSize + 16;
+  batch.posesSize = batch.meshesSize + 16;
   expectRefused(ErrorCode::limitExceeded, {"range"});
 }
 
-TEST_F(PlanErrors, PalettesLargerThanARange) {
+TEST_F(PlanErrors, PosesLargerThanARange) {
   // 48 bytes a matrix become 64 where a joint may scale.
-  batch.addPalette(1000, true);
-  batch.jobs[2].palette = 3;
+  batch.addPose(1000, true);
+  batch.jobs[2].pose = 3;
   limits.maxStorageBufferRange = 63000;
   expectRefused(ErrorCode::limitExceeded, {"range"});
-  batch.palettes[3].mayScale = false;
+  batch.poses[3].mayScale = false;
   expectGood();
 }
 

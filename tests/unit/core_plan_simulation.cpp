@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "abi.h"
-#include "random_rig.h"
 #include "plan_commands.h"
+#include "random_rig.h"
 
 namespace dermis::test {
 namespace {
@@ -151,9 +151,9 @@ class Simulation {
     std::set<PaletteInForm> wanted;
     for (const Job& job : batch_.jobs) {
       if (job.method == Method::linear) continue;
-      wanted.insert({job.palette, wantsLogarithms(job.method)});
+      wanted.insert({job.pose, wantsLogarithms(job.method)});
       if (job.motion == Motion::reskinned)
-        wanted.insert({job.previousPalette, wantsLogarithms(job.method)});
+        wanted.insert({job.previousPose, wantsLogarithms(job.method)});
     }
     ASSERT_EQ(push.paletteCount, wanted.size());
     ASSERT_EQ(push.resultCount, resultCount_);
@@ -164,14 +164,14 @@ class Simulation {
       const std::uint64_t status = std::uint64_t{record.place} * 16;
       // No two palettes of a batch begin at the same matrix.
       const auto matrices = std::uint64_t{record.matrices} * 16;
-      const auto found =
-          std::find_if(batch_.palettes.begin(), batch_.palettes.end(),
-                       [&](const Palette& palette) { return palette.matrixOffset == matrices; });
-      ASSERT_NE(found, batch_.palettes.end());
-      const Palette& palette = *found;
+      const auto found = std::find_if(
+          batch_.poses.begin(), batch_.poses.end(),
+          [&](const PoseDescription& palette) { return palette.matrixOffset == matrices; });
+      ASSERT_NE(found, batch_.poses.end());
+      const PoseDescription& palette = *found;
       const std::uint32_t flags = record.flags;
       const bool logarithms = (flags & abi::PALETTE_LOGARITHMS) != 0;
-      const PaletteInForm form{static_cast<std::uint32_t>(found - batch_.palettes.begin()),
+      const PaletteInForm form{static_cast<std::uint32_t>(found - batch_.poses.begin()),
                                logarithms};
       ASSERT_EQ(wanted.erase(form), 1u) << "a palette that nobody reads, or twice in a form";
       ASSERT_EQ(record.jointCount, palette.jointCount);
@@ -191,7 +191,7 @@ class Simulation {
 
   /// What a plan says of a status is true of one that is written.
   void checkStatuses() {
-    for (std::uint32_t palette = 0; palette < batch_.palettes.size(); ++palette) {
+    for (std::uint32_t palette = 0; palette < batch_.poses.size(); ++palette) {
       const std::uint64_t status = plan_.statusOffset(palette);
       const auto dual = statuses_.find({palette, false}),
                  logarithm = statuses_.find({palette, true});
@@ -296,21 +296,20 @@ class Simulation {
 
   bool mayScale(const Job& job) const {
     if (job.method == Method::linear) return false;
-    return batch_.palettes[job.palette].mayScale ||
-           (job.motion == Motion::reskinned && batch_.palettes[job.previousPalette].mayScale);
+    return batch_.poses[job.pose].mayScale ||
+           (job.motion == Motion::reskinned && batch_.poses[job.previousPose].mayScale);
   }
 
   std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
-    return method == Method::linear ? batch_.palettes[palette].matrixOffset
+    return method == Method::linear ? batch_.poses[palette].matrixOffset
                                     : statuses_.at({palette, wantsLogarithms(method)});
   }
 
   void checkRecord(std::uint32_t group, std::uint64_t record, std::uint32_t index) {
     const Job& job = batch_.jobs[index];
     ASSERT_EQ(std::uint64_t{groupAt(group).mesh} * 4, job.meshOffset);
-    ASSERT_EQ(instanceAt(record).jointCount, batch_.palettes[job.palette].jointCount);
-    ASSERT_EQ(std::uint64_t{instanceAt(record).palette} * 16,
-              paletteBytes(job.method, job.palette));
+    ASSERT_EQ(instanceAt(record).jointCount, batch_.poses[job.pose].jointCount);
+    ASSERT_EQ(std::uint64_t{instanceAt(record).palette} * 16, paletteBytes(job.method, job.pose));
     ASSERT_EQ(instanceAt(record).flags, (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
                                             (job.settles ? abi::INSTANCE_SETTLES : 0u));
   }
@@ -338,8 +337,8 @@ class Simulation {
     ASSERT_NO_FATAL_FAILURE(checkMorphs(extension.morphs, extension.morphCount, job.morphs));
     if (job.motion == Motion::reskinned) {
       ASSERT_EQ(std::uint64_t{extension.previousPalette} * 16,
-                paletteBytes(job.method, job.previousPalette));
-      ASSERT_EQ(extension.previousJointCount, batch_.palettes[job.previousPalette].jointCount);
+                paletteBytes(job.method, job.previousPose));
+      ASSERT_EQ(extension.previousJointCount, batch_.poses[job.previousPose].jointCount);
       ASSERT_NO_FATAL_FAILURE(
           checkMorphs(extension.previousMorphs, extension.previousMorphCount, job.previousMorphs));
     }
@@ -441,16 +440,16 @@ void OwnedBatch::addMesh(PackedMesh mesh) {
   meshes.push_back(std::move(mesh));
 }
 
-void OwnedBatch::addPalette(std::uint32_t joints, bool mayScale) {
-  palettes.push_back({joints, matricesSize, mayScale});
-  matricesSize += std::uint64_t{joints} * 48;
+void OwnedBatch::addPose(std::uint32_t joints, bool mayScale) {
+  poses.push_back({joints, posesSize, mayScale});
+  posesSize += std::uint64_t{joints} * 48;
 }
 
 Job OwnedBatch::jobOf(std::uint32_t mesh, std::uint32_t palette, Method method) const {
   Job job;
   job.mesh = meshes[mesh].info();
   job.meshOffset = meshOffsets[mesh];
-  job.palette = palette;
+  job.pose = palette;
   job.method = method;
   job.positions.format = VertexFormat::float32x3;
   return job;
@@ -503,7 +502,7 @@ std::span<const MorphWeight> OwnedBatch::keep(std::vector<MorphWeight> morphs) {
 }
 
 Batch OwnedBatch::batch() const {
-  return {palettes, jobs, meshesSize, matricesSize,
+  return {poses, jobs, meshesSize, posesSize,
           hasSeparateOutputs
               ? OutputSizes{separateSizes[0], separateSizes[1], separateSizes[2], separateSizes[3]}
               : OutputSizes::oneBuffer(outputSize)};
@@ -517,15 +516,15 @@ void addMeshes(OwnedBatch& batch) {
   batch.addMesh(meshOf(1234, 3, 5, MeshParts{true, false, 5}));
 }
 
-void addPalettes(OwnedBatch& batch) {
-  for (const std::uint32_t joints : {5u, 9u, 300u, 7u}) batch.addPalette(joints, joints % 2 == 1);
+void addPoses(OwnedBatch& batch) {
+  for (const std::uint32_t joints : {5u, 9u, 300u, 7u}) batch.addPose(joints, joints % 2 == 1);
 }
 
 OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
   std::mt19937 engine(seed);
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   // The same mesh may stand twice in the mesh buffer.
   batch.meshesSize += 16;
   batch.addMesh(meshOf(64, 4, 5, true));
@@ -578,7 +577,7 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
   };
   OwnedBatch batch;
   addMeshes(batch);
-  addPalettes(batch);
+  addPoses(batch);
   for (std::uint32_t index = 0; index < jobs; ++index) {
     Job job = batch.jobOf(below(5), below(4), allMethods[below(allMethods.size())]);
     job.positions.format = anyFormat(engine, isPositionFormat);
@@ -591,7 +590,7 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
     job.motion = static_cast<Motion>(below(3));
     job.restartsMotion = job.motion != Motion::none && below(4) == 0;
     job.settles = job.motion != Motion::none && below(4) == 0;
-    job.previousPalette = job.motion == Motion::reskinned ? below(4) : 1000;
+    job.previousPose = job.motion == Motion::reskinned ? below(4) : 1000;
     if (below(2) == 0) {
       job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
       job.previousMorphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));

@@ -28,7 +28,7 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
 
 enum class Arrangement { interleaved, planar, separate };
 
-/// A batch that owns what it points to. Meshes and palettes are laid out one after another.
+/// A batch that owns what it points to. Meshes and poses are laid out one after another.
 struct OwnedBatch {
   OwnedBatch() = default;
   OwnedBatch(OwnedBatch&&) = default;
@@ -36,24 +36,24 @@ struct OwnedBatch {
 
   std::vector<PackedMesh> meshes;
   std::vector<std::uint64_t> meshOffsets;
-  std::vector<Palette> palettes;
+  std::vector<PoseDescription> poses;
   std::vector<Job> jobs;
-  std::uint64_t meshesSize = 0, matricesSize = 0;
+  std::uint64_t meshesSize = 0, posesSize = 0;
   std::uint64_t outputSize = 0;  ///< of the one buffer …
   bool hasSeparateOutputs = false;
   std::array<std::uint64_t, streamCount> separateSizes{};  ///< … or of these
 
   void addMesh(PackedMesh mesh);
-  void addPalette(std::uint32_t joints, bool mayScale);
+  void addPose(std::uint32_t joints, bool mayScale);
 
   /// Positions, and normals behind them, as float32x3 in a stretch of its own at the output's end.
-  Job& addJob(std::uint32_t mesh, std::uint32_t palette, Method method, bool normals,
+  Job& addJob(std::uint32_t mesh, std::uint32_t pose, Method method, bool normals,
               std::uint32_t stride = 24);
   /// A job whose formats, motion and the like are chosen already: finds a place for its attributes,
   /// with `gap` unused bytes after each vertex.
   Job& place(Job job, Arrangement arrangement, std::uint32_t gap = 0);
   /// A job of that mesh, not yet placed.
-  Job jobOf(std::uint32_t mesh, std::uint32_t palette, Method method) const;
+  Job jobOf(std::uint32_t mesh, std::uint32_t pose, Method method) const;
 
   /// The batch keeps the list; the span is valid as long as it lives.
   std::span<const MorphWeight> keep(std::vector<MorphWeight> morphs);
@@ -68,9 +68,9 @@ struct OwnedBatch {
 };
 
 /// Meshes of awkward counts, with and without normals, tangents and morph targets, with 1 to 8
-/// influences; and four palettes.
+/// influences; and four poses.
 void addMeshes(OwnedBatch& batch);
-void addPalettes(OwnedBatch& batch);
+void addPoses(OwnedBatch& batch);
 
 /// Float32 positions and normals in one buffer, interleaved or planar: what any device can do.
 OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs);

@@ -35,7 +35,7 @@ TEST(Plan, BuffersAreDescribed) {
     bool perFrame, hostWritten;
   } expected[] = {
       {BufferRole::meshes, batch.meshesSize, storage | transferTarget, false, true},
-      {BufferRole::matrices, batch.matricesSize, storage, true, true},
+      {BufferRole::poses, batch.posesSize, storage, true, true},
       {BufferRole::positions, batch.separateSizes[0], storage, false, false},
       {BufferRole::normals, batch.separateSizes[1], storage, false, false},
       {BufferRole::tangents, batch.separateSizes[2], storage, false, false},
@@ -57,11 +57,11 @@ TEST(Plan, BuffersAreDescribed) {
 }
 
 TEST(Plan, StatusHasFourWords) {
-  EXPECT_EQ(sizeof(PaletteStatus), 16u);
-  EXPECT_EQ(offsetof(PaletteStatus, twoPhase), offsetof(abi::StatusRecord, twoPhase));
-  EXPECT_EQ(offsetof(PaletteStatus, nonRigidJoints), offsetof(abi::StatusRecord, nonRigidJoints));
-  EXPECT_EQ(offsetof(PaletteStatus, undeclaredScale), offsetof(abi::StatusRecord, undeclaredScale));
-  EXPECT_EQ(offsetof(PaletteStatus, nonFiniteJoints), offsetof(abi::StatusRecord, nonFiniteJoints));
+  EXPECT_EQ(sizeof(PoseStatus), 16u);
+  EXPECT_EQ(offsetof(PoseStatus, twoPhase), offsetof(abi::StatusRecord, twoPhase));
+  EXPECT_EQ(offsetof(PoseStatus, nonRigidJoints), offsetof(abi::StatusRecord, nonRigidJoints));
+  EXPECT_EQ(offsetof(PoseStatus, undeclaredScale), offsetof(abi::StatusRecord, undeclaredScale));
+  EXPECT_EQ(offsetof(PoseStatus, nonFiniteJoints), offsetof(abi::StatusRecord, nonFiniteJoints));
 }
 
 TEST(Plan, ResultsAreLaidOutAsAbiHSays) {
@@ -177,13 +177,13 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
     OwnedBatch batch;
     batch.addMesh(
         meshOf(10, influences, 8, MeshParts{true, true, promises.noMorphTargets ? 0u : 2u}));
-    batch.addPalette(8, false);
-    batch.addPalette(8, !promises.noScale);
+    batch.addPose(8, false);
+    batch.addPose(8, !promises.noScale);
     for (const float weight : {0.0f, 1.0f}) {
       for (const std::uint32_t palette : {0u, 1u}) {
         batch.jobs = {layout};
         batch.jobs[0].mesh = batch.jobOf(0, palette, layout.method).mesh;
-        batch.jobs[0].palette = palette;
+        batch.jobs[0].pose = palette;
         if (!promises.noMorphTargets) batch.jobs[0].morphs = batch.keep({{1, weight}});
         batch.outputSize = 10000;
         Plan out;
@@ -301,11 +301,11 @@ TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
 }
 
 // A kernel leaves the two-phase path out if no palette that it reads may scale.
-TEST(Plan, AJobScalesIfAPaletteThatItReadsMay) {
+TEST(Plan, AJobScalesIfAPoseThatItReadsMay) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 4, 8, MeshParts{true, false, 0}));
-  batch.addPalette(8, false);
-  batch.addPalette(8, true);
+  batch.addPose(8, false);
+  batch.addPose(8, true);
   const auto scales = [&](const Job& job) {
     batch.jobs = {job};
     Plan out;
@@ -322,7 +322,7 @@ TEST(Plan, AJobScalesIfAPaletteThatItReadsMay) {
   // Skinned again from a palette that may.
   Job job = batch.addJob(0, 0, Method::dualQuaternion, true);
   job.motion = Motion::reskinned;
-  job.previousPalette = 1;
+  job.previousPose = 1;
   job.previousPositions = {240, 12, VertexFormat::none};
   batch.outputSize += 1000;
   EXPECT_TRUE(scales(job));

@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(Plan, PlanWindows,
 TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
   OwnedBatch batch;
   batch.addMesh(meshOf(800, 1, 1, true));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   Job& job = batch.addJob(0, 0, Method::dualQuaternion, true, 800);
   job.normals.offset += 100;
   const DeviceLimits limits = limitsOf(65536, 256);
@@ -113,7 +113,7 @@ TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
 TEST(Plan, TheInstanceThatIsCutHasOneResult) {
   OwnedBatch batch;
   batch.addMesh(meshOf(800, 1, 1, MeshParts{true, false, 2}));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   Job& job = batch.addJob(0, 0, Method::dualQuaternion, true, 800);
   job.bounds = true;
   job.morphs = batch.keep({{1, 0.5f}, {0, 0.25f}});
@@ -128,7 +128,7 @@ TEST(Plan, TheInstanceThatIsCutHasOneResult) {
 TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
   OwnedBatch batch;
   batch.addMesh(meshOf(400, 1, 1, true));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   Job& job = batch.addJob(0, 0, Method::linear, true, 512);
   batch.outputSize += 65536;
   int good = 0, refused = 0, differ = 0;
@@ -165,7 +165,7 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
 TEST(Plan, AttributesThatLieNearShareAWindow) {
   OwnedBatch batch;
   batch.addMesh(meshOf(400, 1, 1, true));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   const DeviceLimits limits = limitsOf(65536, 256, 4);
   for (const std::uint32_t stride : {128u, 500u, 512u, 1000u, 4096u}) {
     for (std::uint64_t offset = 2048; offset < 8000; offset += 100) {
@@ -186,7 +186,7 @@ TEST(Plan, AttributesThatLieNearShareAWindow) {
 TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
   OwnedBatch batch;
   batch.addMesh(meshOf(1000, 1, 1, MeshParts{true, true, 0}));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   Job job = batch.jobOf(0, 0, Method::linear);
   job.normals.format = VertexFormat::octahedral16x2;
   job.tangents.format = VertexFormat::snorm8x4;
@@ -211,7 +211,7 @@ TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
 TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   OwnedBatch batch;
   batch.addMesh(meshOf(900, 1, 1, MeshParts{true, false, 0, false}));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   batch.hasSeparateOutputs = true;
   for (std::uint64_t instance = 0; instance < 3; ++instance) {
     Job job = batch.jobOf(0, 0, Method::linear);
@@ -235,7 +235,7 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
 TEST(Plan, AnOutputOfExactlyOneRangeIsNotCut) {
   OwnedBatch batch;
   batch.addMesh(meshOf(1234, 1, 1, true));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   batch.addJob(0, 0, Method::linear, true, 68);
   const DeviceLimits limits = limitsOf(1234 * 68, 256);
   Plan out;
@@ -250,7 +250,7 @@ TEST(Plan, AnOutputOfExactlyOneRangeIsNotCut) {
 TEST(Plan, OutputOffsetsHave64Bits) {
   OwnedBatch batch;
   batch.addMesh(meshOf(100, 1, 1, true));
-  batch.addPalette(1, false);
+  batch.addPose(1, false);
   for (const std::uint64_t offset :
        {std::uint64_t{0}, std::uint64_t{5} << 32, (std::uint64_t{7} << 40) + 12}) {
     batch.outputSize = offset;

@@ -33,10 +33,10 @@ struct OneInstance {
     info.maxInfluences = 4;
     info.byteSize = 4096;
     mesh = *scene.addMesh(info);
-    palette = *scene.addPalette(4);
+    pose = *scene.addPose(4);
     InstanceDescription description;
     description.mesh = mesh;
-    description.palette = palette;
+    description.pose = pose;
     description.bounds = true;
     description.culledOnGpu = isCulled;
     instance = *scene.addInstance(description);
@@ -44,7 +44,7 @@ struct OneInstance {
 
   Scene scene = *Scene::create(smallScene());
   MeshHandle mesh;
-  PaletteHandle palette;
+  PoseHandle pose;
   InstanceHandle instance;
   Plan plan;
 };
@@ -149,7 +149,7 @@ TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
 TEST(Scene, AChangedSceneIsNotCommitted) {
   const std::vector<std::function<void(OneInstance&)>> changes{
       [](OneInstance& one) { EXPECT_TRUE(one.scene.removeInstance(one.instance).ok()); },
-      [](OneInstance& one) { EXPECT_TRUE(one.scene.writePose(one.palette).ok()); },
+      [](OneInstance& one) { EXPECT_TRUE(one.scene.writePose(one.pose).ok()); },
       [](OneInstance& one) { EXPECT_TRUE(one.scene.setVisible(one.instance, false).ok()); },
       [](OneInstance& one) { EXPECT_TRUE(one.scene.teleport(one.instance).ok()); },
       [](OneInstance& one) { EXPECT_TRUE(one.scene.beginFrame(2, 0).ok()); },

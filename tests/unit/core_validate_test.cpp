@@ -435,7 +435,7 @@ TEST_F(ValidateTest, NegativeZeroIsZero) {
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
 }
 
-TEST_F(ValidateTest, JointsOutsideThePalette) {
+TEST_F(ValidateTest, JointsOutsideThePose) {
   mesh.joints[7 * 4 + 1] = jointCount - 1;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   mesh.joints[7 * 4 + 1] = 31;
@@ -453,11 +453,11 @@ TEST_F(ValidateTest, Truth14_JointsOfSlotsWithoutWeightMayBeAnything) {
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
 }
 
-TEST_F(ValidateTest, JointsEndWithTheLargestPalette) {
+TEST_F(ValidateTest, JointsEndWithTheLargestPose) {
   mesh.joints[0] = 65535;
-  EXPECT_TRUE(validate(view, maxPaletteJoints).findings.empty());
+  EXPECT_TRUE(validate(view, maxPoseJoints).findings.empty());
   mesh.joints[0] = 65536;
-  EXPECT_EQ(validate(view, maxPaletteJoints).findings.size(), 1u);
+  EXPECT_EQ(validate(view, maxPoseJoints).findings.size(), 1u);
   EXPECT_EQ(validate(view, 0xffffffffu).findings.size(), 1u) << "joint indices have 16 bits";
   EXPECT_NE(validate(view, 0).find(Problem::jointOutOfRange), nullptr);
 }

@@ -169,7 +169,7 @@ CheckRequest movedBy(const cli::Scene& scene, float distance) {
   for (std::size_t index = 0; index < scene.parts.size(); ++index) {
     const cli::ScenePart& part = scene.parts[index];
     const Result<reference::SkinnedMesh> expected =
-        reference::skin(part.mesh->view(), request.pose.palette(part), skinned.method);
+        reference::skin(part.mesh->view(), request.pose.pose(part), skinned.method);
     EXPECT_TRUE(expected);
     std::vector<float>& positions = skinned.positions.emplace_back();
     for (const reference::Double3& position : expected->positions) {

@@ -37,7 +37,7 @@ struct Extent {
 struct JointBounds {
   /// A joint that moves vertices.
   struct Joint {
-    std::uint32_t joint;  ///< index into the palette
+    std::uint32_t joint;  ///< index into the pose
     Extent alone;         ///< of the vertices that this joint moves on its own, in bind space
   };
 
@@ -58,13 +58,13 @@ struct JointBounds {
   /// Above this number of influences a vertex adds no trios.
   static constexpr std::uint32_t mostInfluencesOfTrio = 8;
 
-  std::vector<Joint> joints;  ///< by rising palette index
+  std::vector<Joint> joints;  ///< by rising pose index
   std::vector<Pair> pairs;    ///< by rising first, then second
   /// Three joints that have vertices in common: indices into `joints`, rising.
   std::vector<std::array<std::uint32_t, 3>> trios;
   /// Of the vertices without weight, which stay in bind pose; min > max for none.
   Box unweighted{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-  std::uint32_t requiredJoints = 0;  ///< minimum joints of a palette: the largest index + 1
+  std::uint32_t requiredJoints = 0;  ///< minimum joints of a pose: the largest index + 1
 
   /// To be stored: little-endian words with a version and a checksum.
   std::vector<std::byte> bytes() const;
@@ -79,30 +79,30 @@ struct MorphRange {
   float max = 1;
 };
 
-/// Gathers what `skinnedBounds` has to know of a mesh for palettes of `jointCount` joints.
+/// Gathers what `skinnedBounds` has to know of a mesh for poses of `jointCount` joints.
 /// O(vertices × influences²). Morph targets may move every vertex by every combination of weights
 /// within `morphRanges`, one a target; empty: 0 to 1 for each. A mesh that is drawn without its
 /// morph targets gets a tighter box from a view without them. Fails with `invalidMesh` where `pack`
 /// would refuse the mesh, or a morph target does not fit it, and with `invalidArgument` for a
-/// `jointCount` of 0 or above `maxPaletteJoints`, or for ranges that are not finite, not in order
+/// `jointCount` of 0 or above `maxPoseJoints`, or for ranges that are not finite, not in order
 /// or not one a target.
 Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
                                 std::span<const MorphRange> morphRanges = {});
 
 /// A box that holds every position that a kernel or the reference makes of the mesh in this pose,
-/// rounding included, in the palette's space. `palette` is what the mesh is skinned with: joint
+/// rounding included, in the pose's space. `pose` is what the mesh is skinned with: joint
 /// global transform × inverse bind matrix.
 ///
 /// For `linear`, `dualQuaternion` and `blended`; of the other methods nothing is proven, and the
 /// box is infinite. A few percent larger than it need be in ordinary poses; docs/bounds.md has the
 /// formulas, the proof and numbers. Joints that move no vertex have no effect, whatever their
 /// matrices. The box is infinite (from -inf to inf) where a joint that moves vertices is not finite
-/// or outside the palette, or the mesh reaches beyond 1e38, and its sides may be infinite where
+/// or outside the pose, or the mesh reaches beyond 1e38, and its sides may be infinite where
 /// numbers leave the range of float32: ask `std::isfinite` before it becomes a format's box. It
 /// never has a NaN. A default-made `JointBounds` gives min > max.
 ///
 /// O(joints + pairs + trios); allocates only above 128 joints that move vertices, and needs
 /// 32 KiB of stack. Any thread.
-Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method);
+Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose, Method method);
 
 }  // namespace dermis

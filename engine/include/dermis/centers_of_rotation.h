@@ -52,7 +52,7 @@ class CenterOfRotationSolver {
   /// out draws no centre towards it. Pass a mesh that was cut up, by material say, as one.
   ///
   /// Fails with `invalidMesh` if `pack` would refuse the mesh, with that finding's sentence; with
-  /// `invalidArgument` for a `jointCount` of 0 or above `maxPaletteJoints`, a number of indices
+  /// `invalidArgument` for a `jointCount` of 0 or above `maxPoseJoints`, a number of indices
   /// that is no multiple of 3, or an index outside the mesh; with `limitExceeded` above 2^32 − 1
   /// triangles. Any thread.
   static Result<CenterOfRotationSolver> make(const MeshView& mesh, std::uint32_t jointCount,

@@ -46,7 +46,7 @@ struct Node {
 
 struct Skin {
   std::string name;
-  /// Node indices, at most `maxPaletteJoints`; a vertex's joint index counts in this list. Empty
+  /// Node indices, at most `maxPoseJoints`; a vertex's joint index counts in this list. Empty
   /// where the skin is broken and no node uses it.
   std::vector<std::uint32_t> joints;
   /// One a joint, finite; identities where the file has none.

@@ -18,7 +18,7 @@ struct Handle {
 };
 
 using MeshHandle = Handle<struct MeshOfSystem>;
-using PaletteHandle = Handle<struct PaletteOfSystem>;
+using PoseHandle = Handle<struct PoseOfSystem>;
 using InstanceHandle = Handle<struct InstanceOfSystem>;
 
 }  // namespace dermis

@@ -13,7 +13,7 @@ namespace dermis {
 
 struct InstanceDescription {
   MeshHandle mesh = {};
-  PaletteHandle palette = {};  ///< Any number of instances may share one: body, clothes, hair.
+  PoseHandle pose = {};  ///< Any number of instances may share one: body, clothes, hair.
   Method method = Method::dualQuaternion;
   /// Previous positions are right on first frames, when poses rest or are skipped, and when an
   /// instance comes back into view; `teleport` for jumps. `Motion::reskinned` is not possible.
@@ -21,8 +21,8 @@ struct InstanceDescription {
   Box box = {};  ///< for positions in snorm16, as `Job::box`
   bool bounds =
       false;  ///< the exact box of the skinned positions is wanted: `SkinningSystem::bounds`
-  /// Skinned in one frame of so many, 1 or more. Instances of one palette take the same frames;
-  /// palettes are spread over them.
+  /// Skinned in one frame of so many, 1 or more. Instances of one pose take the same frames;
+  /// poses are spread over them.
   std::uint32_t updateInterval = 1;
   /// Whether it is skinned is decided on the GPU, by `vulkan::FrameDescription::visibility`. Its
   /// output must lie in one storage buffer range; one of up to a 32nd of that always does.

@@ -30,7 +30,7 @@ enum class Motion : std::uint8_t {
   /// Copied from the output before it is overwritten: the positions from the last time that this
   /// instance was skinned. Takes a read and a write; the output must persist between frames.
   kept,
-  /// Skinned again with the previous palette and morph weights. Takes a second skinning; only the
+  /// Skinned again with the previous pose and morph weights. Takes a second skinning; only the
   /// pose must persist. Not in a scene.
   reskinned,
 };

@@ -8,7 +8,7 @@
 
 namespace dermis {
 
-/// All take the same mesh and palette. Those that blend rotations do it in two phases where joints
+/// All take the same mesh and pose. Those that blend rotations do it in two phases where joints
 /// scale or shear: the scale/shear parts are blended linearly and applied in bind space, then the
 /// rigid parts are blended by the rule. docs/methods.md has a page on each.
 enum class Method : std::uint8_t {

@@ -20,7 +20,7 @@ struct MeshInfo {
   std::uint64_t byteSize = 0;  ///< of the blob
   std::uint32_t vertexCount = 0;
   std::uint32_t requiredJoints =
-      0;  ///< the fewest joints of a palette for this mesh: its largest joint index + 1
+      0;  ///< the fewest joints of a pose for this mesh: its largest joint index + 1
   std::uint32_t maxInfluences = 0;  ///< the most influences of one vertex
   std::uint32_t morphTargetCount = 0;
   bool hasNormals = false;
@@ -37,7 +37,7 @@ class PackedMesh {
  public:
   /// A packed mesh from stored bytes, which are copied. O(bytes): checks the length, the version,
   /// the checksum and every index, so that no stored blob can make a kernel read outside its mesh
-  /// or palette. Fails with `invalidData` or `unsupportedVersion`.
+  /// or pose. Fails with `invalidData` or `unsupportedVersion`.
   static Result<PackedMesh> fromBytes(std::span<const std::byte> bytes);
 
   /// The blob; its size is a multiple of `packedMeshAlignment`.
@@ -52,7 +52,7 @@ class PackedMesh {
   std::vector<std::uint32_t> words_;
 };
 
-/// Packs a mesh for palettes of `jointCount` joints. Per vertex: attributes as float32; weights of
+/// Packs a mesh for poses of `jointCount` joints. Per vertex: attributes as float32; weights of
 /// one joint added up, zero weights dropped, the pivot chosen (the strongest influence, the lowest
 /// joint index on a tie) and stored first, the rest by falling weight; weights normalised in double
 /// precision and rounded to float32 so that they sum to exactly 1. A vertex takes 8 bytes for each

@@ -22,15 +22,15 @@
 
 namespace dermis {
 
-/// What an engine promises about its meshes and palettes. Each promise reduces the number of
-/// pipelines (see `everyVariant`). `makePlan`, `addMesh` and `addPalette` fail if a promise is
+/// What an engine promises about its meshes and poses. Each promise reduces the number of
+/// pipelines (see `everyVariant`). `makePlan`, `addMesh` and `addPose` fail if a promise is
 /// broken.
 struct Promises {
   /// Maximum influences per vertex: 1, 2 or 4. All meshes then use pipelines for that number.
   /// 0: no promise; there are pipelines for 1, 2, 4 and any number.
   std::uint8_t maxInfluences = 0;
   bool noMorphTargets = false;  ///< no mesh has morph targets
-  bool noScale = false;         ///< no palette has `mayScale`
+  bool noScale = false;         ///< no pose has `mayScale`
 
   friend bool operator==(const Promises&, const Promises&) = default;
 };
@@ -80,21 +80,21 @@ struct Tuning {
 };
 
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.
-struct Palette {
-  std::uint32_t jointCount = 0;    ///< 1 to `maxPaletteJoints`
+struct PoseDescription {
+  std::uint32_t jointCount = 0;    ///< 1 to `maxPoseJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
   /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
   /// of scratch memory per joint and, on lavapipe, more time even if no joint scales. If false,
-  /// scale and shear are ignored (rotation only) and counted in `PaletteStatus`.
+  /// scale and shear are ignored (rotation only) and counted in `PoseStatus`.
   bool mayScale = true;
 };
 
-/// One instance: a mesh, a palette, and where its skinned vertices are written. Two jobs of a batch
+/// One instance: a mesh, a pose, and where its skinned vertices are written. Two jobs of a batch
 /// must not write the same byte; this is not checked.
 struct Job {
   MeshInfo mesh;                 ///< `PackedMesh::info`; its bytes are in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
-  std::uint32_t palette = 0;     ///< index into `Batch::palettes`
+  std::uint32_t pose = 0;        ///< index into `Batch::poses`
   /// If `needsCentersOfRotation(method)`, the mesh must have centres of rotation.
   Method method = Method::dualQuaternion;
 
@@ -113,8 +113,8 @@ struct Job {
   /// Its format is that of `positions`; `format` is ignored here. With `Motion::kept`, snorm16
   /// values stay relative to the box that they were written with.
   OutputAttribute previousPositions;
-  /// reskinned: index into `Batch::palettes`; with at least the joints that the mesh requires.
-  std::uint32_t previousPalette = 0;
+  /// reskinned: index into `Batch::poses`; with at least the joints that the mesh requires.
+  std::uint32_t previousPose = 0;
   std::span<const MorphWeight> previousMorphs;  ///< reskinned: the previous weights
   /// Previous positions become the current ones. For the first frame of an instance, and for a
   /// teleport.
@@ -164,15 +164,15 @@ struct OutputSizes {
 
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
-  std::span<const Palette> palettes;
+  std::span<const PoseDescription> poses;
   std::span<const Job> jobs;
-  std::uint64_t meshesSize = 0;    ///< bytes of the mesh buffer
-  std::uint64_t matricesSize = 0;  ///< bytes of the matrices buffer
+  std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
+  std::uint64_t posesSize = 0;   ///< bytes of the poses buffer
   OutputSizes outputs;
 };
 
 enum class Kernel : std::uint8_t {
-  palette,     ///< converts poses
+  palette,     ///< converts poses to palettes
   skin,        ///< skins instances
   visibility,  ///< of a scene: chooses instances that are culled on the GPU
 };
@@ -195,8 +195,8 @@ struct Variant {
   bool bounds = false;
   /// Whether instances have active morph targets.
   bool morphs = false;
-  /// Whether joints may scale or shear (`Palette::mayScale`). Always false for linear blending,
-  /// which does not distinguish them.
+  /// Whether joints may scale or shear (`PoseDescription::mayScale`). Always false for linear
+  /// blending, which does not distinguish them.
   bool scales = false;
   /// Tables, meshes and palettes are read through uniform texel buffers, not storage buffers.
   bool texels = false;
@@ -218,7 +218,7 @@ struct Variant {
 bool hasResults(const Variant& variant);
 
 /// All variants that jobs with the method, outputs, motion and bounds of this job can need,
-/// whatever their mesh, palette, morph targets and batch: for `Context::prepare`, while loading.
+/// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
 /// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for 4 with
 /// joints that scale; for any number; and for any number with morph targets. Some methods need
 /// fewer. `Promises` reduce the number further.
@@ -239,9 +239,9 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
   meshes,
-  matrices,
-  tables,
-  palettes,
+  poses,     ///< joint matrices
+  tables,    ///< what `writeTables` writes
+  palettes,  ///< what the palette kernel makes of poses for the skin kernel
   results,
   positions,
   normals,
@@ -333,7 +333,7 @@ using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, Barrier
 std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
 /// What the palette kernel writes about one pose to the palettes buffer; the engine may read it.
-struct PaletteStatus {
+struct PoseStatus {
   std::uint32_t twoPhase = 0;         ///< 1 if joints are skinned in two phases: scale, rotation
   std::uint32_t nonRigidJoints = 0;   ///< joints with scale, shear or a mirror
   std::uint32_t undeclaredScale = 0;  ///< those whose scale was ignored: `mayScale` is false
@@ -359,9 +359,9 @@ class Plan {
   /// Requirements of a buffer. Sizes of meshes, matrices and outputs are those that the batch
   /// states; tables, palettes and results are as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
-  /// Byte offset of a palette's `PaletteStatus` in the palettes buffer; `noStatus` if only linear
-  /// jobs use that palette.
-  std::uint64_t statusOffset(std::uint32_t palette) const;
+  /// Byte offset of a pose's `PoseStatus` in the palettes buffer; `noStatus` if only linear
+  /// jobs use that pose.
+  std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
   /// Byte offset of a job's `InstanceResult` in the results buffer; `noResult` if it has none.
   /// Results are in the order of their jobs, without gaps.
@@ -380,11 +380,11 @@ class Plan {
   std::unique_ptr<PlanData> data_;
 };
 
-/// Turns a batch into commands: one dispatch for all palettes, then one for each variant and output
-/// window. O(palettes + jobs + morph weights). An empty batch gives an empty plan.
+/// Turns a batch into commands: one dispatch for all poses, then one for each variant and output
+/// window. O(poses + jobs + morph weights). An empty batch gives an empty plan.
 ///
-/// Fails with `invalidArgument` if a job or palette breaks a rule above (the message names it by
-/// its index), for example: a palette with fewer joints than the mesh requires, normals for a mesh
+/// Fails with `invalidArgument` if a job or pose breaks a rule above (the message names it by
+/// its index), for example: a pose with fewer joints than the mesh requires, normals for a mesh
 /// without normals, a range outside its buffer, a broken promise. Fails with `missingFeature` if an
 /// attribute is not at multiples of 4 bytes and the device cannot store less, and with
 /// `limitExceeded` if an attribute or a buffer is larger than the device's storage buffer range.

@@ -1,11 +1,11 @@
-// The books of a scene: which meshes, palettes and instances there are, where each stands in its
+// The books of a scene: which meshes, poses and instances there are, where each stands in its
 // buffer, and what a frame has to do. No Vulkan: `plan` makes a list of commands (plan.h).
 // `vulkan::SkinningSystem` keeps a Scene and executes its commands in buffers of its own; an engine
 // that uses it does not need this header. An engine with its own RHI uses Scene directly:
 //
 //   scene.beginFrame(frame, completedFrame);
 //   scene.readBack(completedFrame, bytes);          // of that frame's read-back buffer
-//   write joint matrices at scene.writePose(palette)->offset of the matrices buffer
+//   write joint matrices at scene.writePose(pose)->offset of the poses buffer
 //   ... add, remove, setVisible, setMorphWeights ...
 //   scene.plan(plan);
 //   writeTables(plan, mapped upload buffer of this frame);
@@ -38,7 +38,7 @@ struct SceneDescription {
   std::uint32_t framesInFlight = 2;
   std::uint64_t meshBudget = std::uint64_t{32} << 20;  ///< bytes of packed meshes; at most a
                                                        ///< storage buffer range
-  std::uint32_t jointBudget = 65536;                   ///< joints of all palettes together
+  std::uint32_t jointBudget = 65536;                   ///< joints of all poses together
   /// Bytes of skinned vertices. May be more than a storage buffer range.
   std::uint64_t outputBudget = std::uint64_t{64} << 20;
   std::uint32_t instanceBudget = 65536;  ///< instances at one time
@@ -62,7 +62,7 @@ struct FrameWorkStatistics {
   std::uint32_t instances = 0;  ///< in the scene
   std::uint32_t skinnedInstances = 0;
   std::uint32_t settledInstances = 0;  ///< only their previous positions were written
-  std::uint32_t convertedPalettes = 0;
+  std::uint32_t convertedPoses = 0;
   std::uint32_t culledCandidates = 0;  ///< instances given to the visibility kernel
   std::uint64_t skinnedVertices = 0;
   std::uint64_t writtenBytes = 0;  ///< of skinned vertices
@@ -85,9 +85,9 @@ struct SceneStatistics {
   StoreStatistics meshes, palettes, outputs;
 };
 
-/// Where to write the joint matrices of a palette.
+/// Where to write the joint matrices of a pose.
 struct PosePlace {
-  std::uint64_t offset = 0;  ///< bytes into the matrices buffer
+  std::uint64_t offset = 0;  ///< bytes into the poses buffer
   std::uint32_t jointCount = 0;
 };
 
@@ -110,7 +110,7 @@ class Scene {
   BufferRequirement buffer(BufferRole role) const;
   const SceneDescription& description() const;
 
-  // -- Meshes, palettes, instances. They may come and go at any time. Memory of what is removed is
+  // -- Meshes, poses, instances. They may come and go at any time. Memory of what is removed is
   // free again when the frame that was last begun is complete. Calls with a stale handle fail with
   // `invalidArgument`.
 
@@ -122,13 +122,13 @@ class Scene {
   /// Fails with `invalidArgument` while an instance uses it.
   Result<void> removeMesh(MeshHandle mesh);
 
-  /// `mayScale` as in `Palette`. The engine writes identity matrices to `pose`, unless it calls
-  /// `writePose` before the next `plan`. Fails as `addMesh`.
-  Result<PaletteHandle> addPalette(std::uint32_t jointCount, bool mayScale = true);
+  /// `mayScale` as in `PoseDescription`. The engine writes identity matrices to `posePlace`, unless
+  /// it calls `writePose` before the next `plan`. Fails as `addMesh`.
+  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale = true);
   /// Where the current pose stands.
-  Result<PosePlace> pose(PaletteHandle palette) const;
+  Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` while an instance uses it.
-  Result<void> removePalette(PaletteHandle palette);
+  Result<void> removePose(PoseHandle pose);
 
   /// The next `plan` skins it. Fails with `invalidArgument` if the description breaks a rule of
   /// `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with `limitExceeded`
@@ -143,9 +143,9 @@ class Scene {
   /// frames are in flight than described, or if numbers run backwards.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
 
-  /// Where to write the joint matrices of this frame; all instances of the palette are skinned
+  /// Where to write the joint matrices of this frame; all instances of the pose are skinned
   /// again. Only between `beginFrame` and `plan`. The GPU no longer reads that memory.
-  Result<PosePlace> writePose(PaletteHandle palette);
+  Result<PosePlace> writePose(PoseHandle pose);
 
   /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
   /// positions are its current ones. Instances begin visible.

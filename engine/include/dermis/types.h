@@ -14,9 +14,9 @@ struct JointMatrix {
 };
 static_assert(sizeof(JointMatrix) == 48);
 
-/// The maximum number of joints of a palette. A packed mesh stores joint indices in 32 bits;
+/// The maximum number of joints of a pose. A packed mesh stores joint indices in 32 bits;
 /// centres of rotation are found by pairs of joints with 16 bits each.
-inline constexpr std::uint32_t maxPaletteJoints = 65536;
+inline constexpr std::uint32_t maxPoseJoints = 65536;
 
 /// An axis-aligned box.
 struct Box {

@@ -65,7 +65,7 @@ bool refusedByPack(Problem problem);
 const char* problemName(Problem problem);
 
 /// Looks at every vertex: O(vertices × influences + displacements). `jointCount` is the number of
-/// joints of the palettes that the mesh will be skinned with, at most `maxPaletteJoints`. Sums of
+/// joints of the poses that the mesh will be skinned with, at most `maxPoseJoints`. Sums of
 /// weights count as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of
 /// the official glTF validator), or when the stored integers sum to 255 or 65535 exactly.
 MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
@@ -106,7 +106,7 @@ class RepairedMesh {
 };
 
 /// Mends what `validate` finds: influences with a weight that is negative or not finite, or a joint
-/// outside the palette, are dropped (weights are normalised by `pack`); a position, normal,
+/// outside the pose, are dropped (weights are normalised by `pack`); a position, normal,
 /// tangent, displacement or centre of rotation that is not finite becomes 0; dual-quaternion
 /// weights and bulge strengths are clamped. Fails with `invalidMesh` where the views make no sense.
 Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);

@@ -62,7 +62,7 @@ std::vector<float> copyShares(const AttributeView& view) {
 }
 
 bool isGoodInfluence(double weight, std::uint32_t joint, std::uint32_t jointCount) {
-  return std::isfinite(weight) && weight > 0 && joint < jointCount && joint < maxPaletteJoints;
+  return std::isfinite(weight) && weight > 0 && joint < jointCount && joint < maxPoseJoints;
 }
 
 }  // namespace

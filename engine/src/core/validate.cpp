@@ -411,7 +411,7 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
   Findings findings(mesh.name);
   if (!checkViews(mesh, findings)) return findings.take();
 
-  const std::uint32_t joints = std::min(jointCount, maxPaletteJoints);
+  const std::uint32_t joints = std::min(jointCount, maxPoseJoints);
   std::vector<std::uint32_t> used;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     if (!isFinitePosition(mesh, vertex)) {

@@ -61,9 +61,9 @@ std::vector<std::uint32_t> findRoots(const Model& model) {
 }
 
 Skin readSkin(Source& source, const tinygltf::Skin& from, const std::string& where) {
-  if (from.joints.size() > maxPaletteJoints) {
+  if (from.joints.size() > maxPoseJoints) {
     fail(ErrorCode::limitExceeded, join(where, ": it has ", from.joints.size(),
-                                        " joints, and a palette holds ", maxPaletteJoints));
+                                        " joints, and a palette holds ", maxPoseJoints));
   }
   Skin skin;
   std::transform(from.joints.begin(), from.joints.end(), std::back_inserter(skin.joints), indexOf);

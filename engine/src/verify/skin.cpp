@@ -68,7 +68,7 @@ Double3 toArray(const dvec3& v) {
 Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
                          std::span<const MorphWeight> morphs) {
   const MeshReport report = validate(
-      mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPaletteJoints)));
+      mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPoseJoints)));
   if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
     return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": " +

@@ -72,7 +72,7 @@ BoundBuffers BindingsState::paletteKernel() const {
   };
   BoundBuffers bound;
   bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound.buffers[abi::BINDING_MESHES] = orElse(buffers.matrices, buffers.tables);
+  bound.buffers[abi::BINDING_MESHES] = orElse(buffers.poses, buffers.tables);
   bound.buffers[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
   if (context->bindingCount() == abi::BINDING_COUNT)
     bound.buffers[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
@@ -84,7 +84,7 @@ BoundBuffers BindingsState::skinKernel(Method method, const Windows& windows) co
   bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
   bound.buffers[abi::BINDING_MESHES] = infoOf(buffers.meshes);
   bound.buffers[abi::BINDING_PALETTES] =
-      infoOf(method == Method::linear ? buffers.matrices : buffers.palettes);
+      infoOf(method == Method::linear ? buffers.poses : buffers.palettes);
   const bool oneOutput = context->bindingCount() != abi::BINDING_COUNT;
   for (std::size_t stream = 0; stream < (oneOutput ? 1 : streamCount); ++stream) {
     const BufferRange& range = output(stream);
@@ -152,7 +152,7 @@ Result<void> BindingsState::createTexelViews() {
   if (Result<void> good = create(buffers.meshes, unit, 16, meshTexels); !good) return good;
   if (Result<void> good = create(buffers.meshes, VK_FORMAT_R32_UINT, 4, meshWords); !good)
     return good;
-  if (Result<void> good = create(buffers.matrices, unit, 16, matrixTexels); !good) return good;
+  if (Result<void> good = create(buffers.poses, unit, 16, matrixTexels); !good) return good;
   return create(buffers.palettes, unit, 16, paletteTexels);
 }
 
@@ -259,7 +259,7 @@ Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers) const
   const OutputBuffers& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
-        {&buffers.matrices, "matrices", false},
+        {&buffers.poses, "poses", false},
         {&buffers.tables, "tables", false},
         {&buffers.palettes, "palettes", false},
         {&buffers.results, "results", false},

@@ -56,11 +56,12 @@ static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&
               offsetof(InstanceResult, clampedVertices) ==
                   offsetof(abi::ResultRecord, clampedVertices) &&
               offsetof(InstanceResult, orderedMax) == offsetof(abi::ResultRecord, maxX));
-static_assert(
-    sizeof(PaletteStatus) == sizeof(abi::StatusRecord) &&
-    offsetof(PaletteStatus, nonRigidJoints) == offsetof(abi::StatusRecord, nonRigidJoints) &&
-    offsetof(PaletteStatus, undeclaredScale) == offsetof(abi::StatusRecord, undeclaredScale) &&
-    offsetof(PaletteStatus, nonFiniteJoints) == offsetof(abi::StatusRecord, nonFiniteJoints));
+static_assert(sizeof(PoseStatus) == sizeof(abi::StatusRecord) &&
+              offsetof(PoseStatus, nonRigidJoints) == offsetof(abi::StatusRecord, nonRigidJoints) &&
+              offsetof(PoseStatus, undeclaredScale) ==
+                  offsetof(abi::StatusRecord, undeclaredScale) &&
+              offsetof(PoseStatus, nonFiniteJoints) ==
+                  offsetof(abi::StatusRecord, nonFiniteJoints));
 
 namespace {
 

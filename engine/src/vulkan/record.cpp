@@ -47,7 +47,7 @@ std::string describe(const Variant& variant) {
 
 Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   for (const auto& [role, range, name] : {std::tuple{BufferRole::meshes, &buffers.meshes, "meshes"},
-                                          {BufferRole::matrices, &buffers.matrices, "matrices"},
+                                          {BufferRole::poses, &buffers.poses, "poses"},
                                           {BufferRole::tables, &buffers.tables, "tables"},
                                           {BufferRole::palettes, &buffers.palettes, "palettes"},
                                           {BufferRole::results, &buffers.results, "results"}}) {

@@ -28,15 +28,15 @@ struct OutputBuffers {
 };
 
 /// The buffers of a batch, each with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. If
-/// `DeviceLimits::texelBuffers`, meshes, matrices, tables and palettes also have
+/// `DeviceLimits::texelBuffers`, meshes, poses, tables and palettes also have
 /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT. `Plan::buffer` gives their sizes and usage. An engine
 /// that cannot give them that usage sets `DeviceDescription::texelBuffers` to false. The engine
 /// owns the buffers. One that a plan does not need may be left empty: meshes and outputs only where
-/// there is no job at all, matrices and tables likewise, palettes where no job uses dual
+/// there is no job at all, poses and tables likewise, palettes where no job uses dual
 /// quaternions, results where no job has any, an attribute's output where no job wants it.
 struct BatchBuffers {
   BufferRange meshes;    ///< packed meshes at the jobs' `meshOffset`
-  BufferRange matrices;  ///< joint matrices at the palettes' `matrixOffset`
+  BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
   BufferRange tables;    ///< what `writeTables` wrote
   BufferRange palettes;  ///< scratch: written and read by `record`
   OutputBuffers outputs;

@@ -40,7 +40,7 @@ struct DeviceDescription {
   /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT if kernels read through texel buffers. Set it to
   /// false for buffers that are storage buffers only.
   bool texelBuffers = true;
-  /// What the engine promises of its meshes and palettes, so that it needs fewer pipelines.
+  /// What the engine promises of its meshes and poses, so that it needs fewer pipelines.
   Promises promises;
   /// Every pipeline is built with it, where given; the engine stores and loads it.
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;
@@ -72,9 +72,9 @@ class Context {
   /// How to cut up the work on this device.
   Tuning tuning() const;
 
-  /// Builds every pipeline that instances with this method and layout may need, whatever their mesh,
-  /// pose and morph targets. Once all methods and layouts are prepared, `record` needs no other
-  /// pipeline. May take long: call it from a loading thread. If it fails (`invalidArgument`,
+  /// Builds every pipeline that instances with this method and layout may need, whatever their
+  /// mesh, pose and morph targets. Once all methods and layouts are prepared, `record` needs no
+  /// other pipeline. May take long: call it from a loading thread. If it fails (`invalidArgument`,
   /// `missingFeature`, `vulkanError`), what was built before stays built.
   Result<void> prepare(const PipelineNeeds& needs) const;
 

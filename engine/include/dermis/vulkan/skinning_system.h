@@ -1,4 +1,4 @@
-// Skinning for a whole scene: meshes, palettes and instances by handle, that come, go and move as
+// Skinning for a whole scene: meshes, poses and instances by handle, that come, go and move as
 // they like while frames are in flight. It owns the memory and keeps the books; the engine owns the
 // device, the command buffer and the clock. Built on plan.h and `Context`, which an engine that has
 // memory and instances of its own uses directly.
@@ -6,7 +6,7 @@
 // One frame:
 //
 //   system.beginFrame(frame, completedFrame);      // counted by the engine; no fence of ours
-//   std::span<JointMatrix> pose = *system.writePose(palette);   // for those that moved
+//   std::span<JointMatrix> matrices = *system.writePose(pose);   // for those that moved
 //   ... add, remove, setVisible, setMorphWeights ...
 //   system.record(commandBuffer);                  // with the engine's barriers around it
 //   draw from system.outputBuffer() at system.output(instance)
@@ -43,7 +43,7 @@ struct SkinningSystemDescription {
 
   std::uint64_t meshBudget = std::uint64_t{32} << 20;    ///< bytes of packed meshes; at most a
                                                          ///< storage buffer range
-  std::uint32_t jointBudget = 65536;                     ///< joints of all palettes together
+  std::uint32_t jointBudget = 65536;                     ///< joints of all poses together
   std::uint64_t outputBudget = std::uint64_t{64} << 20;  ///< bytes of skinned vertices; may be more
                                                          ///< than a storage buffer range
   std::uint32_t instanceBudget = 65536;  ///< instances that there may be at one time
@@ -108,7 +108,7 @@ class SkinningSystem {
   SkinningSystem(SkinningSystem&&) noexcept;
   SkinningSystem& operator=(SkinningSystem&&) noexcept;
 
-  // -- Meshes, palettes, instances: add and remove at any time. What goes is given free when the
+  // -- Meshes, poses, instances: add and remove at any time. What goes is given free when the
   // frame that was last begun is complete. Calls with a stale handle fail with `invalidArgument`.
 
   /// The bytes are copied; `record` brings them to the GPU. Fails with `limitExceeded` where the
@@ -118,10 +118,10 @@ class SkinningSystem {
   Result<void> removeMesh(MeshHandle mesh);
 
   /// A pose of so many joints, which rests in the identity until it is written.
-  /// `mayScale` as in `Palette`.
-  Result<PaletteHandle> addPalette(std::uint32_t jointCount, bool mayScale = true);
+  /// `mayScale` as in `PoseDescription`.
+  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale = true);
   /// Fails with `invalidArgument` while an instance uses it.
-  Result<void> removePalette(PaletteHandle palette);
+  Result<void> removePose(PoseHandle pose);
 
   /// Skinned for the first time by the next `record`. Fails with `invalidArgument` where the
   /// description breaks a rule of `Job`, with `missingFeature` or `limitExceeded` as `makePlan`
@@ -142,9 +142,9 @@ class SkinningSystem {
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
 
   /// Where to write the joint matrices of this frame: mapped memory, to be written as a whole and
-  /// never read; until `record`. Only after `beginFrame`. Instances of the palette are skinned
+  /// never read; until `record`. Only after `beginFrame`. Instances of the pose are skinned
   /// again; calling it is what makes them.
-  Result<std::span<JointMatrix>> writePose(PaletteHandle palette);
+  Result<std::span<JointMatrix>> writePose(PoseHandle pose);
 
   /// What is invisible is neither skinned nor settled; when it comes back, its previous positions
   /// are its current ones. Instances begin visible.

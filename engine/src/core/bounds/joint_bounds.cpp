@@ -218,7 +218,7 @@ class Collector {
             below(pair.leastSum)};
   }
 
-  static_assert(maxPaletteJoints <= 65536, "the keys below have 16 bits a joint");
+  static_assert(maxPoseJoints <= 65536, "the keys below have 16 bits a joint");
   std::vector<Reach> alone_;
   std::vector<bool> used_;
   std::unordered_map<std::uint32_t, PairRange> pairs_;
@@ -228,9 +228,9 @@ class Collector {
 
 Result<void> checkArguments(const MeshView& mesh, std::uint32_t jointCount,
                             std::span<const MorphRange> morphRanges) {
-  if (jointCount == 0 || jointCount > maxPaletteJoints) {
+  if (jointCount == 0 || jointCount > maxPoseJoints) {
     return invalid(mesh, ErrorCode::invalidArgument,
-                   ": a palette has 1 to " + std::to_string(maxPaletteJoints) + " joints, not " +
+                   ": a palette has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
   if (!morphRanges.empty() && morphRanges.size() != mesh.morphTargets.size()) {

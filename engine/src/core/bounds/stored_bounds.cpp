@@ -60,7 +60,7 @@ void take(std::span<const std::byte>& bytes, std::size_t count, std::vector<Elem
 Result<void> checkJoints(const JointBounds& bounds) {
   std::uint32_t required = 0;
   for (const JointBounds::Joint& joint : bounds.joints) {
-    if (joint.joint < required || joint.joint >= maxPaletteJoints || hasNan(joint.alone.reach))
+    if (joint.joint < required || joint.joint >= maxPoseJoints || hasNan(joint.alone.reach))
       return damaged("its joints are not in order, or not numbers");
     required = joint.joint + 1;
   }

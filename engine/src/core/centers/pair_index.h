@@ -48,7 +48,7 @@ class PairIndex {
   std::size_t entryCount(const Influence& first, const Influence& second) const;
 
  private:
-  static_assert(maxPaletteJoints <= 65536, "the keys have 16 bits a joint");
+  static_assert(maxPoseJoints <= 65536, "the keys have 16 bits a joint");
 
   struct Range {
     std::size_t first = 0, last = 0;

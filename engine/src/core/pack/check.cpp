@@ -119,7 +119,7 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
   const auto areFloats = [&](std::uint32_t header) {
     return words[header] == 0 || isSection(words[header], vertices, words.size());
   };
-  if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPaletteJoints ||
+  if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPoseJoints ||
       words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 ||
       !isUnitSection(words[abi::MESH_HEADER_POSITIONS], vertices + 1, words.size()) ||
       !areVectors(abi::MESH_HEADER_NORMALS) || !areVectors(abi::MESH_HEADER_TANGENTS) ||

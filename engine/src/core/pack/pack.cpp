@@ -226,11 +226,10 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
 }  // namespace
 
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
-  if (jointCount == 0 || jointCount > maxPaletteJoints) {
-    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) +
-                                                 ": a palette has 1 to " +
-                                                 std::to_string(maxPaletteJoints) +
-                                                 " joints, not " + std::to_string(jointCount)};
+  if (jointCount == 0 || jointCount > maxPoseJoints) {
+    return Error{ErrorCode::invalidArgument,
+                 "mesh " + inQuotes(mesh.name) + ": a palette has 1 to " +
+                     std::to_string(maxPoseJoints) + " joints, not " + std::to_string(jointCount)};
   }
   if (const Result<void> accepted = validate(mesh, jointCount).accepted(); !accepted)
     return accepted.error();

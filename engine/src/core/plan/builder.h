@@ -158,7 +158,7 @@ class PlanMaker;
 
 /// The sizes of the buffers that do not follow from a plan, in bytes.
 struct PlanSizes {
-  std::uint64_t meshes = 0, matrices = 0, palettes = 0;
+  std::uint64_t meshes = 0, poses = 0, palettes = 0;
   std::uint32_t results = 0;  ///< their number
   OutputSizes outputs;
   bool isScene = false;  ///< there are the buffers of a scene

@@ -135,17 +135,16 @@ bool isBox(const Box& box) {
   return true;
 }
 
-Result<void> checkPaletteOf(const Batch& batch, const Job& job, std::uint32_t palette,
-                            const Subject& subject) {
-  if (palette >= batch.palettes.size()) {
-    return invalid(subject.name() + ": there is no palette " + std::to_string(palette) + " among " +
-                   std::to_string(batch.palettes.size()));
+Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
+                         const Subject& subject) {
+  if (pose >= batch.poses.size()) {
+    return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
+                   std::to_string(batch.poses.size()));
   }
-  if (batch.palettes[palette].jointCount < job.mesh.requiredJoints) {
-    return invalid(subject.name() + ": its mesh needs a palette of " +
-                   std::to_string(job.mesh.requiredJoints) + " joints, palette " +
-                   std::to_string(palette) + " has " +
-                   std::to_string(batch.palettes[palette].jointCount));
+  if (batch.poses[pose].jointCount < job.mesh.requiredJoints) {
+    return invalid(subject.name() + ": its mesh needs a pose of " +
+                   std::to_string(job.mesh.requiredJoints) + " joints, pose " +
+                   std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
   }
   return {};
 }
@@ -158,8 +157,7 @@ Result<void> checkMotion(const Batch& batch, const Job& job, const Subject& subj
                    " settles or restarts its motion, but has no previous positions");
   }
   if (job.motion != Motion::reskinned) return {};
-  if (Result<void> good = checkPaletteOf(batch, job, job.previousPalette, subject); !good)
-    return good;
+  if (Result<void> good = checkPoseOf(batch, job, job.previousPose, subject); !good) return good;
   return checkMorphs(job.previousMorphs, job.mesh.morphTargetCount, subject);
 }
 
@@ -185,7 +183,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                    " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
-  if (Result<void> good = checkPaletteOf(batch, job, job.palette, subject); !good) return good;
+  if (Result<void> good = checkPoseOf(batch, job, job.pose, subject); !good) return good;
   if (methodName(job.method) == "unknown")
     return invalid(subject.name() + ": its method is not one of Method");
   if (isForComparison(job.method) && !limits.comparisonMethods) {
@@ -237,21 +235,20 @@ Result<void> checkWindows(const OutputStreams& streams,
   return {};
 }
 
-Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index,
-                          const Promises& promises) {
-  const std::string name = "palette " + std::to_string(index);
-  if (palette.jointCount == 0 || palette.jointCount > maxPaletteJoints) {
-    return invalid(name + " has " + std::to_string(palette.jointCount) +
-                   " joints, it may have 1 to " + std::to_string(maxPaletteJoints));
+Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
+                       const Promises& promises) {
+  const std::string name = "pose " + std::to_string(index);
+  if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
+    return invalid(name + " has " + std::to_string(pose.jointCount) + " joints, it may have 1 to " +
+                   std::to_string(maxPoseJoints));
   }
-  if (palette.matrixOffset % matrixAlignment != 0 || palette.matrixOffset > batch.matricesSize ||
-      std::uint64_t{palette.jointCount} * sizeof(JointMatrix) >
-          batch.matricesSize - palette.matrixOffset) {
-    return invalid(name + ": " + std::to_string(palette.jointCount) +
-                   " matrices cannot stand at byte " + std::to_string(palette.matrixOffset) +
-                   " of a matrices buffer of " + std::to_string(batch.matricesSize));
+  if (pose.matrixOffset % matrixAlignment != 0 || pose.matrixOffset > batch.posesSize ||
+      std::uint64_t{pose.jointCount} * sizeof(JointMatrix) > batch.posesSize - pose.matrixOffset) {
+    return invalid(name + ": " + std::to_string(pose.jointCount) +
+                   " matrices cannot stand at byte " + std::to_string(pose.matrixOffset) +
+                   " of a poses buffer of " + std::to_string(batch.posesSize));
   }
-  return checkPromisedPalette(palette.mayScale, promises, {"palette", index});
+  return checkPromisedPose(pose.mayScale, promises, {"pose", index});
 }
 
 Result<void> checkPromises(const Promises& promises) {
@@ -273,7 +270,7 @@ Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
   return {};
 }
 
-Result<void> checkPromisedPalette(bool mayScale, const Promises& promises, const Subject& subject) {
+Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject) {
   if (!mayScale || !promises.noScale) return {};
   return invalid(subject.name() + " may scale, despite Promises::noScale");
 }

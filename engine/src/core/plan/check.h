@@ -1,4 +1,4 @@
-// What a batch must keep to, said in sentences that name the job or palette at fault.
+// What a batch must keep to, said in sentences that name the job or pose at fault.
 #pragma once
 
 #include <array>
@@ -27,13 +27,13 @@ Result<void> checkLimits(const DeviceLimits& limits);
 
 /// Whether the values are allowed.
 Result<void> checkPromises(const Promises& promises);
-/// Whether a mesh or a palette keeps the promises.
+/// Whether a mesh or a pose keeps the promises.
 Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
                                const Subject& subject);
-Result<void> checkPromisedPalette(bool mayScale, const Promises& promises, const Subject& subject);
+Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject);
 Result<void> checkTuning(const Tuning& tuning);
-Result<void> checkPalette(const Batch& batch, const Palette& palette, std::size_t index,
-                          const Promises& promises);
+Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
+                       const Promises& promises);
 Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                       const DeviceLimits& limits);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,

@@ -15,7 +15,7 @@ class PlanMaker {
 
  private:
   Result<void> checkSizes(const Batch& batch, const DeviceLimits& limits) const;
-  void placePalettes(const Batch& batch);
+  void placePoses(const Batch& batch);
   Result<void> placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
                         const Tuning& tuning);
   std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
@@ -34,15 +34,14 @@ class PlanMaker {
 };
 
 /// Marks the forms that jobs read, and finds a place for each.
-void PlanMaker::placePalettes(const Batch& batch) {
-  for (std::vector<std::uint32_t>& units : paletteUnits_)
-    units.assign(batch.palettes.size(), notUsed);
+void PlanMaker::placePoses(const Batch& batch) {
+  for (std::vector<std::uint32_t>& units : paletteUnits_) units.assign(batch.poses.size(), notUsed);
   for (const Job& job : batch.jobs) {
     const std::optional<PaletteForm> form = paletteForm(job.method);
     if (!form) continue;
     std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(*form)];
-    units[job.palette] = 0;
-    if (job.motion == Motion::reskinned) units[job.previousPalette] = 0;
+    units[job.pose] = 0;
+    if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
   }
   std::uint64_t end = 0;
   for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
@@ -50,16 +49,16 @@ void PlanMaker::placePalettes(const Batch& batch) {
     for (std::size_t index = 0; index < units.size(); ++index) {
       if (units[index] == notUsed) continue;
       units[index] = static_cast<std::uint32_t>(end);
-      end += paletteSize(form, batch.palettes[index].jointCount, batch.palettes[index].mayScale);
+      end += paletteSize(form, batch.poses[index].jointCount, batch.poses[index].mayScale);
     }
   }
   palettesSize_ = end * unitBytes;
 }
 
 Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limits) const {
-  const std::uint64_t most = std::max({palettesSize_, batch.matricesSize, batch.meshesSize});
+  const std::uint64_t most = std::max({palettesSize_, batch.posesSize, batch.meshesSize});
   if (most <= limits.maxStorageBufferRange) return {};
-  return Error{ErrorCode::limitExceeded, "meshes, matrices or palettes of " + std::to_string(most) +
+  return Error{ErrorCode::limitExceeded, "meshes, poses or palettes of " + std::to_string(most) +
                                              " bytes are more than a storage buffer range of " +
                                              std::to_string(limits.maxStorageBufferRange) +
                                              " bytes; a batch of fewer of them would fit"};
@@ -68,7 +67,7 @@ Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limit
 std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint32_t palette) const {
   const std::optional<PaletteForm> form = paletteForm(method);
   return form ? paletteUnits_[static_cast<std::size_t>(*form)][palette]
-              : static_cast<std::uint32_t>(batch.palettes[palette].matrixOffset / unitBytes);
+              : static_cast<std::uint32_t>(batch.poses[palette].matrixOffset / unitBytes);
 }
 
 /// Null if the job needs none. `extras_` has room for those of all jobs, so that none moves.
@@ -81,8 +80,8 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
   extras.box = job.box;
   extras.hasPrevious = job.motion == Motion::reskinned;
   if (extras.hasPrevious) {
-    extras.previousPalette = paletteOf(batch, job.method, job.previousPalette);
-    extras.previousJoints = batch.palettes[job.previousPalette].jointCount;
+    extras.previousPalette = paletteOf(batch, job.method, job.previousPose);
+    extras.previousJoints = batch.poses[job.previousPose].jointCount;
     assignActive(job.previousMorphs, extras.previousMorphs);
   }
   if (!extras.isNeeded()) return nullptr;
@@ -93,14 +92,14 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
 Result<void> PlanMaker::placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
                                  const Tuning& tuning) {
   const Job& job = batch.jobs[index];
-  const Palette& palette = batch.palettes[job.palette];
+  const PoseDescription& pose = batch.poses[job.pose];
   Placing placing;
   placing.subject = {"job", index};
   placing.outputs = batch.outputs;
-  placing.jointCount = palette.jointCount;
+  placing.jointCount = pose.jointCount;
   placing.mayScale = job.method != Method::linear &&
-                     (palette.mayScale || (job.motion == Motion::reskinned &&
-                                           batch.palettes[job.previousPalette].mayScale));
+                     (pose.mayScale ||
+                      (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale));
   return groups_.place(job, placing, limits, tuning, runs_);
 }
 
@@ -119,12 +118,11 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
     results_[index] = hasResult(job) ? resultCount_++ : notUsed;
     vertexCount += job.mesh.vertexCount;
   }
-  for (std::size_t index = 0; index < batch.palettes.size(); ++index) {
-    if (Result<void> good = checkPalette(batch, batch.palettes[index], index, limits.promises);
-        !good)
+  for (std::size_t index = 0; index < batch.poses.size(); ++index) {
+    if (Result<void> good = checkPose(batch, batch.poses[index], index, limits.promises); !good)
       return good;
   }
-  placePalettes(batch);
+  placePoses(batch);
   if (Result<void> good = checkSizes(batch, limits); !good) return good;
 
   groups_.clear();
@@ -138,7 +136,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
 
   PlanSizes sizes;
   sizes.meshes = batch.meshesSize;
-  sizes.matrices = batch.matricesSize;
+  sizes.poses = batch.posesSize;
   sizes.palettes = palettesSize_;
   sizes.results = resultCount_;
   sizes.outputs = batch.outputs;
@@ -147,9 +145,9 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
     const std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
     for (std::size_t index = 0; index < units.size(); ++index) {
       if (units[index] == notUsed) continue;
-      const Palette& palette = batch.palettes[index];
-      builder_.addPalette(static_cast<std::uint32_t>(palette.matrixOffset / unitBytes),
-                          units[index], palette.jointCount, form, palette.mayScale);
+      const PoseDescription& pose = batch.poses[index];
+      builder_.addPalette(static_cast<std::uint32_t>(pose.matrixOffset / unitBytes), units[index],
+                          pose.jointCount, form, pose.mayScale);
     }
   }
   for (std::uint32_t result = 0; result < resultCount_; ++result) builder_.clearResult(result);
@@ -157,7 +155,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   extras_.resize(std::max(extras_.size(), count));
   for (std::size_t index = 0; index < count; ++index) {
     const Job& job = batch.jobs[index];
-    const std::uint32_t palette = paletteOf(batch, job.method, job.palette);
+    const std::uint32_t palette = paletteOf(batch, job.method, job.pose);
     const std::uint32_t flags = (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
                                 (job.settles ? abi::INSTANCE_SETTLES : 0u);
     const InstanceExtras* extras = extrasOf(batch, index);

@@ -86,8 +86,8 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     // What the host fills may be staged: written to another buffer, and copied.
     case BufferRole::meshes:
       return {meshes, alignment, read | copiedTo, false, true};
-    case BufferRole::matrices:
-      return {matrices, alignment, read | copiedTo, !isScene, true};
+    case BufferRole::poses:
+      return {poses, alignment, read | copiedTo, !isScene, true};
     case BufferRole::tables:
       if (isScene) return {tables, alignment, read | copiedTo | indirect, false, false};
       return {tables, alignment, read | copiedTo, true, true};

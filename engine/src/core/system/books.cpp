@@ -36,9 +36,9 @@ SceneBooks::SceneBooks(const SceneDescription& description)
 PlanSizes sceneSizes(const SceneDescription& description) {
   PlanSizes sizes;
   sizes.meshes = description.meshBudget;
-  sizes.matrices =
+  sizes.poses =
       std::uint64_t{description.jointBudget} * description.framesInFlight * sizeof(JointMatrix);
-  // Room for the largest form of every joint, and the status of every palette of two joints.
+  // Room for the largest form of every joint, and the status of every pose of two joints.
   sizes.palettes = std::uint64_t{description.jointBudget} * 6 * unitBytes;
   sizes.results = description.boundsBudget;
   sizes.outputs = OutputSizes::oneBuffer(description.outputBudget);
@@ -47,7 +47,7 @@ PlanSizes sceneSizes(const SceneDescription& description) {
   return sizes;
 }
 
-// -- Meshes and palettes.
+// -- Meshes and poses.
 
 Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info) {
   if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
@@ -70,37 +70,34 @@ Result<void> SceneBooks::removeMesh(MeshHandle handle) {
   return {};
 }
 
-Result<PaletteHandle> SceneBooks::addPalette(std::uint32_t jointCount, bool mayScale) {
-  if (jointCount == 0 || jointCount > maxPaletteJoints) {
-    return Error{ErrorCode::invalidArgument, "a palette has 1 to " +
-                                                 std::to_string(maxPaletteJoints) +
+Result<PoseHandle> SceneBooks::addPose(std::uint32_t jointCount, bool mayScale) {
+  if (jointCount == 0 || jointCount > maxPoseJoints) {
+    return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
-  if (Result<void> kept =
-          checkPromisedPalette(mayScale, description_.limits.promises, {"the palette"});
+  if (Result<void> kept = checkPromisedPose(mayScale, description_.limits.promises, {"the pose"});
       !kept)
     return kept.error();
   const std::optional<Range> joints = jointStore_.allocate(jointCount, 1);
   if (!joints) {
-    return noRoom("a palette takes " + std::to_string(jointCount) + " joints", jointStore_,
-                  "joints");
+    return noRoom("a pose takes " + std::to_string(jointCount) + " joints", jointStore_, "joints");
   }
-  ScenePalette palette;
-  palette.jointCount = jointCount;
-  palette.mayScale = mayScale;
-  palette.joints = *joints;
-  return palettes_.add(palette);
+  ScenePose pose;
+  pose.jointCount = jointCount;
+  pose.mayScale = mayScale;
+  pose.joints = *joints;
+  return poses_.add(pose);
 }
 
-Result<void> SceneBooks::removePalette(PaletteHandle handle) {
-  const ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return unknownHandle("palette", handle);
-  if (palette->users != 0) return isUsed("palette", handle.index, palette->users);
-  retire(Retired::Store::joints, palette->joints);
-  for (const ScenePalette::Form& form : palette->forms) {
+Result<void> SceneBooks::removePose(PoseHandle handle) {
+  const ScenePose* pose = poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->users != 0) return isUsed("pose", handle.index, pose->users);
+  retire(Retired::Store::joints, pose->joints);
+  for (const ScenePose::Form& form : pose->forms) {
     if (form.units) retire(Retired::Store::units, *form.units);
   }
-  palettes_.remove(handle);
+  poses_.remove(handle);
   return {};
 }
 
@@ -151,28 +148,28 @@ void SceneBooks::free(const Retired& retired) {
   }
 }
 
-std::uint64_t SceneBooks::poseOffset(const ScenePalette& palette) const {
-  return (std::uint64_t{palette.slot} * description_.jointBudget + palette.joints.offset) *
+std::uint64_t SceneBooks::poseOffset(const ScenePose& pose) const {
+  return (std::uint64_t{pose.slot} * description_.jointBudget + pose.joints.offset) *
          sizeof(JointMatrix);
 }
 
-Result<std::uint64_t> SceneBooks::writePose(PaletteHandle handle) {
+Result<std::uint64_t> SceneBooks::writePose(PoseHandle handle) {
   if (!hasBegun_) {
     return Error{ErrorCode::invalidArgument,
                  "a pose is written between beginFrame and record, so that it is known which "
                  "memory the GPU is done with"};
   }
-  ScenePalette* palette = palettes_.find(handle);
-  if (palette == nullptr) return unknownHandle("palette", handle);
-  if (palette->poseFrame != frame_) {
+  ScenePose* pose = poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->poseFrame != frame_) {
     // The next of its slots: the GPU is done with it, since it was superseded at least as many
     // frames ago as there may be in flight.
-    palette->slot = (palette->slot + 1) % description_.framesInFlight;
-    palette->poseFrame = frame_;
-    ++palette->version;
+    pose->slot = (pose->slot + 1) % description_.framesInFlight;
+    pose->poseFrame = frame_;
+    ++pose->version;
     posed_.push_back(handle);
   }
-  return poseOffset(*palette);
+  return poseOffset(*pose);
 }
 
 // -- What engines set.

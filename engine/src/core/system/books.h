@@ -30,8 +30,8 @@ struct SceneMesh {
   std::uint32_t users = 0;
 };
 
-struct ScenePalette {
-  /// The palette as it was last converted to one of the forms that methods read.
+struct ScenePose {
+  /// The pose as it was last converted to one of the forms that methods read.
   struct Form {
     std::optional<Range> units;
     std::uint64_t version = 0;    ///< of the pose
@@ -73,8 +73,8 @@ struct SceneInstance {
   bool isMoving = false;       ///< its previous positions are others, as of the last record
   bool isShifting = false;     ///< among the shifting
   Method method = Method::dualQuaternion;
-  std::uint32_t palette = 0;  ///< index
-  std::uint32_t nextOfPalette = notUsed, previousOfPalette = notUsed;
+  std::uint32_t pose = 0;  ///< index
+  std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
   std::uint32_t updateInterval = 1;
   std::uint32_t vertexCount = 0;
   std::uint64_t plannedIn = 0;    ///< the last plan that skins it
@@ -95,7 +95,7 @@ struct SceneInstance {
   std::uint64_t lastFrame = 0;    ///< in which it was skinned
   std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
   MeshHandle mesh;
-  PaletteHandle paletteHandle;
+  PoseHandle poseHandle;
   Box box;
   bool bounds = false;
   std::optional<Place> shown;  ///< where it was last recorded
@@ -107,14 +107,14 @@ class SceneBooks {
 
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<void> removeMesh(MeshHandle mesh);
-  Result<PaletteHandle> addPalette(std::uint32_t jointCount, bool mayScale);
-  Result<void> removePalette(PaletteHandle palette);
+  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale);
+  Result<void> removePose(PoseHandle pose);
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
 
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
   /// The byte of the matrices buffer at which the pose of this frame is to be written.
-  Result<std::uint64_t> writePose(PaletteHandle palette);
+  Result<std::uint64_t> writePose(PoseHandle pose);
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
   Result<void> teleport(InstanceHandle instance);
@@ -130,9 +130,9 @@ class SceneBooks {
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
-  const SlotMap<ScenePalette, PaletteHandle>& palettes() const { return palettes_; }
+  const SlotMap<ScenePose, PoseHandle>& poses() const { return poses_; }
   const SlotMap<SceneInstance, InstanceHandle>& instances() const { return instances_; }
-  std::uint64_t poseOffset(const ScenePalette& palette) const;
+  std::uint64_t poseOffset(const ScenePose& pose) const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
   const SceneDescription& description() const { return description_; }
@@ -186,7 +186,7 @@ class SceneBooks {
 
   SceneDescription description_;
   SlotMap<SceneMesh, MeshHandle> meshes_;
-  SlotMap<ScenePalette, PaletteHandle> palettes_;
+  SlotMap<ScenePose, PoseHandle> poses_;
   SlotMap<SceneInstance, InstanceHandle> instances_;
   RangeAllocator meshStore_, jointStore_, unitStore_, outputStore_;
   std::vector<std::uint32_t> freeResults_;
@@ -202,7 +202,7 @@ class SceneBooks {
   std::uint32_t nextVersion_ = 0;
   std::vector<PlacedRun> runsScratch_;
 
-  std::vector<PaletteHandle> posed_;      ///< written since the last plan
+  std::vector<PoseHandle> posed_;         ///< written since the last plan
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;  ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;     ///< all that are culled on the GPU
@@ -215,7 +215,7 @@ class SceneBooks {
   std::vector<std::uint32_t> settling_;
   std::vector<std::uint32_t> versioned_;  ///< culled, with something new to show
   struct Conversion {
-    std::uint32_t palette;
+    std::uint32_t pose;
     std::size_t form;
   };
   std::vector<Conversion> conversions_;

@@ -21,21 +21,21 @@ std::uint32_t culledFlags(const SceneInstance& instance) {
 
 }  // namespace
 
-/// In frames that are the same for all instances of a palette with one interval, also where the
+/// In frames that are the same for all instances of a pose with one interval, also where the
 /// engine leaves frames out: a multiple of the interval lies between the last record and this one.
 bool SceneBooks::isDue(const SceneInstance& instance) const {
   const bool cameBack = instance.visibleFrom == record_ + 1;
   if (instance.isUrgent || cameBack || instance.updateInterval == 1) return true;
-  const std::uint64_t beat = instance.palette;
+  const std::uint64_t beat = instance.pose;
   return (frame_ + beat) / instance.updateInterval !=
          (recordedFrame_ + beat) / instance.updateInterval;
 }
 
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
-  const ScenePalette& palette = palettes_.at(instance.palette);
+  const ScenePose& pose = poses_.at(instance.pose);
   const std::optional<PaletteForm> form = paletteForm(instance.method);
-  const std::uint64_t unit = form ? palette.forms[static_cast<std::size_t>(*form)].units->offset
-                                  : poseOffset(palette) / unitBytes;
+  const std::uint64_t unit = form ? pose.forms[static_cast<std::size_t>(*form)].units->offset
+                                  : poseOffset(pose) / unitBytes;
   return static_cast<std::uint32_t>(unit);
 }
 
@@ -43,25 +43,25 @@ std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
 void SceneBooks::convertPalette(const SceneInstance& instance) {
   const std::optional<PaletteForm> form = paletteForm(instance.method);
   if (!form) return;
-  ScenePalette& palette = palettes_.at(instance.palette);
-  ScenePalette::Form& converted = palette.forms[static_cast<std::size_t>(*form)];
-  if (converted.version == palette.version || converted.plannedIn == planNumber_) return;
+  ScenePose& pose = poses_.at(instance.pose);
+  ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(*form)];
+  if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
-  conversions_.push_back({instance.palette, static_cast<std::size_t>(*form)});
-  builder_.addPalette(static_cast<std::uint32_t>(poseOffset(palette) / unitBytes),
-                      static_cast<std::uint32_t>(converted.units->offset), palette.jointCount,
-                      *form, palette.mayScale);
+  conversions_.push_back({instance.pose, static_cast<std::size_t>(*form)});
+  builder_.addPalette(static_cast<std::uint32_t>(poseOffset(pose) / unitBytes),
+                      static_cast<std::uint32_t>(converted.units->offset), pose.jointCount, *form,
+                      pose.mayScale);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
                          const Candidate* candidate) {
   const InstanceExtras* extras = instance.extras.isNeeded() ? &instance.extras : nullptr;
-  const std::uint32_t palette = paletteUnit(instance);
+  const std::uint32_t pose = paletteUnit(instance);
   const auto add = [&](const PlacedRun& run) {
     if (candidate != nullptr) {
-      builder_.addCulled(run, palette, flags, extras, *candidate);
+      builder_.addCulled(run, pose, flags, extras, *candidate);
     } else {
-      builder_.add(run, palette, flags, extras);
+      builder_.add(run, pose, flags, extras);
     }
   };
   add(instance.run);
@@ -69,11 +69,11 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
 }
 
 void SceneBooks::gatherPoses() {
-  for (const PaletteHandle handle : posed_) {
-    const ScenePalette* palette = palettes_.find(handle);
-    if (palette == nullptr) continue;
-    for (std::uint32_t index = palette->firstInstance; index != notUsed;
-         index = instances_.at(index).nextOfPalette)
+  for (const PoseHandle handle : posed_) {
+    const ScenePose* pose = poses_.find(handle);
+    if (pose == nullptr) continue;
+    for (std::uint32_t index = pose->firstInstance; index != notUsed;
+         index = instances_.at(index).nextOfPose)
       makeStale(index);
   }
   posed_.clear();
@@ -205,7 +205,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   gatherCulled();
   gatherResults();
   for (const Conversion& conversion : conversions_)
-    planned_.poseBytes += palettes_.at(conversion.palette).jointCount * sizeof(JointMatrix);
+    planned_.poseBytes += poses_.at(conversion.pose).jointCount * sizeof(JointMatrix);
   const auto record = static_cast<std::uint32_t>(record_ + 1);
   const FrameWork frame{record, !historyIsClear_, moves_, resultCopies_};
   if (Result<void> good = builder_.finish(&frame); !good) {
@@ -217,7 +217,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   planned_.instances = instances_.size();
   planned_.skinnedInstances = static_cast<std::uint32_t>(due_.size());
   planned_.settledInstances = static_cast<std::uint32_t>(settling_.size());
-  planned_.convertedPalettes = builder_.paletteCount();
+  planned_.convertedPoses = builder_.paletteCount();
   planned_.culledCandidates = data.candidateCount;
   isPlanned_ = true;
   return {};
@@ -254,8 +254,8 @@ Result<void> SceneBooks::commit() {
   moved_.clear();
   moving_.clear();
   for (const Conversion& conversion : conversions_) {
-    ScenePalette& palette = palettes_.at(conversion.palette);
-    palette.forms[conversion.form].version = palette.version;
+    ScenePose& pose = poses_.at(conversion.pose);
+    pose.forms[conversion.form].version = pose.version;
   }
   for (const std::uint32_t index : due_) {
     SceneInstance& instance = instances_.at(index);

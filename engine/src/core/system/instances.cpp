@@ -30,8 +30,8 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
 Result<void> SceneBooks::check(const SceneInstance& instance) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
   if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
-  const ScenePalette* palette = palettes_.find(instance.paletteHandle);
-  if (palette == nullptr) return unknownHandle("palette", instance.paletteHandle);
+  const ScenePose* pose = poses_.find(instance.poseHandle);
+  if (pose == nullptr) return unknownHandle("pose", instance.poseHandle);
   if (instance.updateInterval == 0) {
     return invalid("the instance's update interval is 1 or more frames, not 0");
   }
@@ -44,9 +44,9 @@ Result<void> SceneBooks::check(const SceneInstance& instance) const {
                                                " bytes of output, the whole budget is " +
                                                std::to_string(description_.outputBudget)};
   }
-  const Palette own{palette->jointCount, 0, palette->mayScale};
+  const PoseDescription own{pose->jointCount, 0, pose->mayScale};
   Batch batch;
-  batch.palettes = {&own, 1};
+  batch.poses = {&own, 1};
   batch.meshesSize = description_.meshBudget;
   batch.outputs = OutputSizes::oneBuffer(description_.outputBudget);
   return checkJob(batch, jobOf(instance, *mesh, *laidOut), theInstance, description_.limits);
@@ -68,18 +68,18 @@ Result<void> SceneBooks::takeResult(SceneInstance& instance) {
   return {};
 }
 
-/// The palette's place in the form that the method reads; it stays until the palette is removed.
+/// The pose's place in the form that the method reads; it stays until the pose is removed.
 Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
   const std::optional<PaletteForm> form = paletteForm(instance.method);
   if (!form) return {};
-  ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
-  std::optional<Range>& units = palette.forms[static_cast<std::size_t>(*form)].units;
+  ScenePose& pose = poses_.at(instance.poseHandle.index);
+  std::optional<Range>& units = pose.forms[static_cast<std::size_t>(*form)].units;
   if (units) return {};
-  const std::uint64_t size = paletteSize(*form, palette.jointCount, palette.mayScale);
+  const std::uint64_t size = paletteSize(*form, pose.jointCount, pose.mayScale);
   units = unitStore_.allocate(size, 1);
   if (units) return {};
   return Error{ErrorCode::limitExceeded,
-               "palette " + std::to_string(instance.paletteHandle.index) + " takes " +
+               "pose " + std::to_string(instance.poseHandle.index) + " takes " +
                    std::to_string(size * unitBytes) + " bytes in the form that " +
                    std::string(methodName(instance.method)) + " reads; of the " +
                    std::to_string(unitStore_.capacity() * unitBytes) +
@@ -109,15 +109,15 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance) {
 
 Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
-  const ScenePalette& palette = palettes_.at(instance.paletteHandle.index);
+  const ScenePose& pose = poses_.at(instance.poseHandle.index);
   const Result<VertexPlaces> laidOut =
       placeVertices(instance.layout, mesh.info.vertexCount, instance.target.bytes.offset);
   if (!laidOut) return laidOut.error();
   Placing placing;
   placing.subject = theInstance;
   placing.outputs = OutputSizes::oneBuffer(description_.outputBudget);
-  placing.jointCount = palette.jointCount;
-  placing.mayScale = instance.method != Method::linear && palette.mayScale;
+  placing.jointCount = pose.jointCount;
+  placing.mayScale = instance.method != Method::linear && pose.mayScale;
   placing.isCulled = instance.isCulled;
   runsScratch_.clear();
   if (Result<void> placed = groups_.place(jobOf(instance, mesh, *laidOut), placing,
@@ -143,37 +143,36 @@ void SceneBooks::releaseTarget(SceneInstance& instance) {
 
 void SceneBooks::link(std::uint32_t index) {
   SceneInstance& instance = instances_.at(index);
-  ScenePalette& palette = palettes_.at(instance.palette);
-  instance.previousOfPalette = notUsed;
-  instance.nextOfPalette = palette.firstInstance;
-  if (palette.firstInstance != notUsed)
-    instances_.at(palette.firstInstance).previousOfPalette = index;
-  palette.firstInstance = index;
-  ++palette.users;
+  ScenePose& pose = poses_.at(instance.pose);
+  instance.previousOfPose = notUsed;
+  instance.nextOfPose = pose.firstInstance;
+  if (pose.firstInstance != notUsed) instances_.at(pose.firstInstance).previousOfPose = index;
+  pose.firstInstance = index;
+  ++pose.users;
 }
 
 void SceneBooks::unlink(std::uint32_t index) {
   const SceneInstance& instance = instances_.at(index);
-  ScenePalette& palette = palettes_.at(instance.palette);
-  if (instance.previousOfPalette != notUsed) {
-    instances_.at(instance.previousOfPalette).nextOfPalette = instance.nextOfPalette;
+  ScenePose& pose = poses_.at(instance.pose);
+  if (instance.previousOfPose != notUsed) {
+    instances_.at(instance.previousOfPose).nextOfPose = instance.nextOfPose;
   } else {
-    palette.firstInstance = instance.nextOfPalette;
+    pose.firstInstance = instance.nextOfPose;
   }
-  if (instance.nextOfPalette != notUsed)
-    instances_.at(instance.nextOfPalette).previousOfPalette = instance.previousOfPalette;
-  --palette.users;
+  if (instance.nextOfPose != notUsed)
+    instances_.at(instance.nextOfPose).previousOfPose = instance.previousOfPose;
+  --pose.users;
 }
 
 Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& description) {
   SceneInstance instance;
-  instance.palette = description.palette.index;
+  instance.pose = description.pose.index;
   instance.updateInterval = description.updateInterval;
   instance.method = description.method;
   instance.isCulled = description.culledOnGpu;
   instance.hasMotion = description.layout.motion != Motion::none;
   instance.mesh = description.mesh;
-  instance.paletteHandle = description.palette;
+  instance.poseHandle = description.pose;
   instance.layout = description.layout;
   instance.box = description.box;
   instance.bounds = description.bounds;

@@ -81,7 +81,7 @@ SceneBooks& Scene::change() {
   return *books_;
 }
 
-// -- Meshes, palettes, instances.
+// -- Meshes, poses, instances.
 
 Result<MeshHandle> Scene::addMesh(const MeshInfo& info) {
   return change().addMesh(info);
@@ -94,16 +94,16 @@ Result<std::uint64_t> Scene::meshOffset(MeshHandle handle) const {
 Result<void> Scene::removeMesh(MeshHandle mesh) {
   return change().removeMesh(mesh);
 }
-Result<PaletteHandle> Scene::addPalette(std::uint32_t jointCount, bool mayScale) {
-  return change().addPalette(jointCount, mayScale);
+Result<PoseHandle> Scene::addPose(std::uint32_t jointCount, bool mayScale) {
+  return change().addPose(jointCount, mayScale);
 }
-Result<PosePlace> Scene::pose(PaletteHandle handle) const {
-  const ScenePalette* palette = books_->palettes().find(handle);
-  if (palette == nullptr) return unknownHandle("palette", handle);
-  return PosePlace{books_->poseOffset(*palette), palette->jointCount};
+Result<PosePlace> Scene::posePlace(PoseHandle handle) const {
+  const ScenePose* pose = books_->poses().find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  return PosePlace{books_->poseOffset(*pose), pose->jointCount};
 }
-Result<void> Scene::removePalette(PaletteHandle palette) {
-  return change().removePalette(palette);
+Result<void> Scene::removePose(PoseHandle pose) {
+  return change().removePose(pose);
 }
 Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
   return change().addInstance(description);
@@ -117,10 +117,10 @@ Result<void> Scene::removeInstance(InstanceHandle instance) {
 Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
   return change().beginFrame(frame, completedFrame);
 }
-Result<PosePlace> Scene::writePose(PaletteHandle palette) {
-  const Result<std::uint64_t> offset = change().writePose(palette);
+Result<PosePlace> Scene::writePose(PoseHandle pose) {
+  const Result<std::uint64_t> offset = change().writePose(pose);
   if (!offset) return offset.error();
-  return PosePlace{*offset, books_->palettes().find(palette)->jointCount};
+  return PosePlace{*offset, books_->poses().find(pose)->jointCount};
 }
 Result<void> Scene::setVisible(InstanceHandle instance, bool isVisible) {
   return change().setVisible(instance, isVisible);

@@ -34,7 +34,7 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
         SystemBuffer::create(source, {size, needed.usage, MemoryUse::device, "dermis tables"});
     if (!made) return made.error();
     BatchBuffers buffers{meshes.range(),
-                         matrices.range(),
+                         poses.range(),
                          made->range(),
                          palettes.range(),
                          OutputBuffers::oneBuffer(output.range()),

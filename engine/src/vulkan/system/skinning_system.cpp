@@ -45,7 +45,7 @@ SkinningSystem::State::~State() {
 }
 
 std::span<JointMatrix> SkinningSystem::State::poseAt(const PosePlace& place) {
-  return {reinterpret_cast<JointMatrix*>(matrices.bytes().data() + place.offset), place.jointCount};
+  return {reinterpret_cast<JointMatrix*>(poses.bytes().data() + place.offset), place.jointCount};
 }
 
 Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage) {
@@ -67,7 +67,7 @@ Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage
   };
   for (const Wanted& wanted :
        {Wanted{meshes, BufferRole::meshes, MemoryUse::device, "dermis meshes"},
-        {matrices, BufferRole::matrices, MemoryUse::upload, "dermis matrices"},
+        {poses, BufferRole::poses, MemoryUse::upload, "dermis poses"},
         {palettes, BufferRole::palettes, MemoryUse::device, "dermis palettes"},
         {output, BufferRole::positions, MemoryUse::device, "dermis output", outputUsage},
         {counters, BufferRole::counters, MemoryUse::device, "dermis counters"},
@@ -121,7 +121,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   return system;
 }
 
-// -- Meshes, palettes, instances.
+// -- Meshes, poses, instances.
 
 Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
   Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
@@ -146,15 +146,15 @@ Result<void> SkinningSystem::removeMesh(MeshHandle mesh) {
   return removed;
 }
 
-Result<PaletteHandle> SkinningSystem::addPalette(std::uint32_t jointCount, bool mayScale) {
-  Result<PaletteHandle> added = state_->scene.addPalette(jointCount, mayScale);
+Result<PoseHandle> SkinningSystem::addPose(std::uint32_t jointCount, bool mayScale) {
+  Result<PoseHandle> added = state_->scene.addPose(jointCount, mayScale);
   if (!added) return added;
-  // No frame under way reads its memory: that of a palette before it was free.
-  std::ranges::fill(state_->poseAt(*state_->scene.pose(*added)), JointMatrix{});
+  // No frame under way reads its memory: that of a pose before it was free.
+  std::ranges::fill(state_->poseAt(*state_->scene.posePlace(*added)), JointMatrix{});
   return added;
 }
-Result<void> SkinningSystem::removePalette(PaletteHandle palette) {
-  return state_->scene.removePalette(palette);
+Result<void> SkinningSystem::removePose(PoseHandle pose) {
+  return state_->scene.removePose(pose);
 }
 Result<InstanceHandle> SkinningSystem::addInstance(const InstanceDescription& description) {
   return state_->scene.addInstance(description);
@@ -178,8 +178,8 @@ Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t compl
   return {};
 }
 
-Result<std::span<JointMatrix>> SkinningSystem::writePose(PaletteHandle palette) {
-  const Result<PosePlace> place = state_->scene.writePose(palette);
+Result<std::span<JointMatrix>> SkinningSystem::writePose(PoseHandle pose) {
+  const Result<PosePlace> place = state_->scene.writePose(pose);
   if (!place) return place.error();
   return state_->poseAt(*place);
 }

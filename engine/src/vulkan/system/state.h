@@ -59,7 +59,7 @@ struct SkinningSystem::State {
   Scene scene;
   Plan plan;  ///< of the frame
 
-  SystemBuffer meshes, matrices, palettes, output, results, tables, history, counters;
+  SystemBuffer meshes, poses, palettes, output, results, tables, history, counters;
   Bindings bindings;
   /// Without push descriptors: one for each slot.
   VkDescriptorPool visibilityPool = VK_NULL_HANDLE;

@@ -117,7 +117,7 @@ void printSizes() {
                                  sizeof(MeshView),
                                  sizeof(MeshInfo),
                                  sizeof(PackedMesh),
-                                 sizeof(Palette),
+                                 sizeof(PoseDescription),
                                  sizeof(OutputAttribute),
                                  sizeof(Job),
                                  sizeof(Batch),
@@ -170,7 +170,7 @@ bool holds(const Box& box, const reference::Double3& point) {
 
 /// One instance a method, in the vertices that the engine draws.
 Result<void> planBatch(const MeshInfo& info, const Box& box) {
-  const Palette palette{jointCount, 0, true};
+  const PoseDescription palette{jointCount, 0, true};
   const MorphWeight morph{0, 0.75f};
   std::vector<Job> jobs;
   for (const Method method : allMethods) {
@@ -189,10 +189,10 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
     job.bounds = true;
   }
   Batch batch;
-  batch.palettes = {&palette, 1};
+  batch.poses = {&palette, 1};
   batch.jobs = jobs;
   batch.meshesSize = info.byteSize;
-  batch.matricesSize = jointCount * sizeof(JointMatrix);
+  batch.posesSize = jointCount * sizeof(JointMatrix);
   batch.outputs = OutputSizes::oneBuffer(jobs.size() * vertexCount * sizeof(SkinnedVertex));
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
