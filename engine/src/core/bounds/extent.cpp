@@ -70,7 +70,7 @@ Interval intervalOf(double x, double y, double z, const Extent& extent) {
 Reach::Reach(const Range& box) {
   for (std::size_t i = 0; i < 13; ++i) {
     double low = 0, high = 0;
-    for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       const double d = Extent::directions[i][axis];
       low += std::min(d * box.min[axis], d * box.max[axis]);
       high += std::max(d * box.min[axis], d * box.max[axis]);
@@ -92,7 +92,7 @@ Extent Reach::extent() const {
 
 Range imageOf(const Affine& map, const Extent& extent) {
   Range image;
-  for (int row = 0; row < 3; ++row) {
+  for (std::size_t row = 0; row < 3; ++row) {
     const Interval interval =
         intervalOf(map.linear[0][row], map.linear[1][row], map.linear[2][row], extent);
     image.min[row] = interval.min + map.offset[row];
@@ -103,7 +103,7 @@ Range imageOf(const Affine& map, const Extent& extent) {
 
 Range rangeOf(const Extent& extent) {
   Range range;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
     range.max[axis] = static_cast<double>(extent.reach[2 * axis]);
     range.min[axis] = -static_cast<double>(extent.reach[2 * axis + 1]);
   }

@@ -8,13 +8,9 @@
 #include <cstdint>
 #include <limits>
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
-
 #include "dermis/bounds.h"
 #include "dermis/types.h"
+#include "linear_algebra.h"
 
 namespace dermis::bounds {
 
@@ -22,20 +18,20 @@ inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Empty as it is made: min > max.
 struct Range {
-  glm::dvec3 min{infinity, infinity, infinity};
-  glm::dvec3 max{-infinity, -infinity, -infinity};
+  math::Vec3 min{infinity, infinity, infinity};
+  math::Vec3 max{-infinity, -infinity, -infinity};
 
   bool empty() const { return min.x > max.x; }
-  void add(const glm::dvec3& point) { add(Range{point, point}); }
+  void add(const math::Vec3& point) { add(Range{point, point}); }
   void add(const Range& other) {
-    min = glm::min(min, other.min);
-    max = glm::max(max, other.max);
+    min = math::min(min, other.min);
+    max = math::max(max, other.max);
   }
   Range grownBy(double margin) const { return {min - margin, max + margin}; }
 };
 
 inline Range everything() {
-  return {glm::dvec3(-infinity), glm::dvec3(infinity)};
+  return {math::Vec3(-infinity), math::Vec3(infinity)};
 }
 
 inline Range operator+(const Range& a, const Range& b) {
@@ -43,7 +39,7 @@ inline Range operator+(const Range& a, const Range& b) {
 }
 /// No point of the range is further from the origin.
 inline double reachOf(const Range& range) {
-  return glm::length(glm::max(glm::abs(range.min), glm::abs(range.max)));
+  return math::length(math::max(math::abs(range.min), math::abs(range.max)));
 }
 
 /// The float next to `value` that is not above it; never beyond the infinities.
@@ -66,7 +62,7 @@ inline float roundUp(double value) {
 /// Rounded outward.
 inline Box boxOf(const Range& range) {
   Box box;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] = roundDown(range.min[axis]);
     box.max[axis] = roundUp(range.max[axis]);
   }
@@ -79,8 +75,8 @@ inline Range rangeOf(const Box& box) {
 
 /// An affine map x → linear x + offset.
 struct Affine {
-  glm::dmat3 linear{1.0};
-  glm::dvec3 offset{0.0};
+  math::Mat3 linear;
+  math::Vec3 offset;
 };
 
 inline Affine operator+(const Affine& a, const Affine& b) {
@@ -93,10 +89,9 @@ inline Affine operator*(double factor, const Affine& a) {
   return {factor * a.linear, factor * a.offset};
 }
 /// x → a(x) × v
-inline Affine cross(const Affine& a, const glm::dvec3& v) {
-  return {glm::dmat3(glm::cross(a.linear[0], v), glm::cross(a.linear[1], v),
-                     glm::cross(a.linear[2], v)),
-          glm::cross(a.offset, v)};
+inline Affine cross(const Affine& a, const math::Vec3& v) {
+  return {{{math::cross(a.linear[0], v), math::cross(a.linear[1], v), math::cross(a.linear[2], v)}},
+          math::cross(a.offset, v)};
 }
 
 /// How far each direction of an `Extent` reaches, in double precision.

@@ -31,10 +31,10 @@ double loadStored(const AttributeView& view, std::uint32_t element, std::uint32_
   return static_cast<double>(loadFloat(view, element, component));
 }
 
-glm::dvec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {
-  glm::dvec3 position;
+math::Vec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {
+  math::Vec3 position;
   for (std::uint32_t i = 0; i < 3; ++i) {
-    position[static_cast<int>(i)] =
+    position[i] =
         loadStored(mesh.positions, vertex, i) * static_cast<double>(mesh.positionScale[i]) +
         static_cast<double>(mesh.positionOffset[i]);
   }
@@ -80,7 +80,7 @@ class Displacements {
     return {};
   }
 
-  Range around(std::uint32_t vertex, const glm::dvec3& position) const {
+  Range around(std::uint32_t vertex, const math::Vec3& position) const {
     const Range point{position, position};
     return ranges_.empty() ? point : point + ranges_[vertex];
   }
@@ -95,10 +95,10 @@ class Displacements {
         target.positions.components < 3) {
       return invalid(mesh, ErrorCode::invalidMesh, name + ": its positions do not fit the mesh");
     }
-    ranges_.resize(mesh.vertexCount, Range{glm::dvec3(0.0), glm::dvec3(0.0)});
+    ranges_.resize(mesh.vertexCount, Range{math::Vec3(0.0), math::Vec3(0.0)});
     for (std::uint32_t element = 0; element < target.positions.count; ++element) {
       const std::uint32_t vertex = all ? element : target.vertices[element];
-      glm::dvec3 whole;
+      math::Vec3 whole;
       for (std::uint32_t i = 0; i < 3; ++i) {
         whole[static_cast<int>(i)] =
             loadStored(target.positions, element, i) * static_cast<double>(target.positionScale[i]);
@@ -108,9 +108,9 @@ class Displacements {
                        name + ", element " + std::to_string(element) +
                            ": its vertex is outside the mesh, or it is not finite");
       }
-      const glm::dvec3 low = static_cast<double>(range.min) * whole;
-      const glm::dvec3 high = static_cast<double>(range.max) * whole;
-      ranges_[vertex] = ranges_[vertex] + Range{glm::min(low, high), glm::max(low, high)};
+      const math::Vec3 low = static_cast<double>(range.min) * whole;
+      const math::Vec3 high = static_cast<double>(range.max) * whole;
+      ranges_[vertex] = ranges_[vertex] + Range{math::min(low, high), math::max(low, high)};
     }
     return {};
   }

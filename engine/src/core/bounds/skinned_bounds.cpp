@@ -9,13 +9,6 @@
 #include <span>
 #include <vector>
 
-#include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-#include <glm/vec4.hpp>
-#include <glm/vector_relational.hpp>
-
 #include "bounds/extent.h"
 #include "dermis/bounds.h"
 
@@ -24,8 +17,8 @@ namespace {
 
 /// What a joint's 3×3 is made of: C = R S.
 struct Parts {
-  glm::dmat3 scaleShear{1.0};   ///< exactly 1 where the joint is rigid but for rounding
-  glm::dvec4 real{0, 0, 0, 1};  ///< the unit quaternion of R: x y z w
+  math::Mat3 scaleShear;        ///< exactly 1 where the joint is rigid but for rounding
+  math::Vec4 real{0, 0, 0, 1};  ///< the unit quaternion of R: x y z w
   double largest = 1;           ///< no singular value of C is larger
   bool rigid = true;
   /// R is a matter of rounding, a kernel's may be another: rank 1, or so near to a singular mirror
@@ -34,37 +27,28 @@ struct Parts {
 };
 
 /// The largest sum of a row's absolute values of MᵀM − 1: no singular value is further from 1.
-double deviationFromRotation(const glm::dmat3& m) {
-  const double xx = std::abs(glm::dot(m[0], m[0]) - 1), yy = std::abs(glm::dot(m[1], m[1]) - 1),
-               zz = std::abs(glm::dot(m[2], m[2]) - 1);
-  const double xy = std::abs(glm::dot(m[0], m[1])), xz = std::abs(glm::dot(m[0], m[2])),
-               yz = std::abs(glm::dot(m[1], m[2]));
+double deviationFromRotation(const math::Mat3& m) {
+  const double xx = std::abs(math::dot(m[0], m[0]) - 1), yy = std::abs(math::dot(m[1], m[1]) - 1),
+               zz = std::abs(math::dot(m[2], m[2]) - 1);
+  const double xy = std::abs(math::dot(m[0], m[1])), xz = std::abs(math::dot(m[0], m[2])),
+               yz = std::abs(math::dot(m[1], m[2]));
   return std::max({xx + xy + xz, xy + yy + yz, xz + yz + zz});
 }
 
 /// R ← ½ R (3 − RᵀR), which squares the deviation. Björck and Bowie 1971, "An iterative algorithm
 /// for computing the best estimate of an orthogonal matrix". The deviation must be below ½.
-glm::dmat3 orthonormalized(glm::dmat3 m, double deviation) {
+math::Mat3 orthonormalized(math::Mat3 m, double deviation) {
   for (int step = 0; step < 6 && deviation > 1e-12; ++step) {
-    m = 1.5 * m - 0.5 * (m * (glm::transpose(m) * m));
+    m = 1.5 * m - 0.5 * (m * (math::transpose(m) * m));
     deviation *= deviation;
   }
   return m;
 }
 
-glm::dvec4 quaternionOf(const glm::dmat3& rotation) {
-  const glm::dquat q = glm::normalize(glm::quat_cast(rotation));
-  return {q.x, q.y, q.z, q.w};
-}
-
-glm::dmat3 rotationOf(const glm::dvec4& q) {
-  return glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z));
-}
-
 /// The rotation R that makes trace(Rᵀ C) largest: the polar rotation where det C ≥ 0 and the rank
 /// is at least 2. Horn 1987, "Closed-form solution of absolute orientation using unit quaternions":
 /// the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix, here by cyclic Jacobi.
-glm::dvec4 nearestRotation(const glm::dmat3& c) {
+math::Vec4 nearestRotation(const math::Mat3& c) {
   const auto at = [&](int row, int column) { return c[column][row]; };
   double a[4][4] = {{at(0, 0) - at(1, 1) - at(2, 2), at(0, 1) + at(1, 0), at(0, 2) + at(2, 0),
                      at(2, 1) - at(1, 2)},
@@ -106,7 +90,7 @@ glm::dvec4 nearestRotation(const glm::dmat3& c) {
   for (int i = 1; i < 4; ++i) {
     if (a[i][i] > a[best][best]) best = i;
   }
-  return glm::normalize(glm::dvec4(v[0][best], v[1][best], v[2][best], v[3][best]));
+  return math::normalize({v[0][best], v[1][best], v[2][best], v[3][best]});
 }
 
 enum class Sense { upright, mirrored, ambiguous };
@@ -114,52 +98,52 @@ enum class Sense { upright, mirrored, ambiguous };
 /// Which way round a matrix is. The reference and the kernels draw the line between flat and
 /// mirrored at 16 and 24 roundings of float32 and call a matrix of rank 1 where σ₂ ≤ 1e-5 σ₁;
 /// within twice that, one may decide this way and another that way.
-Sense senseOf(const glm::dmat3& m) {
+Sense senseOf(const math::Mat3& m) {
   double cofactors = 0, squares = 0, uncancelled = 0;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const glm::dvec3 cofactor = glm::cross(m[j], m[k]);
-    cofactors += glm::dot(cofactor, cofactor);
-    squares += glm::dot(m[i], m[i]);
+    const math::Vec3 cofactor = math::cross(m[j], m[k]);
+    cofactors += math::dot(cofactor, cofactor);
+    squares += math::dot(m[i], m[i]);
     uncancelled += std::abs(m[0][i]) * (std::abs(m[1][j] * m[2][k]) + std::abs(m[1][k] * m[2][j]));
   }
   // Cofactors, squared, sum to σ₁²σ₂² + σ₁²σ₃² + σ₂²σ₃².
   if (cofactors <= 1e-9 * squares * squares) return Sense::ambiguous;
-  const double determinant = glm::determinant(m), rounding = 0x1p-24 * uncancelled;
+  const double determinant = math::determinant(m), rounding = 0x1p-24 * uncancelled;
   if (determinant >= -8 * rounding) return Sense::upright;
   return determinant <= -64 * rounding ? Sense::mirrored : Sense::ambiguous;
 }
 
 /// By the rules of the reference: the polar decomposition, R being that of −C where C mirrors. The
 /// matrix must be finite.
-Parts partsOf(const glm::dmat3& matrix) {
+Parts partsOf(const math::Mat3& matrix) {
   Parts parts;
-  const double determinant = glm::determinant(matrix);
+  const double determinant = math::determinant(matrix);
   const double deviation = deviationFromRotation(matrix);
   if (determinant > 0 && deviation <= 1e-5) {
-    parts.real = quaternionOf(orthonormalized(matrix, deviation));
+    parts.real = math::quaternionOf(orthonormalized(matrix, deviation));
     parts.largest = 1 + 1e-5;
     return parts;
   }
 
   parts.rigid = false;
-  const double squares = glm::dot(matrix[0], matrix[0]) + glm::dot(matrix[1], matrix[1]) +
-                         glm::dot(matrix[2], matrix[2]);
+  const double squares = math::dot(matrix[0], matrix[0]) + math::dot(matrix[1], matrix[1]) +
+                         math::dot(matrix[2], matrix[2]);
   parts.largest = std::sqrt(squares);  // ‖C‖, at most √3 too much
   parts.scaleShear = matrix;
   if (squares == 0) return parts;
 
   const double size = std::sqrt(squares / 3);
-  const glm::dmat3 unit = matrix / size;
+  const math::Mat3 unit = matrix / size;
   const Sense sense = senseOf(unit);
   // Entries below 2^-126 may be flushed to 0; `reference::PolarParts` has the same line.
   parts.ambiguous = sense == Sense::ambiguous || size < 0x1p-98;
   if (parts.ambiguous) return parts;
-  const glm::dmat3 upright = sense == Sense::mirrored ? -unit : unit;
+  const math::Mat3 upright = sense == Sense::mirrored ? -unit : unit;
   const double unitDeviation = deviationFromRotation(upright);
-  parts.real = unitDeviation < 0.25 ? quaternionOf(orthonormalized(upright, unitDeviation))
+  parts.real = unitDeviation < 0.25 ? math::quaternionOf(orthonormalized(upright, unitDeviation))
                                     : nearestRotation(upright);
-  parts.scaleShear = glm::transpose(rotationOf(parts.real)) * matrix;
+  parts.scaleShear = math::transpose(math::rotationOf(parts.real)) * matrix;
   return parts;
 }
 
@@ -205,14 +189,14 @@ bool isFinite(const JointMatrix& matrix) {
 /// and the axis, towards the first, times the sine.
 struct Turn {
   double cosine;
-  glm::dvec3 axis;
+  math::Vec3 axis;
 };
 
 Turn turnBetween(const Posed& first, const Posed& second) {
-  const glm::dvec4 &a = first.parts.real, &b = second.parts.real;
-  const double cosine = glm::dot(a, b);
-  const glm::dvec3 u(a), v(b);
-  const glm::dvec3 axis = b.w * u - a.w * v - glm::cross(u, v);  // of a b*
+  const math::Vec4 &a = first.parts.real, &b = second.parts.real;
+  const double cosine = math::dot(a, b);
+  const math::Vec3 u = a.xyz(), v = b.xyz();
+  const math::Vec3 axis = b.w * u - a.w * v - math::cross(u, v);  // of a b*
   return cosine < 0 ? Turn{-cosine, -axis} : Turn{cosine, axis};
 }
 
@@ -246,7 +230,8 @@ class PoseBounds {
     }
     if (!box_.empty()) box_ = box_.grownBy(rounding());
     addUnweighted();
-    const bool ordered = box_.empty() || glm::all(glm::lessThanEqual(box_.min, box_.max));
+    const bool ordered = box_.empty() || (box_.min.x <= box_.max.x && box_.min.y <= box_.max.y &&
+                                          box_.min.z <= box_.max.z);
     return bounds::boxOf(ordered ? box_ : bounds::everything());
   }
 
@@ -264,11 +249,11 @@ class PoseBounds {
         anyAmbiguous_ |= joint.parts.ambiguous;
         largest_ = std::max(largest_, joint.parts.largest);
       } else {
-        const glm::dmat3& c = joint.map.linear;
-        largest_ = std::max(largest_, std::sqrt(glm::dot(c[0], c[0]) + glm::dot(c[1], c[1]) +
-                                                glm::dot(c[2], c[2])));
+        const math::Mat3& c = joint.map.linear;
+        largest_ = std::max(largest_, std::sqrt(math::dot(c[0], c[0]) + math::dot(c[1], c[1]) +
+                                                math::dot(c[2], c[2])));
       }
-      furthest_ = std::max(furthest_, glm::length(joint.map.offset));
+      furthest_ = std::max(furthest_, math::length(joint.map.offset));
     }
     for (const JointBounds::Joint& used : bounds_.joints) {
       if (!used.alone.empty()) bind_.add(bounds::rangeOf(used.alone));
@@ -287,7 +272,7 @@ class PoseBounds {
     for (const JointBounds::Pair& pair : bounds_.pairs) {
       if (pair.influences <= JointBounds::mostInfluencesOfTrio) continue;
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
-      const double cosine = std::abs(glm::dot(first.parts.real, second.parts.real));
+      const double cosine = std::abs(math::dot(first.parts.real, second.parts.real));
       for (Posed* joint : {&first, &second}) {
         auto& [least, next] = joint->leastCosines;
         next = std::min(next, std::max(least, cosine));
@@ -302,9 +287,9 @@ class PoseBounds {
 
   /// Whether no choice of signs brings three quaternions into one hemisphere, all of them.
   static void splitIfTorn(Posed& a, Posed& b, Posed& c) {
-    const double ab = glm::dot(a.parts.real, b.parts.real);
-    const double bc = glm::dot(b.parts.real, c.parts.real);
-    const double ca = glm::dot(c.parts.real, a.parts.real);
+    const double ab = math::dot(a.parts.real, b.parts.real);
+    const double bc = math::dot(b.parts.real, c.parts.real);
+    const double ca = math::dot(c.parts.real, a.parts.real);
     const double least = std::min({std::abs(ab), std::abs(bc), std::abs(ca)});
     if (ab * bc * ca > 0 && least > ambiguousCosine) return;
     a.split = b.split = c.split = true;
@@ -316,7 +301,7 @@ class PoseBounds {
     if (!anyAmbiguous_) return;
     for (const JointBounds::Pair& pair : bounds_.pairs) {
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
-      const double distance = glm::length(first.map.offset - second.map.offset);
+      const double distance = math::length(first.map.offset - second.map.offset);
       for (Posed* joint : {&first, &second}) {
         joint->partnerDistance = std::max(joint->partnerDistance, distance);
         joint->influences = std::max(joint->influences, pair.influences);
@@ -392,7 +377,7 @@ class PoseBounds {
   /// The largest |S p − S' p| of a pair's vertices: how differently two joints scale them.
   static double stretchBetween(const Posed& first, const Posed& second, const Extent& extent) {
     if (first.parts.rigid && second.parts.rigid) return 0;
-    const Affine difference{first.parts.scaleShear - second.parts.scaleShear};
+    const Affine difference{first.parts.scaleShear - second.parts.scaleShear, {}};
     return bounds::reachOf(bounds::imageOf(difference, extent));
   }
 

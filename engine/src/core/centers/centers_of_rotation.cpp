@@ -13,15 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
-
 #include "attribute.h"
 #include "centers/pair_index.h"
 #include "dermis/mesh.h"
 #include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
+#include "linear_algebra.h"
 #include "pack/influences.h"
 
 namespace dermis::centers {
@@ -46,7 +44,7 @@ class InfluenceLists {
 };
 
 struct Vertices {
-  std::vector<glm::vec3> positions;
+  std::vector<math::Vec3f> positions;
   InfluenceLists influences;  ///< as `pack` stores them, the strongest first
 };
 
@@ -60,11 +58,11 @@ using Corners = std::span<const std::uint32_t>;
 
 /// In double precision neither overflows, nor comes to 0 by underflow, for any float32 positions.
 Moment momentOf(const Vertices& vertices, Corners corners) {
-  const glm::dvec3 a(vertices.positions[corners[0]]);
-  const glm::dvec3 b(vertices.positions[corners[1]]);
-  const glm::dvec3 c(vertices.positions[corners[2]]);
-  const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
-  const glm::dvec3 moment = area * ((a + b + c) / 3.0);
+  const math::Vec3 a(vertices.positions[corners[0]]);
+  const math::Vec3 b(vertices.positions[corners[1]]);
+  const math::Vec3 c(vertices.positions[corners[2]]);
+  const double area = 0.5 * math::length(math::cross(b - a, c - a));
+  const math::Vec3 moment = area * ((a + b + c) / 3.0);
   return {moment.x, moment.y, moment.z, area};
 }
 
@@ -218,7 +216,7 @@ struct CenterOfRotationSolver::State {
   State(Vertices gathered, std::span<const std::uint32_t> indices)
       : vertices(std::move(gathered)), triangles(centers::indexTriangles(vertices, indices)) {}
 
-  glm::vec3 center(std::uint32_t vertex) const {
+  math::Vec3f center(std::uint32_t vertex) const {
     const std::span<const Influence> influences = vertices.influences[vertex];
     Moment moment;
     for (std::size_t second = 1; second < influences.size(); ++second) {
@@ -227,7 +225,7 @@ struct CenterOfRotationSolver::State {
       }
     }
     if (moment.sum == 0) return vertices.positions[vertex];
-    return glm::vec3(glm::dvec3(moment.x, moment.y, moment.z) / moment.sum);
+    return math::Vec3f(math::Vec3(moment.x, moment.y, moment.z) / moment.sum);
   }
 
   Vertices vertices;
@@ -280,9 +278,9 @@ Result<void> CenterOfRotationSolver::solve(std::uint32_t firstVertex,
                      std::to_string(vertexCount())};
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const glm::vec3 center = state_->center(firstVertex + static_cast<std::uint32_t>(i));
-    for (int axis = 0; axis < 3; ++axis) {
-      centers[3 * i + static_cast<std::size_t>(axis)] = center[axis];
+    const math::Vec3f center = state_->center(firstVertex + static_cast<std::uint32_t>(i));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      centers[3 * i + axis] = center[axis];
     }
   }
   return {};
