@@ -37,9 +37,14 @@ endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/engine/include/dermis DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dermis
         FILES_MATCHING PATTERN "*.h" ${excluded})
 
-# For an engine with an RHI of its own, which compiles the kernels itself and reads the records of abi.h.
+# For an engine with an RHI of its own, which compiles the kernels itself and reads the records of abi.h; and for an engine's own
+# shaders dermis_decode.glsl and dermis_skin.glsl.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/shaders/ DESTINATION ${dermisShaderDir} COMPONENT dermis
-        FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp")
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp" PATTERN skin_include.glsl EXCLUDE)
+get_property(skinInclude GLOBAL PROPERTY DERMIS_SKIN_INCLUDE)
+if(skinInclude)
+  install(FILES ${skinInclude} DESTINATION ${dermisShaderDir} COMPONENT dermis)
+endif()
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/dermis COMPONENT dermis)
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in

@@ -4,7 +4,9 @@
 
 #include "abi.h"
 
-#ifdef TEXELS
+#if defined(DERMIS_SKIN_GLSL)
+// skin_include.glsl says how.
+#elif defined(TEXELS)
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
 layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
 

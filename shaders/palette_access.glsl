@@ -6,7 +6,9 @@
 #include "abi.h"
 #include "polar.glsl"
 
-#ifdef TEXELS
+#if defined(DERMIS_SKIN_GLSL)
+// skin_include.glsl says how.
+#elif defined(TEXELS)
 layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
 
 uvec4 paletteBits(uint unit) { return texelFetch(paletteTexels, int(unit)); }

@@ -87,6 +87,9 @@ struct PoseDescription {
   /// of scratch memory per joint and, on lavapipe, more time even if no joint scales. If false,
   /// scale and shear are ignored (rotation only) and counted in `PoseStatus`.
   bool mayScale = true;
+  /// The engine's own shaders read the palette, by dermis_skin.glsl: it is converted to dual
+  /// quaternions even if no job reads it. It stands at `Plan::paletteOffset`.
+  bool isReadByShaders = false;
 };
 
 /// One instance: a mesh, a pose, and where its skinned vertices are written. Two jobs of a batch
@@ -363,6 +366,10 @@ class Plan {
   /// jobs use that pose.
   std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
+  /// Byte offset in the palettes buffer of a pose's palette of dual quaternions; `noPalette` if it
+  /// has none.
+  std::uint64_t paletteOffset(std::uint32_t pose) const;
+  static constexpr std::uint64_t noPalette = ~std::uint64_t{0};
   /// Byte offset of a job's `InstanceResult` in the results buffer; `noResult` if it has none.
   /// Results are in the order of their jobs, without gaps.
   std::uint64_t resultOffset(std::uint32_t job) const;

@@ -1,4 +1,5 @@
 #version 450
+#include "dermis_decode.glsl"
 #include "draw.glsl"
 #include "view.glsl"
 
@@ -18,18 +19,9 @@ layout(location = 4) out float surfaceValue;
 
 layout(constant_id = 3) const bool normalsAreOctahedral = false;
 
-// dermis/vertex_format.h, octahedral.
-vec3 fromOctahedral(vec2 packed) {
-  vec3 direction = vec3(packed, 1.0 - abs(packed.x) - abs(packed.y));
-  float below = max(-direction.z, 0.0);
-  direction.x += direction.x >= 0.0 ? -below : below;
-  direction.y += direction.y >= 0.0 ? -below : below;
-  return direction;
-}
-
 void main() {
   worldPosition = toWorld(position);
-  worldNormal = directionToWorld(normalsAreOctahedral ? fromOctahedral(normal.xy) : normal);
+  worldNormal = directionToWorld(normalsAreOctahedral ? dermisDecodeOctahedral(normal.xy) : normal);
   surfaceTexcoord = texcoord;
   surfaceColor = color * draw.baseColor;
   surfaceValue = value;

@@ -36,6 +36,10 @@ class PlanMaker {
 /// Marks the forms that jobs read, and finds a place for each.
 void PlanMaker::placePoses(const Batch& batch) {
   for (std::vector<std::uint32_t>& units : paletteUnits_) units.assign(batch.poses.size(), notUsed);
+  for (std::size_t index = 0; index < batch.poses.size(); ++index) {
+    if (batch.poses[index].isReadByShaders)
+      paletteUnits_[static_cast<std::size_t>(PaletteForm::dualQuaternions)][index] = 0;
+  }
   for (const Job& job : batch.jobs) {
     const std::optional<PaletteForm> form = paletteForm(job.method);
     if (!form) continue;

@@ -289,8 +289,8 @@ Result<void> run() {
   printGlm();
   Model model;
   const MeshView mesh = model.view();
-  for (const Finding& finding : validate(mesh, jointCount).findings)
-    std::printf("%s: %llu\n", problemName(finding.problem),
+  for (const MeshFinding& finding : validate(mesh, jointCount).findings)
+    std::printf("%s: %llu\n", meshProblemName(finding.problem),
                 static_cast<unsigned long long>(finding.count));
 
   const Result<PackedMesh> packed = pack(mesh, jointCount);

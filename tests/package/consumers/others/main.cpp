@@ -52,7 +52,7 @@ Result<bool> skinTriangle() {
   const gltf::PrimitiveView view(model->meshes[skinned.mesh].primitives[skinned.primitive]);
   const Result<PackedMesh> packed = pack(view.mesh(), 1);
   if (!packed) return packed.error();
-  const std::vector<JointMatrix> palette = gltf::palette(*model, skinned.skin, gltf::none, 0);
+  const std::vector<JointMatrix> palette = gltf::pose(*model, skinned.skin, gltf::none, 0);
   const std::vector<float> weights = gltf::morphWeights(*model, skinned.node, gltf::none, 0);
   const MorphWeight morph{0, weights.at(0)};
   const auto vertices = reference::skin(view.mesh(), palette, Method::dualQuaternion, {&morph, 1});

@@ -1,0 +1,61 @@
+# Makes one GLSL file that an engine can include from one that includes others: puts what it includes in its place, once, and
+# `dermis_` before the name of every function, struct and constant that does not begin with it already.
+#
+#   cmake -DINPUT=shaders/skin_include.glsl -DOUTPUT=dermis_skin.glsl -P make_include.cmake
+#
+# Names are found where the kernels' sources have them: at the beginning of a line.
+
+cmake_minimum_required(VERSION 3.25)
+get_filename_component(folder ${INPUT} DIRECTORY)
+
+# Semicolons, and brackets, would make lists of the text.
+function(read_source path result)
+  file(READ ${path} text)
+  string(REPLACE ";" "@semicolon@" text "${text}")
+  string(REPLACE "[" "@open@" text "${text}")
+  string(REPLACE "]" "@close@" text "${text}")
+  set(${result} "${text}" PARENT_SCOPE)
+endfunction()
+
+read_source(${INPUT} text)
+set(included)
+while(text MATCHES "#include \"([A-Za-z_.]+)\"")
+  set(name ${CMAKE_MATCH_1})
+  set(own "")
+  if(NOT name IN_LIST included)
+    list(APPEND included ${name})
+    read_source(${folder}/${name} own)
+  endif()
+  # Only the first: the others find it included.
+  string(FIND "${text}" "#include \"${name}\"" begin)
+  string(LENGTH "#include \"${name}\"" length)
+  math(EXPR end "${begin} + ${length}")
+  string(SUBSTRING "${text}" 0 ${begin} before)
+  string(SUBSTRING "${text}" ${end} -1 after)
+  set(text "${before}${own}${after}")
+endwhile()
+
+string(REGEX MATCHALL "\n(struct|DERMIS_CONSTANT|const [a-z]+|[A-Za-z][A-Za-z0-9]*) [A-Za-z_][A-Za-z0-9_]*( =|\\(| {)" declarations "${text}")
+set(names)
+foreach(declaration IN LISTS declarations)
+  string(REGEX REPLACE "^.* ([A-Za-z_][A-Za-z0-9_]*)( =|\\(| {)$" "\\1" name "${declaration}")
+  if(NOT name MATCHES "^([Dd]ermis|DERMIS)" AND NOT declaration MATCHES "using ") # which is C++
+    list(APPEND names ${name})
+  endif()
+endforeach()
+list(REMOVE_DUPLICATES names)
+set(text " ${text} ")
+foreach(name IN LISTS names)
+  # Twice: neighbours share the character between them.
+  foreach(pass RANGE 1)
+    string(REGEX REPLACE "([^A-Za-z0-9_])${name}([^A-Za-z0-9_])" "\\1dermis_${name}\\2" text "${text}")
+  endforeach()
+endforeach()
+string(STRIP "${text}" text)
+# A shader that includes abi.h, too, has those names without a prefix as well.
+string(REPLACE "DERMIS_ABI_H" "DERMIS_SKIN_ABI_H" text "${text}")
+
+string(REPLACE "@open@" "[" text "${text}")
+string(REPLACE "@close@" "]" text "${text}")
+string(REPLACE "@semicolon@" ";" text "${text}")
+file(WRITE ${OUTPUT} "${text}\n")
