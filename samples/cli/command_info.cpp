@@ -37,8 +37,8 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["packedBytes"] = part.mesh ? part.mesh->packed().bytes().size() : 0;
   json["problems"] = Json::array();
   static const MeshReport none;
-  for (const Finding& finding : (part.mesh ? part.mesh->report() : none).findings) {
-    json["problems"].push_back({{"kind", problemName(finding.problem)},
+  for (const MeshFinding& finding : (part.mesh ? part.mesh->report() : none).findings) {
+    json["problems"].push_back({{"kind", meshProblemName(finding.problem)},
                                 {"vertices", finding.count},
                                 {"firstVertex", finding.firstVertex},
                                 {"repaired", refusedByPack(finding.problem)},

@@ -32,7 +32,7 @@ std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& so
 }
 
 void addFindings(Scene& scene, const MeshReport& report) {
-  for (const Finding& finding : report.findings) {
+  for (const MeshFinding& finding : report.findings) {
     std::string text = finding.message;
     if (finding.count > 1) text += fmt::format(" (and {} more such vertices)", finding.count - 1);
     if (refusedByPack(finding.problem)) {
@@ -181,7 +181,7 @@ ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
   pose.poses.resize(scene.model->skins.size());
   for (const ScenePart& part : scene.parts) {
     std::vector<JointMatrix>& palette = pose.poses[part.source.skin];
-    if (palette.empty()) palette = gltf::palette(*scene.model, part.source.skin, globals);
+    if (palette.empty()) palette = gltf::pose(*scene.model, part.source.skin, globals);
     std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
     // A primitive may have fewer targets than its mesh names.
     const std::size_t targets = part.primitive->morphTargets.size();

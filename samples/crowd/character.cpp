@@ -84,7 +84,7 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
     const std::vector<gltf::GlobalTransform> globals =
         gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);
     for (const std::uint32_t skin : skins)
-      sampled.poses.push_back(gltf::palette(*model_, skin, globals));
+      sampled.poses.push_back(gltf::pose(*model_, skin, globals));
   }
   return true;
 }

@@ -70,7 +70,7 @@ Result<void> CrowdCheck::compareUpTo(std::uint64_t completedFrame) {
     Capture capture = std::move(captures_.front());
     captures_.pop_front();
     if (Result<void> prepared = prepareReferences(capture); !prepared) return prepared;
-    std::vector<Finding> findings(capture.instances.size());
+    std::vector<MeshFinding> findings(capture.instances.size());
     inParallel(findings.size(), [&](std::size_t index) {
       findings[index] = check(capture, capture.instances[index]);
     });
@@ -133,19 +133,19 @@ std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
 }
 
 /// Whether one of the poses that may stand there does: all of one, not some vertices of another.
-CrowdCheck::Finding CrowdCheck::check(const Capture& capture, const Instance& instance) const {
-  Finding likeliest;
+CrowdCheck::MeshFinding CrowdCheck::check(const Capture& capture, const Instance& instance) const {
+  MeshFinding likeliest;
   bool isFirst = true;
   for (const ShownPose& pose : byLikelihood(capture, instance)) {
-    Finding finding = checkPose(capture, instance, pose);
+    MeshFinding finding = checkPose(capture, instance, pose);
     if (!finding.done || finding.passed) return finding;
     if (std::exchange(isFirst, false)) likeliest = std::move(finding);
   }
   return likeliest;
 }
 
-CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance& instance,
-                                          const ShownPose& pose) const {
+CrowdCheck::MeshFinding CrowdCheck::checkPose(const Capture& capture, const Instance& instance,
+                                              const ShownPose& pose) const {
   const InstanceOutput& output = instance.output;
   const std::uint32_t vertexCount = character_->parts()[instance.shown.part].packed.vertexCount();
   const std::span<const std::byte> bytes = capture.output.bytes();
@@ -155,7 +155,7 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
     current.normals = attributeAt(bytes, output.normals, vertexCount);
   previous.positions = attributeAt(bytes, output.previousPositions, vertexCount);
 
-  Finding finding;
+  MeshFinding finding;
   finding.passed = true;
   for (const auto& [view, key] : {std::pair{&current, pose.current}, {&previous, pose.previous}}) {
     const Result<Comparison> comparison =
@@ -173,7 +173,8 @@ CrowdCheck::Finding CrowdCheck::checkPose(const Capture& capture, const Instance
   return finding;
 }
 
-void CrowdCheck::count(const Capture& capture, const Instance& instance, const Finding& finding) {
+void CrowdCheck::count(const Capture& capture, const Instance& instance,
+                       const MeshFinding& finding) {
   ++totals_.instances;
   totals_.vertices += finding.compared;
   if (finding.passed) {

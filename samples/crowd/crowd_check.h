@@ -49,7 +49,7 @@ class CrowdCheck {
     dermis::samples::MappedBuffer output;
   };
   /// Of one instance.
-  struct Finding {
+  struct MeshFinding {
     dermis::Result<void> done;
     double worst = 0;
     std::uint64_t compared = 0;  ///< vertices, in the current pose
@@ -64,9 +64,10 @@ class CrowdCheck {
   double distanceFrom(PoseKey pose, std::uint32_t part, const Capture& capture,
                       const dermis::OutputAttribute& attribute) const;
   std::vector<ShownPose> byLikelihood(const Capture& capture, const Instance& instance) const;
-  Finding check(const Capture& capture, const Instance& instance) const;
-  Finding checkPose(const Capture& capture, const Instance& instance, const ShownPose& pose) const;
-  void count(const Capture& capture, const Instance& instance, const Finding& finding);
+  MeshFinding check(const Capture& capture, const Instance& instance) const;
+  MeshFinding checkPose(const Capture& capture, const Instance& instance,
+                        const ShownPose& pose) const;
+  void count(const Capture& capture, const Instance& instance, const MeshFinding& finding);
 
   dermis::samples::Device* device_;
   const Character* character_;

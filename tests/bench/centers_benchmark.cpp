@@ -1,4 +1,4 @@
-// Finding centres of rotation, at import.
+// MeshFinding centres of rotation, at import.
 
 #include <benchmark/benchmark.h>
 

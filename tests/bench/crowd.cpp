@@ -109,7 +109,7 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
   const double step = (std::sqrt(5.0) - 1) / 2;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
     const double phase = std::fmod(instance * step, 1.0);
-    crowd.poses.push_back(gltf::palette(*model, skin, clip, phase * duration));
+    crowd.poses.push_back(gltf::pose(*model, skin, clip, phase * duration));
   }
   return crowd;
 }

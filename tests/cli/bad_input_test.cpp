@@ -89,12 +89,12 @@ void expectSamePose(const FileBuilder& file, const FileBuilder& expected) {
 }
 
 /// Expects that `info` counts the problem and that `skin` says so and goes on, even where strict.
-void expectCounted(const FileBuilder& file, Problem problem, int count, int firstVertex) {
+void expectCounted(const FileBuilder& file, MeshProblem problem, int count, int firstVertex) {
   const std::string model = writeModel("counted.gltf", file);
   const Json info = Json::parse(dermis({"info", model, "--json"}).output);
   const Json& problems = info.at("meshes").at(0).at("problems");
   const auto found = std::find_if(problems.begin(), problems.end(), [&](const Json& entry) {
-    return entry.at("kind") == problemName(problem);
+    return entry.at("kind") == meshProblemName(problem);
   });
   ASSERT_NE(found, problems.end()) << problems;
   EXPECT_EQ(found->at("vertices"), count);
@@ -160,7 +160,7 @@ struct LineMesh {
 };
 
 struct BrokenMesh {
-  Problem problem;
+  MeshProblem problem;
   std::uint64_t count;
   std::uint32_t firstVertex;
   std::function<void(LineMesh&)> breakIt;
@@ -171,17 +171,18 @@ struct BrokenMesh {
 const std::vector<BrokenMesh>& brokenMeshes() {
   constexpr Point inPlace{7, 1, 2}, origin{0, 0, 0};
   static const std::vector<BrokenMesh> meshes{
-      {Problem::jointOutOfRange, 1, 7, [](LineMesh& m) { m.joints[15] = 3; }, inPlace},
-      {Problem::nonFinitePosition, 2, 7,
+      {MeshProblem::jointOutOfRange, 1, 7, [](LineMesh& m) { m.joints[15] = 3; }, inPlace},
+      {MeshProblem::nonFinitePosition, 2, 7,
        [](LineMesh& m) { m.positions[22] = m.positions[27] = nan; }, origin},
-      {Problem::nonFinitePosition, 1, 7, [](LineMesh& m) { m.positions[21] = -infinity; }, origin},
-      {Problem::nonFiniteWeight, 1, 7, [](LineMesh& m) { m.weights[15] = nan; }, inPlace},
-      {Problem::nonFiniteWeight, 2, 7,
+      {MeshProblem::nonFinitePosition, 1, 7, [](LineMesh& m) { m.positions[21] = -infinity; },
+       origin},
+      {MeshProblem::nonFiniteWeight, 1, 7, [](LineMesh& m) { m.weights[15] = nan; }, inPlace},
+      {MeshProblem::nonFiniteWeight, 2, 7,
        [](LineMesh& m) { m.weights[15] = m.weights[17] = infinity; }, inPlace},
-      {Problem::negativeWeight, 1, 7, [](LineMesh& m) { m.weights[15] = -0.25f; }, inPlace},
-      {Problem::countMismatch, 1, 0, [](LineMesh& m) { m.view.positions.count = 9; }, {}},
-      {Problem::emptyMesh, 1, 0, [](LineMesh& m) { m.view.vertexCount = 0; }, {}},
-      {Problem::strideTooSmall,
+      {MeshProblem::negativeWeight, 1, 7, [](LineMesh& m) { m.weights[15] = -0.25f; }, inPlace},
+      {MeshProblem::countMismatch, 1, 0, [](LineMesh& m) { m.view.positions.count = 9; }, {}},
+      {MeshProblem::emptyMesh, 1, 0, [](LineMesh& m) { m.view.vertexCount = 0; }, {}},
+      {MeshProblem::strideTooSmall,
        2,
        0,
        [](LineMesh& m) { m.view.positions.stride = m.set.weights.stride = 7; },
@@ -198,7 +199,7 @@ void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::s
     return;
   }
   ASSERT_TRUE(repaired.ok()) << repaired.error().message;
-  const Finding* changed = repaired->report().find(broken.problem);
+  const MeshFinding* changed = repaired->report().find(broken.problem);
   ASSERT_NE(changed, nullptr);
   EXPECT_EQ(changed->message, sentence) << "it says what it changed";
   EXPECT_TRUE(validate(repaired->view(), LineMesh::jointCount).packable());
@@ -210,7 +211,7 @@ void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::s
     pose[joint].m[2][3] = 4 * static_cast<float>(joint);
   const auto skinned = reference::skin(repaired->view(), pose, Method::linear);
   ASSERT_TRUE(skinned.ok()) << skinned.error().message;
-  const bool lostWeight = broken.problem != Problem::nonFinitePosition;
+  const bool lostWeight = broken.problem != MeshProblem::nonFinitePosition;
   const std::uint32_t vertex = broken.firstVertex, joint = vertex % LineMesh::jointCount;
   EXPECT_EQ(skinned->positions[vertex],
             (reference::Double3{(*broken.repaired)[0], (*broken.repaired)[1],
@@ -279,8 +280,8 @@ TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndR
     LineMesh mesh;
     broken.breakIt(mesh);
     const MeshReport report = validate(mesh.view, LineMesh::jointCount);
-    ASSERT_EQ(report.findings.size(), 1u) << problemName(broken.problem);
-    const Finding& finding = report.findings[0];
+    ASSERT_EQ(report.findings.size(), 1u) << meshProblemName(broken.problem);
+    const MeshFinding& finding = report.findings[0];
     SCOPED_TRACE(finding.message);
     EXPECT_EQ(finding.problem, broken.problem);
     EXPECT_EQ(finding.count, broken.count);
@@ -335,7 +336,7 @@ TEST_F(BadInput, WeightsThatDoNotSumToOneAreNormalisedOverAllSetsAndCounted) {
   expected.attributes()["WEIGHTS_0"] =
       expected.addFloats({0.25f, 0.75f, 0, 0, 1, 0, 0, 0, 0.0625f, 0.9375f, 0, 0}, "VEC4");
   expectSamePose(file, expected);
-  expectCounted(file, Problem::weightsNotNormalized, 2, 0);
+  expectCounted(file, MeshProblem::weightsNotNormalized, 2, 0);
 }
 
 // ---- the same joint twice in one vertex
@@ -351,7 +352,7 @@ TEST_F(BadInput, TheSameJointTwiceInOneVertexHasItsWeightsAddedAndIsCounted) {
   expected.attributes()["WEIGHTS_0"] =
       expected.addFloats({1, 0, 0, 0, 0.75f, 0.25f, 0, 0, 1, 0, 0, 0}, "VEC4");
   expectSamePose(file, expected);
-  expectCounted(file, Problem::duplicateJoint, 1, 1);
+  expectCounted(file, MeshProblem::duplicateJoint, 1, 1);
 }
 
 // ---- rotation keys that are not of unit length
@@ -401,7 +402,7 @@ TEST_F(BadInput, AVertexWithNoWeightLeftStaysInBindPoseAndIsCounted) {
   FileBuilder file = fox();
   file.json["nodes"][1]["translation"] = {0, 0, 5};
   file.attributes()["WEIGHTS_0"] = file.addFloats({1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, "VEC4");
-  expectCounted(file, Problem::vertexWithoutWeight, 2, 1);
+  expectCounted(file, MeshProblem::vertexWithoutWeight, 2, 1);
   skinEverywhere(file, ".ply", [](const std::string& out) {
     const std::vector<Point> expected{{0, 0, 5}, {1, 0, 0}, {0, 2, 0}};
     EXPECT_EQ(readPly(out).value_or(Ply{}).positions, expected);

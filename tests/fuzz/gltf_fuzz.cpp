@@ -62,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto globals = gltf::nodeGlobals(model, clip, model.clips[clip].duration / 2);
     require(globals.size() == model.nodes.size());
     for (std::uint32_t skin = 0; skin < model.skins.size() && skin < 4; ++skin) {
-      require(gltf::palette(model, skin, globals).size() == model.skins[skin].joints.size());
+      require(gltf::pose(model, skin, globals).size() == model.skins[skin].joints.size());
     }
   }
   return 0;

@@ -206,8 +206,8 @@ class MeshMaker {
 };
 
 void checkReport(const MeshReport& report) {
-  std::optional<Problem> last;
-  for (const Finding& finding : report.findings) {
+  std::optional<MeshProblem> last;
+  for (const MeshFinding& finding : report.findings) {
     require(!last || finding.problem > *last);
     require(finding.count > 0);
     require(finding.message.starts_with("mesh 'fuzz'"));

@@ -85,9 +85,9 @@ TEST(Repair, BadInfluencesAreDroppedTheOthersStay) {
   mesh.joints[4 * 4 + 3] = 10;
   mesh.joints[5 * 4 + 0] = 0xffffffffu;
   const RepairedMesh result = repaired(mesh.view(), 10);
-  EXPECT_EQ(result.report().find(Problem::nonFiniteWeight)->count, 3u);
-  EXPECT_EQ(result.report().find(Problem::negativeWeight)->count, 1u);
-  EXPECT_EQ(result.report().find(Problem::jointOutOfRange)->count, 2u);
+  EXPECT_EQ(result.report().find(MeshProblem::nonFiniteWeight)->count, 3u);
+  EXPECT_EQ(result.report().find(MeshProblem::negativeWeight)->count, 1u);
+  EXPECT_EQ(result.report().find(MeshProblem::jointOutOfRange)->count, 2u);
   const InfluenceSet set = result.view().influenceSets[0];
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
     const std::uint32_t dropped = vertex < 4 ? 1 : vertex == 4 ? 3 : 0;
@@ -171,8 +171,8 @@ TEST(Repair, SharesAreClampedCentersThatAreNotFiniteBecomeZero) {
   mesh.centersOfRotation[1 * 3 + 2] = nan;
   mesh.centersOfRotation[4 * 3 + 0] = infinity;
   const RepairedMesh result = repaired(mesh.view(), 10);
-  EXPECT_EQ(result.report().find(Problem::nonFiniteCenter)->count, 2u);
-  EXPECT_NE(result.report().find(Problem::shareOutOfRange), nullptr);
+  EXPECT_EQ(result.report().find(MeshProblem::nonFiniteCenter)->count, 2u);
+  EXPECT_NE(result.report().find(MeshProblem::shareOutOfRange), nullptr);
   const MeshView mended = result.view();
   const float weights[] = {0, 1, 0, 1, 0, 0.25f}, strengths[] = {0.25f, 0, 1, 0, 1, 0};
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
@@ -298,7 +298,7 @@ TEST(Repair, DisplacementsThatAreNotFiniteBecomeZeroAsAWhole) {
   MeshView view = mesh.view();
   view.morphTargets = targets.views;
   const RepairedMesh result = repaired(view, 10);
-  EXPECT_EQ(result.report().find(Problem::nonFiniteMorph)->count, 2u);
+  EXPECT_EQ(result.report().find(MeshProblem::nonFiniteMorph)->count, 2u);
   const MeshView mended = result.view();
   EXPECT_TRUE(validate(mended, 10).findings.empty());
   for (std::uint32_t i = 0; i < 3; ++i) {
@@ -378,8 +378,8 @@ TEST(Repair, AVertexWithoutGoodInfluencesIsLeftWithoutWeight) {
   const RepairedMesh result = repaired(mesh.view(), 10);
   const MeshReport after = validate(result.view(), 10);
   EXPECT_TRUE(after.packable());
-  ASSERT_NE(after.find(Problem::vertexWithoutWeight), nullptr);
-  EXPECT_EQ(after.find(Problem::vertexWithoutWeight)->firstVertex, 2u);
+  ASSERT_NE(after.find(MeshProblem::vertexWithoutWeight), nullptr);
+  EXPECT_EQ(after.find(MeshProblem::vertexWithoutWeight)->firstVertex, 2u);
 }
 
 TEST(Repair, RefusesViewsThatMakeNoSense) {

@@ -44,16 +44,16 @@ struct ValidateMorphs : public ::testing::Test {
   MeshReport report() const { return validate(view, 1); }
 
   /// One finding, of this kind; returns its sentence.
-  std::string onlyFinding(Problem problem, std::uint64_t count, std::uint32_t firstVertex) {
+  std::string onlyFinding(MeshProblem problem, std::uint64_t count, std::uint32_t firstVertex) {
     const MeshReport found = report();
     EXPECT_EQ(found.findings.size(), 1u);
-    const Finding* finding = found.find(problem);
+    const MeshFinding* finding = found.find(problem);
     EXPECT_NE(finding, nullptr);
     if (finding == nullptr) return "";
     EXPECT_EQ(finding->count, count) << finding->message;
     EXPECT_EQ(finding->firstVertex, firstVertex) << finding->message;
     EXPECT_FALSE(found.packable());
-    EXPECT_EQ(found.repairable(), problem == Problem::nonFiniteMorph);
+    EXPECT_EQ(found.repairable(), problem == MeshProblem::nonFiniteMorph);
     return finding->message;
   }
 
@@ -80,24 +80,24 @@ TEST_F(ValidateMorphs, FindNothingInGoodTargets) {
 TEST_F(ValidateMorphs, VerticesMustRise) {
   for (const std::uint32_t second : {2u, 1u, 0u}) {
     vertices[1] = second;
-    EXPECT_EQ(onlyFinding(Problem::morphVertices, 1, 0),
+    EXPECT_EQ(onlyFinding(MeshProblem::morphVertices, 1, 0),
               "mesh 'Fox': morph target 1 displaces vertex " + std::to_string(second) +
                   ", which lies outside the mesh or does not come after the one before");
   }
   vertices = {9, 5, 2};
   targets[1].vertices = vertices;
-  onlyFinding(Problem::morphVertices, 1, 0);
+  onlyFinding(MeshProblem::morphVertices, 1, 0);
 }
 
 TEST_F(ValidateMorphs, VerticesMustLieInTheMesh) {
   for (const std::uint32_t last : {10u, 11u, 0xffffffffu}) {
     vertices[2] = last;
-    EXPECT_NE(onlyFinding(Problem::morphVertices, 1, 0).find("vertex " + std::to_string(last)),
+    EXPECT_NE(onlyFinding(MeshProblem::morphVertices, 1, 0).find("vertex " + std::to_string(last)),
               std::string::npos);
   }
   vertices = {10, 11, 12};
   targets[1].vertices = vertices;
-  onlyFinding(Problem::morphVertices, 1, 0);
+  onlyFinding(MeshProblem::morphVertices, 1, 0);
 }
 
 TEST_F(ValidateMorphs, CountsAreThoseOfTheTargetsVertices) {
@@ -109,7 +109,7 @@ TEST_F(ValidateMorphs, CountsAreThoseOfTheTargetsVertices) {
       const std::uint32_t good = displacements.count;
       for (const std::uint32_t count : {0u, good - 1, good + 1}) {
         displacements.count = count;
-        EXPECT_EQ(onlyFinding(Problem::countMismatch, 1, 0),
+        EXPECT_EQ(onlyFinding(MeshProblem::countMismatch, 1, 0),
                   "mesh 'Fox': there are " + std::to_string(count) + " " + name +
                       " displacements of morph target " + std::to_string(index) + " for " +
                       std::to_string(good) + " displaced vertices");
@@ -132,7 +132,7 @@ TEST_F(ValidateMorphs, TypesThatDisplacementsMayHave) {
       if (allowed->contains(displacements.type)) {
         EXPECT_TRUE(report().repairable()) << type;
       } else {
-        EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find("morph target 1"),
+        EXPECT_NE(onlyFinding(MeshProblem::wrongFormat, 1, 0).find("morph target 1"),
                   std::string::npos);
       }
       displacements.type = Type::float32;
@@ -144,11 +144,11 @@ TEST_F(ValidateMorphs, ComponentsAndStrides) {
   AttributeView& displacements = targets[0].tangents;
   for (const std::uint32_t components : {0u, 2u, 5u}) {
     displacements.components = components;
-    onlyFinding(Problem::wrongFormat, 1, 0);
+    onlyFinding(MeshProblem::wrongFormat, 1, 0);
   }
   displacements.components = 3;
   displacements.stride = 11;
-  EXPECT_EQ(onlyFinding(Problem::strideTooSmall, 1, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
             "mesh 'Fox': the stride of the tangent displacements of morph target 0 is 11 bytes, "
             "an element has 12");
 }
@@ -158,7 +158,7 @@ TEST_F(ValidateMorphs, BadViewsAreNotRead) {
   positions[0] = nan;
   mesh.weights[0] = nan;
   vertices[2] = 10;
-  onlyFinding(Problem::morphVertices, 1, 0);
+  onlyFinding(MeshProblem::morphVertices, 1, 0);
 }
 
 // ---- The values
@@ -169,7 +169,7 @@ TEST_F(ValidateMorphs, DisplacementsThatAreNotFinite) {
     for (const std::size_t component : {0u, 1u, 2u}) {
       for (const float bad : {nan, infinity, -infinity}) {
         (*values)[7 * 3 + component] = bad;
-        EXPECT_EQ(onlyFinding(Problem::nonFiniteMorph, 1, 7),
+        EXPECT_EQ(onlyFinding(MeshProblem::nonFiniteMorph, 1, 7),
                   "mesh 'Fox', vertex 7: its displacement by morph target 0 is not finite");
         (*values)[7 * 3 + component] = 0.5f;
       }
@@ -180,14 +180,14 @@ TEST_F(ValidateMorphs, DisplacementsThatAreNotFinite) {
 TEST_F(ValidateMorphs, OfSparseTargetsTheVertexIsNamedNotTheElement) {
   targets[0] = {};
   positions[1 * 3] = nan;
-  EXPECT_EQ(onlyFinding(Problem::nonFiniteMorph, 1, 5),
+  EXPECT_EQ(onlyFinding(MeshProblem::nonFiniteMorph, 1, 5),
             "mesh 'Fox', vertex 5: its displacement by morph target 1 is not finite");
 }
 
 TEST_F(ValidateMorphs, EveryDisplacementCounts) {
   // Element 2 is vertex 2 of the first target, vertex 9 of the second.
   positions[2 * 3] = normals[2 * 3] = nan;
-  onlyFinding(Problem::nonFiniteMorph, 2, 2);
+  onlyFinding(MeshProblem::nonFiniteMorph, 2, 2);
   // The last displacement of a target and the first of the next, of one vertex.
   positions[2 * 3] = normals[2 * 3] = 0.5f;
   const float bad[] = {nan, 0, 0};
@@ -197,7 +197,7 @@ TEST_F(ValidateMorphs, EveryDisplacementCounts) {
     target.vertices = four;
     target.positions = floatAttribute(bad, 1, 3);
   }
-  onlyFinding(Problem::nonFiniteMorph, 2, 4);
+  onlyFinding(MeshProblem::nonFiniteMorph, 2, 4);
 }
 
 TEST_F(ValidateMorphs, DisplacementsMayOverflowByTheirScale) {
@@ -207,7 +207,7 @@ TEST_F(ValidateMorphs, DisplacementsMayOverflowByTheirScale) {
   targets[0].positionScale = {2, 1, 2};
   EXPECT_TRUE(report().findings.empty());
   targets[0].positionScale = {1, 2, 1};
-  onlyFinding(Problem::nonFiniteMorph, 1, 3);
+  onlyFinding(MeshProblem::nonFiniteMorph, 1, 3);
 }
 
 TEST_F(ValidateMorphs, HalvesMayBeInfiniteOrNoNumber) {
@@ -217,7 +217,7 @@ TEST_F(ValidateMorphs, HalvesMayBeInfiniteOrNoNumber) {
   EXPECT_TRUE(report().findings.empty());
   for (const std::uint16_t bad : std::initializer_list<std::uint16_t>{0x7c00, 0xfe00}) {
     halves[8 * 3 + 2] = bad;
-    onlyFinding(Problem::nonFiniteMorph, 1, 8);
+    onlyFinding(MeshProblem::nonFiniteMorph, 1, 8);
   }
 }
 

@@ -43,19 +43,19 @@ struct ValidateTest : public ::testing::Test {
   }
 
   /// One finding, of this kind; returns its sentence.
-  std::string onlyFinding(Problem problem, std::uint64_t count, std::uint32_t firstVertex) {
+  std::string onlyFinding(MeshProblem problem, std::uint64_t count, std::uint32_t firstVertex) {
     const MeshReport report = validate(view, jointCount);
     EXPECT_EQ(report.findings.size(), 1u);
-    for (const Finding& finding : report.findings) {
+    for (const MeshFinding& finding : report.findings) {
       EXPECT_EQ(finding.problem, problem) << finding.message;
     }
-    const Finding* finding = report.find(problem);
+    const MeshFinding* finding = report.find(problem);
     EXPECT_NE(finding, nullptr);
     if (finding == nullptr) return "";
     EXPECT_EQ(finding->count, count);
     EXPECT_EQ(finding->firstVertex, firstVertex);
-    EXPECT_EQ(report.packable(), problem >= Problem::weightsNotNormalized);
-    EXPECT_EQ(report.repairable(), problem > Problem::morphVertices);
+    EXPECT_EQ(report.packable(), problem >= MeshProblem::weightsNotNormalized);
+    EXPECT_EQ(report.repairable(), problem > MeshProblem::morphVertices);
     return finding->message;
   }
 
@@ -70,7 +70,7 @@ TEST_F(ValidateTest, FindsNothingInAGoodMesh) {
   EXPECT_TRUE(report.findings.empty());
   EXPECT_TRUE(report.packable());
   EXPECT_TRUE(report.repairable());
-  EXPECT_EQ(report.find(Problem::emptyMesh), nullptr);
+  EXPECT_EQ(report.find(MeshProblem::emptyMesh), nullptr);
   view.normals = {};
   view.tangents = {};
   view.centersOfRotation = view.dualQuaternionWeights = view.bulgeStrengths = {};
@@ -81,20 +81,20 @@ TEST_F(ValidateTest, FindsNothingInAGoodMesh) {
 
 TEST_F(ValidateTest, NoVertices) {
   view.vertexCount = 0;
-  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
+  EXPECT_EQ(onlyFinding(MeshProblem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
   view = {};
   view.name = "Fox";
-  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
+  EXPECT_EQ(onlyFinding(MeshProblem::emptyMesh, 1, 0), "mesh 'Fox': it has no vertices");
 }
 
 TEST_F(ValidateTest, NoPositions) {
   view.positions = {};
-  EXPECT_EQ(onlyFinding(Problem::emptyMesh, 1, 0), "mesh 'Fox': it has no positions");
+  EXPECT_EQ(onlyFinding(MeshProblem::emptyMesh, 1, 0), "mesh 'Fox': it has no positions");
 }
 
 TEST_F(ValidateTest, NoInfluenceSets) {
   view.influenceSets = {};
-  EXPECT_EQ(onlyFinding(Problem::noInfluenceSets, 1, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::noInfluenceSets, 1, 0),
             "mesh 'Fox': it has no joints and weights");
 }
 
@@ -102,10 +102,10 @@ TEST_F(ValidateTest, ASetWithoutJointsOrWeights) {
   InfluenceSet sets[] = {set, set};
   view.influenceSets = sets;
   sets[1].joints = {};
-  EXPECT_NE(onlyFinding(Problem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
+  EXPECT_NE(onlyFinding(MeshProblem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
   sets[1] = set;
   sets[1].weights = {};
-  EXPECT_NE(onlyFinding(Problem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
+  EXPECT_NE(onlyFinding(MeshProblem::noInfluenceSets, 1, 0).find("mesh 'Fox'"), std::string::npos);
 }
 
 TEST_F(ValidateTest, CountsThatDisagree) {
@@ -123,14 +123,14 @@ TEST_F(ValidateTest, CountsThatDisagree) {
   for (const auto& [attribute, name] : cases) {
     for (const std::uint32_t count : {9u, 11u, 0u}) {
       attribute->count = count;
-      EXPECT_EQ(onlyFinding(Problem::countMismatch, 1, 0),
+      EXPECT_EQ(onlyFinding(MeshProblem::countMismatch, 1, 0),
                 "mesh 'Fox': there are " + std::to_string(count) + " " + name + " for 10 vertices");
     }
     attribute->count = vertexCount;
   }
   view.normals.count = 9;
   view.tangents.count = 8;
-  EXPECT_EQ(onlyFinding(Problem::countMismatch, 2, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::countMismatch, 2, 0),
             "mesh 'Fox': there are 9 normals for 10 vertices");
 }
 
@@ -151,7 +151,7 @@ TEST_F(ValidateTest, StridesThatAreTooSmall) {
     EXPECT_EQ(attribute->stride, size);
     for (const std::uint32_t stride : {size - 1, 0u}) {
       attribute->stride = stride;
-      EXPECT_EQ(onlyFinding(Problem::strideTooSmall, 1, 0),
+      EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
                 "mesh 'Fox': the stride of the " + std::string(name) + " is " +
                     std::to_string(stride) + " bytes, an element has " + std::to_string(size));
     }
@@ -161,7 +161,7 @@ TEST_F(ValidateTest, StridesThatAreTooSmall) {
 
 TEST_F(ValidateTest, ComponentsWhoseSizeOverflows32BitsDoNotFitAnyStride) {
   set.joints.components = set.weights.components = 0x40000001u;  // times 4 is 4 in 32 bits
-  onlyFinding(Problem::strideTooSmall, 2, 0);
+  onlyFinding(MeshProblem::strideTooSmall, 2, 0);
 }
 
 constexpr ComponentType allTypes[] = {
@@ -196,7 +196,7 @@ TEST_F(ValidateTest, TypesThatAnAttributeMayHave) {
         EXPECT_TRUE(validate(view, jointCount).repairable());
         continue;
       }
-      const std::string message = onlyFinding(Problem::wrongFormat, 1, 0);
+      const std::string message = onlyFinding(MeshProblem::wrongFormat, 1, 0);
       EXPECT_NE(message.find(name), std::string::npos) << message;
       EXPECT_NE(message.find("mesh 'Fox'"), std::string::npos) << message;
     }
@@ -221,7 +221,7 @@ TEST_F(ValidateTest, ComponentsThatAnAttributeMayHave) {
       if (allowed.contains(components)) {
         EXPECT_TRUE(validate(view, jointCount).repairable()) << components;
       } else {
-        EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find(name), std::string::npos);
+        EXPECT_NE(onlyFinding(MeshProblem::wrongFormat, 1, 0).find(name), std::string::npos);
       }
     }
     *attribute = good;
@@ -243,7 +243,7 @@ TEST_F(ValidateTest, SharesHaveOneComponentCentersThree) {
       if (components == allowed) {
         EXPECT_TRUE(validate(view, jointCount).findings.empty());
       } else {
-        EXPECT_NE(onlyFinding(Problem::wrongFormat, 1, 0).find(name), std::string::npos);
+        EXPECT_NE(onlyFinding(MeshProblem::wrongFormat, 1, 0).find(name), std::string::npos);
       }
     }
     *attribute = good;
@@ -255,44 +255,44 @@ TEST_F(ValidateTest, StridesAreHeldAgainstTheTypesSize) {
   view.positions.stride = 6;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.positions.stride = 5;
-  EXPECT_EQ(onlyFinding(Problem::strideTooSmall, 1, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
             "mesh 'Fox': the stride of the positions is 5 bytes, an element has 6");
   view.positions = mesh.view().positions;
   view.tangents.type = ComponentType::snorm8;
   view.tangents.stride = 4;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.tangents.stride = 3;
-  EXPECT_EQ(onlyFinding(Problem::strideTooSmall, 1, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
             "mesh 'Fox': the stride of the tangents is 3 bytes, an element has 4");
 }
 
 TEST_F(ValidateTest, JointsAndWeightsOfDifferentNumber) {
   set.joints.components = 3;
-  EXPECT_EQ(onlyFinding(Problem::wrongFormat, 1, 0),
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
             "mesh 'Fox': an influence set has 3 joints but 4 weights a vertex");
   set.joints.components = 0;
-  onlyFinding(Problem::wrongFormat, 2, 0);
+  onlyFinding(MeshProblem::wrongFormat, 2, 0);
 }
 
 TEST_F(ValidateTest, BadViewsAreNotRead) {
   // Were the values looked at, this would be found as well (or crash).
   view.positions.count = 11;
   mesh.weights[0] = nan;
-  onlyFinding(Problem::countMismatch, 1, 0);
+  onlyFinding(MeshProblem::countMismatch, 1, 0);
 }
 
 // ---- The values
 
 TEST_F(ValidateTest, NonFiniteAttributes) {
   const struct {
-    Problem problem;
+    MeshProblem problem;
     std::vector<float>* values;
     std::size_t components;
     const char* name;
-  } cases[] = {{Problem::nonFinitePosition, &mesh.positions, 3, "position"},
-               {Problem::nonFiniteNormal, &mesh.normals, 3, "normal"},
-               {Problem::nonFiniteTangent, &tangents, 4, "tangent"},
-               {Problem::nonFiniteCenter, &mesh.centersOfRotation, 3, "centre of rotation"}};
+  } cases[] = {{MeshProblem::nonFinitePosition, &mesh.positions, 3, "position"},
+               {MeshProblem::nonFiniteNormal, &mesh.normals, 3, "normal"},
+               {MeshProblem::nonFiniteTangent, &tangents, 4, "tangent"},
+               {MeshProblem::nonFiniteCenter, &mesh.centersOfRotation, 3, "centre of rotation"}};
   for (const auto& [problem, values, components, name] : cases) {
     const std::vector<float> good = *values;
     for (std::size_t component = 0; component < components; ++component) {
@@ -330,16 +330,16 @@ TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
     };
     for (const float bad : {below, -1.0f, above, 7.0f, nan, infinity, -infinity}) {
       (*values)[4] = bad;
-      expectSentence(onlyFinding(Problem::shareOutOfRange, 1, 4),
+      expectSentence(onlyFinding(MeshProblem::shareOutOfRange, 1, 4),
                      "mesh 'Fox', vertex 4: the " + rest);
       (*values)[8] = bad;
-      onlyFinding(Problem::shareOutOfRange, 2, 4);
+      onlyFinding(MeshProblem::shareOutOfRange, 2, 4);
       std::copy(good.begin(), good.end(), values->begin());
       // The mesh's own, which counts where the vertices have none.
       *whole = bad;
       EXPECT_TRUE(validate(view, jointCount).findings.empty());
       *attribute = {};
-      expectSentence(onlyFinding(Problem::shareOutOfRange, 1, 0), "mesh 'Fox': its " + rest);
+      expectSentence(onlyFinding(MeshProblem::shareOutOfRange, 1, 0), "mesh 'Fox': its " + rest);
       *attribute = goodView;
       *whole = goodWhole;
     }
@@ -351,7 +351,7 @@ TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
   }
   // Vertices are counted.
   mesh.dualQuaternionWeights[3] = mesh.bulgeStrengths[3] = 2;
-  onlyFinding(Problem::shareOutOfRange, 1, 3);
+  onlyFinding(MeshProblem::shareOutOfRange, 1, 3);
 }
 
 TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
@@ -366,10 +366,10 @@ TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
       const MeshReport report = validate(view, jointCount);
       // The fourth is read of tangents only.
       EXPECT_EQ(report.findings.size(), component == 3 ? 1u : 3u);
-      for (const Finding& finding : report.findings) EXPECT_EQ(finding.firstVertex, 6u);
-      EXPECT_NE(report.find(Problem::nonFiniteTangent), nullptr);
-      EXPECT_EQ(report.find(Problem::nonFinitePosition) != nullptr, component != 3);
-      EXPECT_EQ(report.find(Problem::nonFiniteNormal) != nullptr, component != 3);
+      for (const MeshFinding& finding : report.findings) EXPECT_EQ(finding.firstVertex, 6u);
+      EXPECT_NE(report.find(MeshProblem::nonFiniteTangent), nullptr);
+      EXPECT_EQ(report.find(MeshProblem::nonFinitePosition) != nullptr, component != 3);
+      EXPECT_EQ(report.find(MeshProblem::nonFiniteNormal) != nullptr, component != 3);
       halves[6 * 4 + component] = 0x3c00;
     }
   }
@@ -387,46 +387,46 @@ TEST_F(ValidateTest, AFourthComponentThatIsNotReadMayBeAnything) {
   view.normals = view.positions;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.tangents = view.positions;
-  onlyFinding(Problem::nonFiniteTangent, vertexCount, 0);
+  onlyFinding(MeshProblem::nonFiniteTangent, vertexCount, 0);
 }
 
 TEST_F(ValidateTest, PositionsThatOverflowByTheirScaleOrOffset) {
   mesh.positions[4 * 3 + 1] = 3e38f;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.positionScale = {1, 2, 1};
-  EXPECT_EQ(onlyFinding(Problem::nonFinitePosition, 1, 4),
+  EXPECT_EQ(onlyFinding(MeshProblem::nonFinitePosition, 1, 4),
             "mesh 'Fox', vertex 4: the position is not finite");
   view.positionScale = {2, 1, 2};
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.positionOffset = {0, 1e38f, 0};
-  onlyFinding(Problem::nonFinitePosition, 1, 4);
+  onlyFinding(MeshProblem::nonFinitePosition, 1, 4);
   view.positionOffset = {0, -1e38f, 0};
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   // Every vertex is as bad as its scale.
   for (const float bad : {nan, infinity}) {
     view.positionOffset = {0, 0, bad};
-    onlyFinding(Problem::nonFinitePosition, vertexCount, 0);
+    onlyFinding(MeshProblem::nonFinitePosition, vertexCount, 0);
   }
   view.positionOffset = {0, 0, 0};
   view.positionScale = {nan, 1, 1};
-  onlyFinding(Problem::nonFinitePosition, vertexCount, 0);
+  onlyFinding(MeshProblem::nonFinitePosition, vertexCount, 0);
 }
 
 TEST_F(ValidateTest, NonFiniteWeights) {
   for (const float bad : {nan, infinity, -infinity}) {
     mesh.weights[4 * 4 + 1] = bad;
-    EXPECT_EQ(onlyFinding(Problem::nonFiniteWeight, 1, 4),
+    EXPECT_EQ(onlyFinding(MeshProblem::nonFiniteWeight, 1, 4),
               "mesh 'Fox', vertex 4: the weight of joint 5 is not finite");
   }
   mesh.weights[4 * 4 + 2] = nan;  // the same vertex counts once
   mesh.weights[8 * 4 + 3] = nan;
-  onlyFinding(Problem::nonFiniteWeight, 2, 4);
+  onlyFinding(MeshProblem::nonFiniteWeight, 2, 4);
 }
 
 TEST_F(ValidateTest, NegativeWeights) {
   mesh.weights[4 * 4 + 1] = -1e-30f;
   mesh.weights[5 * 4 + 0] = -0.75f;
-  EXPECT_EQ(onlyFinding(Problem::negativeWeight, 2, 4),
+  EXPECT_EQ(onlyFinding(MeshProblem::negativeWeight, 2, 4),
             "mesh 'Fox', vertex 4: the weight of joint 5 is negative");
 }
 
@@ -439,11 +439,11 @@ TEST_F(ValidateTest, JointsOutsideThePose) {
   mesh.joints[7 * 4 + 1] = jointCount - 1;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   mesh.joints[7 * 4 + 1] = 31;
-  EXPECT_EQ(onlyFinding(Problem::jointOutOfRange, 1, 7),
+  EXPECT_EQ(onlyFinding(MeshProblem::jointOutOfRange, 1, 7),
             "mesh 'Fox', vertex 7: joint 31 is outside the palette of 24");
   mesh.joints[6 * 4] = jointCount;
   mesh.joints[9 * 4] = 0xffffffffu;
-  EXPECT_EQ(onlyFinding(Problem::jointOutOfRange, 3, 6),
+  EXPECT_EQ(onlyFinding(MeshProblem::jointOutOfRange, 3, 6),
             "mesh 'Fox', vertex 6: joint 24 is outside the palette of 24");
 }
 
@@ -459,7 +459,7 @@ TEST_F(ValidateTest, JointsEndWithTheLargestPose) {
   mesh.joints[0] = 65536;
   EXPECT_EQ(validate(view, maxPoseJoints).findings.size(), 1u);
   EXPECT_EQ(validate(view, 0xffffffffu).findings.size(), 1u) << "joint indices have 16 bits";
-  EXPECT_NE(validate(view, 0).find(Problem::jointOutOfRange), nullptr);
+  EXPECT_NE(validate(view, 0).find(MeshProblem::jointOutOfRange), nullptr);
 }
 
 // ---- Sums: 2e-7 for each weight that is not 0, or 255 and 65535 exactly
@@ -477,7 +477,7 @@ TEST_F(ValidateTest, Truth18_FloatSumsWithinTheToleranceOfTheGltfValidator) {
   }
   for (const double difference : {4.3e-7, -4.3e-7, 1e-6, 0.5, -0.1}) {
     ASSERT_TRUE(sumOf(difference));
-    EXPECT_NE(onlyFinding(Problem::weightsNotNormalized, 1, 3).find("mesh 'Fox', vertex 3"),
+    EXPECT_NE(onlyFinding(MeshProblem::weightsNotNormalized, 1, 3).find("mesh 'Fox', vertex 3"),
               std::string::npos);
   }
 }
@@ -503,7 +503,7 @@ TEST_F(ValidateTest, TheSumIsOverAllSetsTogether) {
   view.influenceSets = sets;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   half[6 * 4] = 0.5f;
-  const std::string message = onlyFinding(Problem::weightsNotNormalized, 1, 6);
+  const std::string message = onlyFinding(MeshProblem::weightsNotNormalized, 1, 6);
   EXPECT_EQ(message.find("mesh 'Fox', vertex 6: the weights sum to 1.5"), 0u) << message;
   mesh.weights[6 * 4] = 0.25f;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
@@ -512,11 +512,11 @@ TEST_F(ValidateTest, TheSumIsOverAllSetsTogether) {
 // A sum that is printed as 1.000000 does not say what is wrong with it.
 TEST_F(ValidateTest, TheSentenceShowsThatTheSumIsNotOne) {
   mesh.weights[3 * 4 + 1] = 0.25000045f;
-  const std::string message = onlyFinding(Problem::weightsNotNormalized, 1, 3);
+  const std::string message = onlyFinding(MeshProblem::weightsNotNormalized, 1, 3);
   EXPECT_EQ(message.find("1.000000,"), std::string::npos) << message;
   mesh.weights[3 * 4 + 1] = 0.25f;
   for (std::size_t slot = 0; slot < 4; ++slot) mesh.weights[8 * 4 + slot] *= 1e-9f;
-  const std::string tiny = onlyFinding(Problem::weightsNotNormalized, 1, 8);
+  const std::string tiny = onlyFinding(MeshProblem::weightsNotNormalized, 1, 8);
   EXPECT_EQ(tiny.find(" 0.000000,"), std::string::npos) << tiny;
 }
 
@@ -535,7 +535,7 @@ void expectExactSums(MeshView view, ComponentType type, const OwnedMesh& mesh) {
     weights[5 * 4] = static_cast<T>(largest - 5 * 7 + off);
     const MeshReport report = validate(view, jointCount);
     ASSERT_EQ(report.findings.size(), 1u);
-    EXPECT_EQ(report.findings[0].problem, Problem::weightsNotNormalized);
+    EXPECT_EQ(report.findings[0].problem, MeshProblem::weightsNotNormalized);
     EXPECT_EQ(report.findings[0].count, 1u);
     EXPECT_EQ(report.findings[0].firstVertex, 5u);
   }
@@ -549,7 +549,7 @@ TEST_F(ValidateTest, Truth18_BytesMustSumTo255ShortsTo65535) {
 TEST_F(ValidateTest, DuplicateJoints) {
   mesh.joints[2 * 4 + 1] = mesh.joints[2 * 4];
   mesh.joints[5 * 4 + 1] = mesh.joints[5 * 4];
-  EXPECT_EQ(onlyFinding(Problem::duplicateJoint, 2, 2),
+  EXPECT_EQ(onlyFinding(MeshProblem::duplicateJoint, 2, 2),
             "mesh 'Fox', vertex 2: joint 2 has weight twice");
 }
 
@@ -560,7 +560,7 @@ TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbours) {
     mesh.joints[8 * 4 + slot] = joints[slot];
     mesh.weights[8 * 4 + slot] = weights[slot];
   }
-  EXPECT_EQ(onlyFinding(Problem::duplicateJoint, 1, 8),
+  EXPECT_EQ(onlyFinding(MeshProblem::duplicateJoint, 1, 8),
             "mesh 'Fox', vertex 8: joint 9 has weight twice");
 }
 
@@ -575,14 +575,14 @@ TEST_F(ValidateTest, DuplicatesAcrossSets) {
   joints[6] = 7;
   none[6] = 0.25f;
   mesh.weights[6 * 4] = 0.5f;
-  onlyFinding(Problem::duplicateJoint, 1, 6);
+  onlyFinding(MeshProblem::duplicateJoint, 1, 6);
 }
 
 TEST_F(ValidateTest, VerticesWithoutWeight) {
   for (const std::size_t vertex : {3u, 8u}) {
     for (std::size_t slot = 0; slot < 4; ++slot) mesh.weights[vertex * 4 + slot] = 0;
   }
-  EXPECT_EQ(onlyFinding(Problem::vertexWithoutWeight, 2, 3),
+  EXPECT_EQ(onlyFinding(MeshProblem::vertexWithoutWeight, 2, 3),
             "mesh 'Fox', vertex 3: no joint has weight; it stays in bind pose");
 }
 
@@ -597,10 +597,11 @@ TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {
   mesh.normals[7 * 3] = nan;
   tangents[8 * 4] = nan;
   const MeshReport report = validate(view, jointCount);
-  const Problem expected[] = {
-      Problem::nonFinitePosition,    Problem::nonFiniteNormal, Problem::nonFiniteTangent,
-      Problem::nonFiniteWeight,      Problem::negativeWeight,  Problem::jointOutOfRange,
-      Problem::weightsNotNormalized, Problem::duplicateJoint,  Problem::vertexWithoutWeight};
+  const MeshProblem expected[] = {MeshProblem::nonFinitePosition,    MeshProblem::nonFiniteNormal,
+                                  MeshProblem::nonFiniteTangent,     MeshProblem::nonFiniteWeight,
+                                  MeshProblem::negativeWeight,       MeshProblem::jointOutOfRange,
+                                  MeshProblem::weightsNotNormalized, MeshProblem::duplicateJoint,
+                                  MeshProblem::vertexWithoutWeight};
   const std::uint32_t vertices[] = {6, 7, 8, 0, 1, 2, 3, 4, 5};
   ASSERT_EQ(report.findings.size(), std::size(expected));
   for (std::size_t i = 0; i < std::size(expected); ++i) {
@@ -612,14 +613,14 @@ TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {
 
 TEST(Validate, EveryKindHasANameAndAConsequence) {
   std::set<std::string> names;
-  for (int kind = 0; kind <= static_cast<int>(Problem::vertexWithoutWeight); ++kind) {
-    const auto problem = static_cast<Problem>(kind);
-    names.insert(problemName(problem));
-    EXPECT_EQ(refusedByPack(problem), kind <= static_cast<int>(Problem::jointOutOfRange));
+  for (int kind = 0; kind <= static_cast<int>(MeshProblem::vertexWithoutWeight); ++kind) {
+    const auto problem = static_cast<MeshProblem>(kind);
+    names.insert(meshProblemName(problem));
+    EXPECT_EQ(refusedByPack(problem), kind <= static_cast<int>(MeshProblem::jointOutOfRange));
   }
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(Problem::vertexWithoutWeight) + 1);
-  EXPECT_STREQ(problemName(Problem::jointOutOfRange), "joint out of range");
-  EXPECT_STREQ(problemName(static_cast<Problem>(99)), "unknown");
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(MeshProblem::vertexWithoutWeight) + 1);
+  EXPECT_STREQ(meshProblemName(MeshProblem::jointOutOfRange), "joint out of range");
+  EXPECT_STREQ(meshProblemName(static_cast<MeshProblem>(99)), "unknown");
 }
 
 }  // namespace

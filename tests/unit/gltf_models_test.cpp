@@ -56,7 +56,7 @@ TEST(GltfModels, AllLoad) {
     for (std::uint32_t clip = 0; clip < model.clips.size(); ++clip) {
       const auto globals = nodeGlobals(model, clip, model.clips[clip].duration / 3);
       for (std::uint32_t skin = 0; skin < model.skins.size(); ++skin) {
-        EXPECT_EQ(palette(model, skin, globals).size(), model.skins[skin].joints.size());
+        EXPECT_EQ(gltf::pose(model, skin, globals).size(), model.skins[skin].joints.size());
       }
       for (std::uint32_t node = 0; node < model.nodes.size(); ++node) {
         const std::uint32_t mesh = model.nodes[node].mesh;

@@ -56,7 +56,7 @@ std::vector<double> meaningOf(const gltf::Model& model) {
   }
   for (const gltf::MorphTarget& target : primitive.morphTargets) append(numbers, target.positions);
   append(numbers, gltf::morphWeights(model, skinned.node, 0, 0.5));
-  const auto matrices = gltf::palette(model, skinned.skin, 0, 0.5);
+  const auto matrices = gltf::pose(model, skinned.skin, 0, 0.5);
   for (std::size_t joint = 0; joint < 2 && joint < matrices.size(); ++joint) {
     for (const auto& row : matrices[joint].m)
       for (const float value : row) numbers.push_back(static_cast<double>(value));

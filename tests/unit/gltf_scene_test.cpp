@@ -180,7 +180,7 @@ TEST(GltfScene, LoadsAFileWithNothingInIt) {
   EXPECT_TRUE(model.nodes.empty());
   EXPECT_TRUE(model.skinnedPrimitives.empty());
   EXPECT_TRUE(nodeGlobals(model, none, 0).empty());
-  EXPECT_TRUE(palette(model, 0, none, 0).empty());
+  EXPECT_TRUE(gltf::pose(model, 0, none, 0).empty());
 }
 
 TEST(GltfScene, RefusesBadScenes) {
@@ -201,7 +201,7 @@ TEST(GltfScene, RefusesBadScenes) {
 
 TEST(GltfSkin, TakesIdentitiesWhereThereAreNoMatrices) {
   const gltf::Model model = loaded(skinnedTriangle());
-  const auto matrices = palette(model, 0, none, 0);
+  const auto matrices = gltf::pose(model, 0, none, 0);
   ASSERT_EQ(matrices.size(), 2u);
   EXPECT_EQ(matrices[0].m[0][0], 1.0f);
   EXPECT_EQ(matrices[0].m[1][3], 0.0f);
@@ -219,7 +219,7 @@ TEST(GltfSkin, MultipliesJointByInverseBindMatrix) {
   matrices.insert(matrices.end(), second.begin(), second.end());
   matrices.insert(matrices.end(), second.begin(), second.end());  // One more than needed.
   file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(matrices, "MAT4");
-  const auto result = palette(loaded(file), 0, none, 0);
+  const auto result = gltf::pose(loaded(file), 0, none, 0);
   ASSERT_EQ(result.size(), 2u);
   // Joint 2 stands at y = 1: its translation is added to what the matrix does.
   EXPECT_EQ(result[1].m[0][0], 2.0f);
@@ -231,9 +231,9 @@ TEST(GltfSkin, MultipliesJointByInverseBindMatrix) {
 // glTF 2.0, 3.7.3.3: a skinned mesh goes where its joints are, not where its node is.
 TEST(GltfSkin, IgnoresTheSkinnedNodesTransform) {
   FileBuilder file = skinnedTriangle();
-  const auto still = palette(loaded(file), 0, none, 0);
+  const auto still = gltf::pose(loaded(file), 0, none, 0);
   file.json["nodes"][0]["translation"] = {100, 200, 300};
-  const auto moved = palette(loaded(file), 0, none, 0);
+  const auto moved = gltf::pose(loaded(file), 0, none, 0);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(std::memcmp(&still[i], &moved[i], sizeof still[i]), 0);
   }
@@ -248,7 +248,7 @@ TEST(GltfSkin, FollowsNodesThatAreNoJoints) {
                         {{"children", {2}}, {"translation", {0, 0, 5}}},
                         {{"children", {1}}, {"scale", {2, 2, 2}}}};
   file.json["scenes"][0]["nodes"] = {0};
-  const auto matrices = palette(loaded(file), 0, none, 0);
+  const auto matrices = gltf::pose(loaded(file), 0, none, 0);
   EXPECT_EQ(matrices[1].m[0][0], 2.0f);
   EXPECT_EQ(matrices[1].m[1][3], 2.0f);
   EXPECT_EQ(matrices[1].m[2][3], 10.0f);
@@ -300,12 +300,12 @@ TEST(GltfSkin, LeavesOutABrokenSkinThatNoNodeUses) {
   gltf::Model model = expectNoted(file, "skin 0: an entry of joints is 9");
   ASSERT_EQ(model.skins.size(), 2u);
   EXPECT_TRUE(model.skins[0].joints.empty());
-  EXPECT_TRUE(palette(model, 0, none, 0).empty());
+  EXPECT_TRUE(gltf::pose(model, 0, none, 0).empty());
   EXPECT_EQ(model.skinnedPrimitives.at(0).skin, 1u);
   file.json["skins"][0] = {{"joints", {1, 2}}, {"inverseBindMatrices", 0}};
   model = expectNoted(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float where MAT4");
   EXPECT_TRUE(model.skins[0].joints.empty());
-  EXPECT_EQ(palette(model, 1, none, 0).size(), 2u);
+  EXPECT_EQ(gltf::pose(model, 1, none, 0).size(), 2u);
 }
 
 TEST(GltfSkin, RefusesBadMatrices) {

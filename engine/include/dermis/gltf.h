@@ -247,16 +247,16 @@ using GlobalTransform = std::array<std::array<double, 4>, 3>;
 /// interpolation. A time that is not a number counts as one before the first key.
 std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time);
 
-/// The palette of one skin: joint global transform × inverse bind matrix for each joint, computed
+/// The pose of one skin: joint global transform × inverse bind matrix for each joint, computed
 /// in double precision and rounded once to float32. The skinned node's own transform has no effect
 /// (glTF 2.0, 3.7.3.3). `globals` is what `nodeGlobals` returned: work that several skins share.
 /// Empty where the skin does not exist or `globals` is too short.
-std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
-                                 std::span<const GlobalTransform> globals);
+std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
+                              std::span<const GlobalTransform> globals);
 
 /// Both in one, for a model with one skin.
-std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin, std::uint32_t clip,
-                                 double time);
+std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin, std::uint32_t clip,
+                              double time);
 
 /// The weight of every morph target of a node's mesh at a time in seconds: the clip's, sampled as
 /// in `nodeGlobals`, where it moves the weights of that node; otherwise the node's own, otherwise

@@ -12,7 +12,7 @@ namespace dermis {
 
 /// Kinds of problem. Those up to `jointOutOfRange` make `pack` refuse the mesh; the rest are dealt
 /// with and counted.
-enum class Problem : std::uint8_t {
+enum class MeshProblem : std::uint8_t {
   // The views make no sense: `repair` cannot help.
   emptyMesh,        ///< no vertices, or no positions
   noInfluenceSets,  ///< nothing to skin by
@@ -37,8 +37,8 @@ enum class Problem : std::uint8_t {
 };
 
 /// One kind of problem in one mesh.
-struct Finding {
-  Problem problem = Problem::emptyMesh;
+struct MeshFinding {
+  MeshProblem problem = MeshProblem::emptyMesh;
   std::uint64_t count = 0;  ///< Vertices that have it, or morph displacements; 1 for the views.
   std::uint32_t firstVertex = 0;  ///< The first of them.
   std::string message;  ///< A sentence with the first place: "mesh 'Fox', vertex 17: joint 31 is
@@ -46,23 +46,23 @@ struct Finding {
 };
 
 struct MeshReport {
-  std::vector<Finding> findings;  ///< At most one a kind, in the order of `Problem`.
+  std::vector<MeshFinding> findings;  ///< At most one a kind, in the order of `MeshProblem`.
 
   /// Whether `pack` takes the mesh.
   bool packable() const;
   /// Whether the views make sense, so that `repair` can mend what is wrong.
   bool repairable() const;
-  const Finding* find(Problem problem) const;
+  const MeshFinding* find(MeshProblem problem) const;
   /// What `pack` says: fails with `invalidMesh` unless `packable()`. The sentence is that of the
   /// first finding that is refused, and names `repair` if that can mend the mesh.
   Result<void> accepted() const;
 };
 
 /// True for the kinds that make `pack` refuse the mesh.
-bool refusedByPack(Problem problem);
+bool refusedByPack(MeshProblem problem);
 
 /// A short name for a kind, as in reports: "joint out of range".
-const char* problemName(Problem problem);
+const char* meshProblemName(MeshProblem problem);
 
 /// Looks at every vertex: O(vertices × influences + displacements). `jointCount` is the number of
 /// joints of the poses that the mesh will be skinned with, at most `maxPoseJoints`. Sums of

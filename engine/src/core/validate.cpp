@@ -14,21 +14,21 @@
 namespace dermis {
 namespace {
 
-constexpr std::size_t problemCount = static_cast<std::size_t>(Problem::vertexWithoutWeight) + 1;
+constexpr std::size_t problemCount = static_cast<std::size_t>(MeshProblem::vertexWithoutWeight) + 1;
 
 /// Collects at most one finding a kind; the sentence is made for its first place only.
 class Findings {
  public:
   explicit Findings(std::string_view meshName) : prefix_("mesh " + inQuotes(meshName)) {}
 
-  void addView(Problem problem, const std::string& text) {
-    Finding& finding = findings_[static_cast<std::size_t>(problem)];
+  void addView(MeshProblem problem, const std::string& text) {
+    MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
     if (finding.count++ == 0) finding.message = prefix_ + ": " + text;
   }
 
   template <typename MakeText>
-  void addVertex(Problem problem, std::uint32_t vertex, MakeText&& makeText) {
-    const Finding& finding = findings_[static_cast<std::size_t>(problem)];
+  void addVertex(MeshProblem problem, std::uint32_t vertex, MakeText&& makeText) {
+    const MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
     // Several influences of one vertex may have the same problem: it counts once.
     if (finding.count != 0 && lastVertex_[static_cast<std::size_t>(problem)] == vertex) return;
     lastVertex_[static_cast<std::size_t>(problem)] = vertex;
@@ -36,8 +36,8 @@ class Findings {
   }
 
   template <typename MakeText>
-  void addEach(Problem problem, std::uint32_t vertex, MakeText&& makeText) {
-    Finding& finding = findings_[static_cast<std::size_t>(problem)];
+  void addEach(MeshProblem problem, std::uint32_t vertex, MakeText&& makeText) {
+    MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
     if (finding.count++ == 0) {
       finding.firstVertex = vertex;
       finding.message = prefix_ + ", vertex " + std::to_string(vertex) + ": " + makeText();
@@ -48,7 +48,7 @@ class Findings {
     MeshReport report;
     for (std::size_t kind = 0; kind < problemCount; ++kind) {
       if (findings_[kind].count == 0) continue;
-      findings_[kind].problem = static_cast<Problem>(kind);
+      findings_[kind].problem = static_cast<MeshProblem>(kind);
       report.findings.push_back(std::move(findings_[kind]));
     }
     return report;
@@ -56,7 +56,7 @@ class Findings {
 
  private:
   std::string prefix_;
-  std::array<Finding, problemCount> findings_{};
+  std::array<MeshFinding, problemCount> findings_{};
   std::array<std::uint32_t, problemCount> lastVertex_{};
 };
 
@@ -103,21 +103,21 @@ bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32
   const std::string name = rule.name;
   if (!rule.allows(view.type) || view.components < rule.fewest || view.components > rule.most) {
     findings.addView(
-        Problem::wrongFormat,
+        MeshProblem::wrongFormat,
         name + " have a component type or number of components that they may not have");
     return false;
   }
   if (view.count != count) {
-    findings.addView(Problem::countMismatch, "there are " + std::to_string(view.count) + " " +
-                                                 name + " for " + std::to_string(count) + " " +
-                                                 elements);
+    findings.addView(MeshProblem::countMismatch, "there are " + std::to_string(view.count) + " " +
+                                                     name + " for " + std::to_string(count) + " " +
+                                                     elements);
     return false;
   }
   const std::uint64_t size = std::uint64_t{view.components} * componentSize(view.type);
   if (view.stride < size) {
-    findings.addView(Problem::strideTooSmall, "the stride of the " + name + " is " +
-                                                  std::to_string(view.stride) +
-                                                  " bytes, an element has " + std::to_string(size));
+    findings.addView(MeshProblem::strideTooSmall,
+                     "the stride of the " + name + " is " + std::to_string(view.stride) +
+                         " bytes, an element has " + std::to_string(size));
     return false;
   }
   return true;
@@ -129,7 +129,7 @@ bool checkMorphTarget(const MorphTargetView& target, std::size_t index, std::uin
   for (std::size_t i = 0; i < target.vertices.size(); ++i) {
     if (target.vertices[i] >= vertexCount ||
         (i > 0 && target.vertices[i] <= target.vertices[i - 1])) {
-      findings.addView(Problem::morphVertices,
+      findings.addView(MeshProblem::morphVertices,
                        name + " displaces vertex " + std::to_string(target.vertices[i]) +
                            ", which lies outside the mesh or does not come after the one before");
       return false;
@@ -152,13 +152,13 @@ bool checkMorphTarget(const MorphTargetView& target, std::size_t index, std::uin
 
 bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
   if (mesh.influenceSets.empty()) {
-    findings.addView(Problem::noInfluenceSets, "it has no joints and weights");
+    findings.addView(MeshProblem::noInfluenceSets, "it has no joints and weights");
     return false;
   }
   bool good = true;
   for (const InfluenceSet& set : mesh.influenceSets) {
     if (!set.joints || !set.weights) {
-      findings.addView(Problem::noInfluenceSets,
+      findings.addView(MeshProblem::noInfluenceSets,
                        "an influence set lacks its joints or its weights");
       return false;
     }
@@ -167,7 +167,7 @@ bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
     good &= checkView(set.weights, {"weights", 1, anyNumber, isWeightType}, mesh.vertexCount,
                       "vertices", findings);
     if (set.joints.components != set.weights.components) {
-      findings.addView(Problem::wrongFormat,
+      findings.addView(MeshProblem::wrongFormat,
                        "an influence set has " + std::to_string(set.joints.components) +
                            " joints but " + std::to_string(set.weights.components) +
                            " weights a vertex");
@@ -179,11 +179,11 @@ bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
 
 bool checkViews(const MeshView& mesh, Findings& findings) {
   if (mesh.vertexCount == 0) {
-    findings.addView(Problem::emptyMesh, "it has no vertices");
+    findings.addView(MeshProblem::emptyMesh, "it has no vertices");
     return false;
   }
   if (!mesh.positions) {
-    findings.addView(Problem::emptyMesh, "it has no positions");
+    findings.addView(MeshProblem::emptyMesh, "it has no positions");
     return false;
   }
   const auto check = [&](const AttributeView& view, const AttributeRule& rule) {
@@ -215,7 +215,7 @@ bool isFinitePosition(const MeshView& mesh, std::uint32_t vertex) {
   return true;
 }
 
-void checkDirection(const AttributeView& view, std::uint32_t components, Problem problem,
+void checkDirection(const AttributeView& view, std::uint32_t components, MeshProblem problem,
                     const char* name, std::uint32_t vertex, Findings& findings) {
   if (!view || isFiniteElement(view, vertex, components)) return;
   findings.addVertex(problem, vertex,
@@ -229,14 +229,14 @@ bool isShare(float share) {
 /// `whole` is the mesh's own, which counts where the vertices have none.
 void checkShares(const AttributeView& view, float whole, const char* name, Findings& findings) {
   if (!view && !isShare(whole)) {
-    findings.addView(Problem::shareOutOfRange, std::string("its ") + name + " is " +
-                                                   inWords(static_cast<double>(whole)) +
-                                                   ", not from 0 to 1");
+    findings.addView(MeshProblem::shareOutOfRange, std::string("its ") + name + " is " +
+                                                       inWords(static_cast<double>(whole)) +
+                                                       ", not from 0 to 1");
   }
   for (std::uint32_t vertex = 0; view && vertex < view.count; ++vertex) {
     const float share = loadFloat(view, vertex, 0);
     if (isShare(share)) continue;
-    findings.addVertex(Problem::shareOutOfRange, vertex, [&] {
+    findings.addVertex(MeshProblem::shareOutOfRange, vertex, [&] {
       return std::string("the ") + name + " is " + inWords(static_cast<double>(share)) +
              ", not from 0 to 1";
     });
@@ -261,10 +261,11 @@ void checkDisplacements(const MorphTargetView& target, std::size_t index, std::u
       target.vertices.empty() ? vertexCount : static_cast<std::uint32_t>(target.vertices.size());
   for (std::uint32_t element = 0; element < count; ++element) {
     if (isFiniteDisplacement(target, element)) continue;
-    findings.addEach(
-        Problem::nonFiniteMorph, target.vertices.empty() ? element : target.vertices[element], [&] {
-          return "its displacement by morph target " + std::to_string(index) + " is not finite";
-        });
+    findings.addEach(MeshProblem::nonFiniteMorph,
+                     target.vertices.empty() ? element : target.vertices[element], [&] {
+                       return "its displacement by morph target " + std::to_string(index) +
+                              " is not finite";
+                     });
   }
 }
 
@@ -290,21 +291,21 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
       if (weight == 0) continue;
       const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
       if (!std::isfinite(weight)) {
-        findings.addVertex(Problem::nonFiniteWeight, vertex, [&] {
+        findings.addVertex(MeshProblem::nonFiniteWeight, vertex, [&] {
           return "the weight of joint " + std::to_string(joint) + " is not finite";
         });
         good = false;
         continue;
       }
       if (weight < 0) {
-        findings.addVertex(Problem::negativeWeight, vertex, [&] {
+        findings.addVertex(MeshProblem::negativeWeight, vertex, [&] {
           return "the weight of joint " + std::to_string(joint) + " is negative";
         });
         good = false;
         continue;
       }
       if (joint >= jointCount) {
-        findings.addVertex(Problem::jointOutOfRange, vertex, [&] {
+        findings.addVertex(MeshProblem::jointOutOfRange, vertex, [&] {
           return "joint " + std::to_string(joint) + " is outside the palette of " +
                  std::to_string(jointCount);
         });
@@ -317,65 +318,65 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
     }
   }
   if (usedWeights == 0) {
-    findings.addVertex(Problem::vertexWithoutWeight, vertex,
+    findings.addVertex(MeshProblem::vertexWithoutWeight, vertex,
                        [] { return std::string("no joint has weight; it stays in bind pose"); });
     return;
   }
   if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
-    findings.addVertex(Problem::weightsNotNormalized, vertex,
+    findings.addVertex(MeshProblem::weightsNotNormalized, vertex,
                        [&] { return "the weights sum to " + inWords(sum) + ", not to 1"; });
   }
   std::sort(used.begin(), used.end());
   const auto twice = std::adjacent_find(used.begin(), used.end());
   if (twice != used.end()) {
-    findings.addVertex(Problem::duplicateJoint, vertex,
+    findings.addVertex(MeshProblem::duplicateJoint, vertex,
                        [&] { return "joint " + std::to_string(*twice) + " has weight twice"; });
   }
 }
 
 }  // namespace
 
-bool refusedByPack(Problem problem) {
-  return problem <= Problem::jointOutOfRange;
+bool refusedByPack(MeshProblem problem) {
+  return problem <= MeshProblem::jointOutOfRange;
 }
 
-const char* problemName(Problem problem) {
+const char* meshProblemName(MeshProblem problem) {
   switch (problem) {
-    case Problem::emptyMesh:
+    case MeshProblem::emptyMesh:
       return "empty mesh";
-    case Problem::noInfluenceSets:
+    case MeshProblem::noInfluenceSets:
       return "no joints and weights";
-    case Problem::countMismatch:
+    case MeshProblem::countMismatch:
       return "counts disagree";
-    case Problem::strideTooSmall:
+    case MeshProblem::strideTooSmall:
       return "stride too small";
-    case Problem::wrongFormat:
+    case MeshProblem::wrongFormat:
       return "wrong format";
-    case Problem::morphVertices:
+    case MeshProblem::morphVertices:
       return "morph target's vertices";
-    case Problem::nonFinitePosition:
+    case MeshProblem::nonFinitePosition:
       return "position not finite";
-    case Problem::nonFiniteNormal:
+    case MeshProblem::nonFiniteNormal:
       return "normal not finite";
-    case Problem::nonFiniteTangent:
+    case MeshProblem::nonFiniteTangent:
       return "tangent not finite";
-    case Problem::nonFiniteMorph:
+    case MeshProblem::nonFiniteMorph:
       return "displacement not finite";
-    case Problem::nonFiniteCenter:
+    case MeshProblem::nonFiniteCenter:
       return "centre of rotation not finite";
-    case Problem::shareOutOfRange:
+    case MeshProblem::shareOutOfRange:
       return "dual-quaternion weight or bulge strength out of range";
-    case Problem::nonFiniteWeight:
+    case MeshProblem::nonFiniteWeight:
       return "weight not finite";
-    case Problem::negativeWeight:
+    case MeshProblem::negativeWeight:
       return "negative weight";
-    case Problem::jointOutOfRange:
+    case MeshProblem::jointOutOfRange:
       return "joint out of range";
-    case Problem::weightsNotNormalized:
+    case MeshProblem::weightsNotNormalized:
       return "weights do not sum to 1";
-    case Problem::duplicateJoint:
+    case MeshProblem::duplicateJoint:
       return "joint twice in a vertex";
-    case Problem::vertexWithoutWeight:
+    case MeshProblem::vertexWithoutWeight:
       return "vertex without weight";
   }
   return "unknown";
@@ -383,25 +384,25 @@ const char* problemName(Problem problem) {
 
 bool MeshReport::packable() const {
   return std::none_of(findings.begin(), findings.end(),
-                      [](const Finding& finding) { return refusedByPack(finding.problem); });
+                      [](const MeshFinding& finding) { return refusedByPack(finding.problem); });
 }
 
 Result<void> MeshReport::accepted() const {
   const auto refused = std::ranges::find_if(
-      findings, [](const Finding& finding) { return refusedByPack(finding.problem); });
+      findings, [](const MeshFinding& finding) { return refusedByPack(finding.problem); });
   if (refused == findings.end()) return {};
   return Error{ErrorCode::invalidMesh,
                refused->message + (repairable() ? "; repair() can mend it" : "")};
 }
 
 bool MeshReport::repairable() const {
-  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.problem <= Problem::morphVertices;
+  return std::none_of(findings.begin(), findings.end(), [](const MeshFinding& finding) {
+    return finding.problem <= MeshProblem::morphVertices;
   });
 }
 
-const Finding* MeshReport::find(Problem problem) const {
-  for (const Finding& finding : findings) {
+const MeshFinding* MeshReport::find(MeshProblem problem) const {
+  for (const MeshFinding& finding : findings) {
     if (finding.problem == problem) return &finding;
   }
   return nullptr;
@@ -415,12 +416,12 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
   std::vector<std::uint32_t> used;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     if (!isFinitePosition(mesh, vertex)) {
-      findings.addVertex(Problem::nonFinitePosition, vertex,
+      findings.addVertex(MeshProblem::nonFinitePosition, vertex,
                          [] { return std::string("the position is not finite"); });
     }
-    checkDirection(mesh.normals, 3, Problem::nonFiniteNormal, "normal", vertex, findings);
-    checkDirection(mesh.tangents, 4, Problem::nonFiniteTangent, "tangent", vertex, findings);
-    checkDirection(mesh.centersOfRotation, 3, Problem::nonFiniteCenter, "centre of rotation",
+    checkDirection(mesh.normals, 3, MeshProblem::nonFiniteNormal, "normal", vertex, findings);
+    checkDirection(mesh.tangents, 4, MeshProblem::nonFiniteTangent, "tangent", vertex, findings);
+    checkDirection(mesh.centersOfRotation, 3, MeshProblem::nonFiniteCenter, "centre of rotation",
                    vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
   }

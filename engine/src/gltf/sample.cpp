@@ -88,8 +88,8 @@ std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
   return globals;
 }
 
-std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
-                                 std::span<const GlobalTransform> globals) {
+std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
+                              std::span<const GlobalTransform> globals) {
   if (skin >= model.skins.size() || globals.size() < model.nodes.size()) return {};
   const Skin& from = model.skins[skin];
   std::vector<JointMatrix> matrices(from.joints.size());
@@ -105,9 +105,9 @@ std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin,
   return matrices;
 }
 
-std::vector<JointMatrix> palette(const Model& model, std::uint32_t skin, std::uint32_t clip,
-                                 double time) {
-  return palette(model, skin, nodeGlobals(model, clip, time));
+std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin, std::uint32_t clip,
+                              double time) {
+  return pose(model, skin, nodeGlobals(model, clip, time));
 }
 
 }  // namespace dermis::gltf

@@ -72,10 +72,10 @@ struct SkinnedMesh {
   std::vector<Conditioning> conditioning;
 };
 
-/// Skins a mesh by a palette of joint matrices (joint global transform × inverse bind matrix),
+/// Skins a mesh by a pose (joint matrices: joint global transform × inverse bind matrix),
 /// after adding the active morph targets to the bind pose. Influences are normalised over all sets
 /// together; a vertex without weight stays in bind pose (morphed). Positions, normals and tangents
-/// are in the palette's space. docs/methods.md has the formula of each method and its source: Kavan
+/// are in the pose's space. docs/methods.md has the formula of each method and its source: Kavan
 /// et al. 2007, section 4, for dual quaternions, 2008 for iterative blending; Alexa 2002 and
 /// Cordier and Magnenat-Thalmann 2005 for logarithms; Kavan and Žára 2005 for spherical blending;
 /// Hejl 2004; Le and Hodgins 2016 for centres of rotation. Two-phase scale and shear by polar
@@ -84,7 +84,7 @@ struct SkinnedMesh {
 /// determinant. Fails with `invalidMesh` where the mesh, with that many joints, would be refused by
 /// `pack`, and with `invalidArgument` for a morph target that the mesh does not have, and for a
 /// method that needs centres of rotation which it lacks.
-Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
+Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
                          std::span<const MorphWeight> morphs = {});
 
 }  // namespace dermis::reference
