@@ -165,7 +165,7 @@ DERMIS_CONSTANT PALETTE_LOGARITHMS = 2u;  // joints are logarithms instead of du
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 
-// The unit at the beginning of a palette, as PaletteStatus has it.
+// The unit at the beginning of a palette, as PoseStatus has it.
 struct StatusRecord {
   uint twoPhase;
   uint nonRigidJoints;

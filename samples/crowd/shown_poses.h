@@ -7,7 +7,7 @@
 
 #include "character.h"
 #include "crowd.h"
-#include "dermis/instance.h"
+#include "dermis/scene.h"
 
 namespace crowd {
 

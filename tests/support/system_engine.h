@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "buffer.h"
-#include "dermis/instance.h"
+#include "dermis/scene.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "device.h"

@@ -72,6 +72,11 @@ TEST(Layout, RefusesWhatCannotStandSo) {
   bad.motion = static_cast<Motion>(3);
   expectRefused(bad, 0, "motion");
   EXPECT_FALSE(everyVariant(PipelineNeeds{.layout = bad}, {}, {}).ok());
+  bad = {};
+  bad.positions = VertexFormat::none;  // nothing at all
+  expectRefused(bad, 0, "positions cannot be in the format");
+  bad.positions = VertexFormat::snorm8x4;
+  expectRefused(bad, 0, "snorm8x4");
 }
 
 // Wherever `placeVertices` lets them begin, jobs need no other pipelines.

@@ -4,7 +4,6 @@
 #include "dermis/bounds.h"
 #include "dermis/centers_of_rotation.h"
 #include "dermis/handle.h"
-#include "dermis/instance.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"

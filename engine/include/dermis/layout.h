@@ -17,7 +17,8 @@ namespace dermis {
 /// must begin at a multiple of 8.
 ///
 /// Offset, stride and the format's size must be multiples of 4; with `DeviceLimits::storage16Bit`,
-/// of 2; with `storage8Bit` too, they may be any number.
+/// of 2; with `storage8Bit` too, they may be any number. On a device with fewer storage buffers
+/// than `storageBuffersWanted` they must always be multiples of 4.
 struct OutputAttribute {
   std::uint64_t offset = 0;                  ///< bytes
   std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`
@@ -65,14 +66,14 @@ struct VertexPlaces {
   OutputAttribute positions, normals, tangents, previousPositions;
   Motion motion = Motion::none;
   std::uint64_t size = 0;  ///< bytes
-  /// Of the offset, in bytes; need not be a power of two. Interleaved: the stride, so that an
-  /// instance may be drawn by `firstVertex`.
+  /// Bytes: `offset` must be a multiple of this, which need not be a power of two. Interleaved: the
+  /// stride, so that an instance may be drawn by `firstVertex`.
   std::uint64_t alignment = 1;
 };
 
-/// Places vertices from byte `offset` of a buffer on. Fails with `invalidArgument` if the stride is
-/// too small or the layout is planar and has one, and if the offset is not a multiple of
-/// `alignment`.
+/// Places vertices from byte `offset` of a buffer on. Fails with `invalidArgument` if positions are
+/// not `isPositionFormat`, if the stride is too small or the layout is planar and has one, and if
+/// the offset is not a multiple of `VertexPlaces::alignment`.
 Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t vertexCount,
                                    std::uint64_t offset = 0);
 

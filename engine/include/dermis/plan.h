@@ -1,6 +1,6 @@
 // Turns a batch of instances into commands, on the CPU, without Vulkan. An engine passes the plan
-// to `vulkan::Context::record`, or issues the commands with its own RHI. This header and
-// vulkan/kernels.h have all that it needs for that.
+// to `vulkan::Context::record`, or issues the commands with its own RHI. For that it also needs
+// vulkan/kernels.h (of dermis::vulkan) and shaders/abi.h.
 #pragma once
 
 #include <array>
@@ -36,9 +36,10 @@ struct Promises {
 };
 
 /// The device limits and the promises that a plan is made for. `vulkan::Context::limits` returns
-/// them. The defaults are the minimum that Vulkan guarantees.
+/// them; an engine without a Context fills in the values of its device. The defaults are the
+/// minimum that Vulkan guarantees.
 struct DeviceLimits {
-  std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes
+  std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes, a multiple of 4
   /// Bytes, a power of two. With `texelBuffers`, the larger of this and the alignment of uniform
   /// texel buffers.
   std::uint32_t minStorageBufferOffsetAlignment = 256;
@@ -50,8 +51,8 @@ struct DeviceLimits {
   std::uint32_t maxStorageBuffersPerStage = 4;
   /// Whether kernels may store 2 bytes and 1 byte (VkPhysicalDevice16BitStorageFeatures::
   /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess). If
-  /// not, attributes must stand at multiples of 4 bytes. Both are false if Dermis was built without
-  /// `DERMIS_SUBWORD_STORES`.
+  /// not, attributes must stand at multiples of 4 bytes. Must be false if Dermis was built without
+  /// `DERMIS_SUBWORD_STORES`; `vulkan::Context::limits` sees to that.
   bool storage16Bit = false;
   bool storage8Bit = false;
   /// Whether kernels read tables, meshes and palettes through uniform texel buffers, which is
@@ -82,10 +83,10 @@ struct Tuning {
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.
 struct PoseDescription {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPoseJoints`
-  std::uint64_t matrixOffset = 0;  ///< bytes into the matrices buffer, a multiple of 16
+  std::uint64_t matrixOffset = 0;  ///< bytes into the poses buffer, a multiple of 16
   /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
-  /// of scratch memory per joint and, on lavapipe, more time even if no joint scales. If false,
-  /// scale and shear are ignored (rotation only) and counted in `PoseStatus`.
+  /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
+  /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`.
   bool mayScale = true;
   /// The engine's own shaders read the palette, by dermis_skin.glsl: it is converted to dual
   /// quaternions even if no job reads it. It stands at `Plan::paletteOffset`.
@@ -119,11 +120,11 @@ struct Job {
   /// reskinned: index into `Batch::poses`; with at least the joints that the mesh requires.
   std::uint32_t previousPose = 0;
   std::span<const MorphWeight> previousMorphs;  ///< reskinned: the previous weights
-  /// Previous positions become the current ones. For the first frame of an instance, and for a
-  /// teleport.
+  /// Previous positions are set to the new positions. For the first frame of an instance, and for a
+  /// teleport. Needs `motion`.
   bool restartsMotion = false;
-  /// The instance is not skinned; its previous positions become the positions in the output. For
-  /// the first frame in which an instance no longer moves.
+  /// The instance is not skinned; its previous positions are set to the positions in the output.
+  /// For the first frame in which an instance no longer moves. Needs `motion`.
   bool settles = false;
 
   /// Write the box of the skinned positions to the results buffer: `Plan::resultOffset`.
@@ -175,7 +176,7 @@ struct Batch {
 };
 
 enum class Kernel : std::uint8_t {
-  palette,     ///< converts poses to palettes
+  palette,     ///< converts poses to palettes, and clears results
   skin,        ///< skins instances
   visibility,  ///< of a scene: chooses instances that are culled on the GPU
 };
@@ -235,7 +236,8 @@ struct PipelineNeeds {
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
 };
 
-/// The same for jobs that stand as `placeVertices` says. Fails as it does.
+/// All variants for instances with these needs; with `culledOnGpu`, the visibility kernel too.
+/// Fails as `placeVertices`.
 Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
                                           const Tuning& tuning);
 
@@ -244,7 +246,7 @@ enum class BufferRole : std::uint8_t {
   meshes,
   poses,     ///< joint matrices
   tables,    ///< what `writeTables` writes
-  palettes,  ///< what the palette kernel makes of poses for the skin kernel
+  palettes,  ///< what the palette kernel makes of poses
   results,
   positions,
   normals,
@@ -253,7 +255,7 @@ enum class BufferRole : std::uint8_t {
   // Only of a scene (scene.h), whose attributes share one buffer.
   upload,      ///< what `writeTables` writes; copied to `tables`
   readBack,    ///< what `Scene::readBack` reads; copied from counters and results
-  visibility,  ///< a word for each instance; written by the engine's culling on the GPU
+  visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
   history,     ///< what the visibility kernel remembers
   counters,    ///< what the visibility kernel counts
 };
@@ -267,7 +269,8 @@ struct BufferRequirement {
   bool hostWritten = false;     ///< written by the CPU: mapped, or copied to before `record`
 };
 
-/// The part of an output buffer that a dispatch writes.
+/// The part of an output buffer that a dispatch writes: bind min(buffer size - `offset`,
+/// `maxStorageBufferRange`) bytes from `offset` on.
 struct OutputWindow {
   std::uint32_t index = 0;  ///< among the windows of that buffer
   /// Bytes. 0 unless the buffer is larger than `maxStorageBufferRange`.
@@ -346,7 +349,8 @@ struct PoseStatus {
 struct PlanData;
 
 /// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. Not
-/// thread-safe while `makePlan` or `Scene::plan` fills it, immutable afterwards.
+/// thread-safe while `makePlan` or `Scene::plan` fills it, immutable afterwards. A plan that was
+/// moved from may only be filled, assigned to or destroyed.
 class Plan {
  public:
   Plan();
@@ -354,16 +358,18 @@ class Plan {
   Plan(Plan&&) noexcept;
   Plan& operator=(Plan&&) noexcept;
 
-  /// In the order in which they must be issued. For a batch: the palette kernel, a barrier, the
-  /// skin kernels. Barriers against what the engine does before and after are not among them.
+  /// In the order in which they must be issued. For a batch: the palette kernel if there is
+  /// anything to convert or clear, then the skin kernels, with a barrier before the first that
+  /// needs it. Barriers against what the engine does before and after are not among them.
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
-  /// Requirements of a buffer. Sizes of meshes, matrices and outputs are those that the batch
-  /// states; tables, palettes and results are as large as this plan needs.
+  /// Requirements of a buffer. Sizes of meshes, poses and outputs are those that the batch states;
+  /// tables, palettes and results are as large as this plan needs. For a scene: as `Scene::buffer`,
+  /// and tables and upload as large as this plan needs.
   BufferRequirement buffer(BufferRole role) const;
-  /// Byte offset of a pose's `PoseStatus` in the palettes buffer; `noStatus` if only linear
-  /// jobs use that pose.
+  /// Byte offset of a pose's `PoseStatus` in the palettes buffer; `noStatus` if the pose is not
+  /// converted, and for a scene's plan.
   std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
   /// Byte offset in the palettes buffer of a pose's palette of dual quaternions; `noPalette` if it
@@ -379,8 +385,10 @@ class Plan {
   const DeviceLimits& limits() const;
 
   std::uint32_t dispatchCount() const;
-  std::uint32_t instanceCount() const;
-  std::uint64_t vertexCount() const;  ///< skinned vertices, over all instances
+  std::uint32_t instanceCount() const;  ///< jobs of a batch; instance records of a scene's frame
+  /// Vertices of all jobs; of a scene's frame those that are skinned, without instances that are
+  /// culled on the GPU.
+  std::uint64_t vertexCount() const;
 
  private:
   friend struct PlanData;  // its contents
@@ -392,10 +400,12 @@ class Plan {
 ///
 /// Fails with `invalidArgument` if a job or pose breaks a rule above (the message names it by
 /// its index), for example: a pose with fewer joints than the mesh requires, normals for a mesh
-/// without normals, a range outside its buffer, a broken promise. Fails with `missingFeature` if an
-/// attribute is not at multiples of 4 bytes and the device cannot store less, and with
-/// `limitExceeded` if an attribute or a buffer is larger than the device's storage buffer range.
-/// The plan is then empty.
+/// without normals, a range outside its buffer, a broken promise; and if limits or tuning make no
+/// sense. Fails with `missingFeature` if an attribute is not at multiples of 4 bytes and the device
+/// cannot store less, or if this build lacks the method's kernels; and with `limitExceeded` if
+/// meshes, poses, palettes or tables are larger than the device's storage buffer range, a dispatch
+/// has too many workgroups, or the device has too few storage buffers for the job. The plan is then
+/// empty.
 Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                       Plan& out);
 

@@ -1,10 +1,10 @@
 // The books of a scene: which meshes, poses and instances there are, where each stands in its
 // buffer, and what a frame has to do. No Vulkan: `plan` makes a list of commands (plan.h).
-// `vulkan::SkinningSystem` keeps a Scene and executes its commands in buffers of its own; an engine
-// that uses it does not need this header. An engine with its own RHI uses Scene directly:
+// `vulkan::SkinningSystem` keeps a Scene and executes its commands in buffers of its own; its calls
+// are documented here. An engine with its own RHI uses Scene directly:
 //
 //   scene.beginFrame(frame, completedFrame);
-//   scene.readBack(completedFrame, bytes);          // of that frame's read-back buffer
+//   for each frame f that has become complete: scene.readBack(f, bytes of its read-back buffer);
 //   write joint matrices at scene.writePose(pose)->offset of the poses buffer
 //   ... add, remove, setVisible, setMorphWeights ...
 //   scene.plan(plan);
@@ -24,7 +24,8 @@
 #include <span>
 
 #include "dermis/handle.h"
-#include "dermis/instance.h"
+#include "dermis/layout.h"
+#include "dermis/method.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
@@ -44,8 +45,50 @@ struct SceneDescription {
   std::uint32_t instanceBudget = 65536;  ///< instances at one time
   /// Instances at one time with bounds or snorm16 positions.
   std::uint32_t boundsBudget = 16384;
+  /// Those of the device. With fewer storage buffers than `storageBuffersWanted`, as in the
+  /// defaults, `boundsBudget` is taken for 0.
   DeviceLimits limits;
   Tuning tuning;
+};
+
+/// One instance of a scene.
+struct InstanceDescription {
+  MeshHandle mesh = {};
+  PoseHandle pose = {};  ///< Instances may share one: body, clothes, hair.
+  Method method = Method::dualQuaternion;
+  /// Formats and arrangement of the skinned vertices. With `Motion::kept`, previous positions are
+  /// right on first frames, when poses rest or are skipped, and when an instance comes back into
+  /// view; `teleport` for jumps. `Motion::reskinned` is not possible.
+  VertexLayout layout = {};
+  Box box = {};  ///< of positions in snorm16, as `Job::box`
+  /// The exact box of the skinned positions is wanted: `Scene::bounds`.
+  bool bounds = false;
+  /// The instance is skinned in one of this number of frames, 1 or more. Instances of one pose and
+  /// interval are skinned in the same frames; poses are spread over the frames. `teleport`,
+  /// `setMesh` and coming back into view do not wait.
+  std::uint32_t updateInterval = 1;
+  /// The GPU decides whether the instance is skinned: its word in the visibility buffer is not 0.
+  /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range
+  /// always does.
+  bool culledOnGpu = false;
+};
+
+/// What `prepare` must be given before such an instance is recorded.
+inline PipelineNeeds pipelineNeeds(const InstanceDescription& description) {
+  return {description.method, description.layout, description.bounds, description.culledOnGpu};
+}
+
+/// Where the vertices of an instance stand in the output buffer.
+struct InstanceOutput {
+  /// The mesh that the instance was last skinned with. After `setMesh` it is the old one until the
+  /// instance is skinned again; of an instance that is culled on the GPU, until the next `commit`.
+  MeshHandle mesh;
+  /// Bytes. Interleaved: a multiple of the stride, so that a draw may use `firstVertex` instead of
+  /// the offset of a vertex buffer.
+  std::uint64_t offset = 0;
+  std::uint64_t size = 0;  ///< bytes; 0: the instance has not been skinned yet
+  /// Their offsets count from the beginning of the buffer.
+  OutputAttribute positions, normals, tangents, previousPositions;
 };
 
 /// Bytes of one buffer of a scene.
@@ -106,7 +149,8 @@ class Scene {
   /// Size and usage of a buffer, for as long as the scene lives. `tables` and `upload` have the
   /// size that `Plan::buffer` returns, which differs from frame to frame; `upload` and `readBack`
   /// exist once for each frame in flight. `history`, `counters` and `visibility` are needed only if
-  /// instances are culled on the GPU.
+  /// instances are culled on the GPU. An engine that replaces `tables` by a larger buffer keeps the
+  /// old one until frames in flight are complete.
   BufferRequirement buffer(BufferRole role) const;
   const SceneDescription& description() const;
 
@@ -115,7 +159,8 @@ class Scene {
   // `invalidArgument`.
 
   /// Finds room for a packed mesh. The engine copies its bytes to `meshOffset` of the mesh buffer
-  /// before the commands of the next plan. Fails with `limitExceeded` if the budget has no room,
+  /// before the commands of the next plan, on the same queue; their first barrier covers the copy.
+  /// Fails with `limitExceeded` if the budget has no room,
   /// and with `invalidArgument` if a promise is broken.
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes
@@ -143,24 +188,27 @@ class Scene {
   /// frames are in flight than described, or if numbers run backwards.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
 
-  /// Where to write the joint matrices of this frame; all instances of the pose are skinned
-  /// again. Only between `beginFrame` and `plan`. The GPU no longer reads that memory.
+  /// Where to write all joint matrices of this frame: the memory holds an older pose, which the GPU
+  /// no longer reads. All instances of the pose are skinned again. Fails with `invalidArgument` if
+  /// it is not called between `beginFrame` and `plan`.
   Result<PosePlace> writePose(PoseHandle pose);
 
   /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
   /// positions are its current ones. Instances begin visible.
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
-  /// As `InstanceDescription::updateInterval`.
+  /// As `InstanceDescription::updateInterval`. Fails with `invalidArgument` for 0.
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
   /// The next `plan` skins the instance, whatever its interval; previous positions are the current
   /// ones then.
   Result<void> teleport(InstanceHandle instance);
-  /// The active targets, as `Job::morphs`. They are copied.
+  /// The active targets, as `Job::morphs`. They are copied. Fails with `invalidArgument` for a
+  /// target that the mesh does not have, one that is given twice, and a weight that is not finite.
   Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
   /// Gives an instance another mesh (a level of detail): its output moves, its motion restarts. Its
   /// morph weights stay if both meshes have the same number of targets, otherwise they are removed.
   /// The old output stays until frames in flight are complete, so there must be room for both:
-  /// otherwise it fails with `limitExceeded`, and the instance keeps its mesh.
+  /// otherwise it fails with `limitExceeded`, and the instance keeps its mesh. Fails as
+  /// `addInstance` if the mesh does not fit the instance.
   Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
 
   /// Moves outputs from the end of the output buffer into free ranges before them, at most
@@ -171,23 +219,27 @@ class Scene {
   // -- Frames.
 
   /// Lists the commands for everything that changed since the last `commit`; none if nothing
-  /// changed. After `beginFrame`, any number of times. Fails with `invalidArgument` without
-  /// `beginFrame`, and with `limitExceeded` if the tables are larger than a storage buffer range.
+  /// changed. Instances that are culled on the GPU are listed in every frame. After `beginFrame`,
+  /// any number of times. Fails with `invalidArgument` without `beginFrame`, and with
+  /// `limitExceeded` if the tables are larger than a storage buffer range.
   Result<void> plan(Plan& out);
   /// The commands of the last `plan` have been recorded, and will be executed in the order of
   /// frames. Without it, the next `plan` lists the same work again. Fails with `invalidArgument` if
-  /// the scene was changed since `plan`.
+  /// there is no plan, or the scene was changed since.
   Result<void> commit();
 
   /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
   /// frame in rising order, before its buffer is used again. Fails with `invalidArgument` if
-  /// `bytes` is smaller than `buffer(BufferRole::readBack).size`. Frames that had nothing to read
-  /// back may be given an empty span.
+  /// the frame is not one of the last `framesInFlight` that were committed, and if `bytes` is
+  /// smaller than `buffer(BufferRole::readBack).size`. Frames that had nothing to read back may be
+  /// given an empty span.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   // -- Results, as of the last `commit`.
 
-  /// Before the first `commit` that shows the instance, its size is 0.
+  /// Before the first `commit` that skins the instance, its size is 0. The output of an instance
+  /// that is culled on the GPU stands there from the first `commit` on, even if the GPU has not
+  /// skinned it.
   Result<InstanceOutput> output(InstanceHandle instance) const;
   /// Instances that were skinned, in no order, without those culled on the GPU.
   std::span<const InstanceHandle> skinnedInstances() const;

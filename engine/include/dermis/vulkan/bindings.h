@@ -8,7 +8,8 @@
 
 namespace dermis::vulkan {
 
-/// A part of a VkBuffer. The offset is a multiple of the device's minStorageBufferOffsetAlignment.
+/// A part of a VkBuffer. The offset is a multiple of
+/// `DeviceLimits::minStorageBufferOffsetAlignment`, the size of 4.
 struct BufferRange {
   VkBuffer buffer = VK_NULL_HANDLE;
   VkDeviceSize offset = 0;
@@ -31,14 +32,14 @@ struct OutputBuffers {
 /// `DeviceLimits::texelBuffers`, meshes, poses, tables and palettes also have
 /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT. `Plan::buffer` gives their sizes and usage. An engine
 /// that cannot give them that usage sets `DeviceDescription::texelBuffers` to false. The engine
-/// owns the buffers. One that a plan does not need may be left empty: meshes and outputs only where
-/// there is no job at all, poses and tables likewise, palettes where no job uses dual
-/// quaternions, results where no job has any, an attribute's output where no job wants it.
+/// owns the buffers. One that a plan does not need may be left empty: meshes and outputs if there
+/// is no job, poses and tables if the batch is empty, palettes if all jobs are linear and no pose
+/// `isReadByShaders`, results if no job has any, an attribute's output if no job wants it.
 struct BatchBuffers {
   BufferRange meshes;    ///< packed meshes at the jobs' `meshOffset`
   BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
   BufferRange tables;    ///< what `writeTables` wrote
-  BufferRange palettes;  ///< scratch: written and read by `record`
+  BufferRange palettes;  ///< palettes and `PoseStatus`: the palette kernel writes them
   OutputBuffers outputs;
   BufferRange results;  ///< what `record` finds out: `InstanceResult` at `Plan::resultOffset`
 };

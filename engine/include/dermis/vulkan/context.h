@@ -58,8 +58,9 @@ struct ContextState;
 class Context {
  public:
   /// Looks up entry points and limits, creates layouts; no shader module or pipeline yet.
-  /// Fails with `invalidArgument` (a handle is missing), `missingEntryPoint`, `missingFeature`
-  /// (Vulkan below 1.1, too few storage buffers a stage) or `vulkanError`.
+  /// Fails with `invalidArgument` (a handle is missing, a promise makes no sense),
+  /// `missingEntryPoint`, `missingFeature` (Vulkan below 1.1, too few storage buffers a stage) or
+  /// `vulkanError`.
   static Result<Context> create(const DeviceDescription& description);
 
   ~Context();
@@ -73,9 +74,10 @@ class Context {
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with this method and layout may need, whatever their
-  /// mesh, pose and morph targets. Once all methods and layouts are prepared, `record` needs no
-  /// other pipeline. May take long: call it from a loading thread. If it fails (`invalidArgument`,
-  /// `missingFeature`, `vulkanError`), what was built before stays built.
+  /// mesh, pose and morph targets, in plans made with `tuning` (for others: `everyVariant`). Once
+  /// all methods and layouts are prepared, `record` needs no other pipeline. May take long: call it
+  /// from a loading thread. If it fails (`invalidArgument`, `missingFeature`, `vulkanError`), what
+  /// was built before stays built.
   Result<void> prepare(const PipelineNeeds& needs) const;
 
   /// Builds the pipelines of these variants only. Those that exist are skipped. For jobs that stand
@@ -83,12 +85,12 @@ class Context {
   Result<void> prepare(std::span<const Variant> variants) const;
 
   /// Makes the descriptor sets and buffer views for a set of buffers. Fails with `invalidArgument`
-  /// (misaligned, no size), `limitExceeded` (larger than a storage buffer range where that is not
-  /// allowed; different outputs on a device with fewer than `storageBuffersWanted` a stage) or
-  /// `vulkanError`.
+  /// (misaligned, a size of 0 or no multiple of 4), `limitExceeded` (larger than a storage buffer
+  /// range where that is not allowed; different outputs on a device with fewer than
+  /// `storageBuffersWanted` a stage) or `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
-  /// Records the dispatches of a plan, and a barrier between the palette and the skin kernel.
+  /// Records the commands of the plan of a batch.
   /// O(dispatches). Call it outside a render pass, on a command buffer of a queue with compute.
   /// Afterwards the compute pipeline, descriptor set 0 of compute and push constants are undefined;
   /// the graphics state is as it was.

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dermis/handle.h"
-#include "dermis/instance.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"

@@ -78,6 +78,10 @@ Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t ver
   if (layout.arrangement > Arrangement::planar)
     return invalid("the layout's arrangement is not one of Arrangement");
   if (layout.motion > Motion::reskinned) return invalid("the layout's motion is not one of Motion");
+  if (!isPositionFormat(layout.positions)) {
+    return invalid("the layout's positions cannot be in the format " +
+                   std::string(formatName(layout.positions)));
+  }
   const bool isPlanar = layout.arrangement == Arrangement::planar;
   if (isPlanar && layout.stride != 0) {
     return invalid(
