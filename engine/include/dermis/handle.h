@@ -1,17 +1,16 @@
-// Names for things that a SkinningSystem owns.
+// Handles of the objects of a Scene or SkinningSystem.
 #pragma once
 
 #include <cstdint>
 
 namespace dermis {
 
-/// A number that stands for a thing of one kind, until that thing is removed. A handle of a removed
-/// thing is noticed, also where its place was given to another since: `generation` counts those
-/// that had the place. Plain data: copy it, store it, compare it.
+/// Identifies an object of one kind until it is removed. Functions reject the handle of a removed
+/// object, even if its index is in use again: `generation` differs. Plain data.
 template <typename Thing>
 struct Handle {
   std::uint32_t index = 0;
-  std::uint32_t generation = 0;  ///< 0: no thing at all
+  std::uint32_t generation = 0;  ///< 0: no object
 
   friend bool operator==(const Handle&, const Handle&) = default;
   explicit operator bool() const { return generation != 0; }

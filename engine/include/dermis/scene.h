@@ -42,8 +42,8 @@ struct SceneDescription {
   std::uint32_t jointBudget = 65536;                   ///< joints of all poses together
   /// Bytes of skinned vertices. May be more than a storage buffer range.
   std::uint64_t outputBudget = std::uint64_t{64} << 20;
-  std::uint32_t instanceBudget = 65536;  ///< instances at one time
-  /// Instances at one time with bounds or snorm16 positions.
+  std::uint32_t instanceBudget = 65536;  ///< maximum live instances
+  /// Maximum live instances with bounds or snorm16 positions.
   std::uint32_t boundsBudget = 16384;
   /// Those of the device. With fewer storage buffers than `storageBuffersWanted`, as in the
   /// defaults, `boundsBudget` is taken for 0.
@@ -63,9 +63,9 @@ struct InstanceDescription {
   Box box = {};  ///< of positions in snorm16, as `Job::box`
   /// The exact box of the skinned positions is wanted: `Scene::bounds`.
   bool bounds = false;
-  /// The instance is skinned in one of this number of frames, 1 or more. Instances of one pose and
-  /// interval are skinned in the same frames; poses are spread over the frames. `teleport`,
-  /// `setMesh` and coming back into view do not wait.
+  /// The instance is skinned every N-th frame; N is at least 1. Instances with the same pose and
+  /// interval are skinned in the same frames; poses are distributed over the frames. `teleport`,
+  /// `setMesh` and coming back into view take effect at once.
   std::uint32_t updateInterval = 1;
   /// The GPU decides whether the instance is skinned: its word in the visibility buffer is not 0.
   /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range

@@ -1,4 +1,4 @@
-// The engine's buffers, bound once for as many `record`s as they live.
+// The engine's buffers, and the descriptors of Dermis for them.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ struct BufferRange {
   VkDeviceSize size = 0;  ///< bytes; VK_WHOLE_SIZE is not allowed here
 };
 
-/// The buffers that skinned vertices go to, by attribute. Several may be the same. Each may be
-/// larger than a storage buffer range.
+/// The output buffers, by attribute. Attributes may share a buffer. Each may be larger than a
+/// storage buffer range.
 struct OutputBuffers {
   BufferRange positions;
   BufferRange normals;
@@ -41,15 +41,14 @@ struct BatchBuffers {
   BufferRange tables;    ///< what `writeTables` wrote
   BufferRange palettes;  ///< palettes and `PoseStatus`: the palette kernel writes them
   OutputBuffers outputs;
-  BufferRange results;  ///< what `record` finds out: `InstanceResult` at `Plan::resultOffset`
+  BufferRange results;  ///< `InstanceResult` at `Plan::resultOffset`
 };
 
 struct BindingsState;
 
-/// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. It
-/// must outlive every command buffer that `record` used it in, until the GPU is done with them;
-/// destroy it before the Context. Movable, not thread-safe to destroy while in use; any number of
-/// threads may `record` with it.
+/// Descriptor sets and buffer views for one set of buffers, created by `Context::createBindings`.
+/// It must live until the GPU has completed all commands that `record` recorded with it. Destroy it
+/// before the Context. Any number of threads may `record` with it at the same time.
 class Bindings {
  public:
   Bindings();

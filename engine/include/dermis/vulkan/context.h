@@ -1,5 +1,4 @@
-// Dermis on one Vulkan device that the engine lends: pipelines, bindings, and the recording of
-// batches.
+// The engine's Vulkan device as Dermis uses it: pipelines, bindings, and the recording of batches.
 #pragma once
 
 #include <cstdint>
@@ -14,50 +13,49 @@
 
 namespace dermis::vulkan {
 
-/// The engine's device, and what was enabled on it. Dermis uses nothing that is not said here, and
-/// owns none of it.
+/// The engine's device and what is enabled on it. Dermis uses only what this structure names. The
+/// engine owns all of it.
 struct DeviceDescription {
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
   VkDevice device = VK_NULL_HANDLE;
-  /// The loader's entry point, or a layer's: everything else is found through it. Dermis links no
-  /// loader.
+  /// The entry point of the loader or of a layer. Dermis gets all other functions through it, and
+  /// links no loader.
   PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
-  /// The lower of the API version that the instance was created with and that of the device; at
-  /// least Vulkan 1.1.
+  /// The API version of the instance or of the device, whichever is lower. Minimum: Vulkan 1.1.
   std::uint32_t apiVersion = VK_API_VERSION_1_1;
-  /// Names of the device extensions that were enabled. Used where present: VK_KHR_push_descriptor.
-  /// Instance extensions that work on the device may be named too: VK_EXT_debug_utils, for names
-  /// and labels.
+  /// Names of the enabled device extensions. Dermis uses VK_KHR_push_descriptor if it is among
+  /// them. The instance extension VK_EXT_debug_utils may be named too; Dermis then names its
+  /// objects and labels its commands.
   std::span<const char* const> enabledExtensions;
-  /// The features that were enabled: the structures that hung in VkDeviceCreateInfo::pNext, as they
-  /// were. Used where enabled: storageBuffer16BitAccess and storageBuffer8BitAccess, of
+  /// The enabled features: the pNext chain of VkDeviceCreateInfo. Dermis uses these if they are
+  /// enabled: storageBuffer16BitAccess and storageBuffer8BitAccess of
   /// VkPhysicalDevice16BitStorageFeatures, VkPhysicalDevice8BitStorageFeatures, or
-  /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64, of VkPhysicalDeviceFeatures2.
-  /// Read by `create` only.
+  /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64 of VkPhysicalDeviceFeatures2.
+  /// Only `create` reads the chain.
   const void* enabledFeatures = nullptr;
   /// Whether the engine's buffers have the usage that `Plan::buffer` returns, which includes
   /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT if kernels read through texel buffers. Set it to
   /// false for buffers that are storage buffers only.
   bool texelBuffers = true;
-  /// What the engine promises of its meshes and poses, so that it needs fewer pipelines.
+  /// What the engine promises about its meshes and poses, to need fewer pipelines.
   Promises promises;
-  /// Every pipeline is built with it, where given; the engine stores and loads it.
+  /// Optional. Every pipeline is created with it. The engine stores and loads it.
   VkPipelineCache pipelineCache = VK_NULL_HANDLE;
-  /// Used for every object that Dermis creates, where given; must outlive the Context.
+  /// Optional. Used for every object that Dermis creates. It must outlive the Context.
   const VkAllocationCallbacks* allocator = nullptr;
 };
 
 struct ContextState;
 
-/// What Dermis has on a device: layouts and pipelines. Immutable but for `prepare`;
-/// every member function may be called from any thread at any time, `record` with a command buffer
-/// of its own. Destroy it when the GPU has finished with what it recorded, before the device.
+/// The layouts and pipelines of Dermis on a device. Any thread may call any member function at any
+/// time; `record` needs a command buffer that no other thread uses. Destroy the Context before the
+/// device, when the GPU has completed all commands that it recorded.
 ///
 /// Nothing here submits, waits, maps, or allocates device memory.
 class Context {
  public:
-  /// Looks up entry points and limits, creates layouts; no shader module or pipeline yet.
+  /// Gets entry points and limits, and creates layouts. Creates no shader module or pipeline.
   /// Fails with `invalidArgument` (a handle is missing, a promise makes no sense),
   /// `missingEntryPoint`, `missingFeature` (Vulkan below 1.1, too few storage buffers a stage) or
   /// `vulkanError`.
@@ -67,10 +65,10 @@ class Context {
   Context(Context&&) noexcept;
   Context& operator=(Context&&) noexcept;
 
-  /// The limits that `makePlan` has to keep to.
+  /// The limits for `makePlan`.
   const DeviceLimits& limits() const;
 
-  /// How to cut up the work on this device.
+  /// The recommended tuning for this device, for `makePlan`. The value for GPUs is a guess.
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with this method and layout may need, whatever their

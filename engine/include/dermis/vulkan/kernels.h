@@ -1,10 +1,20 @@
-// The kernels as data, for an engine that issues the dispatches of a plan with its own RHI. Needs
+// The kernels as data, for an engine that executes the commands of a plan with its own RHI. Needs
 // no Vulkan device.
 //
-// Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers or, on a device that
-// has fewer a stage, four. Variants with `texels` have uniform texel buffers behind them, views of
-// the same ranges in VK_FORMAT_R32G32B32A32_UINT, of meshes in VK_FORMAT_R32_UINT; binding numbers,
-// records and push constants are in shaders/abi.h, which compiles as C++.
+// Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers, or the first four on
+// a device that has fewer per stage:
+//
+// - palette kernel: 0 tables, 1 poses, 2 palettes, 7 results;
+// - skin kernel: 0 tables, 1 meshes, 2 palettes (linear: poses), 3 positions, 4 normals, 5
+// tangents,
+//   6 previous positions, 7 results;
+// - visibility kernel: 0 tables, 1 visibility, 2 history, 3 counters, 7 results.
+//
+// A binding that a kernel does not use may have any buffer. With four, all attributes go to
+// binding 3. Variants with `texels` also have uniform texel buffers: 8 tables, 9 meshes and 11
+// palettes (linear: poses) in VK_FORMAT_R32G32B32A32_UINT, 10 meshes in VK_FORMAT_R32_UINT, views
+// of the same ranges. Records and push constants are in shaders/abi.h, which compiles as C++; it is
+// installed in DERMIS_SHADER_DIR.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// Where a SkinningSystem has its device memory from: two functions that an engine may replace by
-// its own allocator.
+// Device-memory callbacks of SkinningSystem.
 #pragma once
 
 #include <cstdint>
@@ -12,37 +11,37 @@ namespace dermis::vulkan {
 
 /// What the memory of one buffer is for.
 enum class MemoryUse : std::uint8_t {
-  device,    ///< Written and read by the GPU only: device-local where there is such memory.
-  upload,    ///< Written by the CPU, front to back, and read by the GPU: host-visible and coherent,
-             ///< device-local too where there is such memory.
-  readBack,  ///< Written by the GPU and read by the CPU: host-visible and coherent, cached where
-             ///< there is such memory.
+  device,    ///< only the GPU uses it: device-local if possible
+  upload,    ///< the CPU writes it, front to back, and the GPU reads it: host-visible and coherent,
+             ///< also device-local if possible
+  readBack,  ///< the GPU writes it and the CPU reads it: host-visible and coherent, also cached if
+             ///< possible
 };
 
 struct MemoryRequest {
   VkMemoryRequirements requirements{};  ///< of the buffer
   MemoryUse use = MemoryUse::device;
-  /// The buffer may have an address (VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT): its memory needs
-  /// VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
+  /// The buffer has the usage VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT: its memory must be
+  /// allocated with VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
   bool hasDeviceAddress = false;
-  const char* name = "";  ///< what the buffer is for: "dermis output"; lives as long as the call
+  const char* name = "";  ///< of the buffer: "dermis output"; valid during the call
 };
 
 /// A part of a VkDeviceMemory.
 struct MemoryBlock {
   VkDeviceMemory memory = VK_NULL_HANDLE;
   VkDeviceSize offset = 0;
-  void* mapped = nullptr;  ///< upload, readBack: where `offset` stands; stays mapped
-  void* owner = nullptr;   ///< the allocator's own, handed back to `free`
+  void* mapped = nullptr;  ///< upload, readBack: the address of `offset`; must stay mapped
+  void* owner = nullptr;   ///< for the allocator; `free` gets it back
 };
 
-/// Both functions are called by the thread that calls the SkinningSystem, and may call Vulkan.
+/// The thread that calls the SkinningSystem calls both functions. They may call Vulkan.
 struct MemoryCallbacks {
   void* user = nullptr;
-  /// Finds memory that fits the request. What it fails with is what the caller of the
-  /// SkinningSystem gets.
+  /// Allocates memory for a buffer. If it fails, the call of the SkinningSystem fails with its
+  /// error.
   Result<MemoryBlock> (*allocate)(void* user, const MemoryRequest& request) = nullptr;
-  /// The GPU is done with it, and its buffer destroyed.
+  /// Frees a block. The GPU no longer uses it, and its buffer is destroyed.
   void (*free)(void* user, const MemoryBlock& block) = nullptr;
 };
 

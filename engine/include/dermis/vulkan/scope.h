@@ -1,8 +1,9 @@
-// Synchronisation as data: what goes into the barriers at the edges, which are the engine's. Dermis
-// records barriers between its own passes only, and never tracks the state of a resource.
+// Synchronization as data: stages and accesses for the barriers that the engine records before and
+// after `record`. Dermis only records barriers between its own commands, and does not track the
+// state of resources.
 //
-// The values are those of Vulkan 1.0 barriers; the bits are the same in VkPipelineStageFlags2 and
-// VkAccessFlags2.
+// The values are those of Vulkan 1.0 barriers; VkPipelineStageFlags2 and VkAccessFlags2 have the
+// same bits.
 #pragma once
 
 #include <cstdint>
@@ -17,28 +18,28 @@ struct Scope {
   VkAccessFlags accesses = 0;
 };
 
-/// Both sides of the barrier that stands between two uses of a buffer.
+/// Both sides of the barrier between two uses of a buffer.
 struct Dependency {
   Scope source;
   Scope destination;
 };
 
-/// Both needs in one barrier: a frame that uploads its tables and overwrites what the last frame
-/// drew has two.
+/// Two dependencies in one barrier. Example: a frame uploads its tables, and overwrites the
+/// vertices that the last frame drew.
 inline Dependency operator|(const Dependency& a, const Dependency& b) {
   return {{a.source.stages | b.source.stages, a.source.accesses | b.source.accesses},
           {a.destination.stages | b.destination.stages,
            a.destination.accesses | b.destination.accesses}};
 }
 
-/// What a buffer of the batch was last used for, before `record`.
+/// The last use of a buffer before `record`.
 enum class PreviousUse : std::uint8_t {
-  // Someone wrote what `record` reads: meshes, matrices, tables.
-  hostWrite,  ///< through a mapping, before the submission: `vkQueueSubmit` is the barrier, none is
-              ///< needed
+  // A write to what `record` reads: meshes, poses, tables.
+  hostWrite,  ///< through a mapping, before the submission: `vkQueueSubmit` makes it visible, no
+              ///< barrier is needed
   transferWrite,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
   computeWrite,   ///< another compute pass
-  // Someone still reads what `record` overwrites: the output.
+  // A read of what `record` overwrites: the output.
   vertexInput,                 ///< draws, as a vertex buffer
   vertexShader,                ///< draws, as a storage or texel buffer
   compute,                     ///< another compute pass
@@ -48,7 +49,7 @@ enum class PreviousUse : std::uint8_t {
   previousRecord,  ///< an earlier `record` used the same buffer
 };
 
-/// Who reads the skinned vertices next.
+/// The next use of the skinned vertices.
 enum class Consumer : std::uint8_t {
   vertexInput,                 ///< bound as a vertex buffer
   vertexShader,                ///< fetched from a storage or texel buffer in the vertex shader
@@ -58,23 +59,22 @@ enum class Consumer : std::uint8_t {
   hostRead,                    ///< read through a mapping after a fence
 };
 
-/// A queue-family ownership transfer is two barriers: the release on the queue that skinned, the
-/// acquire on the other one. In the release the destination scope is ignored, in the acquire the
-/// source scope (Vulkan 1.3, 7.7.4). The host belongs to no queue family: for
-/// `Consumer::hostRead` there is nothing to transfer, and all three give the same dependency.
+/// A queue-family ownership transfer is two barriers: the release on the queue that skins, the
+/// acquire on the queue that reads. Vulkan ignores the destination scope of a release and the
+/// source scope of an acquire (Vulkan 1.3, 7.7.4). The host has no queue family: for
+/// `Consumer::hostRead` all three values give the same dependency.
 enum class QueueTransfer : std::uint8_t { none, release, acquire };
 
-/// The barrier before `record`, for a buffer that was last used so.
+/// The barrier before `record`, for a buffer with this last use.
 Dependency inputScope(PreviousUse use);
 
 /// The barrier after `record`, for the output buffer.
 Dependency outputScope(Consumer consumer, QueueTransfer transfer = QueueTransfer::none);
 
-/// A dependency as the structures that vkCmdPipelineBarrier takes; the stages are those of its two
-/// scopes.
+/// A dependency as a structure for vkCmdPipelineBarrier. Its stages are those of the two scopes.
 VkMemoryBarrier memoryBarrier(const Dependency& dependency);
 
-/// The same for a part of one buffer and, where the families differ, as one half of a queue-family
+/// The same for a part of one buffer. If the families differ, it is one half of a queue-family
 /// transfer.
 VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffer,
                                     VkDeviceSize offset, VkDeviceSize size,
