@@ -127,7 +127,8 @@ bool PipelineStatistics::createLayouts() {
   setInfo.pBindings = bindings.data();
   if (functions_->CreateDescriptorSetLayout(device_, &setInfo, nullptr, &setLayout_) != VK_SUCCESS)
     return false;
-  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(DispatchCommand::constants)};
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                                  sizeof(DispatchCommand::constants)};
   VkPipelineLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   info.setLayoutCount = 1;
