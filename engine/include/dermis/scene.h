@@ -1,7 +1,7 @@
 // The books of a scene: which meshes, poses and instances there are, where each stands in its
 // buffer, and what a frame has to do. No Vulkan: `plan` makes a list of commands (plan.h).
-// `vulkan::SkinningSystem` keeps a Scene and executes its commands in buffers of its own; its calls
-// are documented here. An engine with its own RHI uses Scene directly:
+// `vulkan::SkinningSystem` contains a Scene, and executes its commands on its own buffers. Calls
+// that both have are documented here. An engine with its own RHI uses Scene directly:
 //
 //   scene.beginFrame(frame, completedFrame);
 //   for each frame f that has become complete: scene.readBack(f, bytes of its read-back buffer);
@@ -61,7 +61,7 @@ struct InstanceDescription {
   /// view; `teleport` for jumps. `Motion::reskinned` is not possible.
   VertexLayout layout = {};
   Box box = {};  ///< of positions in snorm16, as `Job::box`
-  /// The exact box of the skinned positions is wanted: `Scene::bounds`.
+  /// Whether to compute the exact box of the skinned positions, for `Scene::bounds`.
   bool bounds = false;
   /// The instance is skinned every N-th frame; N is at least 1. Instances with the same pose and
   /// interval are skinned in the same frames; poses are distributed over the frames. `teleport`,

@@ -1,4 +1,4 @@
-#include "system/layout.h"
+#include "dermis/layout.h"
 
 #include <algorithm>
 #include <array>
@@ -66,12 +66,6 @@ VertexPlaces separate(const VertexLayout& layout, std::uint32_t vertexCount, std
 }
 
 }  // namespace
-
-std::uint32_t attributeBytes(const VertexLayout& layout) {
-  std::uint32_t bytes = 0;
-  for (const VertexFormat format : formatsOf(layout)) bytes += formatSize(format);
-  return bytes;
-}
 
 Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t vertexCount,
                                    std::uint64_t offset) {

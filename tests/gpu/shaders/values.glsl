@@ -1,4 +1,4 @@
-// What a vertex shader found out about a vertex, drawn into a pixel of its own.
+// Draws the values of a vertex shader, one pixel for each vertex.
 layout(location = 0) flat out vec4 positionOut;
 layout(location = 1) flat out vec4 normalOut;
 layout(location = 2) flat out vec4 tangentOut;

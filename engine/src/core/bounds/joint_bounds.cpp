@@ -230,7 +230,7 @@ Result<void> checkArguments(const MeshView& mesh, std::uint32_t jointCount,
                             std::span<const MorphRange> morphRanges) {
   if (jointCount == 0 || jointCount > maxPoseJoints) {
     return invalid(mesh, ErrorCode::invalidArgument,
-                   ": a palette has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
+                   ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
   if (!morphRanges.empty() && morphRanges.size() != mesh.morphTargets.size()) {

@@ -200,7 +200,7 @@ Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
                    std::span<const std::uint32_t> triangles) {
   if (jointCount == 0 || jointCount > maxPoseJoints) {
     return invalid(mesh, ErrorCode::invalidArgument,
-                   ": a palette has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
+                   ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
   // Centres that the mesh has already, good or bad, have no say.

@@ -173,7 +173,7 @@ struct PlanSizes {
 /// What a frame of a scene does besides skinning.
 struct FrameWork {
   std::uint32_t frame = 0;               ///< counts records, from 1
-  bool clearsHistory = false;            ///< it is the first that has the GPU choose
+  bool clearsHistory = false;            ///< first frame with culling on the GPU
   std::span<const CopyCommand> moves;    ///< of outputs
   std::span<const CopyCommand> results;  ///< to the read-back buffer
 };

@@ -14,7 +14,6 @@
 #include "dermis/result.h"
 #include "dermis/scene.h"
 #include "plan/builder.h"
-#include "system/layout.h"
 #include "system/range_allocator.h"
 #include "system/slot_map.h"
 

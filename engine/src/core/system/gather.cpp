@@ -19,6 +19,13 @@ std::uint32_t culledFlags(const SceneInstance& instance) {
   return flags;
 }
 
+/// Of one vertex, without gaps.
+std::uint32_t attributeBytes(const VertexLayout& layout) {
+  const std::uint32_t positions = layout.motion == Motion::none ? 1 : 2;
+  return positions * formatSize(layout.positions) + formatSize(layout.normals) +
+         formatSize(layout.tangents);
+}
+
 }  // namespace
 
 /// In frames that are the same for all instances of a pose with one interval, also where the

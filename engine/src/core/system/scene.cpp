@@ -45,7 +45,7 @@ Result<void> checkDescription(const SceneDescription& description) {
   return checkTuning(description.tuning);
 }
 
-/// The largest multiple that there is, if the next one is larger.
+/// Rounds down if the next multiple does not fit 64 bits.
 std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
   const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
   return up <= ~value ? value + up : value / multiple * multiple;
