@@ -58,9 +58,9 @@ bool isFinite(std::span<const JointMatrix> palette) {
 }
 
 /// A pose whose joints are all finite leaves no vertex without an answer.
-Exemptions exemptionsIn(std::span<const JointMatrix> palette, const reference::SkinnedMesh& skinned,
-                        Method method) {
-  Exemptions exemptions = exemptionsOf(skinned, method);
+Exemptions exemptionsIn(std::span<const JointMatrix> palette,
+                        const reference::SkinnedMesh& skinned) {
+  Exemptions exemptions = exemptionsOf(skinned);
   if (isFinite(palette)) exemptions.skipped = 0;
   return exemptions;
 }
@@ -70,11 +70,11 @@ Exemptions exemptionsIn(std::span<const JointMatrix> palette, const reference::S
 Result<void> checkReach(const ScenePart& part, const PoseToVerify& pose,
                         const reference::SkinnedMesh& skinned) {
   constexpr double most = static_cast<double>(std::numeric_limits<float>::max()) / 8;
-  for (const reference::Conditioning& conditioning : skinned.conditioning) {
-    if (conditioning.undefined || !(conditioning.scale > most)) continue;
+  for (const reference::VertexBounds& bounds : skinned.bounds) {
+    if (bounds.undefined || !(bounds.scale > most)) continue;
     return Error{ErrorCode::invalidMesh,
                  fmt::format("{}, {}: positions reach {:.3g}, which is too far for float32",
-                             part.name, pose.name, conditioning.scale)};
+                             part.name, pose.name, bounds.scale)};
   }
   return {};
 }
@@ -89,7 +89,7 @@ Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> 
                         skinned.pose.morphs[figure.part]);
     if (!mesh) return mesh.error();
     if (Result<void> checked = checkReach(part, pose, *mesh); !checked) return checked.error();
-    skinned.exemptions.push_back(exemptionsIn(skinned.pose.pose(part), *mesh, figure.method));
+    skinned.exemptions.push_back(exemptionsIn(skinned.pose.pose(part), *mesh));
     skinned.figures.push_back(std::move(*mesh));
   }
   return skinned;
@@ -153,9 +153,8 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
       if (!first.empty() && skinned.streams == first[index].streams) {
         verified.comparison = firstComparisons[index];
       } else {
-        const Result<Comparison> comparison =
-            compareWithReference(batch.expected[index], skinned.view(), requests[index].method,
-                                 batch.instances[index].exemptions);
+        const Result<Comparison> comparison = compareWithReference(
+            batch.expected[index], skinned.view(), batch.instances[index].exemptions);
         if (!comparison) return comparison.error();
         verified.comparison = *comparison;
         if (!first.empty())

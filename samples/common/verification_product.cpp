@@ -229,9 +229,8 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
     verified.expected = &expected[instance];
     verified.expectedBefore = &expected[instance + 3];
     // All joints are finite: no vertex is without an answer.
-    verified.exemptions = {exemptionsOf(expected[instance], verified.method).onlyFinite, 0};
-    verified.exemptionsBefore = {exemptionsOf(expected[instance + 3], verified.method).onlyFinite,
-                                 0};
+    verified.exemptions = {exemptionsOf(expected[instance]).onlyFinite, 0};
+    verified.exemptionsBefore = {exemptionsOf(expected[instance + 3]).onlyFinite, 0};
   }
   return verifyBatch(device, context, instances, random.output, true);
 }

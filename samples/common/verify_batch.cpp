@@ -156,8 +156,8 @@ class BatchVerifier {
 
   Result<void> compareAttributes(const SkinnedVertices& skinned, std::size_t index) {
     const InstanceToVerify& instance = instances_[index];
-    const Result<Comparison> comparison = compareWithReference(
-        *instance.expected, skinned.view(), instance.method, instance.exemptions);
+    const Result<Comparison> comparison =
+        compareWithReference(*instance.expected, skinned.view(), instance.exemptions);
     if (!comparison) return comparison.error();
     results_[index].comparison = *comparison;
     results_[index].status = skinned.status;
@@ -180,8 +180,8 @@ class BatchVerifier {
     view.positions = frames.now.instances[index].attribute(Stream::previousPositions);
     view.box = boxes_[index];
     const InstanceToVerify& instance = instances_[index];
-    const Result<Comparison> comparison = compareWithReference(
-        *instance.expectedBefore, view, instance.method, instance.exemptionsBefore);
+    const Result<Comparison> comparison =
+        compareWithReference(*instance.expectedBefore, view, instance.exemptionsBefore);
     if (!comparison) return comparison.error();
     if (comparison->exempt != comparison->expectedExempt)
       fail(index, "of the previous positions, " + std::to_string(comparison->compared) +
@@ -214,18 +214,17 @@ class BatchVerifier {
   /// rounding, it may be larger than that of the others.
   void checkBoundsNear(const Box& box, std::size_t index) {
     const reference::SkinnedMesh& expected = *instances_[index].expected;
-    const Method method = instances_[index].method;
     std::vector<reference::Double3> certain;
     double allowed = 0;
     bool mayBeLarger = false;
     for (std::size_t vertex = 0; vertex < expected.positions.size(); ++vertex) {
-      const reference::Conditioning& conditioning = expected.conditioning[vertex];
-      if (method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate)) {
+      const reference::VertexBounds& bounds = expected.bounds[vertex];
+      if (bounds.onlyFinite) {
         mayBeLarger = true;
         continue;
       }
       certain.push_back(expected.positions[vertex]);
-      allowed = std::max(allowed, positionBound(method, conditioning));
+      allowed = std::max(allowed, bounds.position);
     }
     const Box expectedBox = boxOf(certain);
     for (std::size_t axis = 0; axis < 3; ++axis) {

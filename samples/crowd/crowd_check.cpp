@@ -159,7 +159,7 @@ CrowdCheck::MeshFinding CrowdCheck::checkPose(const Capture& capture, const Inst
   finding.passed = true;
   for (const auto& [view, key] : {std::pair{&current, pose.current}, {&previous, pose.previous}}) {
     const Result<Comparison> comparison =
-        compareWithReference(references_.of({instance.shown.part, key}), *view, Crowd::method);
+        compareWithReference(references_.of({instance.shown.part, key}), *view);
     if (!comparison) {
       finding.done = comparison.error();
       return finding;

@@ -102,7 +102,7 @@ Result<Comparison> check(const embed::Crowd& crowd, const MeshView& mesh, std::u
   SkinnedView view;
   view.positions = attribute(offsetof(embed::SkinnedVertex, position), VertexFormat::float32x3);
   view.normals = attribute(offsetof(embed::SkinnedVertex, normal), VertexFormat::octahedral16x2);
-  return compareWithReference(*expected, view, Method::dualQuaternion);
+  return compareWithReference(*expected, view);
 }
 
 Result<void> run(samples::Device& engine) {

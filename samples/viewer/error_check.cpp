@@ -20,11 +20,6 @@ double distance(const reference::Double3& expected, const float* actual) {
   return std::sqrt(sum);
 }
 
-/// Where the answer is a matter of rounding there is no error.
-bool isDefined(const reference::Conditioning& conditioning) {
-  return !conditioning.degenerate && !conditioning.signAmbiguous;
-}
-
 Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const CheckRequest& request,
                        const SkinnedFigure& figure, FigureError& result) {
   std::vector<float>& errors = result.errors.emplace_back(part.primitive->vertexCount, 0.0f);
@@ -34,16 +29,17 @@ Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const Chec
       part.mesh->view(), request.pose.pose(part), figure.method, request.pose.morphs[index]);
   if (!expected) return expected.error();
   for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
-    const reference::Conditioning& conditioning = expected->conditioning[vertex];
-    if (!isDefined(conditioning)) continue;
+    const reference::VertexBounds& bounds = expected->bounds[vertex];
+    if (bounds.onlyFinite || bounds.undefined) continue;
     // What is not finite is as wrong as can be told.
     constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
     const double apart = distance(expected->positions[vertex], &positions[3 * vertex]);
     const double error = apart < most ? apart : most;
     errors[vertex] = static_cast<float>(error);
     result.greatest = std::max(result.greatest, error);
-    const double bound = positionBound(figure.method, conditioning);
-    if (bound > 0) result.greatestPartOfBound = std::max(result.greatestPartOfBound, error / bound);
+    if (bounds.position > 0) {
+      result.greatestPartOfBound = std::max(result.greatestPartOfBound, error / bounds.position);
+    }
   }
   return {};
 }

@@ -113,9 +113,9 @@ void addExpectations(Pose& pose, OwnedMesh& mesh) {
     pose.triangles.push_back(
         {expected.positions[first], expected.positions[first + 1], expected.positions[first + 2]});
     const bool ambiguous =
-        std::any_of(expected.conditioning.begin() + static_cast<std::ptrdiff_t>(first),
-                    expected.conditioning.begin() + static_cast<std::ptrdiff_t>(first + 3),
-                    [](const reference::Conditioning& vertex) { return vertex.signAmbiguous; });
+        std::any_of(expected.bounds.begin() + static_cast<std::ptrdiff_t>(first),
+                    expected.bounds.begin() + static_cast<std::ptrdiff_t>(first + 3),
+                    [](const reference::VertexBounds& vertex) { return vertex.onlyFinite; });
     pose.certain.push_back(!ambiguous && isWide(pose.triangles.back()));
     pose.rays.push_back(rayAt(pose.triangles.back()));
   }

@@ -446,7 +446,7 @@ TEST_F(ShaderIncludeTest, AVertexShaderSkinsAsTheKernelsDo) {
         view.normals = {values[1].data(), vertexCount, 16, VertexFormat::float32x4};
         view.tangents = {values[2].data(), vertexCount, 16, VertexFormat::float32x4};
         const Comparison comparison =
-            must(compareWithReference(expected, view, method, exemptionsOf(expected, method)));
+            must(compareWithReference(expected, view, exemptionsOf(expected)));
         EXPECT_TRUE(comparison.passed())
             << "vertex " << comparison.firstFailure << "; positions " << comparison.worstPosition
             << ", normals " << comparison.worstNormal << ", tangents " << comparison.worstTangent;

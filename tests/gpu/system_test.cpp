@@ -49,9 +49,8 @@ void expectReference(const samples::SkinnedVertices& skinned, const samples::Ski
   const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.pose;
   const reference::SkinnedMesh expected =
       must(reference::skin(source->second.view(), pose, request.method, request.morphs));
-  const Exemptions exemptions{exemptionsOf(expected, request.method).onlyFinite, 0};
-  const Comparison comparison =
-      must(compareWithReference(expected, skinned.view(), request.method, exemptions));
+  const Exemptions exemptions{exemptionsOf(expected).onlyFinite, 0};
+  const Comparison comparison = must(compareWithReference(expected, skinned.view(), exemptions));
   EXPECT_TRUE(comparison.passed())
       << "the first is vertex " << comparison.firstFailure << "; positions "
       << comparison.worstPosition << ", normals " << comparison.worstNormal << ", tangents "

@@ -107,10 +107,8 @@ class WrongBytesTest : public ::testing::Test {
       instances[index].method = Method::dualQuaternion;
       instances[index].expected = &expected_[index];
       instances[index].expectedBefore = &expected_[instanceCount + index];
-      instances[index].exemptions =
-          exemptionsOf(*instances[index].expected, Method::dualQuaternion);
-      instances[index].exemptionsBefore =
-          exemptionsOf(*instances[index].expectedBefore, Method::dualQuaternion);
+      instances[index].exemptions = exemptionsOf(*instances[index].expected);
+      instances[index].exemptionsBefore = exemptionsOf(*instances[index].expectedBefore);
     }
     Result<std::vector<samples::VerifiedInstance>> verified =
         samples::verifyBatch(*open_->device, open_->context, instances, output_, thorough);
@@ -250,7 +248,7 @@ TEST_F(WrongBytesTest, AWrongBoxIsFound) {
   const auto far = [](InstanceResult& result) { result.orderedMax[0] += 1 << 16; };
   expectOnly(verify(now, changeResult(0, far)), 0, wrong);
   // With a vertex whose place is a matter of rounding it may be larger, but not smaller.
-  for (reference::SkinnedMesh& expected : expected_) expected.conditioning[3].degenerate = true;
+  for (reference::SkinnedMesh& expected : expected_) expected.bounds[3].onlyFinite = true;
   for (const samples::VerifiedInstance& instance : verify(now, changeResult(0, far))) {
     EXPECT_TRUE(instance.passed()) << instance.wrong;
     EXPECT_EQ(instance.comparison.exempt, (Exemptions{1, 0}));

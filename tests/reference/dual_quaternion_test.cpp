@@ -34,7 +34,7 @@ TEST(ReferenceDualQuaternion, OneInfluenceIsItsJoint) {
         jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(3)));
   }
   OwnedMesh mesh = scatteredMesh(random, 500, 50, 1);
-  const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
   for (std::size_t vertex = 0; vertex < 500; ++vertex) {
     const JointMatrix& joint = pose[mesh.joints[vertex]];
     expectNear(toVector(dual.positions[vertex]),
@@ -70,15 +70,15 @@ TEST(ReferenceDualQuaternion, Truth05_WeightsMayBeMultiplied) {
         jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(1)));
   }
   OwnedMesh mesh = scatteredMesh(random, 300, 9, 4);
-  const reference::SkinnedMesh before = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh before = skinned(mesh, pose, Method::dualQuaternion);
   const std::vector<float> weights = mesh.weights;
   for (float& weight : mesh.weights) weight *= 0.25f;  // exactly
-  const reference::SkinnedMesh quarter = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh quarter = skinned(mesh, pose, Method::dualQuaternion);
   for (std::size_t vertex = 0; vertex < 300; ++vertex) {
     expectNear(toVector(quarter.positions[vertex]), toVector(before.positions[vertex]), 1e-14);
   }
   for (std::size_t i = 0; i < weights.size(); ++i) mesh.weights[i] = weights[i] * 0.37f;
-  const reference::SkinnedMesh part = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh part = skinned(mesh, pose, Method::dualQuaternion);
   for (std::size_t vertex = 0; vertex < 300; ++vertex) {  // the products are rounded to float
     expectNear(toVector(part.positions[vertex]), toVector(before.positions[vertex]), 4e-6);
   }
@@ -99,7 +99,7 @@ TEST(ReferenceDualQuaternion, Truth08_TheResultIsRigid) {
          {glm::dvec3(0.0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
       addVertex(mesh, corner, {{0, weights[0]}, {1, weights[1]}, {2, weights[2]}, {3, weights[3]}});
     }
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
     glm::dmat3 r;
     for (int i = 0; i < 3; ++i) {
       r[i] = toVector(result.positions[static_cast<std::size_t>(i) + 1]) -
@@ -212,8 +212,8 @@ TEST(ReferenceDualQuaternion, WeightsOfOneJointThatAddUpToATieAreATie) {
       mesh.vertexCount = 1;
       mesh.positions = floatAttribute(position, 1, 3);
       mesh.influenceSets = {&set, 1};
-      const Result<reference::SkinnedMesh> result =
-          reference::skin(mesh, pose, Method::dualQuaternion);
+      const Result<reference::AnalyzedMesh> result =
+          reference::analyze(mesh, pose, Method::dualQuaternion);
       ASSERT_TRUE(result.ok());
       ASSERT_NEAR(angleOf(result->positions[0]), 0, 1e-4)
           << part << " + " << total - part << " against " << total;
@@ -252,7 +252,7 @@ TEST(ReferenceDualQuaternion, SaysWhereTheSignIsArbitrary) {
     addVertex(mesh, {1, 0, 0}, {{0, 0.5f}, {joint, 0.5f}});
   }
   addVertex(mesh, {1, 0, 0}, {{0, 1.0f}, {1, 0.0f}});
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
   const bool expected[] = {true, true, false, false, false, false};
   for (std::size_t vertex = 0; vertex < 6; ++vertex) {
     EXPECT_EQ(result.conditioning[vertex].signAmbiguous, expected[vertex]) << vertex;
@@ -268,7 +268,7 @@ TEST(ReferenceDualQuaternion, ConditioningIsWhatItsCommentSays) {
   addVertex(mesh, {0, 2, 0}, {{0, 0.5f}, {1, 0.5f}});
   addVertex(mesh, {0, 2, 0}, {{1, 1.0f}, {2, 0.0f}});
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh result = skinned(mesh, pose, method);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, method);
     EXPECT_NEAR(result.conditioning[0].scale, 5 + 3 * 2, 1e-12);
     // A centre of rotation counts twice.
     const glm::dvec3 center(mesh.centersOfRotation[0], mesh.centersOfRotation[1],
@@ -311,13 +311,13 @@ TEST(ReferenceDualQuaternion, TakesNoShortCutForNearlyRigidJoints) {
   };
   for (const int steps : {-60, -4, 4, 30}) {  // of 2⁻²³: CᵀC − 1 is at most 7.2e-6
     const double scale = 1 + steps * std::ldexp(1.0, -23 + (steps < 0 ? -1 : 0));
-    const reference::SkinnedMesh result = skinnedBy(scale);
+    const reference::AnalyzedMesh result = skinnedBy(scale);
     EXPECT_NEAR(result.positions[0][0], scale, 1e-15);
     EXPECT_NEAR(result.conditioning[0].rigidShortcut, std::abs(scale - 1), 1e-14);
     EXPECT_TRUE(result.conditioning[0].normalRotatedOnly);
   }
   for (const double scale : {1 + std::ldexp(1.0, -14), 1 - std::ldexp(1.0, -14), 2.0}) {
-    const reference::SkinnedMesh result = skinnedBy(scale);
+    const reference::AnalyzedMesh result = skinnedBy(scale);
     EXPECT_NEAR(result.positions[0][0], scale, 1e-15);
     EXPECT_EQ(result.conditioning[0].rigidShortcut, 0);
     EXPECT_FALSE(result.conditioning[0].normalRotatedOnly);
@@ -356,12 +356,12 @@ TEST(ReferenceDualQuaternion, Truth16_JointsTakenForRigidStayInsideTheBound) {
     OwnedMesh mesh;
     addVertex(mesh, axis, {{0, 1.0f}});
     mesh.normals = {0, 0, 1};
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
     if (!result.conditioning[0].normalRotatedOnly) continue;  // not taken for rigid
     ++taken;
     const double error =
         glm::length(rotation * bindPosition(mesh, 0) - toVector(result.positions[0]));
-    worst = std::max(worst, error / positionBound(Method::dualQuaternion, result.conditioning[0]));
+    worst = std::max(worst, error / result.bounds[0].position);
   }
   EXPECT_GT(taken, 1000);
   EXPECT_LE(worst, 1) << "of the bound";

@@ -84,11 +84,11 @@ struct FormatInputTest : public ::testing::Test {
             values[(first + 2) % values.size()].value};
   }
 
-  reference::SkinnedMesh skinnedFree(const MeshView& view) {
+  reference::AnalyzedMesh skinnedFree(const MeshView& view) {
     const std::array pose{JointMatrix{}};
-    Result<reference::SkinnedMesh> result = reference::skin(view, pose, Method::dualQuaternion);
+    Result<reference::AnalyzedMesh> result = reference::analyze(view, pose, Method::dualQuaternion);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
-    return result ? std::move(*result) : reference::SkinnedMesh{};
+    return result ? std::move(*result) : reference::AnalyzedMesh{};
   }
 
   void expectPositions(const std::vector<Stored>& values, ComponentType type) {
@@ -97,10 +97,10 @@ struct FormatInputTest : public ::testing::Test {
         const Elements elements = elementsOf(windows(values, components), components, type, gap);
         MeshView view = freeMesh(values.size());
         view.positions = elements.view;
-        const reference::SkinnedMesh plain = skinnedFree(view);
+        const reference::AnalyzedMesh plain = skinnedFree(view);
         view.positionScale = {0.5f, 3, -7.25f};
         view.positionOffset = {100, -0.75f, 0};
-        const reference::SkinnedMesh scaled = skinnedFree(view);
+        const reference::AnalyzedMesh scaled = skinnedFree(view);
         ASSERT_EQ(plain.positions.size(), values.size());
         for (std::size_t vertex = 0; vertex < values.size(); ++vertex) {
           const glm::dvec3 expected = window(values, vertex);
@@ -118,7 +118,7 @@ struct FormatInputTest : public ::testing::Test {
       MeshView view = freeMesh(values.size());
       view.normals = elements.view;
       if (components == 4) view.tangents = elements.view;
-      const reference::SkinnedMesh result = skinnedFree(view);
+      const reference::AnalyzedMesh result = skinnedFree(view);
       for (std::size_t vertex = 0; vertex < values.size(); ++vertex) {
         const glm::dvec3 expected = glm::normalize(window(values, vertex));
         expectNear(toVector(result.normals[vertex]), expected, 1e-15);
@@ -159,7 +159,7 @@ TEST_F(FormatInputTest, AFourthComponentOfFloatsIsNotRead) {
   const std::array values{1.0f, 2.0f, 3.0f, 77.0f, 4.0f, 5.0f, 6.0f, 88.0f};
   MeshView view = freeMesh(2);
   view.positions = view.normals = floatAttribute(values.data(), 2, 4);
-  const reference::SkinnedMesh result = skinnedFree(view);
+  const reference::AnalyzedMesh result = skinnedFree(view);
   EXPECT_EQ(result.positions[1], (reference::Double3{4, 5, 6}));
   expectNear(toVector(result.normals[1]), glm::normalize(glm::dvec3(4, 5, 6)), 1e-15);
 }
@@ -235,7 +235,7 @@ TEST_F(FormatInputTest, RoundingToFloat32IsInsideWhatIsAllowedFor) {
   view.positions = elements.view;
   view.positionScale = {1.7f, 0.03f, 9.1f};
   view.positionOffset = {-0.2f, 5.5f, -4.4f};
-  const reference::SkinnedMesh result = skinnedFree(view);
+  const reference::AnalyzedMesh result = skinnedFree(view);
   double worst = 0;
   for (std::size_t vertex = 0; vertex < 20000; ++vertex) {
     const glm::dvec3 p = toVector(result.positions[vertex]);

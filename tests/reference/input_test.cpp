@@ -50,8 +50,8 @@ struct InputTest : public ::testing::Test {
 
   void expectAsPlain(const MeshView& mesh, double tolerance) {
     for (const Method method : allMethods) {
-      const reference::SkinnedMesh expected = skinned(plain, pose, method);
-      const Result<reference::SkinnedMesh> result = reference::skin(mesh, pose, method);
+      const reference::AnalyzedMesh expected = skinned(plain, pose, method);
+      const Result<reference::AnalyzedMesh> result = reference::analyze(mesh, pose, method);
       ASSERT_TRUE(result.ok()) << result.error().message;
       for (std::size_t vertex = 0; vertex < plain.vertexCount(); ++vertex) {
         expectNear(toVector(result->positions[vertex]), toVector(expected.positions[vertex]),
@@ -182,8 +182,8 @@ TEST_F(InputTest, Truth14_ASlotOfWeightZeroHasNoEffectInAnyBit) {
     if (slot % 4 == 3) addNothing(0.0f);
   }
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh expected = skinned(plain, pose, method);
-    const reference::SkinnedMesh result = skinned(padded, spoiled, method);
+    const reference::AnalyzedMesh expected = skinned(plain, pose, method);
+    const reference::AnalyzedMesh result = skinned(padded, spoiled, method);
     EXPECT_EQ(result.positions, expected.positions);
     EXPECT_EQ(result.normals, expected.normals);
     for (std::size_t vertex = 0; vertex < plain.vertexCount(); ++vertex) {
@@ -206,7 +206,7 @@ TEST_F(InputTest, AVertexWithoutWeightStaysInBindPose) {
     for (std::size_t slot = 0; slot < 4; ++slot) plain.weights[vertex * 4 + slot] = 0;
   }
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh result = skinned(plain, pose, method);
+    const reference::AnalyzedMesh result = skinned(plain, pose, method);
     for (std::size_t vertex = 0; vertex < plain.vertexCount(); vertex += 2) {
       EXPECT_EQ(toVector(result.positions[vertex]), bindPosition(plain, vertex));
     }
@@ -217,7 +217,7 @@ TEST_F(InputTest, AVertexWithoutWeightStaysInBindPose) {
 TEST_F(InputTest, RefusesWhatPackRefuses) {
   const auto refused = [&](OwnedMesh mesh, std::string_view part) {
     for (const Method method : allMethods) {
-      const Result<reference::SkinnedMesh> result = reference::skin(mesh.view(), pose, method);
+      const Result<reference::AnalyzedMesh> result = reference::analyze(mesh.view(), pose, method);
       ASSERT_FALSE(result.ok());
       EXPECT_EQ(result.error().code, ErrorCode::invalidMesh);
       EXPECT_NE(result.error().message.find(part), std::string::npos) << result.error().message;

@@ -15,7 +15,7 @@ TEST(ReferenceLinear, PositionsAreTheBlendedMatrixTimesThePoint) {
                            random.vector(3)));
   }
   OwnedMesh mesh = scatteredMesh(random, 500, 7, 5);
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::linear);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::linear);
   ASSERT_EQ(result.positions.size(), 500u);
   for (std::size_t vertex = 0; vertex < 500; ++vertex) {
     glm::dvec3 expected(0.0);
@@ -35,7 +35,7 @@ TEST(ReferenceLinear, OneInfluenceIsItsJoint) {
   OwnedMesh mesh;
   addVertex(mesh, {1, 1, 1}, {{0, 1.0f}});
   addVertex(mesh, {1, 2, 3}, {{1, 0.125f}});
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::linear);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::linear);
   EXPECT_EQ(result.positions[0], (reference::Double3{12, 23, 34}));
   EXPECT_EQ(result.positions[1], (reference::Double3{1, 2, 3}));
 }

@@ -137,7 +137,7 @@ using Formula = std::function<Moved(const ByHand&)>;
 /// `compared` counts vertices, normals apart.
 void expectFormula(OwnedMesh& mesh, std::span<const JointMatrix> pose, Method method,
                    double tolerance, const Formula& formula) {
-  const reference::SkinnedMesh result = skinned(mesh, pose, method);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, method);
   std::size_t compared = 0;
   for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
     const ByHand byHand(mesh, vertex, pose);
@@ -160,7 +160,7 @@ TEST(ReferenceMethods, OneInfluenceIsItsJointWhateverTheMethod) {
     const std::vector<JointMatrix> pose = randomJoints(random, kind, 40);
     OwnedMesh mesh = meshWithShares(random, 300, 40, 1);
     for (const Method method : allMethods) {
-      const reference::SkinnedMesh result = skinned(mesh, pose, method);
+      const reference::AnalyzedMesh result = skinned(mesh, pose, method);
       for (std::size_t vertex = 0; vertex < 300; ++vertex) {
         const JointMatrix& joint = pose[mesh.joints[vertex]];
         expectNear(toVector(result.positions[vertex]),
@@ -182,7 +182,7 @@ TEST(ReferenceMethods, EqualJointsAreOneJointWhateverTheMethod) {
       const std::vector<JointMatrix> pose(5, randomJoint(random, kind));
       OwnedMesh mesh = meshWithShares(random, 10, 5, 4);
       for (const Method method : allMethods) {
-        const reference::SkinnedMesh result = skinned(mesh, pose, method);
+        const reference::AnalyzedMesh result = skinned(mesh, pose, method);
         for (std::size_t vertex = 0; vertex < 10; ++vertex) {
           const glm::dmat3 c = linearOf(pose[0]);
           expectNear(toVector(result.positions[vertex]),
@@ -204,7 +204,7 @@ TEST(ReferenceMethods, TranslationsBlendLinearlyWhateverTheMethod) {
     pose.push_back(jointOf(glm::dmat3(1.0), random.vector(2)));
   OwnedMesh mesh = meshWithShares(random, 200, 10, 4);
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh result = skinned(mesh, pose, method);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, method);
     for (std::size_t vertex = 0; vertex < 200; ++vertex) {
       expectNear(toVector(result.positions[vertex]),
                  ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
@@ -230,8 +230,8 @@ TEST(ReferenceMethods, AScaleInBindSpaceIsAScaledMeshWhateverTheMethod) {
       large.centersOfRotation[i] *= scale[i % 3];
     }
     for (const Method method : allMethods) {
-      const reference::SkinnedMesh result = skinned(small, scaled, method);
-      const reference::SkinnedMesh expected = skinned(large, rigid, method);
+      const reference::AnalyzedMesh result = skinned(small, scaled, method);
+      const reference::AnalyzedMesh expected = skinned(large, rigid, method);
       for (std::size_t vertex = 0; vertex < 50; ++vertex) {
         if (expected.conditioning[vertex].signAmbiguous) continue;
         expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-12);
@@ -257,8 +257,8 @@ TEST(ReferenceMethods, Truth19_AScaleOf100IsKeptWhateverTheMethod) {
   for (float& coordinate : large.positions) coordinate *= 100;
   for (float& coordinate : large.centersOfRotation) coordinate *= 100;
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh expected = skinned(large, rigid, method);
-    const reference::SkinnedMesh result = skinned(small, scaled, method);
+    const reference::AnalyzedMesh expected = skinned(large, rigid, method);
+    const reference::AnalyzedMesh result = skinned(small, scaled, method);
     for (std::size_t vertex = 0; vertex < 300; ++vertex) {
       if (expected.conditioning[vertex].signAmbiguous) continue;
       expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-11);
@@ -274,7 +274,7 @@ TEST(ReferenceMethods, ThoseWithACenterOfRotationRefuseAMeshWithout) {
   mesh.centersOfRotation.clear();
   const std::vector<JointMatrix> pose(4);
   for (const Method method : allMethods) {
-    const Result<reference::SkinnedMesh> result = reference::skin(mesh.view(), pose, method);
+    const Result<reference::AnalyzedMesh> result = reference::analyze(mesh.view(), pose, method);
     ASSERT_EQ(result.ok(), !needsCentersOfRotation(method)) << methodName(method);
     if (result) continue;
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
@@ -373,7 +373,7 @@ TEST(ReferenceMethods, IterativeBlendingIsWhereTheLogarithmsCancel) {
       addVertex(mesh, p, {{0, weights[0]}, {1, weights[1]}, {2, weights[2]}, {3, weights[3]}});
     }
     mesh.normals.assign(12, 0.0f);
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternionIterative);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternionIterative);
     glm::dmat4 b(1.0);
     b[3] = glm::dvec4(toVector(result.positions[0]), 1);
     for (int i = 0; i < 3; ++i) {
@@ -465,7 +465,7 @@ TEST(ReferenceMethods, SphericalBlendFindsTheJointWhereTwoBonesMeet) {
     addVertex(mesh, p, {{0, 0.375f}, {1, 0.625f}});
     const glm::dvec3 beside(glm::vec3(elbow + random.direction()));
     addVertex(mesh, beside, {{0, 0.375f}, {1, 0.625f}});
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
     expectNear(toVector(result.positions[0]), p, 1e-5);
     EXPECT_NEAR(glm::length(toVector(result.positions[1]) - p), glm::length(beside - p), 1e-5)
         << "on a sphere about it";
@@ -482,7 +482,7 @@ TEST(ReferenceMethods, SphericalBlendOfACommonAxisIsFinite) {
       pose.push_back(jointOf(first * rotationAbout(axis, random.between(-1, 1)), random.vector(1)));
     }
     OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
     for (std::size_t vertex = 0; vertex < 5; ++vertex) {
       ASSERT_TRUE(isFiniteVector(result.positions[vertex]));
       // The least of two singular values says how far what is left of rounding is thrown.
@@ -503,7 +503,7 @@ TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
     std::vector<JointMatrix> pose;
     for (int joint = 0; joint < 4; ++joint) pose.push_back(jointOf(rotation, random.vector(1)));
     OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
     for (std::size_t vertex = 0; vertex < 5; ++vertex) {
       expectNear(toVector(result.positions[vertex]),
                  ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
@@ -520,7 +520,7 @@ TEST(ReferenceMethods, SphericalBlendOfNearlyEqualRotationsStaysNear) {
       for (int joint = 0; joint < 4; ++joint)
         pose.push_back(jointOf(rotationAbout(random.direction(), angle), random.vector(1)));
       OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
-      const reference::SkinnedMesh result = skinned(mesh, pose, Method::sphericalBlend);
+      const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
       for (std::size_t vertex = 0; vertex < 5; ++vertex) {
         ASSERT_TRUE(isFiniteVector(result.positions[vertex]));
         // All joints move the point nearly alike but for their translations.
@@ -541,9 +541,9 @@ TEST(ReferenceMethods, BlendedIsTheMeanOfBothByItsWeight) {
     OwnedMesh mesh = meshWithShares(random, 400, 20, 4);
     for (std::size_t vertex = 0; vertex < 100; ++vertex)
       mesh.dualQuaternionWeights[vertex] = std::array{0.0f, 0.25f, 0.5f, 1.0f}[vertex % 4];
-    const reference::SkinnedMesh linear = skinned(mesh, pose, Method::linear),
-                                 dual = skinned(mesh, pose, Method::dualQuaternion),
-                                 result = skinned(mesh, pose, Method::blended);
+    const reference::AnalyzedMesh linear = skinned(mesh, pose, Method::linear),
+                                  dual = skinned(mesh, pose, Method::dualQuaternion),
+                                  result = skinned(mesh, pose, Method::blended);
     for (std::size_t vertex = 0; vertex < 400; ++vertex) {
       const auto share = static_cast<double>(mesh.dualQuaternionWeights[vertex]);
       const auto mean = [&](const reference::Double3& a, const reference::Double3& b) {
@@ -568,12 +568,12 @@ TEST(ReferenceMethods, BlendedTakesTheMeshsWeightWhereTheVerticesHaveNone) {
   RigRandom random(21);
   const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
   OwnedMesh mesh = scatteredMesh(random, 50, 8, 3);
-  const reference::SkinnedMesh linear = skinned(mesh, pose, Method::linear),
-                               dual = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh linear = skinned(mesh, pose, Method::linear),
+                                dual = skinned(mesh, pose, Method::dualQuaternion);
   for (const float share : {0.0f, 0.125f, 0.5f, 1.0f}) {
     MeshView view = mesh.view();
     if (share != 0.5f) view.dualQuaternionWeight = share;  // a half unless it says otherwise
-    const Result<reference::SkinnedMesh> result = reference::skin(view, pose, Method::blended);
+    const Result<reference::AnalyzedMesh> result = reference::analyze(view, pose, Method::blended);
     ASSERT_TRUE(result.ok());
     for (std::size_t vertex = 0; vertex < 50; ++vertex) {
       expectNear(toVector(result->positions[vertex]),
@@ -606,8 +606,8 @@ TEST(ReferenceMethods, AVertexAtItsCenterOfRotationGoesWhereLinearBlendingTakesI
   const std::vector<JointMatrix> pose = randomJoints(random, Joints::mixed, 20);
   OwnedMesh mesh = scatteredMesh(random, 300, 20, 4);
   mesh.centersOfRotation = mesh.positions;
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::centerOfRotation),
-                               linear = skinned(mesh, pose, Method::linear);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::centerOfRotation),
+                                linear = skinned(mesh, pose, Method::linear);
   for (std::size_t vertex = 0; vertex < 300; ++vertex)
     expectNear(toVector(result.positions[vertex]), toVector(linear.positions[vertex]), 1e-13);
 }
@@ -617,8 +617,8 @@ TEST(ReferenceMethods, CenterOfRotationAtTheOriginIsQuaternionTranslation) {
   const std::vector<JointMatrix> pose = randomJoints(random, Joints::mixed, 20);
   OwnedMesh mesh = scatteredMesh(random, 300, 20, 4);
   std::fill(mesh.centersOfRotation.begin(), mesh.centersOfRotation.end(), 0.0f);
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::centerOfRotation),
-                               expected = skinned(mesh, pose, Method::quaternionTranslation);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::centerOfRotation),
+                                expected = skinned(mesh, pose, Method::quaternionTranslation);
   for (std::size_t vertex = 0; vertex < 300; ++vertex)
     expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-14);
 }
@@ -632,9 +632,9 @@ TEST(ReferenceMethods, BulgeControlLeadsFromDualQuaternionsToCentersOfRotation) 
     OwnedMesh mesh = meshWithShares(random, 400, 20, 4);
     for (std::size_t vertex = 0; vertex < 100; ++vertex)
       mesh.bulgeStrengths[vertex] = std::array{0.0f, 0.25f, 0.5f, 1.0f}[vertex % 4];
-    const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
-                                 centred = skinned(mesh, pose, Method::centerOfRotation),
-                                 result = skinned(mesh, pose, Method::bulgeControlled);
+    const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
+                                  centred = skinned(mesh, pose, Method::centerOfRotation),
+                                  result = skinned(mesh, pose, Method::bulgeControlled);
     for (std::size_t vertex = 0; vertex < 400; ++vertex) {
       const auto strength = static_cast<double>(mesh.bulgeStrengths[vertex]);
       expectNear(toVector(result.positions[vertex]),
@@ -667,13 +667,13 @@ TEST(ReferenceMethods, BulgeControlTakesTheMeshsStrengthWhereTheVerticesHaveNone
   RigRandom random(27);
   const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
   OwnedMesh mesh = scatteredMesh(random, 50, 8, 3);
-  const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
-                               centred = skinned(mesh, pose, Method::centerOfRotation);
+  const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
+                                centred = skinned(mesh, pose, Method::centerOfRotation);
   for (const float strength : {0.0f, 0.125f, 1.0f}) {
     MeshView view = mesh.view();
     if (strength != 1) view.bulgeStrength = strength;  // all of it unless it says otherwise
-    const Result<reference::SkinnedMesh> result =
-        reference::skin(view, pose, Method::bulgeControlled);
+    const Result<reference::AnalyzedMesh> result =
+        reference::analyze(view, pose, Method::bulgeControlled);
     ASSERT_TRUE(result.ok());
     for (std::size_t vertex = 0; vertex < 50; ++vertex) {
       expectNear(toVector(result->positions[vertex]),
@@ -695,13 +695,13 @@ TEST(ReferenceMethods, SharesOfEveryType) {
   OwnedMesh expected = mesh;
   expected.dualQuaternionWeights = expected.bulgeStrengths = parts;
   for (const Method method : {Method::blended, Method::bulgeControlled}) {
-    const reference::SkinnedMesh whole = skinned(expected, pose, method);
+    const reference::AnalyzedMesh whole = skinned(expected, pose, method);
     for (const AttributeView& shares :
          {AttributeView{bytes.data(), 4, 2, ComponentType::unorm8, 1},
           AttributeView{shorts.data(), 4, 2, ComponentType::unorm16, 1}}) {
       MeshView view = mesh.view();
       view.dualQuaternionWeights = view.bulgeStrengths = shares;
-      const Result<reference::SkinnedMesh> result = reference::skin(view, pose, method);
+      const Result<reference::AnalyzedMesh> result = reference::analyze(view, pose, method);
       ASSERT_TRUE(result.ok());
       for (std::size_t vertex = 0; vertex < 4; ++vertex)
         expectNear(toVector(result->positions[vertex]), toVector(whole.positions[vertex]), 1e-7);
@@ -738,7 +738,7 @@ TEST(ReferenceMethods, WhatIsScaledIsThenMovedRigidly) {
       for (const Method method : twoPhaseMethods) {
         // Those take the centre by the joints themselves, scale and all.
         if (needsCentersOfRotation(method)) continue;
-        const reference::SkinnedMesh result = skinned(mesh, pose, method);
+        const reference::AnalyzedMesh result = skinned(mesh, pose, method);
         if (result.conditioning[0].signAmbiguous) continue;
         expectNear(toVector(result.positions[0]),
                    toVector(skinned(scaled, rigid, method).positions[0]), 1e-6);

@@ -297,7 +297,7 @@ TEST(Property, Truth08_ThroughPosesTheBlendIsAsRigidAsItsJoints) {
                 {{first, weights[0]}, {first + 1, weights[1]}, {first + 2, weights[2]}});
     }
   }
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
   ASSERT_EQ(result.positions.size(), std::size_t{caseCount});
   for (std::size_t body = 0; body < bodies; ++body) {
     Motion3 motion;
@@ -324,8 +324,8 @@ TEST(Property, Truth04_ThroughPosesItIsInvariantFromTheLeft) {
     moved.push_back(jointOf(turn * linearOf(pose.back()), turn * offsetOf(pose.back()) + shift));
   }
   OwnedMesh mesh = scatteredMesh(random, caseCount, jointCount, 4);
-  const reference::SkinnedMesh before = skinned(mesh, pose, Method::dualQuaternion);
-  const reference::SkinnedMesh after = skinned(mesh, moved, Method::dualQuaternion);
+  const reference::AnalyzedMesh before = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh after = skinned(mesh, moved, Method::dualQuaternion);
   for (std::size_t vertex = 0; vertex < caseCount; ++vertex) {
     if (before.conditioning[vertex].signAmbiguous) continue;
     ASSERT_LE(glm::length(toVector(after.positions[vertex]) -

@@ -18,8 +18,8 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/verify/reference.h"
 #include "random_rig.h"
+#include "verify/conditioning.h"
 
 namespace dermis::test {
 
@@ -170,9 +170,9 @@ inline glm::dvec3 bindNormal(const OwnedMesh& mesh, std::size_t vertex) {
 }
 
 /// The reference's answer; a mesh that it refuses fails the test.
-inline reference::SkinnedMesh skinned(OwnedMesh& mesh, std::span<const JointMatrix> pose,
-                                      Method method) {
-  Result<reference::SkinnedMesh> result = reference::skin(mesh.view(), pose, method);
+inline reference::AnalyzedMesh skinned(OwnedMesh& mesh, std::span<const JointMatrix> pose,
+                                       Method method) {
+  Result<reference::AnalyzedMesh> result = reference::analyze(mesh.view(), pose, method);
   EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
   if (!result) return {};
   return std::move(*result);
@@ -240,7 +240,7 @@ double signedVolume(const Tube& tube, const Position& position) {
 /// The volume of the tube posed by {identity, joint}, over that at rest.
 inline double volumeRatio(Tube& tube, const JointMatrix& joint, Method method) {
   const std::array pose{JointMatrix{}, joint};
-  const reference::SkinnedMesh result = skinned(tube.mesh, pose, method);
+  const reference::AnalyzedMesh result = skinned(tube.mesh, pose, method);
   const double after =
       signedVolume(tube, [&](std::uint32_t v) { return toVector(result.positions[v]); });
   return after / signedVolume(tube, [&](std::uint32_t v) { return bindPosition(tube.mesh, v); });

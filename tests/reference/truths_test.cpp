@@ -44,7 +44,7 @@ struct Worst {
 };
 
 Worst worstOf(
-    const reference::SkinnedMesh& a, const reference::SkinnedMesh& b,
+    const reference::AnalyzedMesh& a, const reference::AnalyzedMesh& b,
     const std::function<double(const reference::Double3&, const reference::Double3&)>& difference) {
   Worst worst;
   const std::size_t steps = a.positions.size() - 1;
@@ -83,7 +83,7 @@ TEST(ReferenceTruths, Truth02_TheTranslationAlongTheScrewDiffersBy1501Hundredths
   const glm::dvec3 centre(0.3, -0.4, 0);
   const glm::dmat3 turn = rotationAbout({0, 0, 1}, 179.9999 * pi / 180);
   const std::array pose{JointMatrix{}, jointOf(turn, centre - turn * centre + glm::dvec3(0, 0, 1))};
-  const reference::SkinnedMesh exact = skinned(mesh, pose, Method::dualQuaternionIterative);
+  const reference::AnalyzedMesh exact = skinned(mesh, pose, Method::dualQuaternionIterative);
   for (std::size_t step = 0; step <= 10000; ++step)
     ASSERT_NEAR(exact.positions[step][2], static_cast<double>(step) * 1e-4, 1e-6);
   const Worst worst = worstOf(skinned(mesh, pose, Method::dualQuaternion), exact,
@@ -228,8 +228,8 @@ TEST(ReferenceTruths, Truth04_ThroughPoses) {
           }
         }
       }
-      const reference::SkinnedMesh before = skinned(mesh, pose, method);
-      const reference::SkinnedMesh after = skinned(turned, moved, method);
+      const reference::AnalyzedMesh before = skinned(mesh, pose, method);
+      const reference::AnalyzedMesh after = skinned(turned, moved, method);
       for (std::size_t vertex = 0; vertex < 50; ++vertex) {
         if (before.conditioning[vertex].signAmbiguous) continue;
         const glm::dvec3 expected =
@@ -679,7 +679,7 @@ TEST(ReferenceTruths, Truth16_LinearBlendingInFloatIsWithin6UnitsOfRounding) {
         mesh.weights[i + slot] = static_cast<float>(1 + random.below(5000)) / 32768;
       mesh.weights[i] = 1 - mesh.weights[i + 1] - mesh.weights[i + 2] - mesh.weights[i + 3];
     }
-    const reference::SkinnedMesh expected = skinned(mesh, pose, Method::linear);
+    const reference::AnalyzedMesh expected = skinned(mesh, pose, Method::linear);
     for (std::size_t vertex = 0; vertex < 1000; ++vertex) {
       float result[3];
       for (std::size_t row = 0; row < 3; ++row) {

@@ -67,7 +67,7 @@ void expectAsByHand(OwnedMesh& mesh, std::span<const JointMatrix> pose, double p
                     double normalTolerance) {
   std::vector<Parts> parts;
   for (const JointMatrix& joint : pose) parts.push_back(partsOf(joint));
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
   std::size_t compared = 0;
   for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
     const Skinned expected = skinByHand(mesh, vertex, parts);
@@ -133,7 +133,7 @@ TEST(ReferenceTwoPhase, AMirrorAndItsOppositeMeetInTheMiddle) {
   OwnedMesh mesh;
   addVertex(mesh, {1, 2, 3}, {{0, 0.5f}, {1, 0.5f}});
   addVertex(mesh, {1, 2, 3}, {{0, 0.75f}, {1, 0.25f}});
-  const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
   expectNear(toVector(result.positions[0]), {0, 0, 0}, 1e-15);
   expectNear(toVector(result.positions[1]), {0.5, 1, 1.5}, 1e-15);
 }
@@ -155,8 +155,8 @@ TEST(ReferenceTwoPhase, Truth19_OneInfluenceKeepsItsWholeMatrix) {
     pose.push_back(jointOf(rotation * parts[joint % 8], random.vector(2)));
   }
   OwnedMesh mesh = scatteredMesh(random, 400, 40, 1);
-  const reference::SkinnedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
-  const reference::SkinnedMesh linear = skinned(mesh, pose, Method::linear);
+  const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh linear = skinned(mesh, pose, Method::linear);
   for (std::size_t vertex = 0; vertex < 400; ++vertex) {
     expectNear(toVector(dual.positions[vertex]), toVector(linear.positions[vertex]), 1e-12);
     // The two turn a normal through the same matrix, C = R S.
@@ -178,8 +178,8 @@ TEST(ReferenceTwoPhase, Truth19_AScaleOf100IsKeptWhereRigidPartsBlend) {
   for (float& coordinate : small.positions) coordinate = std::round(coordinate * 1024) / 1024;
   for (std::size_t i = 0; i < small.positions.size(); ++i)
     large.positions[i] = 100 * small.positions[i];
-  const reference::SkinnedMesh expected = skinned(large, rigid, Method::dualQuaternion);
-  const reference::SkinnedMesh result = skinned(small, scaled, Method::dualQuaternion);
+  const reference::AnalyzedMesh expected = skinned(large, rigid, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(small, scaled, Method::dualQuaternion);
   for (std::size_t vertex = 0; vertex < 300; ++vertex) {
     if (expected.conditioning[vertex].signAmbiguous) continue;
     expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-12);
@@ -202,7 +202,7 @@ TEST(ReferenceTwoPhase, RankTwo) {
       parts.push_back({rotation, flat, offsetOf(pose.back())});
     }
     OwnedMesh mesh = scatteredMesh(random, 10, 3, 3);
-    const reference::SkinnedMesh result = skinned(mesh, pose, Method::dualQuaternion);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
     for (std::size_t vertex = 0; vertex < 10; ++vertex) {
       const Skinned expected = skinByHand(mesh, vertex, parts);
       if (result.conditioning[vertex].signAmbiguous) continue;
@@ -224,7 +224,7 @@ TEST(ReferenceTwoPhase, RankOneAndZeroAreFinite) {
                                       JointMatrix{}};
   OwnedMesh mesh = scatteredMesh(random, 500, 7, 3);
   for (const Method method : allMethods) {
-    const reference::SkinnedMesh result = skinned(mesh, pose, method);
+    const reference::AnalyzedMesh result = skinned(mesh, pose, method);
     for (std::size_t vertex = 0; vertex < 500; ++vertex) {
       EXPECT_TRUE(isFiniteVector(result.positions[vertex])) << vertex;
       ASSERT_TRUE(isFiniteVector(result.normals[vertex])) << vertex;
@@ -235,7 +235,7 @@ TEST(ReferenceTwoPhase, RankOneAndZeroAreFinite) {
   // What a joint of rank 0 does is known all the same.
   OwnedMesh point;
   addVertex(point, {4, 5, 6}, {{0, 1.0f}});
-  const reference::SkinnedMesh result = skinned(point, pose, Method::dualQuaternion);
+  const reference::AnalyzedMesh result = skinned(point, pose, Method::dualQuaternion);
   expectNear(toVector(result.positions[0]), {1, 2, 3}, 1e-15);
   EXPECT_TRUE(result.conditioning[0].degenerate);
 }
@@ -262,10 +262,10 @@ TEST(ReferenceTwoPhase, ANaNInOneJointStaysWithItsVertices) {
       pose.push_back(jointOf(randomRotation(random), random.vector(1)));
     OwnedMesh mesh = scatteredMesh(random, 100, 5, 2);
     for (const Method method : allMethods) {
-      const reference::SkinnedMesh before = skinned(mesh, pose, method);
+      const reference::AnalyzedMesh before = skinned(mesh, pose, method);
       std::vector<JointMatrix> damaged = pose;
       damaged[3].m[1][2] = bad;
-      const reference::SkinnedMesh after = skinned(mesh, damaged, method);
+      const reference::AnalyzedMesh after = skinned(mesh, damaged, method);
       for (std::size_t vertex = 0; vertex < 100; ++vertex) {
         const bool touched = mesh.joints[2 * vertex] == 3 || mesh.joints[2 * vertex + 1] == 3;
         if (touched) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "random_rig.h"
+#include "verify/conditioning.h"
 
 namespace dermis::test {
 namespace {
@@ -194,9 +195,17 @@ struct CompareTest : public ::testing::Test {
     skinned.tangents = {tangents.data(), count, 16, VertexFormat::float32x4};
     return skinned;
   }
+  /// What is expected, with the bounds that a method has by its conditioning.
+  reference::SkinnedMesh bounded(Method method) const {
+    reference::SkinnedMesh mesh = expected;
+    for (const reference::Conditioning& vertex : expected.conditioning) {
+      mesh.bounds.push_back(boundsOf(method, vertex));
+    }
+    return mesh;
+  }
   Comparison compared(Method method = Method::dualQuaternion,
                       const Exemptions& exemptions = {}) const {
-    const Result<Comparison> result = compareWithReference(expected, view(), method, exemptions);
+    const Result<Comparison> result = compareWithReference(bounded(method), view(), exemptions);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     return result ? *result : Comparison{};
   }
@@ -220,7 +229,7 @@ struct CompareTest : public ::testing::Test {
   }
 
   static constexpr std::uint32_t count = 20;
-  reference::SkinnedMesh expected;
+  reference::AnalyzedMesh expected;  ///< without bounds
   std::vector<float> positions, normals, tangents;
 };
 
@@ -335,7 +344,7 @@ TEST_F(CompareTest, WhatIsAMatterOfRoundingNeedOnlyBeFinite) {
     const Comparison comparison = compared(Method::dualQuaternion, {1, 0});
     EXPECT_TRUE(comparison.passed());
     EXPECT_EQ(comparison.exempt, (Exemptions{1, 0}));
-    EXPECT_EQ(comparison.exempt, exemptionsOf(expected, Method::dualQuaternion));
+    EXPECT_EQ(comparison.exempt, exemptionsOf(bounded(Method::dualQuaternion)));
     EXPECT_EQ(comparison.compared, count - 1);
     expectOtherExemptionsToFail({1, 0});
     // Linear blending knows neither signs nor rotations.
@@ -353,7 +362,7 @@ TEST_F(CompareTest, VerticesWithoutAnAnswerAreNotLookedAt) {
     const Comparison comparison = compared(method, {0, 1});
     EXPECT_TRUE(comparison.passed());
     EXPECT_EQ(comparison.exempt, (Exemptions{0, 1}));
-    EXPECT_EQ(comparison.exempt, exemptionsOf(expected, method));
+    EXPECT_EQ(comparison.exempt, exemptionsOf(bounded(method)));
     EXPECT_EQ(comparison.compared, count - 1);
     expectOtherExemptionsToFail({0, 1}, method);
   }
@@ -361,7 +370,7 @@ TEST_F(CompareTest, VerticesWithoutAnAnswerAreNotLookedAt) {
 
 // A reference that is broken excuses nothing: not what it computed, nor what that is held against.
 TEST_F(CompareTest, AReferenceThatIsNotFiniteFails) {
-  const reference::SkinnedMesh good = expected;
+  const reference::AnalyzedMesh good = expected;
   const auto expectFailureOf = [&](auto spoil) {
     for (const Method method : allMethods) {
       expected = good;
@@ -370,19 +379,19 @@ TEST_F(CompareTest, AReferenceThatIsNotFiniteFails) {
     }
   };
   for (const double bad : {nan, HUGE_VAL, -HUGE_VAL}) {
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.positions[6][2] = bad; });
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.normals[6][0] = bad; });
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.tangents[6][1] = bad; });
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.tangents[6][3] = bad; });
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) { mesh.positions[6][2] = bad; });
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) { mesh.normals[6][0] = bad; });
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) { mesh.tangents[6][1] = bad; });
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) { mesh.tangents[6][3] = bad; });
     // Where a direction is only asked to be of unit length, too.
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) {
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) {
       mesh.normals[6][0] = bad;
       mesh.conditioning[6].normalRounding = HUGE_VAL;
     });
   }
   // Nor is a bound that is none.
   for (const double bad : {nan, HUGE_VAL})
-    expectFailureOf([bad](reference::SkinnedMesh& mesh) { mesh.conditioning[6].scale = bad; });
+    expectFailureOf([bad](reference::AnalyzedMesh& mesh) { mesh.conditioning[6].scale = bad; });
   expected = good;
   expected.conditioning[6].turning = HUGE_VAL;
   expectOneFailure(6, Method::dualQuaternionIterative);
@@ -460,7 +469,7 @@ TEST(Compare, AZeroNormalMustStayZero) {
         SkinnedView actual;
         actual.positions = {positions.data(), 2, 12, VertexFormat::float32x3};
         actual.normals = {normals.data(), 2, 12, VertexFormat::float32x3};
-        return compareWithReference(*expected, actual, method)->passed();
+        return compareWithReference(*expected, actual)->passed();
       };
       EXPECT_TRUE(passes()) << methodName(method) << ", scale " << scale;
       normals[0] = 1;
@@ -475,13 +484,13 @@ TEST_F(CompareTest, DirectionsAreComparedWhereBothHaveThem) {
   EXPECT_FALSE(compared().passed());
   SkinnedView without = view();
   without.normals = {};
-  EXPECT_TRUE(compareWithReference(expected, without, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(bounded(Method::linear), without)->passed());
   normals = normalsBefore;
   tangents.assign(tangents.size(), 5.0f);
   EXPECT_FALSE(compared().passed());
   without = view();
   without.tangents = {};
-  EXPECT_TRUE(compareWithReference(expected, without, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(bounded(Method::linear), without)->passed());
   normals.assign(normals.size(), 5.0f);
   expected.normals.clear();
   expected.tangents.clear();
@@ -500,11 +509,11 @@ TEST_F(CompareTest, ReadsWithStrides) {
   strided.positions = {&bytes[1], count, stride, VertexFormat::float32x3};
   strided.normals = {&bytes[14], count, stride, VertexFormat::float32x3};
   strided.tangents = {&bytes[27], count, stride, VertexFormat::float32x4};
-  EXPECT_TRUE(compareWithReference(expected, strided, Method::linear)->passed());
+  EXPECT_TRUE(compareWithReference(bounded(Method::linear), strided)->passed());
   for (const std::size_t lastOfAttribute : {1u + 3, 14u + 11, 27u + 15}) {
     unsigned char& byte = bytes[lastOfAttribute + 19 * stride];
     byte ^= 0x80;
-    EXPECT_EQ(compareWithReference(expected, strided, Method::linear)->firstFailure, 19u);
+    EXPECT_EQ(compareWithReference(bounded(Method::linear), strided)->firstFailure, 19u);
     byte ^= 0x80;
   }
 }
@@ -515,7 +524,7 @@ TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
     const auto refused = [&](const SkinnedAttribute& bad, std::string_view part) {
       SkinnedView skinned = view();
       skinned.*attribute = bad;
-      const Result<Comparison> result = compareWithReference(expected, skinned, Method::linear);
+      const Result<Comparison> result = compareWithReference(bounded(Method::linear), skinned);
       ASSERT_FALSE(result.ok()) << part;
       EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
       EXPECT_NE(result.error().message.find(part), std::string::npos) << result.error().message;
@@ -535,13 +544,16 @@ TEST_F(CompareTest, CountsAndFormatsThatDisagreeAreRefused) {
   }
   SkinnedView skinned = view();
   skinned.positions.format = VertexFormat::octahedral16x2;
-  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(bounded(Method::linear), skinned).ok());
   skinned = view();
   skinned.tangents.format = VertexFormat::float32x3;
-  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(bounded(Method::linear), skinned).ok());
+  reference::SkinnedMesh tooFewBounds = bounded(Method::linear);
+  tooFewBounds.bounds.pop_back();
+  EXPECT_FALSE(compareWithReference(tooFewBounds, view()).ok());
   skinned = view();
   skinned.positions = {};
-  EXPECT_FALSE(compareWithReference(expected, skinned, Method::linear).ok());
+  EXPECT_FALSE(compareWithReference(bounded(Method::linear), skinned).ok());
 }
 
 TEST_F(CompareTest, OneWrongTangentIsFound) {

@@ -65,7 +65,7 @@ void expectInside(OwnedMesh& mesh, std::span<const JointMatrix> pose, const std:
     for (std::size_t vertex = 0; vertex < skinned->positions.size(); ++vertex) {
       const reference::Double3& position = skinned->positions[vertex];
       ASSERT_TRUE(isFinite(position)) << what;
-      const double margin = positionBound(method, skinned->conditioning[vertex]);
+      const double margin = skinned->bounds[vertex].position;
       ASSERT_LE(overhang(box, position, margin), 0)
           << what << ", " << methodName(method) << ", vertex " << vertex;
     }
@@ -241,7 +241,7 @@ struct Climber {
     const JointBounds bounds = boundsOf(mesh.view(), static_cast<std::uint32_t>(pose.size()));
     const Box box = skinnedBounds(bounds, pose, method);
     const Result<reference::SkinnedMesh> skinned = reference::skin(mesh.view(), pose, method);
-    const double size = skinned->conditioning[0].scale;
+    const double size = skinned->bounds[0].scale;
     return overhang(box, skinned->positions[0]) / size;
   }
 };

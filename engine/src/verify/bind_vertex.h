@@ -11,7 +11,7 @@
 
 #include "dermis/mesh.h"
 #include "dermis/result.h"
-#include "dermis/verify/reference.h"
+#include "verify/conditioning.h"
 
 namespace dermis::reference {
 

@@ -8,10 +8,10 @@
 namespace dermis {
 namespace {
 
-using reference::Conditioning;
 using reference::Double3;
 using reference::Double4;
 using reference::SkinnedMesh;
+using reference::VertexBounds;
 
 /// As inexact as Vulkan allows: 4 u by `inversesqrt`, 10 u by a division, and their own roundings.
 constexpr double unitTolerance = 1.5e-6;
@@ -20,12 +20,6 @@ constexpr double halfOverflow = 65520;
 
 bool isHalf(VertexFormat format) {
   return format == VertexFormat::float16x3 || format == VertexFormat::float16x4;
-}
-
-/// Whether linear blending, which knows neither signs nor rotations, is the only one to have an
-/// answer.
-bool isArbitrary(const Conditioning& conditioning, Method method) {
-  return method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate);
 }
 
 bool isOctahedral(VertexFormat format) {
@@ -92,8 +86,8 @@ bool dropOverflow(Double3& actual, Double3& expected, double bound) {
 
 /// Whether float16 may be unable to hold a position of which only its size is known. No answer is
 /// much further away than `scale`: blending divides by |b_q|, rarely less than a half.
-bool mayOverflow(VertexFormat format, const Conditioning& conditioning) {
-  return isHalf(format) && 8 * conditioning.scale >= halfOverflow;
+bool mayOverflow(VertexFormat format, const VertexBounds& bounds) {
+  return isHalf(format) && 8 * bounds.scale >= halfOverflow;
 }
 
 PositionCheck checkPosition(Double3 expected, const SkinnedView& view, std::size_t vertex,
@@ -119,16 +113,13 @@ PositionCheck checkPosition(Double3 expected, const SkinnedView& view, std::size
   return check;
 }
 
-/// A unit direction, or a zero one. `bound` is negative where only its length can be said;
-/// `bindRounding` in units of u.
+/// A unit direction, or a zero one. `bound` is negative if only its length is known.
 double directionShare(Double3 expected, const Double3& actual, VertexFormat format, double bound,
-                      double formatBound, double bindRounding) {
+                      double formatBound, bool mayBeZero) {
   if (!isFinite(expected) || !std::isfinite(bound)) return HUGE_VAL;
   const bool isZero = length(expected) == 0;
   if (isOctahedral(format) && isZero) expected = {0, 0, 1};
   if (bound < 0) {
-    // Where the bind pose all but cancels, what is zero and what is not is a matter of rounding.
-    const bool mayBeZero = floatRounding * bindRounding >= 1;
     if (mayBeZero && length(actual) == 0) return 0;
     const double expectedLength = length(expected) == 0 && !mayBeZero ? 0 : 1;
     return std::abs(length(actual) - expectedLength) / (unitTolerance + formatBound);
@@ -139,7 +130,6 @@ double directionShare(Double3 expected, const Double3& actual, VertexFormat form
 struct Checker {
   const SkinnedMesh& expected;
   const SkinnedView& actual;
-  Method method;
   bool withNormals, withTangents;
   Comparison result;
 
@@ -165,26 +155,26 @@ struct Checker {
   }
 
   bool checkNormal(std::size_t vertex) {
-    const Conditioning& conditioning = expected.conditioning[vertex];
+    const VertexBounds& bounds = expected.bounds[vertex];
     const VertexFormat format = actual.normals.format;
-    const double bound = normalBound(method, conditioning);
+    const double bound = bounds.normal;
     const double share = directionShare(expected.normals[vertex], normalAt(vertex), format, bound,
-                                        normalFormatBound(format), conditioning.normalRounding);
+                                        normalFormatBound(format), bounds.normalMayVanish);
     if (bound < 0) ++result.onlyUnitNormals;
     record(share, vertex, result.worstNormal, result.worstNormalVertex);
     return share <= 1 && isFilledWith(0, actual.normals, vertex);
   }
 
   bool checkTangent(std::size_t vertex) {
-    const Conditioning& conditioning = expected.conditioning[vertex];
+    const VertexBounds& bounds = expected.bounds[vertex];
     const VertexFormat format = actual.tangents.format;
     const Double4 tangent = tangentAt(vertex);
-    const double bound = tangentBound(method, conditioning);
+    const double bound = bounds.tangent;
     double share = directionShare(direction(expected.tangents[vertex]), direction(tangent), format,
-                                  bound, tangentFormatBound(format), conditioning.tangentRounding);
+                                  bound, tangentFormatBound(format), bounds.tangentMayVanish);
     if (bound < 0) ++result.onlyUnitTangents;
     const double handedness = expected.tangents[vertex][3];
-    const bool opposite = conditioning.handednessAmbiguous && tangent[3] == -handedness;
+    const bool opposite = bounds.eitherHandedness && tangent[3] == -handedness;
     if (tangent[3] != handedness && !opposite) {
       const double tolerance = bound < 0 ? unitTolerance : bound;
       share = std::max(share, 2 / (tolerance + tangentFormatBound(format)));
@@ -194,13 +184,13 @@ struct Checker {
   }
 
   void checkVertex(std::size_t vertex) {
-    const Conditioning& conditioning = expected.conditioning[vertex];
-    if (conditioning.undefined) {
+    const VertexBounds& bounds = expected.bounds[vertex];
+    if (bounds.undefined) {
       ++result.exempt.skipped;
       return;
     }
-    const bool arbitrary = isArbitrary(conditioning, method);
-    const double bound = positionBound(method, conditioning);
+    const bool arbitrary = bounds.onlyFinite;
+    const double bound = bounds.position;
     if (!isFinite(expected.positions[vertex]) || !(arbitrary || std::isfinite(bound))) {
       fail(vertex);  // of the reference
       return;
@@ -208,7 +198,7 @@ struct Checker {
     const PositionCheck position = checkPosition(expected.positions[vertex], actual, vertex, bound);
     result.clamped += position.clamped ? 1 : 0;
     const Double4 tangent = tangentAt(vertex);
-    const bool overflow = arbitrary && mayOverflow(actual.positions.format, conditioning);
+    const bool overflow = arbitrary && mayOverflow(actual.positions.format, bounds);
     if (!(position.finite || overflow) || !isFinite(normalAt(vertex)) ||
         !isFinite(direction(tangent)) || !std::isfinite(tangent[3])) {
       fail(vertex);
@@ -257,12 +247,12 @@ bool isUpright(const Box& box) {
 
 }  // namespace
 
-Exemptions exemptionsOf(const SkinnedMesh& expected, Method method) {
+Exemptions exemptionsOf(const SkinnedMesh& expected) {
   Exemptions exemptions;
-  for (const Conditioning& conditioning : expected.conditioning) {
-    if (conditioning.undefined) {
+  for (const VertexBounds& bounds : expected.bounds) {
+    if (bounds.undefined) {
       ++exemptions.skipped;
-    } else if (isArbitrary(conditioning, method)) {
+    } else if (bounds.onlyFinite) {
       ++exemptions.onlyFinite;
     }
   }
@@ -270,7 +260,7 @@ Exemptions exemptionsOf(const SkinnedMesh& expected, Method method) {
 }
 
 Result<Comparison> compareWithReference(const SkinnedMesh& expected, const SkinnedView& actual,
-                                        Method method, const Exemptions& exemptions) {
+                                        const Exemptions& exemptions) {
   const std::size_t count = expected.positions.size();
   const bool withNormals = actual.normals.data != nullptr && !expected.normals.empty();
   const bool withTangents = actual.tangents.data != nullptr && !expected.tangents.empty();
@@ -284,9 +274,13 @@ Result<Comparison> compareWithReference(const SkinnedMesh& expected, const Skinn
   if (wrong.empty() && isSnormPosition(actual.positions.format) && !isUpright(actual.box)) {
     wrong = "the box of the skinned positions is not finite or upside down";
   }
+  if (wrong.empty() && expected.bounds.size() != count) {
+    wrong = "the reference has " + std::to_string(expected.bounds.size()) + " bounds for " +
+            std::to_string(count) + " vertices";
+  }
   if (!wrong.empty()) return Error{ErrorCode::invalidArgument, wrong};
 
-  Checker checker{expected, actual, method, withNormals, withTangents, {}};
+  Checker checker{expected, actual, withNormals, withTangents, {}};
   checker.result.expectedExempt = exemptions;
   for (std::size_t vertex = 0; vertex < count; ++vertex) checker.checkVertex(vertex);
   return checker.result;

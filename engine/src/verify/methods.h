@@ -10,8 +10,8 @@
 #include <glm/vec3.hpp>
 
 #include "dermis/method.h"
-#include "dermis/verify/reference.h"
 #include "verify/bind_vertex.h"
+#include "verify/conditioning.h"
 #include "verify/joint.h"
 #include "verify/rigid.h"
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -12,6 +13,7 @@
 #include "dermis/text.h"
 #include "dermis/validate.h"
 #include "verify/bind_vertex.h"
+#include "verify/conditioning.h"
 #include "verify/methods.h"
 
 namespace dermis::reference {
@@ -65,10 +67,10 @@ Double3 toArray(const dvec3& v) {
 
 }  // namespace
 
-Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> palette, Method method,
-                         std::span<const MorphWeight> morphs) {
-  const MeshReport report = validate(
-      mesh, static_cast<std::uint32_t>(std::min<std::size_t>(palette.size(), maxPoseJoints)));
+Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
+                             std::span<const MorphWeight> morphs) {
+  const MeshReport report =
+      validate(mesh, static_cast<std::uint32_t>(std::min<std::size_t>(pose.size(), maxPoseJoints)));
   if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
     return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": " +
@@ -79,12 +81,13 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
   if (!active) return active.error();
 
   std::vector<Joint> joints;
-  joints.reserve(palette.size());
-  for (const JointMatrix& matrix : palette) joints.push_back(takeApart(matrix));
+  joints.reserve(pose.size());
+  for (const JointMatrix& matrix : pose) joints.push_back(takeApart(matrix));
 
-  SkinnedMesh skinned;
+  AnalyzedMesh skinned;
   skinned.positions.resize(mesh.vertexCount);
   skinned.conditioning.resize(mesh.vertexCount);
+  skinned.bounds.resize(mesh.vertexCount);
   if (mesh.normals) skinned.normals.resize(mesh.vertexCount);
   if (mesh.tangents) skinned.tangents.resize(mesh.vertexCount);
 
@@ -95,6 +98,7 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
     const VertexToSkin vertex{joints, influences, bindVertex(mesh, index, *active, conditioning),
                               methodInputs(mesh, index)};
     const BindVertex result = skinOrKeep(vertex, method, conditioning);
+    skinned.bounds[index] = boundsOf(method, conditioning);
     skinned.positions[index] = toArray(result.position);
     if (mesh.normals) skinned.normals[index] = toArray(result.normal);
     if (mesh.tangents) {
@@ -103,6 +107,13 @@ Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pale
     }
   }
   return skinned;
+}
+
+Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
+                         std::span<const MorphWeight> morphs) {
+  Result<AnalyzedMesh> analyzed = analyze(mesh, pose, method, morphs);
+  if (!analyzed) return analyzed.error();
+  return SkinnedMesh(std::move(*analyzed));
 }
 
 }  // namespace dermis::reference

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "dermis/mesh.h"
-#include "dermis/method.h"
 #include "dermis/result.h"
 #include "dermis/verify/reference.h"
 #include "dermis/vertex_format.h"
@@ -15,31 +14,6 @@ namespace dermis {
 
 /// The rounding of float32: half the distance from 1 to the next number, 2^-24.
 inline constexpr double floatRounding = 5.9604644775390625e-8;
-
-/// The largest distance a float32 position may have from the reference's: 6 u · scale for `linear`,
-/// 24 u · A² · (scale + `leverage`) for the others, u = `floatRounding`, A = max(1, 1 / (4 |b|)),
-/// |b| = `blendLength`. A joint that is rigid but for rounding (det > 0, ‖CᵀC − 1‖∞ ≤ 8e-6) is
-/// not decomposed by the kernels: `rigidShortcut` · `distance` more. Inputs that are no float32,
-/// and morph targets: u · `positionRounding` · `stretch` more. As a GPU may flush denormals to 0:
-/// 2^-120 (1 + `distance`) more.
-///
-/// Holds for every device that computes as Vulkan demands, division, `sqrt` and `inversesqrt` as
-/// inexact as it allows; docs/accuracy.md says what of it is derived and what is fitted.
-double positionBound(Method method, const reference::Conditioning& conditioning);
-
-/// The largest distance between a float32 unit normal and the reference's. Turned by a blended
-/// rotation: 1.5e-6 · `turning` · A + `rigidShortcut`. Through the blended 3×3 M of `linear`: 6 u
-/// / a + 2 u, a = `normalAlignment`. In two phases a normal goes through M, (6 u + 2
-/// `rigidShortcut`) / a, and then is turned, so that both errors add up; those of `blended` are
-/// divided by `normalLength`. What the bind pose is off by, u · `normalRounding`, is divided by a
-/// as well, and so is what flushed denormals change in M, 2^-120 / `stretch`. Negative where a
-/// normal is only asked to be finite and of unit length: a · `normalLength` < 1e-3, or a bind pose
-/// off by more than 0.05 a, so that displacements all but cancel.
-double normalBound(Method method, const reference::Conditioning& conditioning);
-
-/// The same for tangents, with `tangentAlignment`, `tangentRounding`, `tangentLength` and
-/// `rigidShortcut` once instead of twice.
-double tangentBound(Method method, const reference::Conditioning& conditioning);
 
 /// The largest distance between a position in float32 and what a format keeps of it; 0 for float32
 /// itself. float16: half a unit of the last place, at most 2^-11 |c| or, below the least normal
@@ -62,15 +36,15 @@ double tangentFormatBound(VertexFormat format);
 /// The number of vertices that have no bound. The caller of `compareWithReference` states it; a
 /// comparison with any other number fails.
 struct Exemptions {
-  std::uint64_t onlyFinite = 0;  ///< the answer is a matter of rounding: it is asked to be finite
-  std::uint64_t skipped = 0;     ///< there is no answer (`Conditioning::undefined`): not looked at
+  std::uint64_t onlyFinite = 0;  ///< `VertexBounds::onlyFinite`: only tested for being finite
+  std::uint64_t skipped = 0;     ///< `VertexBounds::undefined`: not looked at
 
   friend bool operator==(const Exemptions&, const Exemptions&) = default;
 };
 
 /// The exemptions that the reference reports. Use it for poses from outside; a test that makes its
 /// own pose should state the numbers.
-Exemptions exemptionsOf(const reference::SkinnedMesh& expected, Method method);
+Exemptions exemptionsOf(const reference::SkinnedMesh& expected);
 
 /// What a comparison found. An error is counted against its vertex' own bound: 1 is the bound.
 struct Comparison {
@@ -112,7 +86,7 @@ struct SkinnedView {
 };
 
 /// Compares skinned positions, normals and tangents with the reference's, each against the bound of
-/// its method plus that of its format. Normals and tangents are compared where both have them.
+/// its vertex plus that of its format. Normals and tangents are compared where both have them.
 /// `exemptions` is how many vertices must be left out of that, exactly: none, unless the caller
 /// says otherwise. A vertex of the reference that is not finite, or whose bound is not, is a
 /// failure unless the reference says that it has no answer.
@@ -126,7 +100,7 @@ struct SkinnedView {
 /// Fails with `invalidArgument` where the counts disagree, a format does not fit its attribute, a
 /// stride is less than its element, or the box of snorm16 is not finite or upside down.
 Result<Comparison> compareWithReference(const reference::SkinnedMesh& expected,
-                                        const SkinnedView& actual, Method method,
+                                        const SkinnedView& actual,
                                         const Exemptions& exemptions = {});
 
 }  // namespace dermis

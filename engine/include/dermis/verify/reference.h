@@ -18,58 +18,30 @@ namespace dermis::reference {
 using Double3 = std::array<double, 3>;
 using Double4 = std::array<double, 4>;
 
-/// What the accuracy of a float32 result depends on, per vertex (accuracy.h turns it into bounds).
-/// p, n and t are the position, normal and tangent in bind pose after morphing; u = 2^-24.
-struct Conditioning {
-  double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
-                        ///< value of joint j
-  double stretch = 1;   ///< max σ_j; 1 for a vertex without weight
-  double distance = 0;  ///< |p|, from the origin of the bind pose; where there is a centre of
-                        ///< rotation c, |p| + 2 |c|
-  double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels take for rigid as they are
-  /// What the bind pose in float32 may be off by, in units of u: of the mesh's for p, of |n| and
-  /// |t| for directions. A rounding for a stored value that is no float32, two for each target that
-  /// displaces the vertex (w d, and the sum), three where its d is no float32; each of them at most
-  /// u (|p| + Σ |w_i d_i|). 0 for float32 without morphs; infinite where displacements cancel a
-  /// direction.
-  double positionRounding = 0;
-  double normalRounding = 0;
-  double tangentRounding = 0;
-  /// |adjᵀ(M) n| / (max σ_j σ_max |n|), M the blended 3×3 and σ_max its largest singular value:
-  /// where joints cancel in a blend, what is left was rounded at the size of the joints.
-  double normalAlignment = 1;
-  double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|), likewise
-  /// A length that counts besides the scale: twice max σ_j times the centre of rotation's distance
-  /// from the origin (`centerOfRotation`, `bulgeControlled`), how far differences of rotations that
-  /// all but agree throw the centre (`sphericalBlend`: |r| + max |t_a − t_b| / σ, σ the least
-  /// singular value that is made use of), and what is left of the errors of earlier steps
-  /// (`dualQuaternionIterative`: scale · (`turning` − 1)).
-  double leverage = 0;
-  /// |b|, the length of the blended quaternion before it is normalised: at least the greatest
-  /// weight, and so at least 1/4 for up to four influences. 1 for `linear` and `logMatrix`.
-  double blendLength = 1;
-  double turning = 1;  ///< `dualQuaternionIterative`: 1 / (1 − ρ), ρ the factor by which steps
-                       ///< shrink
-  double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalised
-  double tangentLength = 1;  ///< likewise
-  bool normalRotatedOnly =
-      true;  ///< blended rotations of rigid joints: directions pass through no 3×3
-  bool handednessAmbiguous =
-      false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: its sign is a matter of rounding
-  /// The answer jumps here, and rounding decides to which side: |dot| with the pivot below 1e-5,
-  /// `logMatrix`: a joint turned by 180° within 2e-5, `dualQuaternionIterative`: one nearly
-  /// opposite to the blend, `sphericalBlend`: a singular value within 1e-5 of the least.
-  bool signAmbiguous = false;
-  bool degenerate = false;  ///< a joint of rank ≤ 1, or of σ₂ + σ₃ < 2^-100, or not finite: a
-                            ///< result is only asked to be finite
-  bool undefined = false;  ///< a joint is not finite: there is no answer
+/// How near a float32 result must come to the reference at one vertex: the accuracy contract of
+/// docs/accuracy.md for the method, the pose and this vertex. Formats add their own bounds
+/// (`positionFormatBound` and the others in accuracy.h).
+struct VertexBounds {
+  double position = 0;  ///< maximum distance between positions, in the pose's units
+  double normal = 0;    ///< maximum distance between unit normals; negative: only unit length is
+                        ///< required
+  double tangent = 0;   ///< the same for tangents
+  double scale = 0;     ///< the largest length in the computation, in the pose's units: max |t_j| +
+                        ///< max σ_j |p| over the influences, t_j the translation and σ_j the
+                        ///< largest singular value of joint j, p the position in bind pose
+  bool onlyFinite = false;  ///< rounding decides the answer (antipodal rotations, flat joints): the
+                            ///< result must be finite, nothing more
+  bool undefined = false;   ///< a joint is not finite: there is no answer
+  bool normalMayVanish = false;   ///< morph targets cancel the normal: zero is right as well
+  bool tangentMayVanish = false;  ///< the same for the tangent
+  bool eitherHandedness = false;  ///< the blended matrix is flat: both handednesses are right
 };
 
 struct SkinnedMesh {
   std::vector<Double3> positions;
-  std::vector<Double3> normals;   ///< Empty where the mesh has none.
-  std::vector<Double4> tangents;  ///< x y z and the handedness; likewise.
-  std::vector<Conditioning> conditioning;
+  std::vector<Double3> normals;   ///< empty if the mesh has none
+  std::vector<Double4> tangents;  ///< x y z and the handedness; empty if the mesh has none
+  std::vector<VertexBounds> bounds;
 };
 
 /// Skins a mesh by a pose (joint matrices: joint global transform × inverse bind matrix),

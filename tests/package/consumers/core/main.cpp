@@ -131,7 +131,7 @@ void printSizes() {
                                  sizeof(SkinnedView),
                                  sizeof(Comparison),
                                  sizeof(Exemptions),
-                                 sizeof(reference::Conditioning),
+                                 sizeof(reference::VertexBounds),
                                  sizeof(reference::SkinnedMesh),
                                  sizeof(RepairedMesh)})
     std::printf("%zu ", size);
@@ -253,9 +253,8 @@ Result<void> skinAndCompare(const MeshView& mesh, const Box& box, std::span<cons
             hashOf(std::as_bytes(std::span(skinned->normals))) ^
             hashOf(std::as_bytes(std::span(skinned->tangents))));
   double bounds = 0;
-  for (const reference::Conditioning& conditioning : skinned->conditioning) {
-    bounds += positionBound(method, conditioning) + normalBound(method, conditioning) +
-              tangentBound(method, conditioning);
+  for (const reference::VertexBounds& vertex : skinned->bounds) {
+    bounds += vertex.position + vertex.normal + vertex.tangent;
   }
   std::printf("bounds %.17g\n", bounds);
   for (const reference::Double3& position : skinned->positions) {
@@ -269,7 +268,7 @@ Result<void> skinAndCompare(const MeshView& mesh, const Box& box, std::span<cons
   const SkinnedView view{attribute(stored[0].position, VertexFormat::snorm16x4),
                          attribute(stored[0].normal, VertexFormat::snorm8x4),
                          attribute(stored[0].tangent, VertexFormat::snorm16x4), box};
-  const Result<Comparison> comparison = compareWithReference(*skinned, view, method);
+  const Result<Comparison> comparison = compareWithReference(*skinned, view);
   if (!comparison) return comparison.error();
   std::printf("compared %llu, %llu clamped, worst %.9g %.9g %.9g\n",
               static_cast<unsigned long long>(comparison->compared),
