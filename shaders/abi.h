@@ -86,44 +86,52 @@ DERMIS_CONSTANT MOTION_NONE = 0u;
 DERMIS_CONSTANT MOTION_KEPT = 1u;
 DERMIS_CONSTANT MOTION_RESKINNED = 2u;
 
-// Packed mesh: a header, then sections at word offsets from the blob's start.
+// ---- Packed mesh: a header, then sections at word offsets from its start. What every vertex is
+// read from begins at multiples of 4 words, which kernels read at once (a unit).
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
 DERMIS_CONSTANT MESH_VERSION = 5u;
-DERMIS_CONSTANT MESH_HEADER_MAGIC = 0u;
-DERMIS_CONSTANT MESH_HEADER_VERSION = 1u;
-DERMIS_CONSTANT MESH_HEADER_CHECKSUM =
-    2u;  // of all words that follow it: hash = rotl((hash ^ word) * 16777619, 15) from 2166136261
-DERMIS_CONSTANT MESH_HEADER_WORDS_TOTAL = 3u;
-DERMIS_CONSTANT MESH_HEADER_VERTEX_COUNT = 4u;
-DERMIS_CONSTANT MESH_HEADER_REQUIRED_JOINTS = 5u;
-DERMIS_CONSTANT MESH_HEADER_MAX_INFLUENCES = 6u;
-DERMIS_CONSTANT MESH_HEADER_MORPH_COUNT = 7u;
-// What every vertex is read from, at multiples of 4 words, a unit of 4 words at a time: these four
-// offsets are one unit themselves.
-DERMIS_CONSTANT MESH_HEADER_POSITIONS = 8u;    // VERTEX_WORDS each, and one more record
-DERMIS_CONSTANT MESH_HEADER_NORMALS = 9u;      // likewise, 0 where there are none
-DERMIS_CONSTANT MESH_HEADER_TANGENTS = 10u;    // likewise
-DERMIS_CONSTANT MESH_HEADER_INFLUENCES = 11u;  // INFLUENCE_WORDS each
-DERMIS_CONSTANT MESH_HEADER_CENTERS = 12u;     // of rotation: VERTEX_WORDS each, 0 for none
-DERMIS_CONSTANT MESH_HEADER_MORPHS = 13u;      // MORPH_WORDS a morph target
-DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHTS = 14u;  // a float a vertex, 0 where all have …
-DERMIS_CONSTANT MESH_HEADER_DUAL_QUATERNION_WEIGHT = 15u;   // … this one
-DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTHS = 16u;          // likewise
-DERMIS_CONSTANT MESH_HEADER_BULGE_STRENGTH = 17u;
+struct MeshHeader {
+  uint magic;
+  uint version;
+  uint checksum;   // of all words after it: hash = rotl((hash ^ word) * 16777619, 15), from
+                   // 2166136261
+  uint wordCount;  // of the packed mesh
+  uint vertexCount;
+  uint requiredJoints;  // the highest joint index + 1
+  uint maxInfluences;   // of a vertex
+  uint morphCount;
+  // Word offsets of sections. The first four are one unit.
+  uint positions;   // PositionRecord: one for each vertex, and one more
+  uint normals;     // 4 words for each vertex: 3 floats and a 0; offset 0: there are none
+  uint tangents;    // the same with the handedness as a fourth float
+  uint influences;  // InfluenceRecord
+  uint centers;     // of rotation; as normals
+  uint morphs;      // MorphRecord
+  uint dualQuaternionWeights;  // a float for each vertex; 0: all have …
+  float dualQuaternionWeight;  // … this one
+  uint bulgeStrengths;         // the same
+  float bulgeStrength;
+  uint reserved;
+  uint reserved1;
+};
 DERMIS_CONSTANT MESH_HEADER_WORDS = 20u;
 
-// A position, a normal, a tangent or a centre of rotation of a vertex: three floats, and a word
-// that is the handedness of a tangent, 0 of a normal and a centre, and of a position where the
-// influences of the vertex begin: the number of their first unit, times 2, plus 1 where the last of
-// them is padding. Those of the next vertex follow; the record behind the last vertex says where
-// they end.
+// The influences of a vertex end where those of the next begin; the record after the last vertex
+// ends its influences.
+struct PositionRecord {
+  float x;
+  float y;
+  float z;
+  uint influences;  // the number of their first unit, times 2, plus 1 if the last one is padding
+};
 DERMIS_CONSTANT VERTEX_WORDS = 4u;
-DERMIS_CONSTANT VERTEX_INFLUENCES = 3u;
 
-// Influences stand vertex by vertex, as many as each has, two in a unit. The first of a vertex is
-// its pivot; a vertex without influences stays in bind pose.
-DERMIS_CONSTANT INFLUENCE_WEIGHT = 0u;  // float; those of a vertex sum to exactly 1; padding: 0
-DERMIS_CONSTANT INFLUENCE_JOINT = 1u;
+// Influences of a vertex stand together, two in a unit. The first is the pivot of the vertex; a
+// vertex without influences stays in bind pose.
+struct InfluenceRecord {
+  float weight;  // those of a vertex sum to exactly 1; padding: 0
+  uint joint;
+};
 DERMIS_CONSTANT INFLUENCE_WORDS = 2u;
 
 // A morph target displaces some vertices of some blocks of MORPH_BLOCK_VERTICES: a record a block,

@@ -39,7 +39,7 @@ Blend blendJoints(Influences influences, Pose pose) {
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      Influence further = loadInfluence(influences, slot);
+      InfluenceRecord further = loadInfluence(influences, slot);
       blend = addJoint(blend, pivot, further.weight, pose, further.joint);
     } while (++slot < influences.count);
   }
@@ -65,7 +65,7 @@ ScaleShear blendScaleShear(Influences influences, Pose pose) {
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      Influence further = loadInfluence(influences, slot);
+      InfluenceRecord further = loadInfluence(influences, slot);
       blend = addScaleShear(blend, pivot, further.weight, pose, further.joint);
     } while (++slot < influences.count);
   }

@@ -51,7 +51,7 @@ Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNorm
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      Influence further = loadInfluence(influences, slot);
+      InfluenceRecord further = loadInfluence(influences, slot);
       blend = addMatrix(blend, further.weight, pose, further.joint);
     } while (++slot < influences.count);
   }

@@ -24,8 +24,22 @@ vec3 meshVector(uint word) {
   return vec3(uintBitsToFloat(meshWord(word)), uintBitsToFloat(meshWord(word + 1u)), uintBitsToFloat(meshWord(word + 2u)));
 }
 
-// The word at which a section begins.
-uint meshSection(uint mesh, uint header) { return mesh + meshWord(mesh + header); }
+// Compilers leave out what is not used of it.
+MeshHeader loadMeshHeader(uint mesh) {
+  uvec4 a = meshUnit(mesh / 4u);
+  uvec4 b = meshUnit(mesh / 4u + 1u);
+  uvec4 c = meshUnit(mesh / 4u + 2u);
+  uvec4 d = meshUnit(mesh / 4u + 3u);
+  uvec4 e = meshUnit(mesh / 4u + 4u);
+  return MeshHeader(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, uintBitsToFloat(d.w), e.x,
+                    uintBitsToFloat(e.y), e.z, e.w);
+}
+
+PositionRecord loadPosition(uint unit) {
+  uvec4 a = meshUnit(unit);
+  vec3 p = uintBitsToFloat(a.xyz);
+  return PositionRecord(p.x, p.y, p.z, a.w);
+}
 
 MorphRecord loadMorph(uint word) {
   uvec4 a = meshUnit(word / 4u);
@@ -37,7 +51,7 @@ MorphBlockRecord loadMorphBlock(uint word) {
   return MorphBlockRecord(a.x, a.y, a.z, a.w);
 }
 
-// The units at which stand the vertices of a mesh.
+// The units at which the sections of vertices begin.
 struct Sections {
   uint positions;
   uint normals;
@@ -46,7 +60,8 @@ struct Sections {
 };
 
 Sections sectionsOf(uint mesh) {
-  uvec4 units = (mesh + meshUnit((mesh + MESH_HEADER_POSITIONS) / 4u)) / 4u;
+  MeshHeader header = loadMeshHeader(mesh);
+  uvec4 units = (mesh + uvec4(header.positions, header.normals, header.tangents, header.influences)) / 4u;
   return Sections(units.x, units.y, units.z, units.w);
 }
 
@@ -61,9 +76,9 @@ struct Influences {
   uvec4 joints;
 };
 
-// `first` is the last word of the vertex' position.
+// `first` is PositionRecord::influences of the vertex.
 Influences influencesOf(Sections sections, uint vertex, uint first) {
-  uint end = meshUnit(sections.positions + vertex + 1u)[VERTEX_INFLUENCES];
+  uint end = loadPosition(sections.positions + vertex + 1u).influences;
   Influences influences;
   influences.unit = sections.influences + first / 2u;
   influences.count = (end / 2u - first / 2u) * 2u - first % 2u;
@@ -83,14 +98,9 @@ Influences influencesOf(Sections sections, uint vertex, uint first) {
   return influences;
 }
 
-struct Influence {
-  float weight;
-  uint joint;
-};
-
-Influence loadInfluence(Influences influences, uint slot) {
+InfluenceRecord loadInfluence(Influences influences, uint slot) {
   uvec4 two = meshUnit(influences.unit + slot / 2u);
-  return slot % 2u == 0u ? Influence(uintBitsToFloat(two.x), two.y) : Influence(uintBitsToFloat(two.z), two.w);
+  return slot % 2u == 0u ? InfluenceRecord(uintBitsToFloat(two.x), two.y) : InfluenceRecord(uintBitsToFloat(two.z), two.w);
 }
 
 // Whether a vertex has more than the loaded influences. Never, and a constant, where INFLUENCES is not 0.
@@ -111,21 +121,22 @@ struct MethodInputs {
   float share;  // of dual quaternions, or the strength of bulge control
 };
 
-float meshShare(uint mesh, uint vertex, uint values, uint value) {
-  uint section = meshWord(mesh + values);
-  return uintBitsToFloat(section == 0u ? meshWord(mesh + value) : meshWord(mesh + section + vertex));
+// A float for each vertex, or one for all.
+float meshShare(uint mesh, uint vertex, uint section, float value) {
+  return section == 0u ? value : uintBitsToFloat(meshWord(mesh + section + vertex));
 }
 
 MethodInputs methodInputsOf(uint mesh, uint vertex) {
   MethodInputs inputs = MethodInputs(vec3(0.0), 0.0);
+  MeshHeader header = loadMeshHeader(mesh);
   if (METHOD == METHOD_CENTER_OF_ROTATION || METHOD == METHOD_BULGE_CONTROLLED) {
-    inputs.center = uintBitsToFloat(meshUnit(meshSection(mesh, MESH_HEADER_CENTERS) / 4u + vertex).xyz);
+    inputs.center = uintBitsToFloat(meshUnit((mesh + header.centers) / 4u + vertex).xyz);
   }
   if (METHOD == METHOD_BULGE_CONTROLLED) {
-    inputs.share = meshShare(mesh, vertex, MESH_HEADER_BULGE_STRENGTHS, MESH_HEADER_BULGE_STRENGTH);
+    inputs.share = meshShare(mesh, vertex, header.bulgeStrengths, header.bulgeStrength);
   }
   if (METHOD == METHOD_BLENDED) {
-    inputs.share = meshShare(mesh, vertex, MESH_HEADER_DUAL_QUATERNION_WEIGHTS, MESH_HEADER_DUAL_QUATERNION_WEIGHT);
+    inputs.share = meshShare(mesh, vertex, header.dualQuaternionWeights, header.dualQuaternionWeight);
   }
   return inputs;
 }

@@ -27,7 +27,7 @@ void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint c
   precise vec3 position = vertex.position;
   precise vec3 normal = vertex.normal;
   precise vec3 tangent = vertex.tangent.xyz;
-  uint targets = meshSection(mesh, MESH_HEADER_MORPHS);
+  uint targets = mesh + loadMeshHeader(mesh).morphs;
   for (uint i = 0u; i < count; ++i) {
     ActiveMorph morph = loadActiveMorph(first + i * ACTIVE_MORPH_WORDS);
     MorphRecord target = loadMorph(targets + morph.target * MORPH_WORDS);

@@ -97,24 +97,23 @@ uint findGroup(uint number) {
 // `first` says where the influences begin.
 Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
-  uvec4 position = meshUnit(sections.positions + vertex);
-  first = position[VERTEX_INFLUENCES];
-  bind.position = uintBitsToFloat(position.xyz);
+  PositionRecord position = loadPosition(sections.positions + vertex);
+  first = position.influences;
+  bind.position = vec3(position.x, position.y, position.z);
   if (NORMALS) bind.normal = uintBitsToFloat(meshUnit(sections.normals + vertex).xyz);
   if (TANGENTS) bind.tangent = uintBitsToFloat(meshUnit(sections.tangents + vertex));
   return bind;
 }
 
 // A position as it is stored; snorm16 is relative to the box of the instance.
-uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
+uvec4 encodePosition(vec3 position, ExtensionRecord extension, bool mayCount) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
-    ExtensionRecord record = loadExtension(extension);
-    precise vec3 relative = (position - vec3(record.centreX, record.centreY, record.centreZ)) *
-                            vec3(record.inverseX, record.inverseY, record.inverseZ);
+    precise vec3 relative = (position - vec3(extension.centreX, extension.centreY, extension.centreZ)) *
+                            vec3(extension.inverseX, extension.inverseY, extension.inverseZ);
     v.xyz = relative;
     // A vertex of the engine's own box may stand a rounding outside.
-    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(record.result);
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(extension.result);
   }
   return encodeComponents(POSITION_FORMAT, v);
 }
@@ -140,10 +139,9 @@ struct Work {
 };
 
 #ifdef HAS_MOTION
-uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
+uvec4 previousPosition(Instance instance, ExtensionRecord extension, uvec4 current, Work work) {
   if ((instance.record.flags & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-  ExtensionRecord extension = loadExtension(instance.record.extension);
   Vertex before = work.bind;
   if (MORPHS) {
     morphVertex(before, work.mesh, work.vertex, extension.previousMorphs, extension.previousMorphCount, false, false);
@@ -151,7 +149,7 @@ uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
   uint palette = extension.previousPalette;
   Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
   before = skinVertex(before, work.influences, work.inputs, pose, false, false);
-  return encodePosition(before.position, instance.record.extension, false);
+  return encodePosition(before.position, extension, false);
 }
 #endif
 
@@ -164,19 +162,19 @@ void skinInstance(Instance instance, Work work, bool scales) {
   }
 #endif
 
+  ExtensionRecord extension = loadExtension(instance.record.extension);  // compilers leave out what is not used
   Vertex morphed = work.bind;
   if (MORPHS) {
-    ExtensionRecord extension = loadExtension(instance.record.extension);
     morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount, NORMALS, TANGENTS);
     makeDirectionsUnit(morphed, NORMALS, TANGENTS);
   }
   Pose pose = Pose(instance.record.palette, instance.record.jointCount, scales);
   Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
-  if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
-  uvec4 position = encodePosition(skinned.position, instance.record.extension, true);
+  if (BOUNDS) addToBounds(extension.result, skinned.position);
+  uvec4 position = encodePosition(skinned.position, extension, true);
 #ifdef HAS_MOTION
   if (MOTION != MOTION_NONE) {
-    uvec4 words = previousPosition(instance, position, work);
+    uvec4 words = previousPosition(instance, extension, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
   }
 #endif

@@ -60,18 +60,19 @@ struct DermisVertex {
 
 // As the mesh has it.
 DermisVertex dermisBindVertex(uint mesh, uint vertex) {
+  MeshHeader header = loadMeshHeader(mesh);
   Sections sections = sectionsOf(mesh);
   DermisVertex bind = DermisVertex(vec3(0.0), vec3(0.0), vec4(0.0));
   bind.position = uintBitsToFloat(meshUnit(sections.positions + vertex).xyz);
-  if (meshWord(mesh + MESH_HEADER_NORMALS) != 0u) bind.normal = uintBitsToFloat(meshUnit(sections.normals + vertex).xyz);
-  if (meshWord(mesh + MESH_HEADER_TANGENTS) != 0u) bind.tangent = uintBitsToFloat(meshUnit(sections.tangents + vertex));
+  if (header.normals != 0u) bind.normal = uintBitsToFloat(meshUnit(sections.normals + vertex).xyz);
+  if (header.tangents != 0u) bind.tangent = uintBitsToFloat(meshUnit(sections.tangents + vertex));
   return bind;
 }
 
 // Position and directions in the space of the joint matrices.
 DermisVertex dermisSkinVertex(DermisVertex bind, uint mesh, uint vertex, uint palette, uint jointCount) {
   Sections sections = sectionsOf(mesh);
-  uint first = meshUnit(sections.positions + vertex)[VERTEX_INFLUENCES];
+  uint first = loadPosition(sections.positions + vertex).influences;
   Vertex own = Vertex(bind.position, bind.normal, bind.tangent, vec3(0.0), vec3(0.0));
   makeDirectionsUnit(own, true, true);
   Pose pose = Pose(palette, jointCount, METHOD != METHOD_LINEAR && paletteScales(palette));

@@ -25,6 +25,7 @@ class KernelReads {
       : words_(new std::uint32_t[mesh.bytes().size() / 4]), info_(mesh.info()) {
     const auto* bytes = reinterpret_cast<const std::uint32_t*>(mesh.bytes().data());
     for (std::size_t i = 0; i < mesh.bytes().size() / 4; ++i) words_[i] = bytes[i];
+    std::memcpy(&header_, words_, sizeof(header_));
   }
   ~KernelReads() { delete[] words_; }
   KernelReads(const KernelReads&) = delete;
@@ -32,13 +33,12 @@ class KernelReads {
 
   void readAll() {
     for (std::uint32_t vertex = 0; vertex < info_.vertexCount; ++vertex) {
-      read(words_[abi::MESH_HEADER_POSITIONS] + vertex * 4, 8);  // the next one says the end
-      if (info_.hasNormals) read(words_[abi::MESH_HEADER_NORMALS] + vertex * 4, 4);
-      if (info_.hasTangents) read(words_[abi::MESH_HEADER_TANGENTS] + vertex * 4, 4);
-      if (info_.hasCentersOfRotation) read(words_[abi::MESH_HEADER_CENTERS] + vertex * 4, 4);
-      for (const std::uint32_t shares :
-           {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, abi::MESH_HEADER_BULGE_STRENGTHS}) {
-        if (words_[shares] != 0) read(words_[shares] + vertex, 1);
+      read(header_.positions + vertex * 4, 8);  // the next one says the end
+      if (info_.hasNormals) read(header_.normals + vertex * 4, 4);
+      if (info_.hasTangents) read(header_.tangents + vertex * 4, 4);
+      if (info_.hasCentersOfRotation) read(header_.centers + vertex * 4, 4);
+      for (const std::uint32_t shares : {header_.dualQuaternionWeights, header_.bulgeStrengths}) {
+        if (shares != 0) read(shares + vertex, 1);
       }
       readInfluences(vertex);
     }
@@ -64,8 +64,7 @@ class KernelReads {
  private:
   abi::MorphRecord morph(std::uint32_t target) const {
     abi::MorphRecord record;
-    std::memcpy(&record, words_ + words_[abi::MESH_HEADER_MORPHS] + target * abi::MORPH_WORDS,
-                sizeof(record));
+    std::memcpy(&record, words_ + header_.morphs + target * abi::MORPH_WORDS, sizeof(record));
     return record;
   }
   std::uint32_t displacementWords(std::uint32_t target) const {
@@ -75,17 +74,16 @@ class KernelReads {
     for (std::uint32_t i = 0; i < count; ++i) sink_ = words_[word + i];
   }
   void readInfluences(std::uint32_t vertex) {
-    const std::uint32_t* record = words_ + words_[abi::MESH_HEADER_POSITIONS] + vertex * 4;
+    const std::uint32_t* record = words_ + header_.positions + vertex * 4;
     const std::uint32_t first = record[3], end = record[7], padding = first % 2;
     const std::uint32_t count = (end / 2 - first / 2) * 2 - padding;
     require(count <= info_.maxInfluences);
     // Two are read at a time.
     for (std::uint32_t influence = first / 2 * 2; influence < first / 2 * 2 + count + padding;
          ++influence) {
-      const std::uint32_t word =
-          words_[abi::MESH_HEADER_INFLUENCES] + influence * abi::INFLUENCE_WORDS;
+      const std::uint32_t word = header_.influences + influence * abi::INFLUENCE_WORDS;
       read(word, abi::INFLUENCE_WORDS);
-      require(words_[word + abi::INFLUENCE_JOINT] < info_.requiredJoints);
+      require(words_[word + offsetof(abi::InfluenceRecord, joint) / 4] < info_.requiredJoints);
     }
   }
   void readMorph(std::uint32_t target) {
@@ -96,6 +94,7 @@ class KernelReads {
   }
 
   std::uint32_t* words_;
+  abi::MeshHeader header_;
   MeshInfo info_;
   volatile std::uint32_t sink_ = 0;
 };

@@ -76,9 +76,11 @@ std::vector<std::uint32_t> blobOf(std::span<const std::uint8_t> data) {
   std::vector<std::uint32_t> words(data.size() / 16 * 4);
   if (!words.empty()) std::memcpy(words.data(), data.data(), words.size() * 4);
   if (words.size() > abi::MESH_HEADER_WORDS) {
-    words[abi::MESH_HEADER_MAGIC] = abi::MESH_MAGIC;
-    words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
-    words[abi::MESH_HEADER_WORDS_TOTAL] = static_cast<std::uint32_t>(words.size());
+    auto header = abi::load<abi::MeshHeader>(words, 0);
+    header.magic = abi::MESH_MAGIC;
+    header.version = abi::MESH_VERSION;
+    header.wordCount = static_cast<std::uint32_t>(words.size());
+    abi::store(words, 0, header);
   }
   return words;
 }
@@ -86,11 +88,12 @@ std::vector<std::uint32_t> blobOf(std::span<const std::uint8_t> data) {
 /// The checksum would stop nearly every input: it is put right, so that what lies behind it is
 /// attacked.
 void putChecksumRight(std::vector<std::uint32_t>& words) {
-  if (words.size() <= abi::MESH_HEADER_CHECKSUM) return;
+  constexpr std::size_t checksum = offsetof(abi::MeshHeader, checksum) / 4;
+  if (words.size() <= checksum) return;
   std::uint32_t hash = 2166136261u;
-  for (std::size_t i = abi::MESH_HEADER_CHECKSUM + 1; i < words.size(); ++i)
+  for (std::size_t i = checksum + 1; i < words.size(); ++i)
     hash = std::rotl((hash ^ words[i]) * 16777619u, 15);
-  words[abi::MESH_HEADER_CHECKSUM] = hash;
+  words[checksum] = hash;
 }
 
 /// A job with all attributes that the mesh claims to have, and its first and last morph target.

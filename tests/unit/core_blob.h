@@ -15,7 +15,34 @@
 
 namespace dermis::test {
 
-/// Words of a morph target's record, and of its blocks'.
+/// Words of a packed mesh's header.
+namespace header {
+#define DERMIS_HEADER_WORD(name) \
+  inline constexpr std::uint32_t name = offsetof(abi::MeshHeader, name) / 4;
+DERMIS_HEADER_WORD(magic)
+DERMIS_HEADER_WORD(version)
+DERMIS_HEADER_WORD(checksum)
+DERMIS_HEADER_WORD(wordCount)
+DERMIS_HEADER_WORD(vertexCount)
+DERMIS_HEADER_WORD(requiredJoints)
+DERMIS_HEADER_WORD(maxInfluences)
+DERMIS_HEADER_WORD(morphCount)
+DERMIS_HEADER_WORD(positions)
+DERMIS_HEADER_WORD(normals)
+DERMIS_HEADER_WORD(tangents)
+DERMIS_HEADER_WORD(influences)
+DERMIS_HEADER_WORD(centers)
+DERMIS_HEADER_WORD(morphs)
+DERMIS_HEADER_WORD(dualQuaternionWeights)
+DERMIS_HEADER_WORD(dualQuaternionWeight)
+DERMIS_HEADER_WORD(bulgeStrengths)
+DERMIS_HEADER_WORD(bulgeStrength)
+#undef DERMIS_HEADER_WORD
+}  // namespace header
+
+/// Words of an influence, of a morph target's record, and of its blocks'.
+inline constexpr std::size_t influenceWeight = offsetof(abi::InfluenceRecord, weight) / 4;
+inline constexpr std::size_t influenceJoint = offsetof(abi::InfluenceRecord, joint) / 4;
 inline constexpr std::size_t morphFirstBlock = offsetof(abi::MorphRecord, firstBlock) / 4;
 inline constexpr std::size_t morphBlockCount = offsetof(abi::MorphRecord, blockCount) / 4;
 inline constexpr std::size_t morphBlocks = offsetof(abi::MorphRecord, blocks) / 4;
@@ -48,37 +75,37 @@ class Blob {
   std::vector<std::uint32_t>& words() { return words_; }
   std::span<const std::byte> bytes() const { return std::as_bytes(std::span(words_)); }
 
-  std::uint32_t vertexCount() const { return word(abi::MESH_HEADER_VERTEX_COUNT); }
+  std::uint32_t vertexCount() const { return word(header::vertexCount); }
   float position(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_POSITIONS)} + vertex * 4 + component);
+    return number(std::size_t{word(header::positions)} + vertex * 4 + component);
   }
   float normal(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_NORMALS)} + vertex * 4 + component);
+    return number(std::size_t{word(header::normals)} + vertex * 4 + component);
   }
   float tangent(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_TANGENTS)} + vertex * 4 + component);
+    return number(std::size_t{word(header::tangents)} + vertex * 4 + component);
   }
 
   float center(std::uint32_t vertex, std::uint32_t component) const {
-    return number(std::size_t{word(abi::MESH_HEADER_CENTERS)} + vertex * 4 + component);
+    return number(std::size_t{word(header::centers)} + vertex * 4 + component);
   }
   /// The vertex' own, or the mesh's.
   float dualQuaternionWeight(std::uint32_t vertex) const {
-    const std::size_t section = word(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS);
-    return number(section != 0 ? section + vertex : abi::MESH_HEADER_DUAL_QUATERNION_WEIGHT);
+    const std::size_t section = word(header::dualQuaternionWeights);
+    return number(section != 0 ? section + vertex : header::dualQuaternionWeight);
   }
   float bulgeStrength(std::uint32_t vertex) const {
-    const std::size_t section = word(abi::MESH_HEADER_BULGE_STRENGTHS);
-    return number(section != 0 ? section + vertex : abi::MESH_HEADER_BULGE_STRENGTH);
+    const std::size_t section = word(header::bulgeStrengths);
+    return number(section != 0 ? section + vertex : header::bulgeStrength);
   }
 
   /// The word that says where a vertex' influences begin; that of the next ends them.
   std::size_t firstOf(std::uint32_t vertex) const {
-    return std::size_t{word(abi::MESH_HEADER_POSITIONS)} + vertex * 4 + 3;
+    return std::size_t{word(header::positions)} + vertex * 4 + 3;
   }
   /// Padding counts, too.
   std::size_t influenceWord(std::uint32_t influence) const {
-    return word(abi::MESH_HEADER_INFLUENCES) + std::size_t{influence} * abi::INFLUENCE_WORDS;
+    return word(header::influences) + std::size_t{influence} * abi::INFLUENCE_WORDS;
   }
   std::vector<BlobInfluence> influences(std::uint32_t vertex) const {
     std::vector<BlobInfluence> result;
@@ -86,15 +113,15 @@ class Blob {
     const std::uint32_t padding = word(firstOf(vertex)) % 2;
     const std::uint32_t end = word(firstOf(vertex + 1)) / 2 * 2 - padding;
     for (std::uint32_t i = begin; i < end; ++i) {
-      result.push_back({word(influenceWord(i) + abi::INFLUENCE_JOINT),
-                        number(influenceWord(i) + abi::INFLUENCE_WEIGHT)});
+      result.push_back(
+          {word(influenceWord(i) + influenceJoint), number(influenceWord(i) + influenceWeight)});
     }
     return result;
   }
 
-  std::uint32_t morphCount() const { return word(abi::MESH_HEADER_MORPH_COUNT); }
+  std::uint32_t morphCount() const { return word(header::morphCount); }
   std::size_t morphRecord(std::uint32_t target) const {
-    return word(abi::MESH_HEADER_MORPHS) + std::size_t{target} * abi::MORPH_WORDS;
+    return word(header::morphs) + std::size_t{target} * abi::MORPH_WORDS;
   }
   /// The record of a block, counted from the target's first.
   std::size_t morphBlock(std::uint32_t target, std::uint32_t block) const {
@@ -136,12 +163,12 @@ class Blob {
   /// Makes the checksum right again: FNV-1a by words, of all that follow it.
   void seal() {
     std::uint32_t hash = 0x811c9dc5u;
-    for (std::size_t i = abi::MESH_HEADER_CHECKSUM + 1; i < words_.size(); ++i) {
+    for (std::size_t i = header::checksum + 1; i < words_.size(); ++i) {
       hash ^= words_[i];
       hash *= 0x01000193u;
       hash = hash << 15 | hash >> 17;
     }
-    words_.at(abi::MESH_HEADER_CHECKSUM) = hash;
+    words_.at(header::checksum) = hash;
   }
 
  private:

@@ -74,9 +74,9 @@ void expectPacked(OwnedMesh& mesh, std::uint32_t jointCount) {
   const std::uint32_t vertices = mesh.vertexCount();
   ASSERT_EQ(result.bytes().size() % packedMeshAlignment, 0u);
   ASSERT_EQ(info.byteSize, result.bytes().size());
-  ASSERT_EQ(blob.word(abi::MESH_HEADER_MAGIC), abi::MESH_MAGIC);
-  ASSERT_EQ(blob.word(abi::MESH_HEADER_VERSION), abi::MESH_VERSION);
-  ASSERT_EQ(blob.word(abi::MESH_HEADER_WORDS_TOTAL), blob.size());
+  ASSERT_EQ(blob.word(header::magic), abi::MESH_MAGIC);
+  ASSERT_EQ(blob.word(header::version), abi::MESH_VERSION);
+  ASSERT_EQ(blob.word(header::wordCount), blob.size());
   ASSERT_EQ(blob.vertexCount(), vertices);
   ASSERT_EQ(result.vertexCount(), vertices);
   ASSERT_EQ(info.vertexCount, vertices);
@@ -85,7 +85,7 @@ void expectPacked(OwnedMesh& mesh, std::uint32_t jointCount) {
   ASSERT_EQ(info.morphTargetCount, 0u);
   Blob sealed = blob;
   sealed.seal();
-  ASSERT_EQ(sealed.word(abi::MESH_HEADER_CHECKSUM), blob.word(abi::MESH_HEADER_CHECKSUM));
+  ASSERT_EQ(sealed.word(header::checksum), blob.word(header::checksum));
 
   std::uint32_t required = 1;
   std::size_t most = 0, pairs = 0;
@@ -147,7 +147,7 @@ TEST(Pack, WithoutNormals) {
   mesh.normals.clear();
   const PackedMesh result = packed(mesh.view(), 10);
   EXPECT_FALSE(result.info().hasNormals);
-  EXPECT_EQ(Blob(result.bytes()).word(abi::MESH_HEADER_NORMALS), 0u);
+  EXPECT_EQ(Blob(result.bytes()).word(header::normals), 0u);
   EXPECT_NEAR(static_cast<double>(size - result.bytes().size()), 65 * 16, 16);
   EXPECT_EQ(Blob(result.bytes()).position(64, 2), mesh.positions[64 * 3 + 2]);
 }
@@ -321,7 +321,7 @@ TEST(Pack, NormalsAndTangentsOfEveryType) {
 
 TEST(Pack, WithoutTangents) {
   TypedMesh mesh(4);
-  EXPECT_EQ(Blob(packed(mesh.view, 1).bytes()).word(abi::MESH_HEADER_TANGENTS), 0u);
+  EXPECT_EQ(Blob(packed(mesh.view, 1).bytes()).word(header::tangents), 0u);
   EXPECT_FALSE(packed(mesh.view, 1).info().hasTangents);
 }
 
@@ -368,9 +368,9 @@ TEST(Pack, SharesOfTheWholeMeshStandInTheHeader) {
   const PackedMesh plain = packed(mesh.view(), 20);
   EXPECT_FALSE(plain.info().hasCentersOfRotation);
   const Blob blob(plain.bytes());
-  EXPECT_EQ(blob.word(abi::MESH_HEADER_CENTERS), 0u);
-  EXPECT_EQ(blob.word(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS), 0u);
-  EXPECT_EQ(blob.word(abi::MESH_HEADER_BULGE_STRENGTHS), 0u);
+  EXPECT_EQ(blob.word(header::centers), 0u);
+  EXPECT_EQ(blob.word(header::dualQuaternionWeights), 0u);
+  EXPECT_EQ(blob.word(header::bulgeStrengths), 0u);
   EXPECT_EQ(blob.dualQuaternionWeight(0), 0.5f) << "as mesh.h has it";
   EXPECT_EQ(blob.bulgeStrength(0), 1.0f);
   for (const float share : {0.0f, 0.125f, 1.0f}) {

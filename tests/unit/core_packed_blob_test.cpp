@@ -132,7 +132,7 @@ TEST_F(DamagedBlob, EveryFlippedBitIsRefused) {
       bytes[index] ^= std::byte{1} << bit;
       const Result<PackedMesh> result = PackedMesh::fromBytes(bytes);
       ASSERT_FALSE(result.ok()) << "byte " << index << ", bit " << bit;
-      const bool version = index / 4 == abi::MESH_HEADER_VERSION;
+      const bool version = index / 4 == header::version;
       ASSERT_EQ(result.error().code,
                 version ? ErrorCode::unsupportedVersion : ErrorCode::invalidData);
       bytes[index] ^= std::byte{1} << bit;
@@ -142,7 +142,7 @@ TEST_F(DamagedBlob, EveryFlippedBitIsRefused) {
 
 TEST_F(DamagedBlob, SwappedWordsAreRefused) {
   int swapped = 0;
-  for (std::size_t index = abi::MESH_HEADER_CHECKSUM + 1; index + 1 < blob.size(); ++index) {
+  for (std::size_t index = header::checksum + 1; index + 1 < blob.size(); ++index) {
     Blob changed = blob;
     const std::uint32_t difference = changed.word(index) ^ changed.word(index + 1);
     // FNV carries a change upwards only: of two words that differ in high bits alone too little is
@@ -159,7 +159,7 @@ TEST_F(DamagedBlob, AnotherVersionIsNamed) {
   ASSERT_EQ(abi::MESH_VERSION, 5u);
   for (const std::uint32_t version : {0u, 1u, 2u, 3u, 4u, 6u, 0xffffffffu}) {
     Blob changed = blob;
-    changed.words()[abi::MESH_HEADER_VERSION] = version;
+    changed.words()[header::version] = version;
     changed.seal();
     const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
     ASSERT_FALSE(result.ok());
@@ -170,25 +170,25 @@ TEST_F(DamagedBlob, AnotherVersionIsNamed) {
 
 // A checksum is no proof: what a kernel would read with must be checked by itself.
 TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
-  expectRefusedWith(abi::MESH_HEADER_MAGIC, 0);
+  expectRefusedWith(header::magic, 0);
   for (const std::uint32_t words : {0u, size() - 4, size() + 4, 0xffffffffu})
-    expectRefusedWith(abi::MESH_HEADER_WORDS_TOTAL, words);
+    expectRefusedWith(header::wordCount, words);
   for (const std::uint32_t vertices : {0u, 100000u, 0x55555556u, 0x80000000u, 0xffffffffu})
-    expectRefusedWith(abi::MESH_HEADER_VERTEX_COUNT, vertices);
+    expectRefusedWith(header::vertexCount, vertices);
   for (const std::uint32_t joints : {0u, 1u, 8u, 65537u, 0xffffffffu})
-    expectRefusedWith(abi::MESH_HEADER_REQUIRED_JOINTS, joints);
+    expectRefusedWith(header::requiredJoints, joints);
   for (const std::uint32_t influences : {0u, 1u, good.info().maxInfluences - 1})
-    expectRefusedWith(abi::MESH_HEADER_MAX_INFLUENCES, influences);
+    expectRefusedWith(header::maxInfluences, influences);
   // Each section's offset: in the header, too late for what it holds, behind the end.
   const std::pair<std::uint32_t, std::uint32_t> sections[] = {
-      {abi::MESH_HEADER_POSITIONS, 67 * 4},
-      {abi::MESH_HEADER_NORMALS, 66 * 4},
-      {abi::MESH_HEADER_TANGENTS, 66 * 4},
-      {abi::MESH_HEADER_CENTERS, 66 * 4},
-      {abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS, 66},
-      {abi::MESH_HEADER_BULGE_STRENGTHS, 66},
-      {abi::MESH_HEADER_INFLUENCES, 2 * blob.word(blob.firstOf(66))},
-      {abi::MESH_HEADER_MORPHS, 3 * abi::MORPH_WORDS}};
+      {header::positions, 67 * 4},
+      {header::normals, 66 * 4},
+      {header::tangents, 66 * 4},
+      {header::centers, 66 * 4},
+      {header::dualQuaternionWeights, 66},
+      {header::bulgeStrengths, 66},
+      {header::influences, 2 * blob.word(blob.firstOf(66))},
+      {header::morphs, 3 * abi::MORPH_WORDS}};
   for (const auto& [header, words] : sections) {
     const std::uint32_t late = (size() - words + 4) / 4 * 4;  // many stand at multiples of 4
     for (const std::uint32_t offset : {1u, abi::MESH_HEADER_WORDS - 4, late, size(), size() + 4,
@@ -196,29 +196,26 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
       expectRefusedWith(header, offset);
     }
     ASSERT_NE(blob.word(header), 0u) << "this blob has everything";
-    const bool mayBeAbsent = header != abi::MESH_HEADER_POSITIONS &&
-                             header != abi::MESH_HEADER_INFLUENCES &&
-                             header != abi::MESH_HEADER_MORPHS;
+    const bool mayBeAbsent =
+        header != header::positions && header != header::influences && header != header::morphs;
     if (!mayBeAbsent) expectRefusedWith(header, 0);
   }
   // Inside the blob, but not at a multiple of four words.
-  for (const std::uint32_t header :
-       {abi::MESH_HEADER_POSITIONS, abi::MESH_HEADER_NORMALS, abi::MESH_HEADER_TANGENTS,
-        abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_INFLUENCES, abi::MESH_HEADER_MORPHS}) {
+  for (const std::uint32_t header : {header::positions, header::normals, header::tangents,
+                                     header::centers, header::influences, header::morphs}) {
     for (const std::uint32_t by : {1u, 2u, 3u}) {
       expectRefusedWith(header, blob.word(header) + by);
       expectRefusedWith(header, blob.word(header) - by);
     }
   }
   for (const std::uint32_t targets : {size(), size() / 4, 0x40000000u, 0x40000003u, 0xffffffffu})
-    expectRefusedWith(abi::MESH_HEADER_MORPH_COUNT, targets);
+    expectRefusedWith(header::morphCount, targets);
 }
 
 TEST_F(DamagedBlob, WhatOnlySomeMethodsWantMayBeAbsent) {
   Blob changed = blob;
   for (const std::uint32_t header :
-       {abi::MESH_HEADER_CENTERS, abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS,
-        abi::MESH_HEADER_BULGE_STRENGTHS}) {
+       {header::centers, header::dualQuaternionWeights, header::bulgeStrengths}) {
     changed.words()[header] = 0;
     changed.seal();
     const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
@@ -259,7 +256,7 @@ TEST_F(DamagedBlob, EveryJointIndexIsChecked) {
   ASSERT_GT(count, 60u);
   for (std::uint32_t influence = 0; influence < count; ++influence) {
     for (const std::uint32_t joint : {9u, 65536u, 0xffffffffu})
-      expectRefusedWith(blob.influenceWord(influence) + abi::INFLUENCE_JOINT, joint);
+      expectRefusedWith(blob.influenceWord(influence) + influenceJoint, joint);
   }
 }
 
@@ -320,7 +317,7 @@ TEST(PackedBlob, APoseOfNoJointsIsRefused) {
   std::fill(mesh.weights.begin(), mesh.weights.end(), 0.0f);
   Blob blob(packed(mesh.view(), 10).bytes());
   for (const std::uint32_t joints : {0u, 65537u}) {
-    blob.words()[abi::MESH_HEADER_REQUIRED_JOINTS] = joints;
+    blob.words()[header::requiredJoints] = joints;
     blob.seal();
     EXPECT_FALSE(PackedMesh::fromBytes(blob.bytes()).ok()) << joints;
   }
@@ -333,7 +330,7 @@ TEST(PackedBlob, InfluencesBetweenUnitsAreRefused) {
   Blob blob(packed(mesh.view(), 10).bytes());
   for (const int off : {-4, -2, -1, 0}) {
     Blob changed = blob;
-    changed.words()[abi::MESH_HEADER_INFLUENCES] += static_cast<std::uint32_t>(off);
+    changed.words()[header::influences] += static_cast<std::uint32_t>(off);
     changed.seal();
     EXPECT_EQ(PackedMesh::fromBytes(changed.bytes()).ok(), off % 4 == 0) << off;
   }
@@ -369,7 +366,7 @@ float readEverything(const Blob& blob, const MeshInfo& info) {
 // Random words under a right checksum: refused, or good enough that nothing leaves the blob.
 TEST_F(DamagedBlob, NoRandomWordReachesOutside) {
   std::vector<std::size_t> targets;  // words that say where something stands, or how much of it
-  for (std::size_t word = abi::MESH_HEADER_WORDS_TOTAL; word < abi::MESH_HEADER_WORDS; ++word)
+  for (std::size_t word = header::wordCount; word < abi::MESH_HEADER_WORDS; ++word)
     targets.push_back(word);
   for (const std::uint32_t vertex : {0u, 1u, 33u, 64u, 65u, 66u})
     targets.push_back(blob.firstOf(vertex));
@@ -396,8 +393,8 @@ TEST_F(DamagedBlob, NoRandomWordReachesOutside) {
                                       0xffffffffu};
       changed.words()[word] = values[engine() % std::size(values)];
     }
-    changed.words()[abi::MESH_HEADER_MAGIC] = abi::MESH_MAGIC;
-    changed.words()[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
+    changed.words()[header::magic] = abi::MESH_MAGIC;
+    changed.words()[header::version] = abi::MESH_VERSION;
     changed.seal();
     const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
     if (!result) continue;

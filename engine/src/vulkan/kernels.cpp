@@ -47,6 +47,10 @@ static_assert(sizeof(abi::ExtensionRecord) == abi::EXTENSION_WORDS * 4 &&
 static_assert(sizeof(abi::CulledDispatchRecord) == abi::CULLED_DISPATCH_WORDS * 4);
 static_assert(sizeof(abi::IndirectRecord) == abi::INDIRECT_WORDS * 4);
 static_assert(sizeof(abi::ActiveMorph) == abi::ACTIVE_MORPH_WORDS * 4);
+static_assert(sizeof(abi::MeshHeader) == abi::MESH_HEADER_WORDS * 4 &&
+              abi::MESH_HEADER_WORDS % 4 == 0 && offsetof(abi::MeshHeader, positions) % 16 == 0);
+static_assert(sizeof(abi::PositionRecord) == abi::VERTEX_WORDS * 4 && abi::VERTEX_WORDS == 4);
+static_assert(sizeof(abi::InfluenceRecord) == abi::INFLUENCE_WORDS * 4);
 static_assert(sizeof(abi::MorphRecord) == abi::MORPH_WORDS * 4 && abi::MORPH_WORDS == 4);
 static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
               abi::MORPH_BLOCK_WORDS == 4);

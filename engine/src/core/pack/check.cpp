@@ -1,6 +1,7 @@
 #include "pack/check.h"
 
 #include <bit>
+#include <cstddef>
 
 #include "abi.h"
 #include "dermis/types.h"
@@ -19,17 +20,17 @@ bool isUnitSection(std::uint64_t offset, std::uint64_t count, std::uint64_t tota
 }
 
 /// Positions are known to lie in the blob.
-Result<void> checkInfluences(std::span<const std::uint32_t> words) {
-  const std::size_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
-  const std::uint32_t offset = words[abi::MESH_HEADER_INFLUENCES];
+Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::MeshHeader& header) {
+  const std::size_t vertices = header.vertexCount;
+  const std::uint32_t offset = header.influences;
   const auto begin = [&](std::size_t vertex) {
-    return words[words[abi::MESH_HEADER_POSITIONS] + vertex * abi::VERTEX_WORDS +
-                 abi::VERTEX_INFLUENCES];
+    return abi::load<abi::PositionRecord>(words, header.positions + vertex * abi::VERTEX_WORDS)
+        .influences;
   };
   for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
     const std::uint32_t first = begin(vertex), next = begin(vertex + 1), isOdd = first % 2;
     if (next / 2 < first / 2 + isOdd ||
-        std::uint64_t{next / 2 - first / 2} * 2 - isOdd > words[abi::MESH_HEADER_MAX_INFLUENCES]) {
+        std::uint64_t{next / 2 - first / 2} * 2 - isOdd > header.maxInfluences) {
       return damagedBlob("the influences of vertex " + std::to_string(vertex) +
                          " do not follow those before");
     }
@@ -41,7 +42,7 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words) {
   }
   for (std::uint64_t influence = 0; influence < count; ++influence) {
     const std::size_t record = static_cast<std::size_t>(offset + influence * abi::INFLUENCE_WORDS);
-    if (words[record + abi::INFLUENCE_JOINT] >= words[abi::MESH_HEADER_REQUIRED_JOINTS]) {
+    if (abi::load<abi::InfluenceRecord>(words, record).joint >= header.requiredJoints) {
       return damagedBlob("influence " + std::to_string(influence) +
                          " has a joint index above its largest");
     }
@@ -51,11 +52,11 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words) {
 
 /// Checks a target whose blocks begin at word `behind` or later, and moves that behind them: as the
 /// blocks of two targets do not overlap, all targets together take no longer than the blob is.
-Result<void> checkMorph(std::span<const std::uint32_t> words, std::uint32_t target,
-                        std::uint64_t& behind) {
-  const std::uint32_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
-  const auto morph = abi::load<abi::MorphRecord>(
-      words, words[abi::MESH_HEADER_MORPHS] + std::size_t{target} * abi::MORPH_WORDS);
+Result<void> checkMorph(std::span<const std::uint32_t> words, const abi::MeshHeader& header,
+                        std::uint32_t target, std::uint64_t& behind) {
+  const std::uint32_t vertices = header.vertexCount;
+  const auto morph =
+      abi::load<abi::MorphRecord>(words, header.morphs + std::size_t{target} * abi::MORPH_WORDS);
   const std::uint64_t blockCount = morph.blockCount;
   if (blockCount == 0) return {};
   const std::uint64_t allBlocks =
@@ -87,7 +88,7 @@ Result<void> checkMorph(std::span<const std::uint32_t> words, std::uint32_t targ
 
 std::uint32_t checksumOfBlob(std::span<const std::uint32_t> words) {
   std::uint32_t hash = 2166136261u;
-  for (const std::uint32_t word : words.subspan(abi::MESH_HEADER_CHECKSUM + 1))
+  for (const std::uint32_t word : words.subspan(offsetof(abi::MeshHeader, checksum) / 4 + 1))
     hash = std::rotl((hash ^ word) * 16777619u, 15);
   return hash;
 }
@@ -97,43 +98,38 @@ Error damagedBlob(const std::string& what) {
 }
 
 Result<void> checkBlob(std::span<const std::uint32_t> words) {
-  if (words.size() < abi::MESH_HEADER_WORDS || words[abi::MESH_HEADER_MAGIC] != abi::MESH_MAGIC) {
+  if (words.size() < abi::MESH_HEADER_WORDS || words[0] != abi::MESH_MAGIC)
     return damagedBlob("the bytes do not begin with the header of a packed mesh");
-  }
-  if (words[abi::MESH_HEADER_VERSION] != abi::MESH_VERSION) {
+  const auto header = abi::load<abi::MeshHeader>(words, 0);
+  if (header.version != abi::MESH_VERSION) {
     return Error{ErrorCode::unsupportedVersion,
-                 "packed mesh: version " + std::to_string(words[abi::MESH_HEADER_VERSION]) +
+                 "packed mesh: version " + std::to_string(header.version) +
                      ", this library reads version " + std::to_string(abi::MESH_VERSION)};
   }
-  if (words[abi::MESH_HEADER_WORDS_TOTAL] != words.size()) {
+  if (header.wordCount != words.size()) {
     return damagedBlob("it has " + std::to_string(words.size() * 4) + " bytes, its header says " +
-                       std::to_string(std::uint64_t{words[abi::MESH_HEADER_WORDS_TOTAL]} * 4));
+                       std::to_string(std::uint64_t{header.wordCount} * 4));
   }
-  if (checksumOfBlob(words) != words[abi::MESH_HEADER_CHECKSUM])
-    return damagedBlob("the checksum does not match");
+  if (checksumOfBlob(words) != header.checksum) return damagedBlob("the checksum does not match");
 
-  const std::uint64_t vertices = words[abi::MESH_HEADER_VERTEX_COUNT];
-  const auto areVectors = [&](std::uint32_t header) {
-    return words[header] == 0 || isUnitSection(words[header], vertices, words.size());
+  const std::uint64_t vertices = header.vertexCount;
+  const auto areVectors = [&](std::uint32_t offset) {
+    return offset == 0 || isUnitSection(offset, vertices, words.size());
   };
-  const auto areFloats = [&](std::uint32_t header) {
-    return words[header] == 0 || isSection(words[header], vertices, words.size());
+  const auto areFloats = [&](std::uint32_t offset) {
+    return offset == 0 || isSection(offset, vertices, words.size());
   };
-  if (vertices == 0 || words[abi::MESH_HEADER_REQUIRED_JOINTS] > maxPoseJoints ||
-      words[abi::MESH_HEADER_REQUIRED_JOINTS] == 0 ||
-      !isUnitSection(words[abi::MESH_HEADER_POSITIONS], vertices + 1, words.size()) ||
-      !areVectors(abi::MESH_HEADER_NORMALS) || !areVectors(abi::MESH_HEADER_TANGENTS) ||
-      !areVectors(abi::MESH_HEADER_CENTERS) ||
-      !areFloats(abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS) ||
-      !areFloats(abi::MESH_HEADER_BULGE_STRENGTHS) ||
-      !isUnitSection(words[abi::MESH_HEADER_MORPHS], words[abi::MESH_HEADER_MORPH_COUNT],
-                     words.size())) {
+  if (vertices == 0 || header.requiredJoints > maxPoseJoints || header.requiredJoints == 0 ||
+      !isUnitSection(header.positions, vertices + 1, words.size()) || !areVectors(header.normals) ||
+      !areVectors(header.tangents) || !areVectors(header.centers) ||
+      !areFloats(header.dualQuaternionWeights) || !areFloats(header.bulgeStrengths) ||
+      !isUnitSection(header.morphs, header.morphCount, words.size())) {
     return damagedBlob("its header does not fit its sections");
   }
-  if (Result<void> good = checkInfluences(words); !good) return good;
+  if (Result<void> good = checkInfluences(words, header); !good) return good;
   std::uint64_t behind = 0;
-  for (std::uint32_t target = 0; target < words[abi::MESH_HEADER_MORPH_COUNT]; ++target) {
-    if (Result<void> good = checkMorph(words, target, behind); !good) return good;
+  for (std::uint32_t target = 0; target < header.morphCount; ++target) {
+    if (Result<void> good = checkMorph(words, header, target, behind); !good) return good;
   }
   return {};
 }

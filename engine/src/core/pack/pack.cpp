@@ -177,12 +177,15 @@ std::uint32_t appendFloats(const AttributeView& view, std::vector<std::uint32_t>
 }
 
 /// Behind the positions, whose records are told where the influences of their vertices begin.
-void appendInfluences(const MeshView& mesh, std::vector<std::uint32_t>& words) {
+void appendInfluences(const MeshView& mesh, abi::MeshHeader& header,
+                      std::vector<std::uint32_t>& words) {
   const std::size_t offset = words.size();
-  words[abi::MESH_HEADER_INFLUENCES] = offsetOf(words);
-  const auto begin = [&](std::uint32_t vertex) -> std::uint32_t& {
-    return words[words[abi::MESH_HEADER_POSITIONS] + std::size_t{vertex} * abi::VERTEX_WORDS +
-                 abi::VERTEX_INFLUENCES];
+  header.influences = offsetOf(words);
+  const auto setBegin = [&](std::uint32_t vertex, std::uint32_t begin) {
+    const std::size_t place = header.positions + std::size_t{vertex} * abi::VERTEX_WORDS;
+    auto record = abi::load<abi::PositionRecord>(words, place);
+    record.influences = begin;
+    abi::store(words, place, record);
   };
   std::vector<PackedInfluence> influences;
   std::uint32_t requiredJoints = 1, maxInfluences = 0;
@@ -190,18 +193,19 @@ void appendInfluences(const MeshView& mesh, std::vector<std::uint32_t>& words) {
     const auto unit = static_cast<std::uint32_t>((words.size() - offset) / 4);
     packInfluences(mesh, vertex, influences);
     const auto count = static_cast<std::uint32_t>(influences.size());
-    begin(vertex) = unit * 2 + count % 2;
+    setBegin(vertex, unit * 2 + count % 2);
     for (const PackedInfluence& influence : influences) {
-      words.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(influence.weight)));
-      words.push_back(influence.joint);
+      words.resize(words.size() + abi::INFLUENCE_WORDS);
+      abi::store(words, words.size() - abi::INFLUENCE_WORDS,
+                 abi::InfluenceRecord{static_cast<float>(influence.weight), influence.joint});
       requiredJoints = std::max(requiredJoints, influence.joint + 1);
     }
     alignToUnit(words);
     maxInfluences = std::max(maxInfluences, count);
   }
-  begin(mesh.vertexCount) = static_cast<std::uint32_t>((words.size() - offset) / 4 * 2);
-  words[abi::MESH_HEADER_REQUIRED_JOINTS] = requiredJoints;
-  words[abi::MESH_HEADER_MAX_INFLUENCES] = maxInfluences;
+  setBegin(mesh.vertexCount, static_cast<std::uint32_t>((words.size() - offset) / 4 * 2));
+  header.requiredJoints = requiredJoints;
+  header.maxInfluences = maxInfluences;
 }
 
 /// An upper limit of the words that a mesh takes, before any is written.
@@ -242,25 +246,27 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   PackedMesh packed;
   std::vector<std::uint32_t>& words = packed.words_;
   words.assign(abi::MESH_HEADER_WORDS, 0u);
-  words[abi::MESH_HEADER_MAGIC] = abi::MESH_MAGIC;
-  words[abi::MESH_HEADER_VERSION] = abi::MESH_VERSION;
-  words[abi::MESH_HEADER_VERTEX_COUNT] = mesh.vertexCount;
-  words[abi::MESH_HEADER_POSITIONS] = appendPositions(mesh, words);
-  words[abi::MESH_HEADER_NORMALS] = appendVectors(mesh.normals, 3, words);
-  words[abi::MESH_HEADER_TANGENTS] = appendVectors(mesh.tangents, 4, words);
-  words[abi::MESH_HEADER_CENTERS] = appendVectors(mesh.centersOfRotation, 3, words);
-  appendInfluences(mesh, words);
-  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHTS] = appendFloats(mesh.dualQuaternionWeights, words);
-  words[abi::MESH_HEADER_DUAL_QUATERNION_WEIGHT] =
-      std::bit_cast<std::uint32_t>(mesh.dualQuaternionWeight);
-  words[abi::MESH_HEADER_BULGE_STRENGTHS] = appendFloats(mesh.bulgeStrengths, words);
-  words[abi::MESH_HEADER_BULGE_STRENGTH] = std::bit_cast<std::uint32_t>(mesh.bulgeStrength);
-  words[abi::MESH_HEADER_MORPHS] = appendMorphs(mesh, words);
-  words[abi::MESH_HEADER_MORPH_COUNT] = static_cast<std::uint32_t>(mesh.morphTargets.size());
+  abi::MeshHeader header{};
+  header.magic = abi::MESH_MAGIC;
+  header.version = abi::MESH_VERSION;
+  header.vertexCount = mesh.vertexCount;
+  header.positions = appendPositions(mesh, words);
+  header.normals = appendVectors(mesh.normals, 3, words);
+  header.tangents = appendVectors(mesh.tangents, 4, words);
+  header.centers = appendVectors(mesh.centersOfRotation, 3, words);
+  appendInfluences(mesh, header, words);
+  header.dualQuaternionWeights = appendFloats(mesh.dualQuaternionWeights, words);
+  header.dualQuaternionWeight = mesh.dualQuaternionWeight;
+  header.bulgeStrengths = appendFloats(mesh.bulgeStrengths, words);
+  header.bulgeStrength = mesh.bulgeStrength;
+  header.morphs = appendMorphs(mesh, words);
+  header.morphCount = static_cast<std::uint32_t>(mesh.morphTargets.size());
   while (words.size() % (packedMeshAlignment / 4) != 0) words.push_back(0);
 
-  words[abi::MESH_HEADER_WORDS_TOTAL] = offsetOf(words);
-  words[abi::MESH_HEADER_CHECKSUM] = checksumOfBlob(words);
+  header.wordCount = offsetOf(words);
+  abi::store(words, 0, header);
+  header.checksum = checksumOfBlob(words);
+  abi::store(words, 0, header);
   return packed;
 }
 
@@ -277,15 +283,16 @@ Result<PackedMesh> PackedMesh::fromBytes(std::span<const std::byte> bytes) {
 }
 
 MeshInfo PackedMesh::info() const {
+  const auto header = abi::load<abi::MeshHeader>(words_, 0);
   MeshInfo info;
   info.byteSize = bytes().size();
-  info.vertexCount = words_[abi::MESH_HEADER_VERTEX_COUNT];
-  info.requiredJoints = words_[abi::MESH_HEADER_REQUIRED_JOINTS];
-  info.maxInfluences = words_[abi::MESH_HEADER_MAX_INFLUENCES];
-  info.morphTargetCount = words_[abi::MESH_HEADER_MORPH_COUNT];
-  info.hasNormals = words_[abi::MESH_HEADER_NORMALS] != 0;
-  info.hasTangents = words_[abi::MESH_HEADER_TANGENTS] != 0;
-  info.hasCentersOfRotation = words_[abi::MESH_HEADER_CENTERS] != 0;
+  info.vertexCount = header.vertexCount;
+  info.requiredJoints = header.requiredJoints;
+  info.maxInfluences = header.maxInfluences;
+  info.morphTargetCount = header.morphCount;
+  info.hasNormals = header.normals != 0;
+  info.hasTangents = header.tangents != 0;
+  info.hasCentersOfRotation = header.centers != 0;
   return info;
 }
 
