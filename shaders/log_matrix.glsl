@@ -21,8 +21,6 @@ float rowSum(vec4 row) {
   return sum;
 }
 
-const float INVERSES[8] = float[8](1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0);
-
 Affine exponentialOf(Affine logarithm) {
   // Halved until its norm is at most a half: then eight terms are exact to 2e-9.
   precise float norm = max(rowSum(logarithm.r0), max(rowSum(logarithm.r1), rowSum(logarithm.r2)));
@@ -39,7 +37,7 @@ Affine exponentialOf(Affine logarithm) {
   Affine l = Affine(l0, l1, l2);
   Affine power = Affine(vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
   for (uint term = 8u; term > 0u; --term) {
-    float inverse = INVERSES[term - 1u];
+    float inverse = quotient(1.0, float(term));
     precise vec4 r0 = vec4(1.0, 0.0, 0.0, 0.0) + inverse * (rowTimes(l.r0, power) + vec4(0.0, 0.0, 0.0, l.r0.w));
     precise vec4 r1 = vec4(0.0, 1.0, 0.0, 0.0) + inverse * (rowTimes(l.r1, power) + vec4(0.0, 0.0, 0.0, l.r1.w));
     precise vec4 r2 = vec4(0.0, 0.0, 1.0, 0.0) + inverse * (rowTimes(l.r2, power) + vec4(0.0, 0.0, 0.0, l.r2.w));

@@ -106,14 +106,15 @@ Vertex bindVertex(Sections sections, uint vertex, out uint first) {
 }
 
 // A position as it is stored; snorm16 is relative to the box of the instance.
-uvec4 encodePosition(vec3 position, ExtensionRecord extension, bool mayCount) {
+uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
-    precise vec3 relative = (position - vec3(extension.centreX, extension.centreY, extension.centreZ)) *
-                            vec3(extension.inverseX, extension.inverseY, extension.inverseZ);
+    ExtensionRecord record = loadExtension(extension);
+    precise vec3 relative = (position - vec3(record.centreX, record.centreY, record.centreZ)) *
+                            vec3(record.inverseX, record.inverseY, record.inverseZ);
     v.xyz = relative;
     // A vertex of the engine's own box may stand a rounding outside.
-    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(extension.result);
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(record.result);
   }
   return encodeComponents(POSITION_FORMAT, v);
 }
@@ -139,9 +140,10 @@ struct Work {
 };
 
 #ifdef HAS_MOTION
-uvec4 previousPosition(Instance instance, ExtensionRecord extension, uvec4 current, Work work) {
+uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
   if ((instance.record.flags & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  ExtensionRecord extension = loadExtension(instance.record.extension);
   Vertex before = work.bind;
   if (MORPHS) {
     morphVertex(before, work.mesh, work.vertex, extension.previousMorphs, extension.previousMorphCount, false, false);
@@ -149,7 +151,7 @@ uvec4 previousPosition(Instance instance, ExtensionRecord extension, uvec4 curre
   uint palette = extension.previousPalette;
   Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
   before = skinVertex(before, work.influences, work.inputs, pose, false, false);
-  return encodePosition(before.position, extension, false);
+  return encodePosition(before.position, instance.record.extension, false);
 }
 #endif
 
@@ -162,19 +164,19 @@ void skinInstance(Instance instance, Work work, bool scales) {
   }
 #endif
 
-  ExtensionRecord extension = loadExtension(instance.record.extension);  // compilers leave out what is not used
   Vertex morphed = work.bind;
   if (MORPHS) {
+    ExtensionRecord extension = loadExtension(instance.record.extension);
     morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount, NORMALS, TANGENTS);
     makeDirectionsUnit(morphed, NORMALS, TANGENTS);
   }
   Pose pose = Pose(instance.record.palette, instance.record.jointCount, scales);
   Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
-  if (BOUNDS) addToBounds(extension.result, skinned.position);
-  uvec4 position = encodePosition(skinned.position, extension, true);
+  if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
+  uvec4 position = encodePosition(skinned.position, instance.record.extension, true);
 #ifdef HAS_MOTION
   if (MOTION != MOTION_NONE) {
-    uvec4 words = previousPosition(instance, extension, position, work);
+    uvec4 words = previousPosition(instance, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
   }
 #endif

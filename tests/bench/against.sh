@@ -30,14 +30,16 @@ build "$PWD"
 times=$folder/times.csv # run, side, benchmark, time
 : >"$times"
 measure() { # RUN SIDE TREE
-  out=$folder/out.csv
+  out=$folder/out.json
   "$3/build/release/tests/bench/dermis_benchmarks" --benchmark_filter="$filter" --benchmark_repetitions=3 \
     --benchmark_min_time=0.03 --benchmark_enable_random_interleaving=true --benchmark_out="$out" \
-    --benchmark_out_format=csv >"$folder/console.log"
-  awk -F, -v run="$1" -v side="$2" '
-    /^name,/ { start = 1; next }
-    start && $1 !~ /_(mean|median|stddev|cv)"?$/ { gsub(/"|\/manual_time/, "", $1); print run "," side "," $1 "," $3 }' \
-    "$out" >>"$times"
+    --benchmark_out_format=json >"$folder/console.log"
+  # A member stands on a line of its own: "name": "…", … "run_type": "iteration", … "real_time": …,
+  awk -v run="$1" -v side="$2" '
+    { gsub(/[",]/, "") }
+    $1 == "name:" { name = $2; sub(/\/manual_time/, "", name) }
+    $1 == "run_type:" { one = $2 == "iteration" }
+    $1 == "real_time:" && one { print run "," side "," name "," $2 }' "$out" >>"$times"
 }
 run=1
 while [ "$run" -le "$RUNS" ]; do
