@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "blocks.h"
+#include "dermis/vulkan/vertex_input.h"
 #include "dermis_render_shaders.h"
 #include "target.h"
 
@@ -24,27 +25,6 @@ struct Specialization {
 };
 constexpr std::uint32_t specializationCount = sizeof(Specialization) / 4;
 
-VkFormat vulkanFormat(VertexFormat format) {
-  switch (format) {
-    case VertexFormat::float32x3:
-      return VK_FORMAT_R32G32B32_SFLOAT;
-    case VertexFormat::float32x4:
-      return VK_FORMAT_R32G32B32A32_SFLOAT;
-    case VertexFormat::float16x4:
-      return VK_FORMAT_R16G16B16A16_SFLOAT;
-    case VertexFormat::snorm16x4:
-      return VK_FORMAT_R16G16B16A16_SNORM;
-    case VertexFormat::snorm8x4:
-      return VK_FORMAT_R8G8B8A8_SNORM;
-    case VertexFormat::octahedral16x2:
-      return VK_FORMAT_R16G16_SNORM;
-    case VertexFormat::octahedral8x2:
-      return VK_FORMAT_R8G8_SNORM;
-    default:
-      return VK_FORMAT_UNDEFINED;
-  }
-}
-
 bool isOctahedral(VertexFormat format) {
   return format == VertexFormat::octahedral16x2 || format == VertexFormat::octahedral8x2;
 }
@@ -53,8 +33,8 @@ Result<void> checkFormats(const PipelineKey& key) {
   const bool positions = key.positions == VertexFormat::float32x3 ||
                          key.positions == VertexFormat::float32x4 ||
                          key.positions == VertexFormat::float16x4;
-  const bool normals =
-      key.normals == VertexFormat::none || vulkanFormat(key.normals) != VK_FORMAT_UNDEFINED;
+  const bool normals = key.normals == VertexFormat::none ||
+                       vulkan::vertexInputFormat(key.normals) != VK_FORMAT_UNDEFINED;
   if (positions && normals) return {};
   return Error{ErrorCode::invalidArgument,
                std::string("the renderer cannot draw from ") +
@@ -73,7 +53,7 @@ VertexState vertexState(const PipelineKey& key) {
   state.bindings = {{0, key.positionStride, VK_VERTEX_INPUT_RATE_VERTEX},
                     {2, sizeof(StaticVertex), VK_VERTEX_INPUT_RATE_VERTEX}};
   state.attributes = {
-      {0, 0, vulkanFormat(key.positions), 0},
+      {0, 0, vulkan::vertexInputFormat(key.positions), 0},
       {2, 2, VK_FORMAT_R32G32_SFLOAT, offsetof(StaticVertex, texcoord)},
       {3, 2, VK_FORMAT_R16G16B16A16_UNORM, offsetof(StaticVertex, color)},
   };
@@ -81,10 +61,10 @@ VertexState vertexState(const PipelineKey& key) {
   // The shader reads every attribute, whether it needs it or not: what there is not is something
   // else that is there.
   if (key.normals == VertexFormat::none) {
-    state.attributes.push_back({1, 0, vulkanFormat(key.positions), 0});
+    state.attributes.push_back({1, 0, vulkan::vertexInputFormat(key.positions), 0});
   } else {
     state.bindings.push_back({1, key.normalStride, VK_VERTEX_INPUT_RATE_VERTEX});
-    state.attributes.push_back({1, 1, vulkanFormat(key.normals), 0});
+    state.attributes.push_back({1, 1, vulkan::vertexInputFormat(key.normals), 0});
   }
   if (key.valueStride == 0) {
     state.attributes.push_back({4, 2, VK_FORMAT_R32_SFLOAT, 0});

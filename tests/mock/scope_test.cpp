@@ -15,9 +15,11 @@ using vulkan::Dependency;
 using vulkan::PreviousUse;
 using vulkan::QueueTransfer;
 using vulkan::Scope;
+using vulkan::Writer;
 
 constexpr Scope nothing{0, 0};
 constexpr Scope computeReads{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT};
+constexpr Scope kernelsRead{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0};
 constexpr Scope computeWrites{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT};
 
 void expectScope(const Scope& scope, const Scope& expected, const char* what) {
@@ -37,6 +39,18 @@ constexpr Reader readers[] = {
     {Consumer::vertexShader,
      {VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT},
      "vertexShader"},
+    {Consumer::fragmentShader,
+     {VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT},
+     "fragmentShader"},
+    {Consumer::taskShader,
+     {VK_PIPELINE_STAGE_TASK_SHADER_BIT_EXT, VK_ACCESS_SHADER_READ_BIT},
+     "taskShader"},
+    {Consumer::meshShader,
+     {VK_PIPELINE_STAGE_MESH_SHADER_BIT_EXT, VK_ACCESS_SHADER_READ_BIT},
+     "meshShader"},
+    {Consumer::rayTracingShader,
+     {VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_KHR, VK_ACCESS_SHADER_READ_BIT},
+     "rayTracingShader"},
     {Consumer::compute, computeReads, "compute"},
     // A build reads its vertices with the access of a shader.
     {Consumer::accelerationStructureBuild,
@@ -80,6 +94,22 @@ TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
        {VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, 0},
        computeWaits,
        "vertexShader"},
+      {PreviousUse::fragmentShader,
+       {VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0},
+       computeWaits,
+       "fragmentShader"},
+      {PreviousUse::taskShader,
+       {VK_PIPELINE_STAGE_TASK_SHADER_BIT_EXT, 0},
+       computeWaits,
+       "taskShader"},
+      {PreviousUse::meshShader,
+       {VK_PIPELINE_STAGE_MESH_SHADER_BIT_EXT, 0},
+       computeWaits,
+       "meshShader"},
+      {PreviousUse::rayTracingShader,
+       {VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_KHR, 0},
+       computeWaits,
+       "rayTracingShader"},
       {PreviousUse::compute, computeWaits, computeWaits, "compute"},
       {PreviousUse::accelerationStructureBuild,
        {VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR, 0},
@@ -96,6 +126,42 @@ TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
     const Dependency dependency = vulkan::inputScope(expected.use);
     expectScope(dependency.source, expected.source, expected.name);
     expectScope(dependency.destination, expected.destination, expected.name);
+  }
+}
+
+// Write after read: an execution dependency, from the kernels to the writer.
+TEST(ScopeTest, OverwritersWaitForKernels) {
+  expectScope(vulkan::overwriteScope(Writer::compute).source, kernelsRead, "source");
+  expectScope(vulkan::overwriteScope(Writer::compute).destination, kernelsRead, "compute");
+  expectScope(vulkan::overwriteScope(Writer::transfer).source, kernelsRead, "source");
+  expectScope(vulkan::overwriteScope(Writer::transfer).destination,
+              {VK_PIPELINE_STAGE_TRANSFER_BIT, 0}, "transfer");
+}
+
+TEST(ScopeTest, Synchronization2HasTheSameStagesAndAccesses) {
+  for (const Reader& reader : readers) {
+    const Dependency dependency = vulkan::outputScope(reader.consumer);
+    const VkMemoryBarrier2 memory = vulkan::memoryBarrier2(dependency);
+    EXPECT_EQ(memory.sType, VK_STRUCTURE_TYPE_MEMORY_BARRIER_2);
+    EXPECT_EQ(memory.pNext, nullptr);
+    EXPECT_EQ(memory.srcStageMask, VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT);
+    EXPECT_EQ(memory.srcAccessMask, VK_ACCESS_2_SHADER_WRITE_BIT);
+    EXPECT_EQ(memory.dstStageMask, reader.scope.stages) << reader.name;
+    EXPECT_EQ(memory.dstAccessMask, reader.scope.accesses) << reader.name;
+
+    const auto buffer = reinterpret_cast<VkBuffer>(std::uintptr_t{5});
+    const VkBufferMemoryBarrier2 part = vulkan::bufferBarrier2(dependency, buffer, 16, 32, 1, 2);
+    EXPECT_EQ(part.sType, VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2);
+    EXPECT_EQ(part.pNext, nullptr);
+    EXPECT_EQ(part.srcStageMask, memory.srcStageMask);
+    EXPECT_EQ(part.srcAccessMask, memory.srcAccessMask);
+    EXPECT_EQ(part.dstStageMask, memory.dstStageMask);
+    EXPECT_EQ(part.dstAccessMask, memory.dstAccessMask);
+    EXPECT_EQ(part.srcQueueFamilyIndex, 1u);
+    EXPECT_EQ(part.dstQueueFamilyIndex, 2u);
+    EXPECT_EQ(part.buffer, buffer);
+    EXPECT_EQ(part.offset, 16u);
+    EXPECT_EQ(part.size, 32u);
   }
 }
 

@@ -12,11 +12,6 @@ Error invalid(std::string message) {
   return {ErrorCode::invalidArgument, std::move(message)};
 }
 
-/// Bytes of one component.
-std::uint32_t componentBytes(VkFormat format) {
-  return format == VK_FORMAT_R32G32B32_SFLOAT ? 4 : 2;
-}
-
 Result<void> checkLayout(const OutputAttribute& positions, VkFormat format,
                          VkDeviceAddress outputAddress) {
   const std::string name(formatName(positions.format));
@@ -26,7 +21,7 @@ Result<void> checkLayout(const OutputAttribute& positions, VkFormat format,
     return invalid("the stride of " + std::to_string(positions.stride) +
                    " bytes is less than a position in " + name + " takes");
   }
-  const std::uint32_t alignment = componentBytes(format);
+  const std::uint32_t alignment = formatAlignment(positions.format);
   if (positions.stride % alignment != 0) {
     return invalid("the stride of " + std::to_string(positions.stride) +
                    " bytes is no multiple of " + std::to_string(alignment) +

@@ -11,6 +11,14 @@ Scope scopeOf(Consumer consumer) {
       return {VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT};
     case Consumer::vertexShader:
       return {VK_PIPELINE_STAGE_VERTEX_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::fragmentShader:
+      return {VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::taskShader:
+      return {VK_PIPELINE_STAGE_TASK_SHADER_BIT_EXT, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::meshShader:
+      return {VK_PIPELINE_STAGE_MESH_SHADER_BIT_EXT, VK_ACCESS_SHADER_READ_BIT};
+    case Consumer::rayTracingShader:
+      return {VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_KHR, VK_ACCESS_SHADER_READ_BIT};
     case Consumer::compute:
       return {compute, VK_ACCESS_SHADER_READ_BIT};
     case Consumer::accelerationStructureBuild:
@@ -43,6 +51,14 @@ Dependency inputScope(PreviousUse use) {
       return afterReader(Consumer::vertexInput);
     case PreviousUse::vertexShader:
       return afterReader(Consumer::vertexShader);
+    case PreviousUse::fragmentShader:
+      return afterReader(Consumer::fragmentShader);
+    case PreviousUse::taskShader:
+      return afterReader(Consumer::taskShader);
+    case PreviousUse::meshShader:
+      return afterReader(Consumer::meshShader);
+    case PreviousUse::rayTracingShader:
+      return afterReader(Consumer::rayTracingShader);
     case PreviousUse::compute:
       return afterReader(Consumer::compute);
     case PreviousUse::accelerationStructureBuild:
@@ -54,6 +70,11 @@ Dependency inputScope(PreviousUse use) {
               {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}};
   }
   return {};
+}
+
+Dependency overwriteScope(Writer writer) {
+  constexpr VkPipelineStageFlags transfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
+  return {{compute, 0}, {writer == Writer::compute ? compute : transfer, 0}};
 }
 
 Dependency outputScope(Consumer consumer, QueueTransfer transfer) {
@@ -80,6 +101,33 @@ VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffe
   VkBufferMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
   barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  barrier.srcQueueFamilyIndex = sourceFamily;
+  barrier.dstQueueFamilyIndex = destinationFamily;
+  barrier.buffer = buffer;
+  barrier.offset = offset;
+  barrier.size = size;
+  return barrier;
+}
+
+VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency) {
+  VkMemoryBarrier2 barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
+  barrier.srcStageMask = dependency.source.stages;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstStageMask = dependency.destination.stages;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  return barrier;
+}
+
+VkBufferMemoryBarrier2 bufferBarrier2(const Dependency& dependency, VkBuffer buffer,
+                                      VkDeviceSize offset, VkDeviceSize size,
+                                      std::uint32_t sourceFamily, std::uint32_t destinationFamily) {
+  VkBufferMemoryBarrier2 barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2;
+  barrier.srcStageMask = dependency.source.stages;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstStageMask = dependency.destination.stages;
   barrier.dstAccessMask = dependency.destination.accesses;
   barrier.srcQueueFamilyIndex = sourceFamily;
   barrier.dstQueueFamilyIndex = destinationFamily;

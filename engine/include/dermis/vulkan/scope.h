@@ -2,8 +2,8 @@
 // after `record`. Dermis only records barriers between its own commands, and does not track the
 // state of resources.
 //
-// The values are those of Vulkan 1.0 barriers; VkPipelineStageFlags2 and VkAccessFlags2 have the
-// same bits.
+// The values are those of Vulkan 1.0 barriers. VkPipelineStageFlags2 and VkAccessFlags2 have the
+// same bits: `memoryBarrier2` and `bufferBarrier2` are for vkCmdPipelineBarrier2.
 #pragma once
 
 #include <cstdint>
@@ -40,8 +40,12 @@ enum class PreviousUse : std::uint8_t {
   transferWrite,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
   computeWrite,   ///< another compute pass
   // A read of what `record` overwrites: the output.
-  vertexInput,                 ///< draws, as a vertex buffer
-  vertexShader,                ///< draws, as a storage or texel buffer
+  vertexInput,   ///< draws, as a vertex buffer
+  vertexShader,  ///< this and the next four: as a storage or texel buffer
+  fragmentShader,
+  taskShader,  ///< of VK_EXT_mesh_shader
+  meshShader,
+  rayTracingShader,            ///< any shader of a ray-tracing pipeline
   compute,                     ///< another compute pass
   accelerationStructureBuild,  ///< a build or refit
   transfer,                    ///< vkCmdCopyBuffer
@@ -51,12 +55,22 @@ enum class PreviousUse : std::uint8_t {
 
 /// The next use of the skinned vertices.
 enum class Consumer : std::uint8_t {
-  vertexInput,                 ///< bound as a vertex buffer
-  vertexShader,                ///< fetched from a storage or texel buffer in the vertex shader
+  vertexInput,   ///< bound as a vertex buffer
+  vertexShader,  ///< this and the next four: fetched from a storage or texel buffer
+  fragmentShader,
+  taskShader,  ///< of VK_EXT_mesh_shader
+  meshShader,
+  rayTracingShader,            ///< any shader of a ray-tracing pipeline
   compute,                     ///< another compute pass
   accelerationStructureBuild,  ///< the geometry of a bottom-level acceleration structure
   transfer,                    ///< vkCmdCopyBuffer
   hostRead,                    ///< read through a mapping after a fence
+};
+
+/// What overwrites, on the GPU, data that `record` reads.
+enum class Writer : std::uint8_t {
+  compute,   ///< a compute pass of the engine: animation, culling
+  transfer,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
 };
 
 /// A queue-family ownership transfer is two barriers: the release on the queue that skins, the
@@ -67,6 +81,11 @@ enum class QueueTransfer : std::uint8_t { none, release, acquire };
 
 /// The barrier before `record`, for a buffer with this last use.
 Dependency inputScope(PreviousUse use);
+
+/// The barrier before the engine overwrites poses, visibility words or meshes that an earlier
+/// `record` reads. After its writes comes `inputScope(PreviousUse::computeWrite)` or
+/// `inputScope(PreviousUse::transferWrite)`.
+Dependency overwriteScope(Writer writer);
 
 /// The barrier after `record`, for the output buffer.
 Dependency outputScope(Consumer consumer, QueueTransfer transfer = QueueTransfer::none);
@@ -80,5 +99,12 @@ VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffe
                                     VkDeviceSize offset, VkDeviceSize size,
                                     std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
                                     std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
+
+/// The same two for vkCmdPipelineBarrier2 (Vulkan 1.3, VK_KHR_synchronization2).
+VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency);
+VkBufferMemoryBarrier2 bufferBarrier2(const Dependency& dependency, VkBuffer buffer,
+                                      VkDeviceSize offset, VkDeviceSize size,
+                                      std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
+                                      std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
 
 }  // namespace dermis::vulkan

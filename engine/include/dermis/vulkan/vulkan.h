@@ -8,3 +8,4 @@
 #include "dermis/vulkan/memory.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/vertex_input.h"

@@ -1,0 +1,102 @@
+#include "dermis/vulkan/vertex_input.h"
+
+#include <string>
+#include <utility>
+
+namespace dermis::vulkan {
+namespace {
+
+/// Attributes that there are, one after the other; of planar layouts only, or the first.
+std::array<VkDeviceSize, 4> offsetsOf(const VertexLayout& layout,
+                                      const std::array<OutputAttribute, 4>& attributes) {
+  std::array<VkDeviceSize, 4> offsets{};
+  std::size_t count = 0;
+  for (const OutputAttribute& attribute : attributes) {
+    if (attribute.format == VertexFormat::none) continue;
+    offsets[count++] = attribute.offset;
+    if (layout.arrangement == Arrangement::interleaved) break;
+  }
+  return offsets;
+}
+
+}  // namespace
+
+VkFormat vertexInputFormat(VertexFormat format) {
+  switch (format) {
+    case VertexFormat::float32x3:
+      return VK_FORMAT_R32G32B32_SFLOAT;
+    case VertexFormat::float32x4:
+      return VK_FORMAT_R32G32B32A32_SFLOAT;
+    case VertexFormat::float16x4:
+      return VK_FORMAT_R16G16B16A16_SFLOAT;
+    case VertexFormat::snorm16x4:
+      return VK_FORMAT_R16G16B16A16_SNORM;
+    case VertexFormat::snorm8x4:
+      return VK_FORMAT_R8G8B8A8_SNORM;
+    case VertexFormat::octahedral16x2:
+      return VK_FORMAT_R16G16_SNORM;
+    case VertexFormat::octahedral8x2:
+      return VK_FORMAT_R8G8_SNORM;
+    case VertexFormat::none:
+    case VertexFormat::float16x3:
+    case VertexFormat::snorm16x3:
+    case VertexFormat::snorm8x3:
+      break;
+  }
+  return VK_FORMAT_UNDEFINED;
+}
+
+Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNumbers& numbers) {
+  const Result<VertexPlaces> places = placeVertices(layout, 1);
+  if (!places) return places.error();
+  const bool isInterleaved = layout.arrangement == Arrangement::interleaved;
+  VertexInput input;
+  const auto add = [&](const OutputAttribute& attribute, std::uint32_t location) -> Result<void> {
+    if (attribute.format == VertexFormat::none) return {};
+    const std::string name(formatName(attribute.format));
+    const VkFormat format = vertexInputFormat(attribute.format);
+    if (format == VK_FORMAT_UNDEFINED) {
+      return Error{ErrorCode::invalidArgument,
+                   "vertex input cannot read " + name +
+                       " on every device: use a format of four components, or a storage buffer"};
+    }
+    if (attribute.stride % formatAlignment(attribute.format) != 0) {
+      return Error{ErrorCode::invalidArgument,
+                   "the stride of " + std::to_string(attribute.stride) +
+                       " bytes is no multiple of " +
+                       std::to_string(formatAlignment(attribute.format)) +
+                       ", the size of a component of " + name};
+    }
+    if (!isInterleaved || input.bindingCount == 0) {
+      input.bindings[input.bindingCount] = {numbers.firstBinding + input.bindingCount,
+                                            attribute.stride, VK_VERTEX_INPUT_RATE_VERTEX};
+      ++input.bindingCount;
+    }
+    const std::uint32_t binding = input.bindings[input.bindingCount - 1].binding;
+    const auto offset = isInterleaved ? static_cast<std::uint32_t>(attribute.offset) : 0;
+    input.attributes[input.attributeCount++] = {location, binding, format, offset};
+    return {};
+  };
+  for (const auto& [attribute, location] :
+       {std::pair{places->positions, numbers.positions},
+        {places->normals, numbers.normals},
+        {places->tangents, numbers.tangents},
+        {places->previousPositions, numbers.previousPositions}}) {
+    if (Result<void> added = add(attribute, location); !added) return added.error();
+  }
+  return input;
+}
+
+std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
+                                                const InstanceOutput& output) {
+  return offsetsOf(layout,
+                   {output.positions, output.normals, output.tangents, output.previousPositions});
+}
+
+std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
+                                                const VertexPlaces& places) {
+  return offsetsOf(layout,
+                   {places.positions, places.normals, places.tangents, places.previousPositions});
+}
+
+}  // namespace dermis::vulkan
