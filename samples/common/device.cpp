@@ -368,11 +368,11 @@ Result<std::uint32_t> Device::memoryType(std::uint32_t allowedTypes, VkMemoryPro
   return unusable("device '" + info_.name + "' has no memory of the kind that is needed");
 }
 
-VkCommandBuffer Device::allocateCommandBuffer() {
+VkCommandBuffer Device::allocateCommandBuffer(VkCommandBufferLevel level) {
   VkCommandBufferAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
   info.commandPool = commandPool_;
-  info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+  info.level = level;
   info.commandBufferCount = 1;
   VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
   functions_.AllocateCommandBuffers(device_, &info, &commandBuffer);

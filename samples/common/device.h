@@ -77,7 +77,8 @@ class Device {
   Result<std::uint32_t> memoryType(std::uint32_t allowedTypes, VkMemoryPropertyFlags required,
                                    VkMemoryPropertyFlags preferred) const;
 
-  VkCommandBuffer allocateCommandBuffer();
+  VkCommandBuffer allocateCommandBuffer(
+      VkCommandBufferLevel level = VK_COMMAND_BUFFER_LEVEL_PRIMARY);
   void freeCommandBuffer(VkCommandBuffer commandBuffer);
 
   /// Submits and waits. Fails with `vulkanError`.

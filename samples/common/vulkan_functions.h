@@ -78,6 +78,7 @@
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
   X(CmdCopyBuffer)                        \
+  X(CmdExecuteCommands)                   \
   X(CmdBeginQuery)                        \
   X(CmdEndQuery)                          \
   X(CreateQueryPool)                      \

@@ -75,7 +75,7 @@ void SystemModel::checkPlacesAreApart() const {
 bool SystemModel::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
   const bool comesBack = !instance.wasDisplayed;
   const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
-  const bool isForced = isPlaced || instance.teleports || isOwed;
+  const bool isForced = isPlaced || instance.teleports || instance.isUrgent || isOwed;
   if (instance.description.culledOnGpu) return isForced;
   const bool isSkinned = lists.skinned.contains(instance.handle.index);
   if (isForced) {
@@ -104,7 +104,7 @@ void SystemModel::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists&
     instance.before = restarts ? now : instance.shown;
     instance.shown = now;
     instance.isMoving = hasPrevious && !restarts;
-    instance.isChanged = false;
+    instance.isChanged = instance.isUrgent = false;
     instance.waitedFrames = 0;
   } else {
     lists.gpu.settled += isCulled && instance.isMoving;

@@ -18,6 +18,7 @@ namespace dermis::test {
 /// can look up.
 struct ShownPose {
   std::uint32_t mesh = 0, pose = 0, morphs = 0;
+  Method method = Method::dualQuaternion;
   friend auto operator<=>(const ShownPose&, const ShownPose&) = default;
 };
 
@@ -36,6 +37,7 @@ struct ModelInstance {
 
   // Since the last `record`.
   bool isChanged = true;  ///< its positions are not what they should be
+  bool isUrgent = false;  ///< it changed in a way that no interval holds back
   bool teleports = false;
   bool changesMesh = true;
   std::uint32_t waitedFrames = 0;  ///< in which it was changed, but skipped for its interval
@@ -85,7 +87,8 @@ class SystemModel {
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> beats;
   };
   ShownPose wantedPose(const ModelInstance& instance) const {
-    return {instance.mesh, poses.at(instance.pose).pose, instance.morphs};
+    return {instance.mesh, poses.at(instance.pose).pose, instance.morphs,
+            instance.description.method};
   }
   void lock(const InstanceOutput& output);
   void checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed);

@@ -1,6 +1,7 @@
 // Thousands of random steps of a system beside a model of it: meshes, palettes and instances come
-// and go, move, hide, find no room and are moved about while frames are under way, and every
-// instance's output stays, bit for bit, what it would be alone.
+// and go, move, hide, find no room and are moved about while frames are under way, frames are
+// abandoned, and every instance's output stays, bit for bit, what it would be alone. Half of the
+// tests record into secondary command buffers.
 
 #include <gtest/gtest.h>
 
@@ -8,7 +9,7 @@
 #include <array>
 #include <cstring>
 #include <random>
-#include <tuple>
+#include <utility>
 
 #include "system_model.h"
 
@@ -16,7 +17,7 @@ namespace dermis::test {
 namespace {
 
 constexpr std::uint32_t framesInFlight = 3;
-constexpr std::uint32_t stepCount = 4000;
+constexpr std::uint32_t stepCount = 10'000;
 constexpr std::uint32_t poseCount = 12;
 constexpr std::uint32_t meshKinds = 8;
 
@@ -51,6 +52,7 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
     small.instanceBudget = 200;
     small.outputBudget = 120 << 10;  // so small that it is full at times
     engine_.emplace(device(), small);
+    engine_->recordsSecondary = GetParam() % 2 == 0;
     model_.emplace(*engine_);
     for (samples::MappedBuffer& words : words_)
       words = must(
@@ -79,8 +81,11 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   void removeInstance();
   void changeInstance();
   void setMesh(ModelInstance& instance);
+  void changeSeveral();
   void tryStaleHandle();
   void runFrame();
+  void beginFrame();
+  void changeMeanwhile();
   void step();
 
   void showSome(std::span<std::byte> words);
@@ -97,7 +102,8 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
   std::array<samples::MappedBuffer, framesInFlight> words_;
-  std::map<std::tuple<ShownPose, Method, VertexFormat>, Streams> expected_;
+  std::map<std::pair<ShownPose, VertexFormat>, Streams> expected_;
+  std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };
 
@@ -214,6 +220,41 @@ void SystemModelTest::changeInstance() {
   }
 }
 
+/// In one call: methods, poses, visibility, morph weights and jumps, of some instances twice.
+void SystemModelTest::changeSeveral() {
+  if (model_->instances.empty()) return;
+  std::vector<InstanceChange> changes;
+  for (std::uint32_t count = 1 + below(12); count != 0; --count) {
+    ModelInstance& instance = anyInstance();
+    InstanceChange& change = changes.emplace_back();
+    change.instance = instance.handle;
+    if (chance(40)) change.visible = instance.isVisible = chance(60);
+    if (chance(20)) change.teleports = instance.teleports = instance.isChanged = true;
+    if (chance(30)) {
+      const auto pose = anyPalette();
+      change.pose = pose->second.handle;
+      instance.pose = pose->first;
+      instance.description.pose = pose->second.handle;
+    }
+    if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
+    if (change.pose || change.method) {
+      must(system().prepare(pipelineNeeds(instance.description)));
+      instance.isChanged = instance.isUrgent = true;
+      instance.waitedFrames = 0;
+    }
+    if (chance(30)) {
+      instance.morphs = below(3);
+      change.morphs = morphSets[instance.morphs];
+      instance.isChanged = true;
+    }
+    if (chance(20) && !instance.description.culledOnGpu) {
+      change.updateInterval = instance.description.updateInterval = 1 + below(4);
+      instance.waitedFrames = 0;
+    }
+  }
+  must(system().change(changes));
+}
+
 void SystemModelTest::tryStaleHandle() {
   if (gone_.empty()) return;
   const InstanceHandle stale = gone_[below(gone_.size())];
@@ -240,22 +281,62 @@ void SystemModelTest::runFrame() {
     model_->writePose(number, pose);
   }
   if (chance(15)) system().compact(below(40'000));
-  samples::MappedBuffer& words = words_[engine_->frame() % framesInFlight];
-  showSome(words.bytes());
-  engine_->submit({words.handle(), 0});
+  const auto nextWords = [this]() -> samples::MappedBuffer& {
+    return words_[submittedFrames_ % framesInFlight];
+  };
+  if (chance(15)) {
+    showSome(nextWords().bytes());
+    engine_->abandon({nextWords().handle(), 0}, [this] { changeMeanwhile(); });
+    ++abandonedFrames_;
+    if (chance(50)) return beginFrame();
+  }
+  showSome(nextWords().bytes());
+  engine_->submit({nextWords().handle(), 0});
+  ++submittedFrames_;
   model_->afterRecord();
   movedInstances_ += system().movedInstances().size();
-  if (engine_->frame() % 8 == 0) expectOutputs();
+  if (submittedFrames_ % 8 == 0) expectOutputs();
+  beginFrame();
+}
+
+void SystemModelTest::beginFrame() {
   engine_->begin(below(framesInFlight));
   model_->beginFrame();
+}
+
+/// Between `record` and `abandonFrame`, when poses cannot be written.
+void SystemModelTest::changeMeanwhile() {
+  for (std::uint32_t count = below(6); count != 0; --count) {
+    switch (below(6)) {
+      case 0:
+        addMesh();
+        break;
+      case 1:
+        removeMesh();
+        break;
+      case 2:
+        removePose();
+        break;
+      case 3:
+        addInstance();
+        break;
+      case 4:
+        removeInstance();
+        break;
+      default:
+        changeSeveral();
+    }
+  }
+  if (chance(15)) system().compact(below(40'000));
 }
 
 const Streams& SystemModelTest::expected(const ModelInstance& instance, const ShownPose& shown) {
   // Meshes are told apart by what is in them, of which there are few.
   const std::uint32_t kind = kindOf_.at(shown.mesh);
-  const ShownPose content{kind, shown.pose, shown.morphs};
-  const InstanceDescription& description = instance.description;
-  Streams& streams = expected_[{content, description.method, description.layout.tangents}];
+  const ShownPose content{kind, shown.pose, shown.morphs, shown.method};
+  InstanceDescription description = instance.description;
+  description.method = shown.method;
+  Streams& streams = expected_[{content, description.layout.tangents}];
   if (streams[positionStream].empty())
     streams = alone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
   return streams;
@@ -285,7 +366,8 @@ void SystemModelTest::step() {
   if (kind < 17) return removePose();
   if (kind < 38) return isCrowded ? removeInstance() : addInstance();
   if (kind < 50) return removeInstance();
-  if (kind < 75) return changeInstance();
+  if (kind < 65) return changeInstance();
+  if (kind < 75) return changeSeveral();
   if (kind < 78) return tryStaleHandle();
   runFrame();
 }
@@ -301,6 +383,7 @@ TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
   EXPECT_GT(checkedInstances_, 1000u);
   EXPECT_GT(movedInstances_, 20u);
   EXPECT_GT(refusals_, 20u);
+  EXPECT_GT(abandonedFrames_, 50u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SystemModelTest, ::testing::Values(1u, 2u));

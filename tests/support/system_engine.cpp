@@ -36,6 +36,7 @@ SystemEngine::SystemEngine(samples::Device& device,
 SystemEngine::~SystemEngine() {
   device_.functions().DeviceWaitIdle(device_.handle());
   for (const SubmittedFrame& frame : submitted_) waitFor(frame);
+  for (const VkCommandBuffer secondary : secondaries_) device_.freeCommandBuffer(secondary);
 }
 
 MeshHandle SystemEngine::addMesh(const PackedMesh& mesh) {
@@ -72,9 +73,28 @@ Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
                                        const vulkan::FrameDescription& frame) {
   if (beforeRecord) beforeRecord(commandBuffer);
   if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transfer));
-  const Result<void> recorded = system_.record(commandBuffer, frame);
+  const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
+                                                 : system_.record(commandBuffer, frame);
   if (recordsBarriers) recordBarrier(commandBuffer, vulkan::outputScope(Consumer::transfer));
   if (afterRecord) afterRecord(commandBuffer);
+  return recorded;
+}
+
+Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
+                                             const vulkan::FrameDescription& frame) {
+  const VkCommandBuffer secondary =
+      device_.allocateCommandBuffer(VK_COMMAND_BUFFER_LEVEL_SECONDARY);
+  secondaries_.push_back(secondary);
+  VkCommandBufferInheritanceInfo inheritance{};
+  inheritance.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_INHERITANCE_INFO;
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  begin.pInheritanceInfo = &inheritance;
+  device_.functions().BeginCommandBuffer(secondary, &begin);
+  Result<void> recorded = system_.record(secondary, frame);
+  device_.functions().EndCommandBuffer(secondary);
+  device_.functions().CmdExecuteCommands(primary, 1, &secondary);
   return recorded;
 }
 
@@ -83,6 +103,16 @@ Result<void> SystemEngine::trySubmit(const vulkan::FrameDescription& frame) {
   const Result<void> recorded = recordFrame(commandBuffer, frame);
   submitted_.push_back({frame_, submitCommands(commandBuffer), commandBuffer});
   return recorded;
+}
+
+void SystemEngine::abandon(const vulkan::FrameDescription& frame,
+                           const std::function<void()>& meanwhile) {
+  const VkCommandBuffer commandBuffer = beginCommands();
+  must(recordFrame(commandBuffer, frame));
+  device_.functions().EndCommandBuffer(commandBuffer);
+  device_.freeCommandBuffer(commandBuffer);
+  meanwhile();
+  must(system_.abandonFrame(frame_));
 }
 
 VkCommandBuffer SystemEngine::beginCommands() {

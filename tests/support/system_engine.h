@@ -64,6 +64,9 @@ class SystemEngine {
   void submit(const vulkan::FrameDescription& frame = {}) { must(trySubmit(frame)); }
   /// Where `record` fails an empty command buffer is submitted.
   Result<void> trySubmit(const vulkan::FrameDescription& frame = {});
+  /// Records it, calls `meanwhile`, and says that it was not submitted.
+  void abandon(
+      const vulkan::FrameDescription& frame = {}, const std::function<void()>& meanwhile = [] {});
   void runFrame() {
     begin();
     submit();
@@ -89,6 +92,8 @@ class SystemEngine {
 
   /// Called in each frame before and behind the system's commands.
   std::function<void(VkCommandBuffer)> beforeRecord, afterRecord;
+  /// The system records into a secondary command buffer, which the frame's executes.
+  bool recordsSecondary = false;
   /// For tests of what happens without: the engine's own barriers.
   bool recordsBarriers = true;
 
@@ -102,6 +107,7 @@ class SystemEngine {
     return {mesh.index, mesh.generation};
   }
   VkCommandBuffer beginCommands();
+  Result<void> recordInSecondary(VkCommandBuffer primary, const vulkan::FrameDescription& frame);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const vulkan::FrameDescription& frame);
   VkFence submitCommands(VkCommandBuffer commandBuffer);
   void waitFor(const SubmittedFrame& frame);
@@ -112,6 +118,7 @@ class SystemEngine {
   vulkan::SkinningSystem system_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
   std::deque<SubmittedFrame> submitted_;
+  std::vector<VkCommandBuffer> secondaries_;
   std::uint64_t frame_ = 0, completedFrame_ = 0;
   samples::MappedBuffer readBack_;
 };

@@ -145,6 +145,122 @@ TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
   EXPECT_TRUE(one.plan.commands().empty());
 }
 
+TEST(Scene, AnAbandonedFrameIsPlannedAgain) {
+  OneInstance one;
+  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
+  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  const std::vector<std::string> all = namesOf(one.plan);
+  ASSERT_TRUE(one.scene.commit().ok());
+  EXPECT_EQ(one.scene.skinnedInstances().size(), 1u);
+  ASSERT_TRUE(one.scene.abandonFrame(1).ok());
+  EXPECT_EQ(one.scene.output(one.instance)->size, 0u);
+  EXPECT_TRUE(one.scene.skinnedInstances().empty());
+  EXPECT_EQ(one.scene.statistics().lastFrame.skinnedInstances, 0u);
+  ASSERT_TRUE(one.scene.plan(one.plan).ok()) << "in the same frame";
+  EXPECT_EQ(namesOf(one.plan), all);
+  ASSERT_TRUE(one.scene.commit().ok());
+  ASSERT_TRUE(one.scene.abandonFrame(1).ok());
+  ASSERT_TRUE(one.scene.beginFrame(2, 0).ok());
+  ASSERT_TRUE(one.scene.plan(one.plan).ok()) << "in another";
+  EXPECT_EQ(namesOf(one.plan), all);
+  ASSERT_TRUE(one.scene.commit().ok());
+  EXPECT_EQ(one.scene.output(one.instance)->size, 100u * 12u);
+  ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
+  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  EXPECT_TRUE(one.plan.commands().empty());
+}
+
+// The GPU's history was not cleared either.
+TEST(Scene, AnAbandonedFrameClearsNothing) {
+  OneInstance one(true);
+  for (std::uint64_t frame = 1; frame < 4; ++frame) {
+    ASSERT_TRUE(one.scene.beginFrame(frame, 0).ok());
+    ASSERT_TRUE(one.scene.plan(one.plan).ok());
+    EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear history"), 1) << frame;
+    ASSERT_TRUE(one.scene.commit().ok());
+    if (frame < 3) {
+      ASSERT_TRUE(one.scene.abandonFrame(frame).ok());
+    }
+  }
+  ASSERT_TRUE(one.scene.beginFrame(4, 0).ok());
+  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear history"), 0);
+}
+
+// The frame in which it was hidden was never displayed: it moved in the frame before, and rests.
+TEST(Scene, WhatWasHiddenInAnAbandonedFrameOnlySettles) {
+  OneInstance one;
+  InstanceDescription description;
+  description.mesh = one.mesh;
+  description.pose = *one.scene.addPose(4);
+  description.layout.motion = Motion::kept;
+  const InstanceHandle moving = *one.scene.addInstance(description);
+  const auto runFrame = [&](std::uint64_t frame) {
+    ASSERT_TRUE(one.scene.plan(one.plan).ok());
+    ASSERT_TRUE(one.scene.commit().ok()) << frame;
+  };
+  for (std::uint64_t frame = 1; frame < 3; ++frame) {
+    ASSERT_TRUE(one.scene.beginFrame(frame, frame - 1).ok());
+    ASSERT_TRUE(one.scene.writePose(description.pose).ok());
+    runFrame(frame);
+  }
+  ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
+  ASSERT_TRUE(one.scene.setVisible(moving, false).ok());
+  runFrame(3);
+  ASSERT_TRUE(one.scene.abandonFrame(3).ok());
+  ASSERT_TRUE(one.scene.setVisible(moving, true).ok());
+  runFrame(3);
+  ASSERT_EQ(one.scene.settledInstances().size(), 1u);
+  EXPECT_EQ(one.scene.settledInstances()[0], moving);
+}
+
+TEST(Scene, OnlyTheFrameCommittedLastIsAbandoned) {
+  OneInstance one;
+  const auto expectRefused = [&](std::uint64_t frame) {
+    const Result<void> abandoned = one.scene.abandonFrame(frame);
+    ASSERT_FALSE(abandoned.ok());
+    EXPECT_EQ(abandoned.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(abandoned.error().message.find("frame " + std::to_string(frame)), std::string::npos);
+  };
+  expectRefused(0);
+  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
+  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  expectRefused(1);
+  ASSERT_TRUE(one.scene.commit().ok());
+  expectRefused(2);
+  ASSERT_TRUE(one.scene.beginFrame(2, 0).ok());
+  expectRefused(1);
+  expectRefused(2);
+  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  ASSERT_TRUE(one.scene.commit().ok());
+  EXPECT_TRUE(one.scene.abandonFrame(2).ok());
+  expectRefused(2);
+}
+
+// Otherwise an engine that cannot present for a while could not begin another frame; and what a
+// frame in flight reads must not be overwritten.
+TEST(Scene, AbandonedFramesAreNotInFlight) {
+  OneInstance one;
+  const auto place = [&](std::uint64_t frame) {
+    EXPECT_TRUE(one.scene.beginFrame(frame, 0).ok()) << frame;
+    const std::uint64_t offset = one.scene.writePose(one.pose)->offset;
+    EXPECT_TRUE(one.scene.plan(one.plan).ok());
+    EXPECT_TRUE(one.scene.commit().ok());
+    return offset;
+  };
+  const std::uint64_t first = place(1);
+  const std::uint64_t second = place(2);
+  EXPECT_NE(first, second);
+  ASSERT_TRUE(one.scene.abandonFrame(2).ok());
+  for (std::uint64_t frame = 3; frame < 8; ++frame) {
+    EXPECT_EQ(place(frame), second) << "frame 1 still reads its pose";
+    ASSERT_TRUE(one.scene.abandonFrame(frame).ok());
+  }
+  EXPECT_EQ(place(8), second);
+  EXPECT_FALSE(one.scene.beginFrame(9, 0).ok()) << "frames 1 and 8 are in flight";
+  EXPECT_TRUE(one.scene.beginFrame(9, 1).ok());
+}
+
 // A change between plan and commit would count as done.
 TEST(Scene, AChangedSceneIsNotCommitted) {
   const std::vector<std::function<void(OneInstance&)>> changes{

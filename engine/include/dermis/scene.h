@@ -34,8 +34,8 @@
 namespace dermis {
 
 struct SceneDescription {
-  /// Frames that the engine records ahead of the GPU: `beginFrame(f)` comes after frame
-  /// f - framesInFlight is complete. 1 or more.
+  /// Maximum frames that are recorded and not yet complete, including the one that is being
+  /// recorded. 1 or more.
   std::uint32_t framesInFlight = 2;
   std::uint64_t meshBudget = std::uint64_t{32} << 20;  ///< bytes of packed meshes; at most a
                                                        ///< storage buffer range
@@ -71,6 +71,21 @@ struct InstanceDescription {
   /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range
   /// always does.
   bool culledOnGpu = false;
+};
+
+/// What changes about an instance: everything that has a value. The next `plan` skins an instance
+/// that changes its mesh, pose, method or box, whatever its interval.
+struct InstanceChange {
+  InstanceHandle instance = {};
+  std::optional<bool> visible;                  ///< as `Scene::setVisible`
+  bool teleports = false;                       ///< as `Scene::teleport`
+  std::optional<Method> method;                 ///< motion goes on
+  std::optional<std::uint32_t> updateInterval;  ///< as `InstanceDescription::updateInterval`
+  std::optional<MeshHandle> mesh;               ///< as `Scene::setMesh`
+  std::optional<PoseHandle> pose;               ///< motion goes on
+  /// Of positions in snorm16. Motion restarts: previous positions would be relative to the old box.
+  std::optional<Box> box;
+  std::optional<std::span<const MorphWeight>> morphs;  ///< as `Scene::setMorphWeights`
 };
 
 /// What `prepare` must be given before such an instance is recorded.
@@ -184,14 +199,20 @@ class Scene {
   // -- What changes.
 
   /// Begins a frame. `frame` is larger than the last one; `completedFrame` is the newest frame that
-  /// the GPU has completed, 0 if none. Frames count from 1. Fails with `invalidArgument` if more
-  /// frames are in flight than described, or if numbers run backwards.
+  /// the GPU has completed, 0 if none. Frames count from 1; numbers may be left out. Fails with
+  /// `invalidArgument` if more frames would be in flight than described, or if numbers run
+  /// backwards.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
 
   /// Where to write all joint matrices of this frame: the memory holds an older pose, which the GPU
   /// no longer reads. All instances of the pose are skinned again. Fails with `invalidArgument` if
   /// it is not called between `beginFrame` and `plan`.
   Result<PosePlace> writePose(PoseHandle pose);
+
+  /// Changes many instances, one after the other. If one fails, for a reason that the functions
+  /// below and `addInstance` have, nothing about it changes; the changes before it stay, those
+  /// after it are not made, and the message says which one it was.
+  Result<void> change(std::span<const InstanceChange> changes);
 
   /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
   /// positions are its current ones. Instances begin visible.
@@ -228,6 +249,15 @@ class Scene {
   /// there is no plan, or the scene was changed since.
   Result<void> commit();
 
+  /// The commands of the last `commit` will never be executed, because the engine did not submit
+  /// the frame. The scene forgets that frame: `output`, motion and update intervals are as they
+  /// were before it, and the next `plan` lists its work again. What the engine changed meanwhile
+  /// stays changed. The frame may be planned again, or the engine begins another one. Copies of
+  /// packed meshes that went with the frame are the engine's to repeat. O(instances). Fails with
+  /// `invalidArgument` if the frame is not the one that was committed last, or if `beginFrame` was
+  /// called since: older frames cannot be abandoned.
+  Result<void> abandonFrame(std::uint64_t frame);
+
   /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
   /// frame in rising order, before its buffer is used again. Fails with `invalidArgument` if
   /// the frame is not one of the last `framesInFlight` that were committed, and if `bytes` is
@@ -241,7 +271,8 @@ class Scene {
   /// that is culled on the GPU stands there from the first `commit` on, even if the GPU has not
   /// skinned it.
   Result<InstanceOutput> output(InstanceHandle instance) const;
-  /// Instances that were skinned, in no order, without those culled on the GPU.
+  /// Instances that were skinned, in no order, without those culled on the GPU. After
+  /// `abandonFrame`, none.
   std::span<const InstanceHandle> skinnedInstances() const;
   /// Instances of which only previous positions changed: they came to rest, or came back into view
   /// in the pose in which they left it.

@@ -62,6 +62,8 @@ class Context {
   static Result<Context> create(const DeviceDescription& description);
 
   ~Context();
+  /// May be moved while bindings and systems that were made with it exist, and while frames are in
+  /// flight, but not during a call of another thread.
   Context(Context&&) noexcept;
   Context& operator=(Context&&) noexcept;
 
@@ -88,10 +90,10 @@ class Context {
   /// `storageBuffersWanted` a stage) or `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 
-  /// Records the commands of the plan of a batch.
-  /// O(dispatches). Call it outside a render pass, on a command buffer of a queue with compute.
-  /// Afterwards the compute pipeline, descriptor set 0 of compute and push constants are undefined;
-  /// the graphics state is as it was.
+  /// Records the commands of the plan of a batch. O(dispatches). Call it outside a render pass,
+  /// with a primary or secondary command buffer for a queue with compute. Afterwards the compute
+  /// pipeline, descriptor set 0 of compute and push constants are undefined; the graphics state is
+  /// as it was.
   ///
   /// The engine puts barriers before and after (scope.h), sees to it that the tables of this very
   /// plan stand in the tables buffer when the GPU gets there, and keeps the bindings until the GPU

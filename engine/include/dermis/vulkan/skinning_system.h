@@ -125,6 +125,7 @@ class SkinningSystem {
   /// Where to write the joint matrices of this frame: mapped memory, to be written as a whole and
   /// never read, until `record`.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
+  Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
   Result<void> teleport(InstanceHandle instance);
@@ -136,8 +137,9 @@ class SkinningSystem {
 
   /// Records uploads and the commands of the frame (`Scene::plan`), with the barriers between them;
   /// nothing if nothing changed and no instance is culled on the GPU. Once after each `beginFrame`,
-  /// outside a render pass. The engine records a barrier `inputScope(PreviousUse)` of what last
-  /// used the output before it, and `outputScope(Consumer)` after it.
+  /// outside a render pass, with a primary or secondary command buffer. The engine records a
+  /// barrier `inputScope(PreviousUse)` of what last used the output before it, and
+  /// `outputScope(Consumer)` after it.
   ///
   /// Fails with `notPrepared` (`prepare` was not called for such instances), `invalidArgument` (no
   /// `beginFrame`; instances culled on the GPU without `FrameDescription::visibility`),
@@ -145,6 +147,11 @@ class SkinningSystem {
   /// `MemoryCallbacks::allocate` fails with. Nothing is recorded then, and the next `record` does
   /// all of it.
   Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
+
+  /// The engine did not submit what the last `record` recorded, and never will. As
+  /// `Scene::abandonFrame`: the next `record` does all of it again, uploads included, in the same
+  /// frame or in another one.
+  Result<void> abandonFrame(std::uint64_t frame);
 
   // -- Results, as of the last `record`: as `Scene`.
 

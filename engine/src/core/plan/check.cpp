@@ -124,8 +124,6 @@ Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targ
   return {};
 }
 
-namespace {
-
 bool isBox(const Box& box) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(box.min[axis]) || !std::isfinite(box.max[axis]) ||
@@ -134,6 +132,8 @@ bool isBox(const Box& box) {
   }
   return true;
 }
+
+namespace {
 
 Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
                          const Subject& subject) {

@@ -36,6 +36,8 @@ Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::siz
                        const Promises& promises);
 Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                       const DeviceLimits& limits);
+/// Whether positions in snorm16 can be relative to it.
+bool isBox(const Box& box);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
                          const Subject& subject);
 /// Whether a kernel can see all windows that a run is written to.

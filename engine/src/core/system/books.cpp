@@ -2,6 +2,7 @@
 
 #include "system/books.h"
 
+#include <algorithm>
 #include <string>
 
 #include "plan/check.h"
@@ -110,7 +111,8 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
                      " complete, cannot follow frame " + std::to_string(frame_) + ", with " +
                      std::to_string(completed_) + " complete"};
   }
-  if (frame - completedFrame > description_.framesInFlight) {
+  if (std::ranges::all_of(
+          readBacks_, [&](const ReadBack& recorded) { return recorded.frame > completedFrame; })) {
     return Error{ErrorCode::invalidArgument,
                  "frame " + std::to_string(frame) + " begins while the GPU has completed frame " +
                      std::to_string(completedFrame) + ": that makes more than the " +
@@ -119,6 +121,7 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
   frame_ = frame;
   completed_ = completedFrame;
   hasBegun_ = true;
+  abandonable_.isPossible = false;
   while (!retired_.empty() && retired_.front().frame <= completed_) {
     free(retired_.front());
     retired_.pop_front();
@@ -163,8 +166,9 @@ Result<std::uint64_t> SceneBooks::writePose(PoseHandle handle) {
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->poseFrame != frame_) {
     // The next of its slots: the GPU is done with it, since it was superseded at least as many
-    // frames ago as there may be in flight.
-    pose->slot = (pose->slot + 1) % description_.framesInFlight;
+    // recorded frames ago as there may be in flight. What no recorded frame reads is overwritten.
+    if (pose->poseFrame <= recordedFrame_)
+      pose->slot = (pose->slot + 1) % description_.framesInFlight;
     pose->poseFrame = frame_;
     ++pose->version;
     posed_.push_back(handle);
@@ -187,24 +191,28 @@ void SceneBooks::makePending(std::uint32_t index) {
   pending_.push_back(instances_.handleOf(index));
 }
 
+void SceneBooks::setVisible(SceneInstance& instance, InstanceHandle handle, bool isVisible) {
+  if (instance.isVisible == isVisible) return;
+  instance.isVisible = isVisible;
+  if (!isVisible) {
+    instance.hiddenAfter = record_;
+    return;
+  }
+  if (instance.hiddenAfter != record_) {
+    // Not displayed by the last record: what it showed before is no motion.
+    instance.visibleFrom = record_ + 1;
+    if (instance.isMoving) moving_.push_back(handle);
+  }
+  if (instance.isStale) {
+    instance.isUrgent = true;
+    makePending(handle.index);
+  }
+}
+
 Result<void> SceneBooks::setVisible(InstanceHandle handle, bool isVisible) {
   SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
-  if (instance->isVisible == isVisible) return {};
-  instance->isVisible = isVisible;
-  if (!isVisible) {
-    instance->hiddenAfter = record_;
-    return {};
-  }
-  if (instance->hiddenAfter != record_) {
-    // Not displayed by the last record: what it showed before is no motion.
-    instance->visibleFrom = record_ + 1;
-    if (instance->isMoving) moving_.push_back(handle);
-  }
-  if (instance->isStale) {
-    instance->isUrgent = true;
-    makePending(handle.index);
-  }
+  setVisible(*instance, handle, isVisible);
   return {};
 }
 
@@ -219,12 +227,16 @@ Result<void> SceneBooks::setUpdateInterval(InstanceHandle handle, std::uint32_t 
   return {};
 }
 
+void SceneBooks::teleport(SceneInstance& instance, InstanceHandle handle) {
+  instance.restartsMotion = true;
+  instance.isUrgent = true;
+  makeStale(handle.index);
+}
+
 Result<void> SceneBooks::teleport(InstanceHandle handle) {
   SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
-  instance->restartsMotion = true;
-  instance->isUrgent = true;
-  makeStale(handle.index);
+  teleport(*instance, handle);
   return {};
 }
 

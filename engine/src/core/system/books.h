@@ -113,6 +113,7 @@ class SceneBooks {
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
   /// The byte of the matrices buffer at which the pose of this frame is to be written.
   Result<std::uint64_t> writePose(PoseHandle pose);
+  Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
   Result<void> teleport(InstanceHandle instance);
@@ -123,6 +124,7 @@ class SceneBooks {
   /// Plans all that has to be done; nothing of it counts as done before `commit`.
   Result<void> plan(Plan& out);
   Result<void> commit();
+  Result<void> abandonFrame(std::uint64_t frame);
   /// Something changes: what was planned cannot be committed.
   void unplan() { isPlanned_ = false; }
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
@@ -160,6 +162,11 @@ class SceneBooks {
 
   // instances.cpp
   Result<void> takeBackOrFindRoom(SceneInstance& changed);
+  Result<void> changeOne(SceneInstance& instance, const InstanceChange& change);
+  Result<void> rebuild(SceneInstance& instance, const InstanceChange& change);
+  Result<void> setBox(SceneInstance& instance, InstanceHandle handle, const Box& box);
+  void setVisible(SceneInstance& instance, InstanceHandle handle, bool isVisible);
+  void teleport(SceneInstance& instance, InstanceHandle handle);
   void shift(InstanceHandle handle);
 
   // scene.cpp
@@ -181,6 +188,9 @@ class SceneBooks {
   void convertPalette(const SceneInstance& instance);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
+  void keepForAbandoning();
+  void abandonInstances();
+  void abandonShifts();
 
   SceneDescription description_;
   SlotMap<SceneMesh, MeshHandle> meshes_;
@@ -224,13 +234,38 @@ class SceneBooks {
   std::vector<InstanceHandle> skinned_, settled_, moved_;
   FrameWorkStatistics planned_, committed_;
 
-  // What came back.
-  bool historyIsClear_ = false;
+  /// What a frame reads back.
   struct ReadBack {
     std::uint64_t frame = 0;
     bool hasCounters = false;
     std::vector<CopyCommand> results;
   };
+
+  /// What the last `commit` changed, as it was before, so that `abandonFrame` can put it back. Its
+  /// other lists (skinned_, settled_) are those of the plan.
+  struct Abandonable {
+    struct Instance {
+      InstanceHandle handle;
+      bool restartsMotion, isUrgent, isMoving, isFirst;
+    };
+    struct Shift {
+      InstanceHandle handle;
+      std::optional<Place> shown;
+    };
+    struct Form {
+      PoseHandle pose;
+      std::size_t form;
+    };
+    bool isPossible = false;
+    std::uint64_t recordedFrame = 0;
+    bool historyIsClear = false;
+    std::vector<Instance> instances;
+    std::vector<Shift> shifts;
+    std::vector<Form> forms;
+    ReadBack readBack;
+  } abandonable_;
+
+  bool historyIsClear_ = false;
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
   CullingStatistics culling_;
   std::vector<InstanceResult> latestResults_;  ///< each of the newest complete frame that wrote it

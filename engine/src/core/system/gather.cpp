@@ -234,6 +234,7 @@ Result<void> SceneBooks::plan(Plan& out) {
 bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
+  abandonable_.shifts.push_back({handle, instance.shown});
   if (instance.shown && instance.shown != instance.target) {
     retire(Retired::Store::output, instance.shown->bytes);
     moved_.push_back(handle);
@@ -243,8 +244,28 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   return true;
 }
 
+void SceneBooks::keepForAbandoning() {
+  abandonable_.isPossible = true;
+  abandonable_.recordedFrame = recordedFrame_;
+  abandonable_.historyIsClear = historyIsClear_;
+  abandonable_.instances.clear();
+  abandonable_.shifts.clear();
+  abandonable_.forms.clear();
+  for (const std::vector<std::uint32_t>* indices : {&due_, &versioned_}) {
+    for (const std::uint32_t index : *indices) {
+      const SceneInstance& instance = instances_.at(index);
+      abandonable_.instances.push_back({instances_.handleOf(index), instance.restartsMotion,
+                                        instance.isUrgent, instance.isMoving,
+                                        instance.firstFrame == 0});
+    }
+  }
+  for (const Conversion& conversion : conversions_)
+    abandonable_.forms.push_back({poses_.handleOf(conversion.pose), conversion.form});
+}
+
 Result<void> SceneBooks::commit() {
   if (!isPlanned_) return invalid("there is no plan to commit, or the scene has changed since");
+  keepForAbandoning();
   isPlanned_ = false;
   ++record_;
   recordedFrame_ = frame_;
@@ -253,6 +274,7 @@ Result<void> SceneBooks::commit() {
   const bool culls = planned_.culledCandidates != 0;
   historyIsClear_ |= culls;
   ReadBack& readBack = readBacks_[record_ % readBacks_.size()];
+  std::swap(abandonable_.readBack, readBack);
   readBack.frame = frame_;
   readBack.hasCounters = culls;
   std::swap(readBack.results, resultCopies_);
@@ -288,6 +310,77 @@ Result<void> SceneBooks::commit() {
     SceneInstance* instance = instances_.find(handle);
     return instance == nullptr || commitShift(*instance, handle);
   });
+  return {};
+}
+
+/// They are skinned again, as they would have been without the frame.
+void SceneBooks::abandonInstances() {
+  for (const Abandonable::Instance& before : abandonable_.instances) {
+    SceneInstance* instance = instances_.find(before.handle);
+    if (instance == nullptr) continue;
+    instance->restartsMotion |= before.restartsMotion;
+    instance->isUrgent |= before.isUrgent;
+    instance->isMoving = before.isMoving;
+    if (before.isFirst) instance->firstFrame = 0;
+    makeStale(before.handle.index);
+  }
+  for (const InstanceHandle handle : settled_) {
+    if (SceneInstance* instance = instances_.find(handle)) instance->isMoving = true;
+  }
+  moving_.clear();
+  for (std::uint32_t index = 0; index < instances_.capacity(); ++index) {
+    if (!instances_.isUsed(index)) continue;
+    SceneInstance& instance = instances_.at(index);
+    // They count records, and the frame's does not count.
+    if (instance.visibleFrom == record_ + 1) --instance.visibleFrom;
+    if (instance.hiddenAfter == record_) --instance.hiddenAfter;
+    const bool mayReturn = instance.isVisible || instance.hiddenAfter + 1 == record_;
+    if (instance.isMoving && mayReturn) moving_.push_back(instances_.handleOf(index));
+  }
+}
+
+/// What was shown before the frame still is. Its place was given back; nobody else has it yet.
+void SceneBooks::abandonShifts() {
+  for (const Abandonable::Shift& shifted : abandonable_.shifts) {
+    SceneInstance* instance = instances_.find(shifted.handle);
+    if (instance == nullptr) continue;
+    const Place abandoned = *instance->shown;
+    instance->shown = shifted.shown;
+    if (shifted.shown && shifted.shown != abandoned) {
+      const auto isIts = [&](const Retired& retired) {
+        return retired.store == Retired::Store::output && retired.range == shifted.shown->bytes;
+      };
+      // The newest: an older one of the same range would have been freed before this one was taken.
+      const auto found = std::find_if(retired_.rbegin(), retired_.rend(), isIts);
+      if (found != retired_.rend()) retired_.erase(std::next(found).base());
+    }
+    if (instance->target != abandoned) retire(Retired::Store::output, abandoned.bytes);
+    if (instance->shown != instance->target) shift(shifted.handle);
+  }
+}
+
+Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
+  if (!abandonable_.isPossible || frame != frame_) {
+    return invalid("frame " + std::to_string(frame) +
+                   " cannot be abandoned: it is not the frame that was committed last, or another "
+                   "has begun since");
+  }
+  abandonable_.isPossible = false;
+  abandonInstances();
+  abandonShifts();
+  for (const Abandonable::Form& converted : abandonable_.forms) {
+    if (ScenePose* pose = poses_.find(converted.pose)) pose->forms[converted.form].version = 0;
+  }
+  std::swap(abandonable_.readBack, readBacks_[record_ % readBacks_.size()]);
+  historyIsClear_ = abandonable_.historyIsClear;
+  recordedFrame_ = abandonable_.recordedFrame;
+  --record_;
+  hasBegun_ = true;
+  isPlanned_ = false;
+  skinned_.clear();
+  settled_.clear();
+  moved_.clear();
+  committed_ = {};
   return {};
 }
 

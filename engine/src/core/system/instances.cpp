@@ -236,28 +236,111 @@ Result<void> SceneBooks::takeBackOrFindRoom(SceneInstance& changed) {
   return makeRuns(changed);
 }
 
+/// Another mesh, pose or method, and what goes with it: checked as a new instance is.
+Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& change) {
+  const InstanceHandle handle = change.instance;
+  const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
+  SceneInstance changed = instance;
+  if (change.mesh) changed.mesh = *change.mesh;
+  if (change.pose) {
+    changed.poseHandle = *change.pose;
+    changed.pose = change.pose->index;
+  }
+  if (change.method) changed.method = *change.method;
+  if (change.box) changed.box = changed.extras.box = *change.box;
+  changed.furtherRuns.clear();
+  const SceneMesh* mesh = meshes_.find(changed.mesh);
+  if (mesh != nullptr &&
+      mesh->info.morphTargetCount != meshes_.at(instance.mesh.index).info.morphTargetCount)
+    changed.extras.morphs.clear();
+  if (mesh != nullptr && change.morphs) {
+    if (Result<void> good =
+            checkMorphs(*change.morphs, mesh->info.morphTargetCount, {"instance", handle.index});
+        !good)
+      return good;
+    assignActive(*change.morphs, changed.extras.morphs);
+  }
+  if (Result<void> good = check(changed); !good) return good;
+  if (Result<void> good = reserveUnits(changed); !good) return good;
+  if (Result<void> room = hasNewMesh ? takeBackOrFindRoom(changed) : makeRuns(changed); !room)
+    return room;
+
+  --meshes_.at(instance.mesh.index).users;
+  ++meshes_.at(changed.mesh.index).users;
+  unlink(handle.index);
+  if (hasNewMesh) {
+    releaseTarget(instance);
+  } else {
+    releaseRuns(instance);
+  }
+  const bool hasNewBox = change.box && isSnormPosition(changed.layout.positions);
+  changed.restartsMotion |= hasNewMesh || hasNewBox;
+  changed.isUrgent = true;
+  instance = std::move(changed);
+  link(handle.index);
+  if (hasNewMesh) shift(handle);
+  makeStale(handle.index);
+  return {};
+}
+
 Result<void> SceneBooks::setMesh(InstanceHandle handle, MeshHandle mesh) {
   SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   if (instance->mesh == mesh && meshes_.contains(mesh)) return {};
-  SceneInstance changed = *instance;
-  changed.mesh = mesh;
-  changed.furtherRuns.clear();
-  if (const SceneMesh* to = meshes_.find(mesh);
-      to != nullptr &&
-      to->info.morphTargetCount != meshes_.at(instance->mesh.index).info.morphTargetCount)
-    changed.extras.morphs.clear();
-  if (Result<void> good = check(changed); !good) return good;
-  if (Result<void> room = takeBackOrFindRoom(changed); !room) return room;
+  InstanceChange change;
+  change.instance = handle;
+  change.mesh = mesh;
+  return rebuild(*instance, change);
+}
 
-  --meshes_.at(instance->mesh.index).users;
-  ++meshes_.at(mesh.index).users;
-  releaseTarget(*instance);
-  changed.restartsMotion = true;
-  changed.isUrgent = true;
-  *instance = std::move(changed);
-  shift(handle);
+Result<void> SceneBooks::setBox(SceneInstance& instance, InstanceHandle handle, const Box& box) {
+  if (!isSnormPosition(instance.layout.positions)) return {};
+  if (!isBox(box)) {
+    return invalid("instance " + std::to_string(handle.index) +
+                   ": the box of its snorm16 positions must be finite, each side longer than 0");
+  }
+  instance.box = instance.extras.box = box;
+  instance.isUrgent = true;
+  instance.restartsMotion = true;
   makeStale(handle.index);
+  return {};
+}
+
+Result<void> SceneBooks::changeOne(SceneInstance& instance, const InstanceChange& change) {
+  if (change.updateInterval && *change.updateInterval == 0) {
+    return invalid("instance " + std::to_string(change.instance.index) +
+                   ": an update interval is 1 or more frames, not 0");
+  }
+  // A box and morph weights alone need neither other kernels nor room.
+  Result<void> done;
+  if (change.mesh || change.pose || change.method || (change.box && change.morphs)) {
+    done = rebuild(instance, change);
+  } else if (change.box) {
+    done = setBox(instance, change.instance, *change.box);
+  } else if (change.morphs) {
+    done = setMorphWeights(change.instance, *change.morphs);
+  }
+  if (!done) return done;
+  if (change.updateInterval) instance.updateInterval = *change.updateInterval;
+  if (change.visible) setVisible(instance, change.instance, *change.visible);
+  if (change.teleports) teleport(instance, change.instance);
+  return {};
+}
+
+Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
+  for (const InstanceChange& change : changes) {
+    SceneInstance* instance = instances_.find(change.instance);
+    Result<void> done;
+    if (instance == nullptr) {
+      done = unknownHandle("instance", change.instance);
+    } else {
+      done = changeOne(*instance, change);
+    }
+    if (done) continue;
+    Error error = done.error();
+    error.message = "change " + std::to_string(&change - changes.data()) + ": " + error.message;
+    return error;
+  }
   return {};
 }
 

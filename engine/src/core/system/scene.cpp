@@ -122,6 +122,9 @@ Result<PosePlace> Scene::writePose(PoseHandle pose) {
   if (!offset) return offset.error();
   return PosePlace{*offset, books_->poses().find(pose)->jointCount};
 }
+Result<void> Scene::change(std::span<const InstanceChange> changes) {
+  return change().change(changes);
+}
 Result<void> Scene::setVisible(InstanceHandle instance, bool isVisible) {
   return change().setVisible(instance, isVisible);
 }
@@ -148,6 +151,9 @@ Result<void> Scene::plan(Plan& out) {
 }
 Result<void> Scene::commit() {
   return books_->commit();
+}
+Result<void> Scene::abandonFrame(std::uint64_t frame) {
+  return books_->abandonFrame(frame);
 }
 Result<void> Scene::readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
   return books_->readBack(frame, bytes);

@@ -134,10 +134,29 @@ Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
                                  &region);
     ++recorded.copies;
     frameStatistics.uploadedBytes += upload.staging.size();
-    retired.push_back({frameNumber, std::move(upload.staging), {}});
+    recordedUploads.push_back(std::move(upload));
   }
   uploads.clear();
   return recorded;
+}
+
+/// Of the last `record`, which can no longer be abandoned.
+void SkinningSystem::State::retireUploads() {
+  for (MeshUpload& upload : recordedUploads)
+    retired.push_back({frameNumber, std::move(upload.staging), {}});
+  recordedUploads.clear();
+}
+
+/// The GPU has seen nothing of it: its slot is free again, its meshes are not uploaded yet.
+void SkinningSystem::State::abandonRecord() {
+  --recordCount;
+  slot().frame = 0;
+  slot().hasTimestamps = false;
+  for (MeshUpload& upload : recordedUploads) {
+    if (scene.meshOffset(upload.mesh)) uploads.push_back(std::move(upload));
+  }
+  recordedUploads.clear();
+  frameStatistics = {};
 }
 
 }  // namespace dermis::vulkan

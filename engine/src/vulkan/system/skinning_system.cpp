@@ -171,6 +171,7 @@ Result<void> SkinningSystem::prepare(const PipelineNeeds& needs) const {
 
 Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
   if (Result<void> begun = state_->scene.beginFrame(frame, completedFrame); !begun) return begun;
+  state_->retireUploads();
   state_->frameNumber = frame;
   state_->readBackUpTo(completedFrame);
   while (!state_->retired.empty() && state_->retired.front().frame <= completedFrame)
@@ -184,6 +185,9 @@ Result<std::span<JointMatrix>> SkinningSystem::writePose(PoseHandle pose) {
   return state_->poseAt(*place);
 }
 
+Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
+  return state_->scene.change(changes);
+}
 Result<void> SkinningSystem::setVisible(InstanceHandle instance, bool isVisible) {
   return state_->scene.setVisible(instance, isVisible);
 }
@@ -206,6 +210,12 @@ std::uint64_t SkinningSystem::compact(std::uint64_t maxBytes) {
 
 Result<void> SkinningSystem::record(VkCommandBuffer commandBuffer, const FrameDescription& frame) {
   return state_->recordFrame(commandBuffer, frame);
+}
+
+Result<void> SkinningSystem::abandonFrame(std::uint64_t frame) {
+  if (Result<void> abandoned = state_->scene.abandonFrame(frame); !abandoned) return abandoned;
+  state_->abandonRecord();
+  return {};
 }
 
 // -- What came of it.

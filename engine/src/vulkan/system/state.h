@@ -41,6 +41,8 @@ struct SkinningSystem::State {
   std::span<JointMatrix> poseAt(const PosePlace& place);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   Recorded recordUploads(VkCommandBuffer commandBuffer);
+  void retireUploads();
+  void abandonRecord();
   FrameBuffers buffersOf(const FrameDescription& frame);
 
   // skinning_system.cpp
@@ -69,6 +71,7 @@ struct SkinningSystem::State {
   Timestamps timestamps;
   std::vector<FrameSlot> slots;
   std::vector<MeshUpload> uploads;
+  std::vector<MeshUpload> recordedUploads;  ///< by the last `record`
 
   /// What frames in flight may still use.
   struct Retired {

@@ -1,0 +1,117 @@
+// What a scene costs the CPU, without a device: changes by one call for each instance and by one
+// call for all, and plans of frames in which all instances move, or none.
+
+#include <benchmark/benchmark.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <vector>
+
+#include "dermis/scene.h"
+
+namespace dermis::bench {
+namespace {
+
+constexpr std::uint32_t jointCount = 24;
+
+/// Instances of one mesh, each in a pose of its own.
+struct Crowd {
+  explicit Crowd(std::uint32_t count) {
+    MeshInfo info;
+    info.vertexCount = 1000;
+    info.requiredJoints = jointCount;
+    info.maxInfluences = 4;
+    info.byteSize = 1 << 16;
+    const MeshHandle mesh = *scene.addMesh(info);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      poses.push_back(*scene.addPose(jointCount));
+      InstanceDescription description;
+      description.mesh = mesh;
+      description.pose = poses.back();
+      instances.push_back(*scene.addInstance(description));
+    }
+    runFrame();
+  }
+  static SceneDescription description() {
+    SceneDescription description;
+    description.jointBudget = 10'000 * jointCount;
+    description.outputBudget = std::uint64_t{10'000} * 1000 * 12;
+    description.limits.maxStorageBufferRange = 1u << 30;
+    return description;
+  }
+  void runFrame() {
+    ++frame;
+    if (!scene.beginFrame(frame, frame - 1) || !scene.plan(plan) || !scene.commit()) std::abort();
+  }
+
+  Scene scene = *Scene::create(description());
+  std::vector<PoseHandle> poses;
+  std::vector<InstanceHandle> instances;
+  Plan plan;
+  std::uint64_t frame = 0;
+};
+
+void reportEach(benchmark::State& state, std::uint32_t count) {
+  state.counters["ns/instance"] = benchmark::Counter(
+      static_cast<double>(count) * 1e-9,
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+/// Every instance is shown or hidden, and gets an interval, as an engine sets both after culling.
+void changeOneByOne(benchmark::State& state) {
+  Crowd crowd(static_cast<std::uint32_t>(state.range(0)));
+  bool isVisible = true;
+  for ([[maybe_unused]] auto iteration : state) {
+    isVisible = !isVisible;
+    for (const InstanceHandle instance : crowd.instances) {
+      if (!crowd.scene.setVisible(instance, isVisible) ||
+          !crowd.scene.setUpdateInterval(instance, isVisible ? 1 : 2))
+        return state.SkipWithError("a change failed");
+    }
+  }
+  reportEach(state, static_cast<std::uint32_t>(state.range(0)));
+}
+
+void changeAll(benchmark::State& state) {
+  Crowd crowd(static_cast<std::uint32_t>(state.range(0)));
+  std::vector<InstanceChange> changes(crowd.instances.size());
+  bool isVisible = true;
+  for ([[maybe_unused]] auto iteration : state) {
+    isVisible = !isVisible;
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      changes[i].instance = crowd.instances[i];
+      changes[i].visible = isVisible;
+      changes[i].updateInterval = isVisible ? 1 : 2;
+    }
+    if (!crowd.scene.change(changes)) return state.SkipWithError("a change failed");
+  }
+  reportEach(state, static_cast<std::uint32_t>(state.range(0)));
+}
+
+void planFrames(benchmark::State& state, bool moves) {
+  Crowd crowd(static_cast<std::uint32_t>(state.range(0)));
+  for ([[maybe_unused]] auto iteration : state) {
+    state.PauseTiming();
+    ++crowd.frame;
+    if (!crowd.scene.beginFrame(crowd.frame, crowd.frame - 1)) std::abort();
+    for (const PoseHandle pose : crowd.poses) {
+      if (moves && !crowd.scene.writePose(pose)) std::abort();
+    }
+    state.ResumeTiming();
+    if (!crowd.scene.plan(crowd.plan) || !crowd.scene.commit())
+      return state.SkipWithError("a plan failed");
+  }
+  reportEach(state, static_cast<std::uint32_t>(state.range(0)));
+}
+
+BENCHMARK(changeOneByOne)->Name("scene/change_one_by_one")->Arg(10'000);
+BENCHMARK(changeAll)->Name("scene/change_all")->Arg(10'000);
+BENCHMARK_CAPTURE(planFrames, all, true)
+    ->Name("scene/plan_all_move")
+    ->Arg(1)
+    ->Arg(1000)
+    ->Arg(10'000);
+BENCHMARK_CAPTURE(planFrames, none, false)->Name("scene/plan_none_moves")->Arg(1)->Arg(10'000);
+
+}  // namespace
+}  // namespace dermis::bench
