@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "buffer.h"
 #include "system_test.h"
 
 namespace dermis::test {
@@ -46,6 +47,70 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
     engine.begin();
     for (const PoseHandle palette : palettes) engine.writePose(palette, pose);
     engine.submit();
+  }
+}
+
+/// The vertex buffer of an engine, of which Dermis has a part.
+TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
+  constexpr std::uint64_t whole = 1 << 18, begin = 3 * 4096, size = 92'000;
+  samples::MappedBuffer buffer =
+      must(samples::MappedBuffer::create(device(), whole, vulkan::outputRangeUsage));
+  vulkan::SkinningSystemDescription ranged = description();
+  ranged.output = {buffer.handle(), begin, size};
+  ranged.outputBudget = whole;  // what the test reads
+  SystemEngine engine(device(), ranged);
+  EXPECT_EQ(engine->outputBuffer(), buffer.handle());
+  EXPECT_EQ(engine->statistics().outputs.capacity, size);
+  engine.fillOutput(std::byte{0x5a});
+  engine.begin();
+  const PackedMesh mesh = systemMesh(1, 200);
+  InstanceDescription instance;
+  instance.mesh = engine.addMesh(mesh);
+  std::vector<InstanceHandle> instances;
+  std::vector<InstanceDescription> descriptions;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    instance.pose = engine.addPose(systemPose(i));
+    instance.layout = motionLayout();
+    instance.layout.arrangement = i % 2 == 0 ? Arrangement::interleaved : Arrangement::planar;
+    descriptions.push_back(instance);
+    instances.push_back(engine.addInstance(instance));
+  }
+  EXPECT_FALSE(engine->addInstance(instance).ok()) << "the range is full";
+  engine.submit();
+  engine.begin();
+  must(engine->removeInstance(instances[0]));
+  engine.submit();
+  engine.begin();
+  EXPECT_GT(engine->compact(50'000), 0u);
+  engine.submit();
+  const std::vector<std::byte> bytes = engine.readOutput();
+  for (std::uint32_t i = 1; i < 12; ++i) {
+    const InstanceOutput output = must(engine->output(instances[i]));
+    EXPECT_GE(output.offset, begin);
+    EXPECT_LE(output.offset + output.size, begin + size);
+    expectSkinned(engine.read(bytes, instances[i]), alone(mesh, systemPose(i), descriptions[i]));
+  }
+  for (std::uint64_t byte = 0; byte < whole; ++byte) {
+    if (byte >= begin && byte < begin + size) continue;
+    ASSERT_EQ(bytes[byte], std::byte{0x5a}) << "byte " << byte << " is the engine's";
+  }
+}
+
+TEST_F(SystemOutputTest, RangesThatMakeNoSenseAreRefused) {
+  samples::MappedBuffer buffer =
+      must(samples::MappedBuffer::create(device(), 1 << 16, vulkan::outputRangeUsage));
+  const std::uint64_t alignment = context().limits().minStorageBufferOffsetAlignment;
+  for (const vulkan::BufferRange& bad :
+       {vulkan::BufferRange{buffer.handle(), 0, 0}, vulkan::BufferRange{buffer.handle(), 0, 1026},
+        vulkan::BufferRange{buffer.handle(), alignment + 1, 1024},
+        vulkan::BufferRange{VK_NULL_HANDLE, 0, 1024}}) {
+    vulkan::SkinningSystemDescription ranged = description();
+    ranged.output = bad;
+    const Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(ranged);
+    ASSERT_FALSE(system.ok());
+    EXPECT_EQ(system.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(system.error().message.find("::output "), std::string::npos)
+        << system.error().message;
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -31,6 +33,42 @@ void expectRegions(const std::string& sample, const std::vector<std::string>& na
     EXPECT_NE(readme.find("```cpp\n" + marked + "```"), std::string::npos)
         << "region " << name << " differs";
   }
+}
+
+/// Lines from the one with `first` to the one with `last`.
+std::ptrdiff_t linesBetween(const std::string& text, const std::string& first,
+                            const std::string& last) {
+  const std::size_t begin = text.find(first), end = text.find(last, begin);
+  if (begin == std::string::npos || end == std::string::npos) return -1;
+  return 1 + std::count(text.begin() + static_cast<std::ptrdiff_t>(begin),
+                        text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+}
+
+// How long the smallest program is, and how much of the interface it needs.
+TEST(DocumentationTest, TheSmallestSceneIsSmall) {
+  const std::string code = readText("samples/minimal/main.cpp");
+  const std::ptrdiff_t all = linesBetween(code, "vkCreateInstance", "comparison.passed()");
+  EXPECT_GT(all, 0);
+  EXPECT_LE(all, 150);
+  const std::ptrdiff_t scene = linesBetween(code, "SkinningSystem::create", "scene.record");
+  EXPECT_GT(scene, 0);
+  EXPECT_LE(scene, 60);
+
+  const std::string map = readText("engine/README.md");
+  const std::size_t begin = map.find("### What to learn first"), end = map.find("###", begin + 3);
+  ASSERT_NE(end, std::string::npos);
+  std::string list = map.substr(begin, end - begin);
+  list = list.substr(list.find(':'));
+  int count = 0;
+  for (std::size_t place = list.find('`'); place != std::string::npos;
+       place = list.find('`', place)) {
+    const std::size_t close = list.find('`', place + 1);
+    const std::string name = list.substr(place + 1, close - place - 1);
+    EXPECT_NE(code.find(name), std::string::npos) << name;
+    ++count;
+    place = close + 1;
+  }
+  EXPECT_EQ(count, 14);
 }
 
 TEST(DocumentationTest, TheReadmesCodeIsTheSamplesCode) {

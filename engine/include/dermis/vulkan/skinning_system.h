@@ -27,10 +27,16 @@
 #include "dermis/result.h"
 #include "dermis/scene.h"
 #include "dermis/types.h"
+#include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/memory.h"
 
 namespace dermis::vulkan {
+
+/// The usage that Dermis needs of `SkinningSystemDescription::output`.
+inline constexpr VkBufferUsageFlags outputRangeUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                                                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                                       VK_BUFFER_USAGE_TRANSFER_DST_BIT;
 
 /// What a system can hold. Its buffers keep their size.
 struct SkinningSystemDescription {
@@ -43,9 +49,14 @@ struct SkinningSystemDescription {
   std::uint64_t outputBudget = std::uint64_t{64} << 20;  ///< bytes
   std::uint32_t instanceBudget = 65536;
   std::uint32_t boundsBudget = 16384;
-  /// How the engine uses the output buffer: VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and
-  /// `buildInputUsage`.
+  /// How the engine uses the output buffer that the system creates:
+  /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and `buildInputUsage`.
   VkBufferUsageFlags outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
+  /// Or a range of a buffer of the engine's, for all outputs: the system creates no output buffer,
+  /// and `outputBudget` and `outputUsage` do not matter. The buffer has `outputRangeUsage` and what
+  /// the engine needs; the offset is a multiple of minStorageBufferOffsetAlignment, the size of 4.
+  /// Nothing outside the range is written. The engine destroys it after the system.
+  BufferRange output;
 
   /// Both functions, or none: then memory is allocated from the device in blocks of 64 MiB or more.
   MemoryCallbacks memory;
@@ -155,7 +166,9 @@ class SkinningSystem {
 
   // -- Results, as of the last `record`: as `Scene`.
 
-  /// All outputs are in this buffer, as long as the system lives.
+  /// All outputs are in this buffer, as long as the system lives: the system's own, or that of
+  /// `SkinningSystemDescription::output`. Offsets count from its beginning. In a range of the
+  /// engine's they are multiples of the stride (interleaved layouts) if the range's offset is.
   VkBuffer outputBuffer() const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
   std::span<const InstanceHandle> skinnedInstances() const;

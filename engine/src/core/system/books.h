@@ -58,8 +58,9 @@ struct Place {
 };
 
 struct SceneInstance {
-  // What every frame looks at stands together: where the GPU is the CPU, as in software Vulkan, the
-  // caches hold vertices when the next frame begins.
+  // What frames and changes look at stands together, the first of it in the cache line of the slot:
+  // where the GPU is the CPU, as in software Vulkan, the caches hold vertices when the next frame
+  // begins.
   bool isStale = false;   ///< something changed since it was skinned
   bool isListed = false;  ///< among the pending
   bool isVisible = true;
@@ -72,13 +73,14 @@ struct SceneInstance {
   bool isShifting = false;     ///< among the shifting
   Method method = Method::dualQuaternion;
   std::uint32_t pose = 0;  ///< index
-  std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
   std::uint32_t updateInterval = 1;
   std::uint32_t vertexCount = 0;
-  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
   std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
-  std::uint64_t firstFrame = 0;   ///< in which it was skinned
-  PlacedRun run;                  ///< the first, and mostly the only one
+  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
+  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
+  std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
+  std::uint64_t firstFrame = 0;  ///< in which it was skinned
+  PlacedRun run;                 ///< the first, and mostly the only one
   VertexLayout layout;
   Place target;  ///< where it is skinned to
   InstanceExtras extras;
@@ -90,8 +92,6 @@ struct SceneInstance {
   std::uint32_t culledIndex = notUsed;
 
   // Seldom looked at.
-  std::uint64_t lastFrame = 0;    ///< in which it was skinned
-  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
   MeshHandle mesh;
   PoseHandle poseHandle;
   Box box;
@@ -163,6 +163,7 @@ class SceneBooks {
   // instances.cpp
   Result<void> takeBackOrFindRoom(SceneInstance& changed);
   Result<void> changeOne(SceneInstance& instance, const InstanceChange& change);
+  void setSmall(SceneInstance& instance, const InstanceChange& change);
   Result<void> rebuild(SceneInstance& instance, const InstanceChange& change);
   Result<void> setBox(SceneInstance& instance, InstanceHandle handle, const Box& box);
   void setVisible(SceneInstance& instance, InstanceHandle handle, bool isVisible);

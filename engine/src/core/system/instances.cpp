@@ -320,16 +320,26 @@ Result<void> SceneBooks::changeOne(SceneInstance& instance, const InstanceChange
   } else if (change.morphs) {
     done = setMorphWeights(change.instance, *change.morphs);
   }
-  if (!done) return done;
+  if (done) setSmall(instance, change);
+  return done;
+}
+
+/// What cannot fail.
+void SceneBooks::setSmall(SceneInstance& instance, const InstanceChange& change) {
   if (change.updateInterval) instance.updateInterval = *change.updateInterval;
   if (change.visible) setVisible(instance, change.instance, *change.visible);
   if (change.teleports) teleport(instance, change.instance);
-  return {};
 }
 
 Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
   for (const InstanceChange& change : changes) {
     SceneInstance* instance = instances_.find(change.instance);
+    const bool isSmall = !change.mesh && !change.pose && !change.method && !change.box &&
+                         !change.morphs && change.updateInterval != 0u;
+    if (instance != nullptr && isSmall) {
+      setSmall(*instance, change);
+      continue;
+    }
     Result<void> done;
     if (instance == nullptr) {
       done = unknownHandle("instance", change.instance);

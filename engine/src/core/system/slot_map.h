@@ -68,7 +68,7 @@ class SlotMap {
   std::uint32_t capacity() const { return static_cast<std::uint32_t>(slots_.size()); }
 
  private:
-  struct Slot {
+  struct alignas(64) Slot {  // a cache line
     std::uint32_t generation = 1;
     bool isUsed = false;
     Thing thing;

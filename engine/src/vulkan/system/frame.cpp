@@ -37,7 +37,7 @@ Result<void> SkinningSystem::State::makeRoomForTables() {
                          poses.range(),
                          made->range(),
                          palettes.range(),
-                         OutputBuffers::oneBuffer(output.range()),
+                         OutputBuffers::oneBuffer(outputRange),
                          results.range()};
     Result<Bindings> bound = context->createBindings(buffers);
     if (!bound) return bound.error();

@@ -22,12 +22,28 @@ SceneDescription sceneOf(const SkinningSystemDescription& description,
   scene.framesInFlight = description.framesInFlight;
   scene.meshBudget = description.meshBudget;
   scene.jointBudget = description.jointBudget;
-  scene.outputBudget = description.outputBudget;
+  scene.outputBudget = description.output.buffer != VK_NULL_HANDLE ? description.output.size
+                                                                   : description.outputBudget;
   scene.instanceBudget = description.instanceBudget;
   scene.boundsBudget = description.boundsBudget;
   scene.limits = context.limits;
   scene.tuning = description.tuning.value_or(context.tuning);
   return scene;
+}
+
+Result<void> checkOutput(const BufferRange& output, const DeviceLimits& limits) {
+  if (output.buffer == VK_NULL_HANDLE) {
+    if (output.offset == 0 && output.size == 0) return {};
+    return wrongField("output has no buffer");
+  }
+  if (output.size == 0 || output.size % 4 != 0)
+    return wrongField("output has " + std::to_string(output.size) + " bytes, not a multiple of 4");
+  if (output.offset % limits.minStorageBufferOffsetAlignment != 0) {
+    return wrongField("output begins at " + std::to_string(output.offset) +
+                      " bytes, not at a multiple of minStorageBufferOffsetAlignment, " +
+                      std::to_string(limits.minStorageBufferOffsetAlignment));
+  }
+  return {};
 }
 
 }  // namespace
@@ -48,7 +64,7 @@ std::span<JointMatrix> SkinningSystem::State::poseAt(const PosePlace& place) {
   return {reinterpret_cast<JointMatrix*>(poses.bytes().data() + place.offset), place.jointCount};
 }
 
-Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage) {
+Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescription& description) {
   struct Wanted {
     SystemBuffer& buffer;
     BufferRole role;
@@ -69,10 +85,17 @@ Result<void> SkinningSystem::State::createBuffers(VkBufferUsageFlags outputUsage
        {Wanted{meshes, BufferRole::meshes, MemoryUse::device, "dermis meshes"},
         {poses, BufferRole::poses, MemoryUse::upload, "dermis poses"},
         {palettes, BufferRole::palettes, MemoryUse::device, "dermis palettes"},
-        {output, BufferRole::positions, MemoryUse::device, "dermis output", outputUsage},
         {counters, BufferRole::counters, MemoryUse::device, "dermis counters"},
         {results, BufferRole::results, MemoryUse::device, "dermis results"}}) {
     if (Result<void> made = create(wanted); !made) return made;
+  }
+  outputRange = description.output;
+  if (outputRange.buffer == VK_NULL_HANDLE) {
+    if (Result<void> made = create({output, BufferRole::positions, MemoryUse::device,
+                                    "dermis output", description.outputUsage});
+        !made)
+      return made;
+    outputRange = output.range();
   }
   for (FrameSlot& frameSlot : slots) {
     if (Result<void> made = create(
@@ -88,6 +111,8 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
     return wrongField("memory has one of its two functions only");
   ContextState& context = *description.context->state_;
+  if (Result<void> good = checkOutput(description.output, context.limits); !good)
+    return good.error();
   Result<Scene> scene = Scene::create(sceneOf(description, context));
   if (!scene) return scene.error();
   Result<SystemFunctions> functions = loadSystemFunctions(context);
@@ -105,7 +130,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
     state.source.memory = state.blocks->callbacks();
   }
   state.slots.resize(description.framesInFlight);
-  if (Result<void> made = state.createBuffers(description.outputUsage); !made) return made.error();
+  if (Result<void> made = state.createBuffers(description); !made) return made.error();
   if (!context.pushesDescriptors()) {
     if (Result<void> made = context.allocateSets(description.framesInFlight, state.visibilityPool,
                                                  state.visibilitySets);
@@ -221,10 +246,18 @@ Result<void> SkinningSystem::abandonFrame(std::uint64_t frame) {
 // -- What came of it.
 
 VkBuffer SkinningSystem::outputBuffer() const {
-  return state_->output.handle();
+  return state_->outputRange.buffer;
 }
 Result<InstanceOutput> SkinningSystem::output(InstanceHandle instance) const {
-  return state_->scene.output(instance);
+  Result<InstanceOutput> output = state_->scene.output(instance);
+  if (!output || output->size == 0) return output;
+  const VkDeviceSize begin = state_->outputRange.offset;
+  output->offset += begin;
+  for (OutputAttribute* attribute :
+       {&output->positions, &output->normals, &output->tangents, &output->previousPositions}) {
+    if (attribute->format != VertexFormat::none) attribute->offset += begin;
+  }
+  return output;
 }
 std::span<const InstanceHandle> SkinningSystem::skinnedInstances() const {
   return state_->scene.skinnedInstances();

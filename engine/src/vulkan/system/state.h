@@ -33,7 +33,7 @@ struct MeshUpload {
 struct SkinningSystem::State {
   State(ContextState& context, Scene&& ownScene);
   ~State();
-  Result<void> createBuffers(VkBufferUsageFlags outputUsage);
+  Result<void> createBuffers(const SkinningSystemDescription& description);
 
   // frame.cpp
   Result<void> makeRoomForTables();
@@ -62,6 +62,7 @@ struct SkinningSystem::State {
   Plan plan;  ///< of the frame
 
   SystemBuffer meshes, poses, palettes, output, results, tables, history, counters;
+  BufferRange outputRange;  ///< of `output`, or the engine's
   Bindings bindings;
   /// Without push descriptors: one for each slot.
   VkDescriptorPool visibilityPool = VK_NULL_HANDLE;
