@@ -1,5 +1,7 @@
 #include "dermis/vulkan/scope.h"
 
+#include "dermis/vulkan/bindings.h"
+
 namespace dermis::vulkan {
 namespace {
 
@@ -30,6 +32,33 @@ Scope scopeOf(Consumer consumer) {
       return {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT};
   }
   return {};
+}
+
+// The structures of Vulkan 1.0 and of synchronization2 have the same members, but for the stages.
+
+template <typename Barrier>
+Barrier withAccesses(VkStructureType type, const Dependency& dependency) {
+  Barrier barrier{};
+  barrier.sType = type;
+  barrier.srcAccessMask = dependency.source.accesses;
+  barrier.dstAccessMask = dependency.destination.accesses;
+  return barrier;
+}
+
+template <typename Barrier>
+void setStages(Barrier& barrier, const Dependency& dependency) {
+  barrier.srcStageMask = dependency.source.stages;
+  barrier.dstStageMask = dependency.destination.stages;
+}
+
+template <typename Barrier>
+void setRange(Barrier& barrier, const BufferRange& range, std::uint32_t sourceFamily,
+              std::uint32_t destinationFamily) {
+  barrier.srcQueueFamilyIndex = sourceFamily;
+  barrier.dstQueueFamilyIndex = destinationFamily;
+  barrier.buffer = range.buffer;
+  barrier.offset = range.offset;
+  barrier.size = range.size;
 }
 
 }  // namespace
@@ -88,52 +117,31 @@ Dependency outputScope(Consumer consumer, QueueTransfer transfer) {
 }
 
 VkMemoryBarrier memoryBarrier(const Dependency& dependency) {
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstAccessMask = dependency.destination.accesses;
-  return barrier;
+  return withAccesses<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER, dependency);
 }
 
 VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffer,
                                     VkDeviceSize offset, VkDeviceSize size,
                                     std::uint32_t sourceFamily, std::uint32_t destinationFamily) {
-  VkBufferMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstAccessMask = dependency.destination.accesses;
-  barrier.srcQueueFamilyIndex = sourceFamily;
-  barrier.dstQueueFamilyIndex = destinationFamily;
-  barrier.buffer = buffer;
-  barrier.offset = offset;
-  barrier.size = size;
+  auto barrier =
+      withAccesses<VkBufferMemoryBarrier>(VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER, dependency);
+  setRange(barrier, {buffer, offset, size}, sourceFamily, destinationFamily);
   return barrier;
 }
 
 VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency) {
-  VkMemoryBarrier2 barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
-  barrier.srcStageMask = dependency.source.stages;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstStageMask = dependency.destination.stages;
-  barrier.dstAccessMask = dependency.destination.accesses;
+  auto barrier = withAccesses<VkMemoryBarrier2>(VK_STRUCTURE_TYPE_MEMORY_BARRIER_2, dependency);
+  setStages(barrier, dependency);
   return barrier;
 }
 
 VkBufferMemoryBarrier2 bufferBarrier2(const Dependency& dependency, VkBuffer buffer,
                                       VkDeviceSize offset, VkDeviceSize size,
                                       std::uint32_t sourceFamily, std::uint32_t destinationFamily) {
-  VkBufferMemoryBarrier2 barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2;
-  barrier.srcStageMask = dependency.source.stages;
-  barrier.srcAccessMask = dependency.source.accesses;
-  barrier.dstStageMask = dependency.destination.stages;
-  barrier.dstAccessMask = dependency.destination.accesses;
-  barrier.srcQueueFamilyIndex = sourceFamily;
-  barrier.dstQueueFamilyIndex = destinationFamily;
-  barrier.buffer = buffer;
-  barrier.offset = offset;
-  barrier.size = size;
+  auto barrier =
+      withAccesses<VkBufferMemoryBarrier2>(VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2, dependency);
+  setStages(barrier, dependency);
+  setRange(barrier, {buffer, offset, size}, sourceFamily, destinationFamily);
   return barrier;
 }
 
