@@ -94,7 +94,6 @@ struct SceneInstance {
   // Seldom looked at.
   MeshHandle mesh;
   PoseHandle poseHandle;
-  Box box;
   bool bounds = false;
   std::optional<Place> shown;  ///< where it was last recorded
 };
@@ -189,6 +188,7 @@ class SceneBooks {
   void convertPalette(const SceneInstance& instance);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
+  void commitInstance(SceneInstance& instance, InstanceHandle handle);
   void keepForAbandoning();
   void abandonInstances();
   void abandonShifts();
@@ -224,7 +224,7 @@ class SceneBooks {
   std::vector<std::uint32_t> settling_;
   std::vector<std::uint32_t> versioned_;  ///< culled, with something new to show
   struct Conversion {
-    std::uint32_t pose;
+    PoseHandle pose;
     std::size_t form;
   };
   std::vector<Conversion> conversions_;
@@ -242,8 +242,8 @@ class SceneBooks {
     std::vector<CopyCommand> results;
   };
 
-  /// What the last `commit` changed, as it was before, so that `abandonFrame` can put it back. Its
-  /// other lists (skinned_, settled_) are those of the plan.
+  /// What the last `commit` changed, as it was before, so that `abandonFrame` can put it back.
+  /// `conversions_` and `settled_` last until the next plan and are not repeated here.
   struct Abandonable {
     struct Instance {
       InstanceHandle handle;
@@ -253,16 +253,11 @@ class SceneBooks {
       InstanceHandle handle;
       std::optional<Place> shown;
     };
-    struct Form {
-      PoseHandle pose;
-      std::size_t form;
-    };
     bool isPossible = false;
     std::uint64_t recordedFrame = 0;
     bool historyIsClear = false;
     std::vector<Instance> instances;
     std::vector<Shift> shifts;
-    std::vector<Form> forms;
     ReadBack readBack;
   } abandonable_;
 

@@ -54,7 +54,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(*form)];
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
-  conversions_.push_back({instance.pose, static_cast<std::size_t>(*form)});
+  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(*form)});
   builder_.addPalette(static_cast<std::uint32_t>(poseOffset(pose) / unitBytes),
                       static_cast<std::uint32_t>(converted.units->offset), pose.jointCount, *form,
                       pose.mayScale);
@@ -212,7 +212,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   gatherCulled();
   gatherResults();
   for (const Conversion& conversion : conversions_)
-    planned_.poseBytes += poses_.at(conversion.pose).jointCount * sizeof(JointMatrix);
+    planned_.poseBytes += poses_.at(conversion.pose.index).jointCount * sizeof(JointMatrix);
   const auto record = static_cast<std::uint32_t>(record_ + 1);
   const FrameWork frame{record, !historyIsClear_, moves_, resultCopies_};
   if (Result<void> good = builder_.finish(&frame); !good) {
@@ -250,17 +250,14 @@ void SceneBooks::keepForAbandoning() {
   abandonable_.historyIsClear = historyIsClear_;
   abandonable_.instances.clear();
   abandonable_.shifts.clear();
-  abandonable_.forms.clear();
-  for (const std::vector<std::uint32_t>* indices : {&due_, &versioned_}) {
-    for (const std::uint32_t index : *indices) {
-      const SceneInstance& instance = instances_.at(index);
-      abandonable_.instances.push_back({instances_.handleOf(index), instance.restartsMotion,
-                                        instance.isUrgent, instance.isMoving,
-                                        instance.firstFrame == 0});
-    }
-  }
-  for (const Conversion& conversion : conversions_)
-    abandonable_.forms.push_back({poses_.handleOf(conversion.pose), conversion.form});
+}
+
+/// The instance shows what it should, as far as the books go.
+void SceneBooks::commitInstance(SceneInstance& instance, InstanceHandle handle) {
+  abandonable_.instances.push_back({handle, instance.restartsMotion, instance.isUrgent,
+                                    instance.isMoving, instance.firstFrame == 0});
+  instance.isStale = instance.isUrgent = instance.restartsMotion = false;
+  if (instance.firstFrame == 0) instance.firstFrame = frame_;
 }
 
 Result<void> SceneBooks::commit() {
@@ -283,14 +280,14 @@ Result<void> SceneBooks::commit() {
   moved_.clear();
   moving_.clear();
   for (const Conversion& conversion : conversions_) {
-    ScenePose& pose = poses_.at(conversion.pose);
+    ScenePose& pose = poses_.at(conversion.pose.index);
     pose.forms[conversion.form].version = pose.version;
   }
   for (const std::uint32_t index : due_) {
     SceneInstance& instance = instances_.at(index);
     const InstanceHandle handle = instances_.handleOf(index);
-    instance.isStale = instance.isListed = instance.isUrgent = instance.restartsMotion = false;
-    if (instance.firstFrame == 0) instance.firstFrame = frame_;
+    commitInstance(instance, handle);
+    instance.isListed = false;
     instance.isMoving = instance.willMove;
     if (instance.isMoving) moving_.push_back(handle);
     skinned_.push_back(handle);
@@ -301,11 +298,8 @@ Result<void> SceneBooks::commit() {
     instances_.at(index).isMoving = false;
     settled_.push_back(instances_.handleOf(index));
   }
-  for (const std::uint32_t index : versioned_) {
-    SceneInstance& instance = instances_.at(index);
-    instance.isStale = instance.isUrgent = instance.restartsMotion = false;
-    if (instance.firstFrame == 0) instance.firstFrame = frame_;
-  }
+  for (const std::uint32_t index : versioned_)
+    commitInstance(instances_.at(index), instances_.handleOf(index));
   std::erase_if(shifting_, [this](InstanceHandle handle) {
     SceneInstance* instance = instances_.find(handle);
     return instance == nullptr || commitShift(*instance, handle);
@@ -339,7 +333,8 @@ void SceneBooks::abandonInstances() {
   }
 }
 
-/// What was shown before the frame still is. Its place was given back; nobody else has it yet.
+/// The output of the frame before is displayed again. `commit` retired its place, and no other
+/// instance can have taken it: places are reused after `beginFrame` only.
 void SceneBooks::abandonShifts() {
   for (const Abandonable::Shift& shifted : abandonable_.shifts) {
     SceneInstance* instance = instances_.find(shifted.handle);
@@ -368,8 +363,8 @@ Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
   abandonable_.isPossible = false;
   abandonInstances();
   abandonShifts();
-  for (const Abandonable::Form& converted : abandonable_.forms) {
-    if (ScenePose* pose = poses_.find(converted.pose)) pose->forms[converted.form].version = 0;
+  for (const Conversion& conversion : conversions_) {
+    if (ScenePose* pose = poses_.find(conversion.pose)) pose->forms[conversion.form].version = 0;
   }
   std::swap(abandonable_.readBack, readBacks_[record_ % readBacks_.size()]);
   historyIsClear_ = abandonable_.historyIsClear;

@@ -18,7 +18,7 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
   job.meshOffset = mesh.bytes.offset;
   job.method = instance.method;
   job.place(places);
-  job.box = instance.box;
+  job.box = instance.extras.box;
   job.bounds = instance.bounds;
   job.morphs = instance.extras.morphs;
   return job;
@@ -174,7 +174,7 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   instance.mesh = description.mesh;
   instance.poseHandle = description.pose;
   instance.layout = description.layout;
-  instance.box = description.box;
+  instance.extras.box = description.box;
   instance.bounds = description.bounds;
   if (Result<void> good = check(instance); !good) return good.error();
   if (instances_.capacity() >= description_.instanceBudget && !instances_.hasHole()) {
@@ -182,7 +182,6 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
                                                std::to_string(description_.instanceBudget)};
   }
   if (Result<void> good = reserveUnits(instance); !good) return good.error();
-  instance.extras.box = instance.box;
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);
   if (Result<void> taken = takeResult(instance); !taken) return taken.error();
   if (Result<void> found = findRoom(instance); !found) {
@@ -236,7 +235,8 @@ Result<void> SceneBooks::takeBackOrFindRoom(SceneInstance& changed) {
   return makeRuns(changed);
 }
 
-/// Another mesh, pose or method, and what goes with it: checked as a new instance is.
+/// Gives an instance another mesh, pose or method, and sets its box and morph weights with it. The
+/// result is checked like a new instance.
 Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& change) {
   const InstanceHandle handle = change.instance;
   const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
@@ -247,7 +247,7 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
     changed.pose = change.pose->index;
   }
   if (change.method) changed.method = *change.method;
-  if (change.box) changed.box = changed.extras.box = *change.box;
+  if (change.box) changed.extras.box = *change.box;
   changed.furtherRuns.clear();
   const SceneMesh* mesh = meshes_.find(changed.mesh);
   if (mesh != nullptr &&
@@ -299,7 +299,7 @@ Result<void> SceneBooks::setBox(SceneInstance& instance, InstanceHandle handle, 
     return invalid("instance " + std::to_string(handle.index) +
                    ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
-  instance.box = instance.extras.box = box;
+  instance.extras.box = box;
   instance.isUrgent = true;
   instance.restartsMotion = true;
   makeStale(handle.index);
