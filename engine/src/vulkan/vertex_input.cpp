@@ -6,7 +6,7 @@
 namespace dermis::vulkan {
 namespace {
 
-/// Attributes that there are, one after the other; of planar layouts only, or the first.
+/// The offset of each attribute in use (planar), or of the first one only (interleaved).
 std::array<VkDeviceSize, 4> offsetsOf(const VertexLayout& layout,
                                       const std::array<OutputAttribute, 4>& attributes) {
   std::array<VkDeviceSize, 4> offsets{};
