@@ -170,8 +170,10 @@ struct PaletteRecord {
 DERMIS_CONSTANT PALETTE_WORDS = 4u;
 DERMIS_CONSTANT PALETTE_MAY_SCALE = 1u;
 DERMIS_CONSTANT PALETTE_LOGARITHMS = 2u;  // joints are logarithms instead of dual quaternions
+DERMIS_CONSTANT PALETTE_MATRICES = 4u;    // joints are the matrices as they are
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
+DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
 
 // The unit at the beginning of a palette, as PoseStatus has it.
 struct StatusRecord {

@@ -2,8 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 
 // Joint matrices (3×4) to unit dual quaternions, or the logarithms of the rigid parts, and, where a joint is not rigid, its
-// scale/shear part: one workgroup a palette, so that what is said of the whole palette needs no second pass. The workgroups
-// behind those clear the results that the skin kernel adds to. With ONE_OUTPUT there are no results (4 storage buffers in all).
+// scale/shear part; or copied as they are: one workgroup a palette, so that what is said of the whole palette needs no second
+// pass. The workgroups behind those clear the results that the skin kernel adds to. With ONE_OUTPUT there are no results (4
+// storage buffers in all).
 
 #include "abi.h"
 #include "exact.glsl"
@@ -53,6 +54,13 @@ void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
   palettes[unit + 2u] = floatBitsToUint(vec4(-turn.y, turn.x, 0.0, shift.z));
 }
 
+// For linear blending, which is to read the memory of the device, not that which the CPU writes.
+void copyMatrices(PaletteRecord palette) {
+  uint units = palette.jointCount * UNITS_OF_MATRIX;
+  for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x)
+    palettes[palette.place + unit] = floatBitsToUint(matrices[palette.matrices + unit]);
+}
+
 void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
@@ -62,6 +70,10 @@ void main() {
     return;
   }
   PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
+  if ((palette.flags & PALETTE_MATRICES) != 0u) {
+    copyMatrices(palette);
+    return;
+  }
   bool mayScale = (palette.flags & PALETTE_MAY_SCALE) != 0u;
   bool logarithms = (palette.flags & PALETTE_LOGARITHMS) != 0u;
   uint unitsOfJoint = logarithms ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;

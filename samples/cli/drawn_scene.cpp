@@ -89,11 +89,11 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
     return Error{ErrorCode::limitExceeded, "so many figures have too many joints"};
   }
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  description.meshBudget = std::max<std::uint64_t>(meshes, 4096);
-  description.jointBudget = std::max(static_cast<std::uint32_t>(all), 1u);
-  description.outputBudget = std::max<std::uint64_t>(outputs * figures, 4096);
-  description.instanceBudget = std::max(instances * figures, 1u);
-  description.boundsBudget = description.instanceBudget;
+  description.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};
+  description.jointCapacity = {std::max<std::uint64_t>(all, 1)};
+  description.outputCapacity = {std::max<std::uint64_t>(outputs * figures, 4096)};
+  description.instanceCapacity = {std::max(instances * figures, 1u)};
+  description.boundsCapacity = description.instanceCapacity;
   Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
   if (!system) return system.error();
   system_.emplace(std::move(*system));

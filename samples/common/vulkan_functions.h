@@ -77,6 +77,7 @@
   X(EndCommandBuffer)                     \
   X(CmdPipelineBarrier)                   \
   X(CmdFillBuffer)                        \
+  X(CmdUpdateBuffer)                      \
   X(CmdCopyBuffer)                        \
   X(CmdExecuteCommands)                   \
   X(CmdBeginQuery)                        \

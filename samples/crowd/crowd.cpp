@@ -28,25 +28,25 @@ std::uint64_t withSlack(std::uint64_t count) {
   return count + count / 4 + 64;
 }
 
-vulkan::SkinningSystemDescription budgets(const Character& character, std::uint32_t figures,
-                                          const CrowdOptions& options) {
-  vulkan::SkinningSystemDescription budget;
-  budget.meshBudget = 0;
+vulkan::SkinningSystemDescription capacities(const Character& character, std::uint32_t figures,
+                                             const CrowdOptions& options) {
+  vulkan::SkinningSystemDescription capacity;
+  capacity.meshCapacity.initial = 0;
   std::uint64_t joints = 0, outputBytes = 0;
   for (const std::uint32_t count : character.jointCounts()) joints += count;
   for (const Part& part : character.parts()) {
     const MeshInfo mesh = part.packed.info();
     const VertexLayout layout = layoutOf(part);
-    budget.meshBudget += mesh.byteSize;
+    capacity.meshCapacity.initial += mesh.byteSize;
     outputBytes += mesh.vertexCount *
                    std::uint64_t{2 * formatSize(layout.positions) + formatSize(layout.normals)};
   }
   const std::uint64_t parts = character.parts().size();
-  budget.jointBudget = static_cast<std::uint32_t>(withSlack(figures * joints + parts * joints));
-  budget.instanceBudget = static_cast<std::uint32_t>(withSlack(figures * parts + parts));
-  budget.outputBudget =
-      options.outputBudget != 0 ? options.outputBudget : withSlack((figures + 1) * outputBytes);
-  return budget;
+  capacity.jointCapacity.initial = withSlack(figures * joints + parts * joints);
+  capacity.instanceCapacity.initial = withSlack(figures * parts + parts);
+  capacity.outputCapacity.initial = withSlack((figures + 1) * outputBytes);
+  if (options.outputBudget != 0) capacity.outputCapacity = Capacity::fixed(options.outputBudget);
+  return capacity;
 }
 
 }  // namespace
@@ -55,8 +55,8 @@ vulkan::SkinningSystemDescription budgets(const Character& character, std::uint3
 Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
                             const Character& character, const Figures& script,
                             const CrowdOptions& options) {
-  // How much there may be, in bytes, joints and instances. It is taken now; nothing grows later.
-  vulkan::SkinningSystemDescription description = budgets(character, script.count(), options);
+  // How much there will be, in bytes, joints and instances: then nothing has to grow later.
+  vulkan::SkinningSystemDescription description = capacities(character, script.count(), options);
   description.context = &context;
   description.framesInFlight = options.framesInFlight;
   description.measuresGpuTime = options.measuresGpuTime;

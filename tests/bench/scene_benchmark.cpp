@@ -34,8 +34,9 @@ struct Crowd {
   }
   static SceneDescription description() {
     SceneDescription description;
-    description.jointBudget = 10'000 * jointCount;
-    description.outputBudget = std::uint64_t{10'000} * 1000 * 12;
+    description.jointCapacity = Capacity::fixed(10'000 * jointCount);
+    description.instanceCapacity = Capacity::fixed(10'000);
+    description.outputCapacity = Capacity::fixed(std::uint64_t{10'000} * 1000 * 12);
     description.limits.maxStorageBufferRange = 1u << 30;
     return description;
   }

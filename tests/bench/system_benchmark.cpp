@@ -82,7 +82,7 @@ class Scene {
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
       instance.mesh = meshes[i % meshes.size()];
       vertexCount_ += engine_.vertexCount(instance.mesh);
-      instance.pose = palettes_.emplace_back(engine_.addPose(poses_[0], false));
+      instance.pose = palettes_.emplace_back(engine_.addPose(poses_[0], {.mayScale = false}));
       if (i == 0) must(engine_->prepare(pipelineNeeds(instance)));
       must(engine_->addInstance(instance));
     }
@@ -124,13 +124,14 @@ class Scene {
     vulkan::SkinningSystemDescription description;
     description.context = &open.context;
     description.tuning = open.context.tuning();
-    description.jointBudget = instanceCount * jointCount;
-    description.instanceBudget = instanceCount;
-    description.boundsBudget = 0;
+    description.jointCapacity = Capacity::fixed(instanceCount * jointCount);
+    description.instanceCapacity = Capacity::fixed(instanceCount);
+    description.boundsCapacity = Capacity::fixed(0);
     // Positions and normals, and what alignment takes.
     const std::uint64_t vertexCount =
         std::uint64_t{instanceCount} * (from.meanVertexCount + from.count * from.difference / 2);
-    description.outputBudget = vertexCount * 24 + std::uint64_t{instanceCount} * 256;
+    description.outputCapacity =
+        Capacity::fixed(vertexCount * 24 + std::uint64_t{instanceCount} * 256);
     description.measuresGpuTime = gpuTime == GpuTime::measured;
     return description;
   }

@@ -91,8 +91,8 @@ class PipelineCacheTest : public DeviceTest {
   static void prepareSystem(vulkan::Context& context) {
     vulkan::SkinningSystemDescription system;
     system.context = &context;
-    system.meshBudget = system.outputBudget = 1 << 20;
-    system.jointBudget = system.instanceBudget = system.boundsBudget = 16;
+    system.meshCapacity = system.outputCapacity = Capacity::fixed(1 << 20);
+    system.jointCapacity = system.instanceCapacity = system.boundsCapacity = Capacity::fixed(16);
     InstanceDescription instance;
     instance.method = Method::linear;
     instance.culledOnGpu = true;

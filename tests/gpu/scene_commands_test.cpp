@@ -19,18 +19,41 @@ namespace {
 /// Every call of Vulkan that the commands of a scene need.
 class Rhi {
  public:
-  Rhi(samples::Device& device, const Scene& scene)
-      : device_(device), functions_(device.functions()), limits_(scene.description().limits) {
+  Rhi(samples::Device& device, const DeviceLimits& limits)
+      : device_(device), functions_(device.functions()), limits_(limits) {
+    createLayouts();
+  }
+
+  /// Those that a scene has at first.
+  void createBuffers(const Scene& scene) {
     for (std::size_t index = 0; index < bufferRoleCount; ++index) {
       const auto role = static_cast<BufferRole>(index);
       const BufferRequirement needed = scene.buffer(role);
-      // Outputs share one buffer; those of the tables are as large as a plan says.
-      if (needed.size == 0 || (role > BufferRole::positions && role < BufferRole::upload)) continue;
-      buffers_[role] = must(samples::MappedBuffer::create(device, needed.size, needed.usage));
-      std::ranges::fill(buffers_[role].bytes(), std::byte{0xa5});
+      // Outputs share one buffer.
+      if (role <= BufferRole::positions || role >= BufferRole::gpuPoses)
+        makeRoom(buffers_[role], needed);
     }
-    createLayouts();
+    for (std::uint32_t number = 0; number < scene.poseBufferCount(); ++number)
+      makeRoom(poses_.emplace_back(), scene.poseBuffer(number).requirement);
   }
+
+  void makeRoom(BufferRole role, const BufferRequirement& needed) {
+    makeRoom(buffers_[role], needed);
+  }
+
+  GrowthCallback growth() {
+    return {this, [](void* user, const BufferGrowth& growth) {
+              Rhi& self = *static_cast<Rhi*>(user);
+              ++self.growths;
+              const bool isPose =
+                  growth.role == BufferRole::poses || growth.role == BufferRole::gpuPoses;
+              EXPECT_TRUE(!isPose || growth.poseBuffer == self.poses_.size());
+              self.makeRoom(isPose ? self.poses_.emplace_back() : self.buffers_[growth.role],
+                            growth.requirement);
+              return Result<void>();
+            }};
+  }
+  std::uint32_t growths = 0;
 
   ~Rhi() {
     functions_.DeviceWaitIdle(device_.handle());
@@ -44,6 +67,9 @@ class Rhi {
   Rhi& operator=(const Rhi&) = delete;
 
   std::span<std::byte> bytes(BufferRole role) { return buffers_.at(role).bytes(); }
+  std::byte* poseBytes(const PosePlace& place) {
+    return poses_[place.poseBuffer].bytes().data() + place.offset;
+  }
 
   void prepare(const Variant& variant) {
     if (pipelines_.contains(variant.key())) return;
@@ -75,10 +101,9 @@ class Rhi {
 
   /// Writes the tables, executes all commands, and waits.
   void run(const Plan& plan) {
-    for (const BufferRole role : {BufferRole::tables, BufferRole::upload}) {
-      const BufferRequirement needed = plan.buffer(role);
-      buffers_[role] = must(samples::MappedBuffer::create(device_, needed.size, needed.usage));
-    }
+    for (const BufferRole role : {BufferRole::tables, BufferRole::upload, BufferRole::readBack,
+                                  BufferRole::history, BufferRole::counters})
+      makeRoom(role, plan.buffer(role));
     must(writeTables(plan, bytes(BufferRole::upload)));
     check(load<PFN_vkResetDescriptorPool>("vkResetDescriptorPool")(device_.handle(), pool_, 0));
     const VkCommandBuffer commands = device_.allocateCommandBuffer();
@@ -105,6 +130,16 @@ class Rhi {
   template <typename Function>
   Function load(const char* name) const {
     return reinterpret_cast<Function>(functions_.GetDeviceProcAddr(device_.handle(), name));
+  }
+
+  /// Nothing runs: a larger buffer gets the old contents at once.
+  void makeRoom(samples::MappedBuffer& buffer, const BufferRequirement& needed) {
+    if (buffer.bytes().size() >= needed.size) return;
+    samples::MappedBuffer larger =
+        must(samples::MappedBuffer::create(device_, needed.size, needed.usage));
+    std::ranges::fill(larger.bytes(), std::byte{0xa5});
+    std::ranges::copy(buffer.bytes(), larger.bytes().begin());
+    buffer = std::move(larger);
   }
 
   // As vulkan/kernels.h says.
@@ -138,24 +173,22 @@ class Rhi {
   }
 
   VkBuffer handleOf(BufferRole role) const { return buffers_.at(role).handle(); }
+  VkBuffer handleOf(BufferRole role, const DispatchCommand& dispatch) const {
+    const bool isPose = role == BufferRole::poses || role == BufferRole::gpuPoses;
+    return isPose ? poses_[dispatch.poseBuffer].handle() : handleOf(role);
+  }
 
   /// The role behind each binding of a kernel.
-  static std::array<BufferRole, storageBuffersWanted> rolesOf(const Variant& variant) {
+  static std::array<BufferRole, storageBuffersWanted> rolesOf(const DispatchCommand& dispatch) {
     constexpr BufferRole out = BufferRole::positions, tables = BufferRole::tables;
+    const Variant& variant = dispatch.variant;
     if (variant.kernel == Kernel::palette)
-      return {tables, BufferRole::poses,  BufferRole::palettes, out, out, out,
+      return {tables, dispatch.joints,    BufferRole::palettes, out, out, out,
               out,    BufferRole::results};
     if (variant.kernel == Kernel::visibility)
       return {tables, BufferRole::visibility, BufferRole::history, BufferRole::counters, out, out,
               out,    BufferRole::results};
-    return {tables,
-            BufferRole::meshes,
-            variant.method == Method::linear ? BufferRole::poses : BufferRole::palettes,
-            out,
-            out,
-            out,
-            out,
-            BufferRole::results};
+    return {tables, BufferRole::meshes, dispatch.joints, out, out, out, out, BufferRole::results};
   }
 
   void record(const DispatchCommand& dispatch) {
@@ -168,9 +201,9 @@ class Rhi {
     check(functions_.AllocateDescriptorSets(device_.handle(), &allocate, &set));
     std::array<VkDescriptorBufferInfo, storageBuffersWanted> infos{};
     std::array<VkWriteDescriptorSet, storageBuffersWanted> writes{};
-    const std::array<BufferRole, storageBuffersWanted> roles = rolesOf(dispatch.variant);
+    const std::array<BufferRole, storageBuffersWanted> roles = rolesOf(dispatch);
     for (std::uint32_t binding = 0; binding < storageBuffersWanted; ++binding) {
-      infos[binding] = {handleOf(roles[binding]), 0, VK_WHOLE_SIZE};
+      infos[binding] = {handleOf(roles[binding], dispatch), 0, VK_WHOLE_SIZE};
       writes[binding].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
       writes[binding].dstSet = set;
       writes[binding].dstBinding = binding;
@@ -236,6 +269,7 @@ class Rhi {
   const samples::VulkanFunctions& functions_;
   DeviceLimits limits_;
   std::map<BufferRole, samples::MappedBuffer> buffers_;
+  std::vector<samples::MappedBuffer> poses_;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkPipelineLayout pipelineLayout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
@@ -245,20 +279,24 @@ class Rhi {
 
 class SceneCommandsTest : public SystemTest {};
 
-// Half of the instances are culled on the GPU; some are linear; all have motion, some bounds. An
-// instance goes and makes room, and another moves there.
+// Half of the instances are culled on the GPU; some are linear; all have motion, some bounds; the
+// poses of some are the GPU's. An instance goes and makes room, and another moves there. All
+// buffers are too small at first, and again when more instances come.
 TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
-  constexpr std::uint32_t count = 24, vertexCount = 150, jointCount = 8;
+  constexpr std::uint32_t count = 24, lateCount = 60, vertexCount = 150, jointCount = 8;
   SceneDescription description;
-  description.meshBudget = 1 << 20;
-  description.jointBudget = 1024;
-  description.outputBudget = 1 << 20;
-  description.instanceBudget = 64;
-  description.boundsBudget = 64;
+  // So little that everything grows, in the frames too.
+  description.meshCapacity = {1 << 10};
+  description.jointCapacity = {8};
+  description.outputCapacity = {1 << 10};
+  description.instanceCapacity = {4};
+  description.boundsCapacity = {1};
   description.limits = context().limits();
   description.limits.texelBuffers = false;
+  Rhi rhi(device(), description.limits);
+  description.growth = rhi.growth();
   Scene scene = must(Scene::create(description));
-  Rhi rhi(device(), scene);
+  rhi.createBuffers(scene);
 
   const PackedMesh packed = systemMesh(1, vertexCount, jointCount);
   const MeshHandle mesh = must(scene.addMesh(packed.info()));
@@ -267,8 +305,10 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
   std::vector<PoseHandle> palettes;
   std::vector<InstanceHandle> instances;
   std::vector<InstanceDescription> descriptions;
-  for (std::uint32_t index = 0; index < count; ++index) {
-    palettes.push_back(must(scene.addPose(jointCount)));
+  const auto isOfGpu = [](std::uint32_t index) { return index % 5 == 1; };
+  const auto add = [&](std::uint32_t index) {
+    palettes.push_back(must(
+        scene.addPose(jointCount, {.writer = isOfGpu(index) ? PoseWriter::gpu : PoseWriter::cpu})));
     InstanceDescription instance;
     instance.mesh = mesh;
     instance.pose = palettes.back();
@@ -281,34 +321,43 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
       rhi.prepare(variant);
     instances.push_back(must(scene.addInstance(instance)));
     descriptions.push_back(instance);
-  }
-  const std::span<std::byte> words = rhi.bytes(BufferRole::visibility);
+  };
+  for (std::uint32_t index = 0; index < count; ++index) add(index);
   const auto isShown = [](std::uint32_t index) { return index % 2 == 1 || index % 8 != 6; };
-  std::ranges::fill(words, std::byte{0});
-  for (std::uint32_t index = 0; index < count; index += 2) {
-    if (isShown(index)) words[must(scene.visibilityIndex(instances[index])) * 4] = std::byte{1};
-  }
+  const auto writeWords = [&] {
+    rhi.makeRoom(BufferRole::visibility, scene.buffer(BufferRole::visibility));
+    const std::span<std::byte> words = rhi.bytes(BufferRole::visibility);
+    std::ranges::fill(words, std::byte{0});
+    for (std::uint32_t index = 0; index < instances.size(); index += 2) {
+      const Result<std::uint32_t> word = scene.visibilityIndex(instances[index]);
+      if (word && isShown(index)) words[*word * 4] = std::byte{1};
+    }
+  };
+  writeWords();
 
   Plan plan;
   const auto poseOf = [](std::uint64_t frame, std::uint32_t index) {
     return systemPose(static_cast<std::uint32_t>(frame) * 100 + index * 5);
   };
+  const auto writePose = [&](const PosePlace& place, const Pose& pose) {
+    ASSERT_EQ(place.jointCount, pose.size());
+    std::memcpy(rhi.poseBytes(place), pose.data(), pose.size() * sizeof(JointMatrix));
+  };
   const auto runFrame = [&](std::uint64_t frame, bool moves) {
     must(scene.beginFrame(frame, frame - 1));
     if (frame > 1) must(scene.readBack(frame - 1, rhi.bytes(BufferRole::readBack)));
     for (std::uint32_t index = 0; moves && index < count; ++index) {
-      const PosePlace place = must(scene.writePose(palettes[index]));
-      const Pose pose = poseOf(frame, index);
-      ASSERT_EQ(place.jointCount, pose.size());
-      std::memcpy(rhi.bytes(BufferRole::poses).data() + place.offset, pose.data(),
-                  pose.size() * sizeof(JointMatrix));
+      if (isOfGpu(index)) must(scene.markWritten({&palettes[index], 1}));
+      const PosePlace place = must(isOfGpu(index) ? scene.posePlace(palettes[index])
+                                                  : scene.writePose(palettes[index]));
+      writePose(place, poseOf(frame, index));
     }
     must(scene.plan(plan));
     rhi.run(plan);
     must(scene.commit());
   };
   const auto expectInstances = [&](std::uint64_t frame, std::uint64_t before, std::uint32_t first) {
-    for (std::uint32_t index = first; index < count; ++index) {
+    for (std::uint32_t index = first; index < instances.size(); ++index) {
       SCOPED_TRACE(index);
       const InstanceOutput output = must(scene.output(instances[index]));
       const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
@@ -338,7 +387,14 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
   EXPECT_EQ(scene.statistics().lastCompletedFrame.skinnedInstances, count / 2 - 3);
 
   must(scene.removeInstance(instances[0]));
-  runFrame(3, false);  // all come to rest
+  const std::uint32_t growths = rhi.growths;
+  for (std::uint32_t index = count; index < count + lateCount; ++index) {
+    add(index);
+    writePose(must(scene.posePlace(palettes[index])), poseOf(2, index));
+  }
+  EXPECT_GE(rhi.growths, growths + 5) << "outputs, palettes, results, and poses of both kinds";
+  writeWords();
+  runFrame(3, false);  // all come to rest, but for the new ones
   EXPECT_EQ(scene.settledInstances().size(), count / 2);
   expectInstances(2, 2, 1);
   runFrame(4, false);
@@ -347,7 +403,7 @@ TEST_F(SceneCommandsTest, AnEnginesOwnRhiExecutesTheFramesOfAScene) {
   EXPECT_GT(scene.movedInstances().size(), 0u);
   expectInstances(2, 2, 1);
 
-  for (std::uint32_t index = 4; index < count; index += 4) {
+  for (std::uint32_t index = 4; index < instances.size(); index += 4) {
     const std::optional<Box> box = must(scene.bounds(instances[index]));
     ASSERT_EQ(box.has_value(), isShown(index)) << index;
   }

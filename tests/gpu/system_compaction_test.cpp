@@ -17,7 +17,7 @@ class SystemCompactionTest : public SystemTest {
     SystemTest::SetUp();
     if (device_ == nullptr) return;
     vulkan::SkinningSystemDescription small = description();
-    small.outputBudget = 64 << 10;
+    small.outputCapacity = Capacity::fixed(64 << 10);
     engine_.emplace(device(), small);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);

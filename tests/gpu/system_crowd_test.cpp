@@ -26,8 +26,8 @@ class SystemCrowdTest : public SystemTest {
 
   vulkan::SkinningSystemDescription crowdDescription() {
     vulkan::SkinningSystemDescription crowd = description();
-    crowd.outputBudget = 8 << 20;
-    crowd.jointBudget = 16384;
+    crowd.outputCapacity = Capacity::fixed(8 << 20);
+    crowd.jointCapacity = Capacity::fixed(16384);
     return crowd;
   }
   static Method methodOf(std::uint32_t member) {

@@ -185,8 +185,8 @@ TEST_F(SystemHandlesTest, ChangesThatBreakARuleAreRefused) {
 TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
   SkinningSystemDescription small = description();
   const PackedMesh mesh = systemMesh(1, 100);
-  small.meshBudget = mesh.bytes().size() + 16;
-  small.jointBudget = 20;
+  small.meshCapacity = Capacity::fixed(mesh.bytes().size() + 16);
+  small.jointCapacity = Capacity::fixed(20);
   SystemEngine full(device(), small);
   full.begin();
   const MeshHandle first = full.addMesh(mesh);
@@ -208,7 +208,7 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
 // added had anything else to do.
 TEST_F(SystemHandlesTest, APoseRestsInTheIdentityUntilItIsWritten) {
   SkinningSystemDescription small = description();
-  small.jointBudget = 8;
+  small.jointCapacity = Capacity::fixed(8);
   for (const bool hasWork : {false, true}) {
     SingleInstance one(device(), small, plainLayout());
     one.engine.submit();
@@ -236,8 +236,8 @@ TEST_F(SystemHandlesTest, APoseRestsInTheIdentityUntilItIsWritten) {
 
 TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
   SkinningSystemDescription small = description();
-  small.instanceBudget = 3;
-  small.boundsBudget = 1;
+  small.instanceCapacity = Capacity::fixed(3);
+  small.boundsCapacity = Capacity::fixed(1);
   SingleInstance first(device(), small, plainLayout());
   EXPECT_EQ(first.engine->instanceCapacity(), 3u);
   InstanceDescription bounded = first.description;
@@ -280,17 +280,22 @@ TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
 
 TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
   using Change = std::function<void(SkinningSystemDescription&)>;
-  const auto allocate = [](void*, const vulkan::MemoryRequest&) -> Result<vulkan::MemoryBlock> {
+  const auto create = [](void*, const vulkan::BufferRequest&) -> Result<vulkan::CreatedBuffer> {
     return Error{ErrorCode::ioError, "never called"};
   };
   const std::pair<const char*, Change> changes[] = {
       {"context", [](SkinningSystemDescription& d) { d.context = nullptr; }},
       {"framesInFlight", [](SkinningSystemDescription& d) { d.framesInFlight = 0; }},
-      {"meshBudget", [](SkinningSystemDescription& d) { d.meshBudget = 0; }},
-      {"jointBudget", [](SkinningSystemDescription& d) { d.jointBudget = 0; }},
-      {"outputBudget", [](SkinningSystemDescription& d) { d.outputBudget = 0; }},
-      {"instanceBudget", [](SkinningSystemDescription& d) { d.instanceBudget = 0; }},
-      {"memory", [&](SkinningSystemDescription& d) { d.memory.allocate = allocate; }},
+      {"meshCapacity", [](SkinningSystemDescription& d) { d.meshCapacity = Capacity::fixed(0); }},
+      {"jointCapacity",
+       [](SkinningSystemDescription& d) {
+         d.jointCapacity = {2, 1};
+       }},
+      {"outputCapacity",
+       [](SkinningSystemDescription& d) { d.outputCapacity = Capacity::fixed(0); }},
+      {"instanceCapacity",
+       [](SkinningSystemDescription& d) { d.instanceCapacity = Capacity::fixed(0); }},
+      {"buffers", [&](SkinningSystemDescription& d) { d.buffers.create = create; }},
       {"tuning",
        [](SkinningSystemDescription& d) {
          d.tuning = Tuning{33, 4};
@@ -305,13 +310,14 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
     EXPECT_NE(system.error().message.find(field), std::string::npos) << system.error().message;
   }
   SkinningSystemDescription large = description();
-  large.meshBudget = context().limits().maxStorageBufferRange + 4096;
-  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  large.meshCapacity = Capacity::fixed(context().limits().maxStorageBufferRange + 4096);
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshCapacity");
   // Sizes that no integer holds.
-  large.meshBudget = std::numeric_limits<std::uint64_t>::max();
-  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshBudget");
+  large.meshCapacity = Capacity::fixed(std::numeric_limits<std::uint64_t>::max());
+  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshCapacity");
   large = description();
-  large.framesInFlight = large.jointBudget = std::numeric_limits<std::uint32_t>::max();
+  large.framesInFlight = std::numeric_limits<std::uint32_t>::max();
+  large.jointCapacity = Capacity::fixed(large.framesInFlight);
   expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "framesInFlight");
 }
 

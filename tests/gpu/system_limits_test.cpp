@@ -95,9 +95,9 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
       vulkan::Context narrow = must(vulkan::Context::create(small.description()));
       vulkan::SkinningSystemDescription system = description();
       system.context = &narrow;
-      system.meshBudget = 192 << 10;
-      system.jointBudget = 1024;
-      system.outputBudget = 2 << 20;
+      system.meshCapacity = Capacity::fixed(192 << 10);
+      system.jointCapacity = Capacity::fixed(1024);
+      system.outputCapacity = Capacity::fixed(2 << 20);
       SystemEngine engine(device(), system);
       engine.begin();
       VertexLayout layout = motionLayout();
@@ -117,10 +117,10 @@ TEST_F(SystemLimitsTest, OutputLargerThanTheDevicesRange) {
   const std::uint64_t range = context().limits().maxStorageBufferRange;
   if (range > std::uint64_t{256} << 20) GTEST_SKIP() << "it would take too much memory";
   vulkan::SkinningSystemDescription large = description();
-  large.outputBudget = range + range / 2;
+  large.outputCapacity = Capacity::fixed(range + range / 2);
   const std::uint32_t vertexCount = 200'000;
   const PackedMesh packed = systemMesh(3, vertexCount, 8, 1);
-  large.meshBudget = packed.bytes().size() + 4096;
+  large.meshCapacity = Capacity::fixed(packed.bytes().size() + 4096);
   SystemEngine engine(device(), large);
   engine.begin();
   InstanceDescription instance;
@@ -129,7 +129,7 @@ TEST_F(SystemLimitsTest, OutputLargerThanTheDevicesRange) {
   instance.pose = engine.addPose(systemPose(1));
   std::vector<InstanceHandle> instances;
   const std::uint64_t size = std::uint64_t{vertexCount} * 24;
-  while ((instances.size() + 1) * size <= large.outputBudget)
+  while ((instances.size() + 1) * size <= large.outputCapacity.initial)
     instances.push_back(engine.addInstance(instance));
   engine.submit();
   EXPECT_EQ(engine.lastFrame().skinnedInstances, instances.size());
@@ -151,9 +151,9 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuReachesEveryRange) {
   vulkan::Context narrow = must(vulkan::Context::create(small.description()));
   vulkan::SkinningSystemDescription system = description();
   system.context = &narrow;
-  system.meshBudget = 192 << 10;
-  system.jointBudget = 1024;
-  system.outputBudget = 600 * 70 * 24 + (1 << 16);
+  system.meshCapacity = Capacity::fixed(192 << 10);
+  system.jointCapacity = Capacity::fixed(1024);
+  system.outputCapacity = Capacity::fixed(600 * 70 * 24 + (1 << 16));
   SystemEngine engine(device(), system);
   engine.begin();
   expectCulledCrowd(engine, 600);
@@ -174,7 +174,7 @@ TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
       EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
     };
     expectRefused(engine->addMesh(*pack(randomMesh(1, 200, 8, 5).view(), 8)), "5 influences");
-    expectRefused(engine->addPose(8, true), "noScale");
+    expectRefused(engine->addPose(8), "noScale");
     const PackedMesh packed = systemMesh(3, 1234);
     ASSERT_NE(packed.info().morphTargetCount, 0u);
     if (noMorphTargets) {
@@ -187,7 +187,7 @@ TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
     instance.layout = plainLayout();
     instance.mesh = engine.addMesh(packed);
     const std::vector<JointMatrix> pose = randomPose(1, 8, Rigidity::rigid);
-    instance.pose = engine.addPose(pose, false);
+    instance.pose = engine.addPose(pose, {.mayScale = false});
     const InstanceHandle added = engine.addInstance(instance);
     engine.submit();
     expectSkinned(engine.read(engine.readOutput(), added), alone(packed, pose, instance));

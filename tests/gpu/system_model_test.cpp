@@ -1,7 +1,7 @@
 // Thousands of random steps of a system beside a model of it: meshes, palettes and instances come
-// and go, move, hide, find no room and are moved about while frames are under way, frames are
-// abandoned, and every instance's output stays, bit for bit, what it would be alone. Half of the
-// tests record into secondary command buffers.
+// and go, move, hide, find no room and are moved about while frames are under way, buffers grow,
+// frames are abandoned, the GPU writes some poses, and every instance's output stays, bit for bit,
+// what it would be alone. Half of the tests record into secondary command buffers.
 
 #include <gtest/gtest.h>
 
@@ -18,6 +18,7 @@ namespace {
 
 constexpr std::uint32_t framesInFlight = 3;
 constexpr std::uint32_t stepCount = 10'000;
+constexpr std::uint32_t systemSteps = 500;  // then another system begins to grow
 constexpr std::uint32_t poseCount = 12;
 constexpr std::uint32_t meshKinds = 8;
 
@@ -47,16 +48,26 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
       kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
     vulkan::SkinningSystemDescription small = description();
     small.framesInFlight = framesInFlight;
-    small.meshBudget = 512 << 10;
-    small.jointBudget = 8 * 80;
-    small.instanceBudget = 200;
-    small.outputBudget = 120 << 10;  // so small that it is full at times
-    engine_.emplace(device(), small);
-    engine_->recordsSecondary = GetParam() % 2 == 0;
-    model_.emplace(*engine_);
+    small.meshCapacity = {2048, 512 << 10};
+    small.jointCapacity = {8, 8 * 40};
+    small.gpuJointCapacity = {0, 8 * 40};
+    small.instanceCapacity = {4, 200};
+    small.boundsCapacity = {1};
+    small.outputCapacity = {1024, 100 << 10};  // so small that it is full at times
+    description_ = small;
     for (samples::MappedBuffer& words : words_)
       words = must(
           samples::MappedBuffer::create(device(), 4096 * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    makeSystem();
+  }
+  /// A system without anything, of which everything has to grow.
+  void makeSystem() {
+    model_.reset();
+    meshes_.clear();
+    gone_.clear();
+    engine_.emplace(device(), description_);
+    engine_->recordsSecondary = GetParam() % 2 == 0;
+    model_.emplace(*engine_);
     engine_->begin();
   }
   void TearDown() override {
@@ -94,6 +105,7 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   void expectOutputs();
 
   std::mt19937 random_{GetParam()};
+  vulkan::SkinningSystemDescription description_;
   std::vector<PackedMesh> kinds_;
   std::optional<SystemEngine> engine_;
   std::optional<SystemModel> model_;
@@ -104,6 +116,7 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   std::array<samples::MappedBuffer, framesInFlight> words_;
   std::map<std::pair<ShownPose, VertexFormat>, Streams> expected_;
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0;
+  std::uint64_t growths_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };
 
@@ -125,7 +138,8 @@ void SystemModelTest::removeMesh() {
 void SystemModelTest::addPose() {
   if (model_->poses.size() >= 30) return;
   const std::uint32_t pose = below(poseCount);
-  const Result<PoseHandle> added = system().addPose(8);
+  const PoseWriter writer = chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
+  const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
   if (!added) return;  // places of palettes that went are not free yet
   model_->poses[nextNumber_++] = {*added, pose};
   engine_->writePose(*added, systemPose(pose));
@@ -376,14 +390,18 @@ TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
   for (std::uint32_t number = 0; number < stepCount && !HasFailure(); ++number) {
     SCOPED_TRACE("step " + std::to_string(number));
     step();
+    if (number % systemSteps != systemSteps - 1) continue;
+    runFrame();
+    expectOutputs();
+    growths_ += system().outputGeneration();
+    makeSystem();
   }
-  runFrame();
-  expectOutputs();
   // Or else nothing was tested.
   EXPECT_GT(checkedInstances_, 1000u);
   EXPECT_GT(movedInstances_, 20u);
   EXPECT_GT(refusals_, 20u);
   EXPECT_GT(abandonedFrames_, 50u);
+  EXPECT_GT(growths_, 100u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SystemModelTest, ::testing::Values(1u, 2u));

@@ -13,13 +13,18 @@ namespace {
 
 constexpr std::uint32_t meshCount = 20;
 
-class SystemOutputTest : public SystemTest {};
+class SystemOutputTest : public SystemTest {
+ protected:
+  VkBufferUsageFlags outputUsage() {
+    return must(vulkan::SkinningSystem::requirement(description(), BufferRole::positions)).usage;
+  }
+};
 
 TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
   vulkan::SkinningSystemDescription large = description();
-  large.outputBudget = 32 << 20;
-  large.jointBudget = 10'000 * 4;
-  large.instanceBudget = 10'000;
+  large.outputCapacity = Capacity::fixed(32 << 20);
+  large.jointCapacity = Capacity::fixed(10'000 * 4);
+  large.instanceCapacity = Capacity::fixed(10'000);
   SystemEngine engine(device(), large);
   engine.begin();
   std::vector<MeshHandle> meshes;
@@ -54,10 +59,10 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
 TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   constexpr std::uint64_t whole = 1 << 18, begin = 3 * 4096, size = 92'000;
   samples::MappedBuffer buffer =
-      must(samples::MappedBuffer::create(device(), whole, vulkan::outputRangeUsage));
+      must(samples::MappedBuffer::create(device(), whole, outputUsage()));
   vulkan::SkinningSystemDescription ranged = description();
   ranged.output = {buffer.handle(), begin, size};
-  ranged.outputBudget = whole;  // what the test reads
+  ranged.outputCapacity = Capacity::fixed(whole);  // what the test reads
   SystemEngine engine(device(), ranged);
   EXPECT_EQ(engine->outputBuffer(), buffer.handle());
   EXPECT_EQ(engine->statistics().outputs.capacity, size);
@@ -98,7 +103,7 @@ TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
 
 TEST_F(SystemOutputTest, RangesThatMakeNoSenseAreRefused) {
   samples::MappedBuffer buffer =
-      must(samples::MappedBuffer::create(device(), 1 << 16, vulkan::outputRangeUsage));
+      must(samples::MappedBuffer::create(device(), 1 << 16, outputUsage()));
   const std::uint64_t alignment = context().limits().minStorageBufferOffsetAlignment;
   for (const vulkan::BufferRange& bad :
        {vulkan::BufferRange{buffer.handle(), 0, 0}, vulkan::BufferRange{buffer.handle(), 0, 1026},
@@ -178,7 +183,7 @@ TEST_F(SystemOutputTest, AnUnwrittenPoseIsTheIdentity) {
 // A palette's place is given to another: nothing of the old pose must show.
 TEST_F(SystemOutputTest, ANewPoseIsTheIdentityAgain) {
   vulkan::SkinningSystemDescription small = description();
-  small.jointBudget = 8;
+  small.jointCapacity = Capacity::fixed(8);
   SingleInstance one(device(), small, plainLayout());
   one.engine.submit();
   must(one.engine->removeInstance(one.instance));
@@ -201,7 +206,7 @@ TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
   instance.layout = plainLayout();
   instance.mesh = engine.addMesh(packed);
   for (const bool mayScale : {true, false}) {
-    instance.pose = engine.addPose(pose, mayScale);
+    instance.pose = engine.addPose(pose, {.mayScale = mayScale});
     const InstanceHandle handle = engine.addInstance(instance);
     if (mayScale) engine.submit();
     if (!mayScale) engine.submit();

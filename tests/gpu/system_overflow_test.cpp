@@ -18,7 +18,7 @@ class SystemOverflowTest : public SystemTest {
   void open(std::uint32_t instances) {
     if (device_ == nullptr) return;
     vulkan::SkinningSystemDescription small = description();
-    small.outputBudget = instances * instanceSize + instanceSize / 2;
+    small.outputCapacity = Capacity::fixed(instances * instanceSize + instanceSize / 2);
     engine_.emplace(device(), small);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);
@@ -110,13 +110,13 @@ TEST_F(SystemOverflowTest, AMeshThatIsRefusedLeavesTheOldOne) {
 // The kernel that chooses instances reads a word for each index, and keeps a record for it.
 TEST_F(SystemOverflowTest, NoVisibilityIndexReachesTheInstanceBudget) {
   vulkan::SkinningSystemDescription small = description();
-  small.instanceBudget = 3;
+  small.instanceCapacity = Capacity::fixed(3);
   engine_.emplace(device(), small);
   engine_->begin();
   instance_.layout = motionLayout();
   instance_.culledOnGpu = true;
   std::vector<InstanceHandle> added;
-  for (std::uint32_t i = 0; i < small.instanceBudget; ++i) {
+  for (std::uint32_t i = 0; i < small.instanceCapacity.initial; ++i) {
     instance_.mesh = engine_->addMesh(packed_);
     added.push_back(add(i));
     EXPECT_LT(must(system().visibilityIndex(added.back())), system().instanceCapacity());
@@ -125,7 +125,7 @@ TEST_F(SystemOverflowTest, NoVisibilityIndexReachesTheInstanceBudget) {
   ASSERT_FALSE(further.ok());
   EXPECT_EQ(further.error().code, ErrorCode::limitExceeded);
   samples::MappedBuffer words = must(samples::MappedBuffer::create(
-      device(), small.instanceBudget * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+      device(), small.instanceCapacity.initial * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::memset(words.bytes().data(), 1, words.bytes().size());
   engine_->submit({words.handle(), 0});
   for (std::uint32_t i = 0; i < added.size(); ++i) expectPose(added[i], packed_, i, i);

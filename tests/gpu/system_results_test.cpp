@@ -154,7 +154,7 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
   vulkan::SkinningSystemDescription system = description();
   system.context = &watched;
-  system.boundsBudget = count;
+  system.boundsCapacity = Capacity::fixed(count);
   SystemEngine engine(device(), system);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);
@@ -190,8 +190,8 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
 // An instance that finds no room in the output gives back its slot among the results.
 TEST_F(SystemResultsTest, AnInstanceThatIsRefusedKeepsNoSlot) {
   vulkan::SkinningSystemDescription small = description();
-  small.boundsBudget = 2;
-  small.outputBudget = vertexCount * 24;
+  small.boundsCapacity = Capacity::fixed(2);
+  small.outputCapacity = Capacity::fixed(vertexCount * 24);
   SystemEngine engine(device(), small);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);

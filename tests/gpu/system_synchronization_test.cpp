@@ -50,8 +50,8 @@ class SystemSynchronizationTest : public SystemTest {
     vulkan::SkinningSystemDescription strict = description();
     strict.context = &open_->context;
     strict.framesInFlight = framesInFlight;
-    strict.outputBudget = 256 << 10;
-    strict.instanceBudget = 1000;
+    strict.outputCapacity = Capacity::fixed(256 << 10);
+    strict.instanceCapacity = Capacity::fixed(1000);
     return strict;
   }
 
@@ -74,8 +74,9 @@ class BusyScene {
     visibility_ =
         must(samples::MappedBuffer::create(device, engine_->instanceCapacity() * 4, usage));
     for (samples::MappedBuffer& drawn : drawn_)
-      drawn = must(samples::MappedBuffer::create(device, system.outputBudget, usage, true));
-    size_ = system.outputBudget;
+      drawn =
+          must(samples::MappedBuffer::create(device, system.outputCapacity.initial, usage, true));
+    size_ = system.outputCapacity.initial;
     instance_.layout = motionLayout();
     instance_.bounds = true;
     engine_.beforeRecord = [this](VkCommandBuffer buffer) { cull(buffer); };
@@ -202,7 +203,7 @@ TEST_F(SystemSynchronizationTest, TheLayerMissesBarriersOneByOne) {
 // Where the system copies nothing back, all that stands between it and who draws is the engine's.
 TEST_F(SystemSynchronizationTest, WithoutTheEnginesBarriersTheLayerSpeaks) {
   SingleInstance one(strictDevice(), strictDescription(), motionLayout());
-  const std::uint64_t size = strictDescription().outputBudget;
+  const std::uint64_t size = strictDescription().outputCapacity.initial;
   const samples::MappedBuffer drawn = must(
       samples::MappedBuffer::create(strictDevice(), size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   one.engine.afterRecord = [&](VkCommandBuffer commandBuffer) {

@@ -94,11 +94,11 @@ std::set<std::uint32_t> indicesOf(std::span<const InstanceHandle> instances) {
 vulkan::SkinningSystemDescription SystemTest::description() {
   vulkan::SkinningSystemDescription description;
   description.context = &context();
-  description.meshBudget = 4 << 20;
-  description.jointBudget = 4096;
-  description.instanceBudget = 4096;
-  description.boundsBudget = 256;
-  description.outputBudget = 4 << 20;
+  description.meshCapacity = Capacity::fixed(4 << 20);
+  description.jointCapacity = Capacity::fixed(4096);
+  description.instanceCapacity = Capacity::fixed(4096);
+  description.boundsCapacity = Capacity::fixed(256);
+  description.outputCapacity = Capacity::fixed(4 << 20);
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                             VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   return description;

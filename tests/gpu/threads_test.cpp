@@ -264,8 +264,9 @@ TEST_F(ThreadsTest, ManyPrepareTheSameVariants) {
 TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   vulkan::SkinningSystemDescription description;
   description.context = &context();
-  description.meshBudget = description.outputBudget = 1 << 20;
-  description.jointBudget = description.instanceBudget = description.boundsBudget = 256;
+  description.meshCapacity = description.outputCapacity = Capacity::fixed(1 << 20);
+  description.jointCapacity = description.instanceCapacity = description.boundsCapacity =
+      Capacity::fixed(256);
   description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.tuning = Tuning{16, 2};
   SystemEngine engine(device(), description);

@@ -30,7 +30,8 @@ std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
 SystemEngine::SystemEngine(samples::Device& device,
                            const vulkan::SkinningSystemDescription& description)
     : device_(device),
-      outputSize_(description.outputBudget / 4 * 4),
+      outputSize_(description.outputCapacity.initial / 4 * 4),
+      outputGrows_(description.output.buffer == VK_NULL_HANDLE),
       system_(must(vulkan::SkinningSystem::create(description))) {}
 
 SystemEngine::~SystemEngine() {
@@ -45,9 +46,8 @@ MeshHandle SystemEngine::addMesh(const PackedMesh& mesh) {
   return handle;
 }
 
-PoseHandle SystemEngine::addPose(std::span<const JointMatrix> pose, bool mayScale) {
-  const PoseHandle handle =
-      must(system_.addPose(static_cast<std::uint32_t>(pose.size()), mayScale));
+PoseHandle SystemEngine::addPose(std::span<const JointMatrix> pose, const PoseOptions& options) {
+  const PoseHandle handle = must(system_.addPose(static_cast<std::uint32_t>(pose.size()), options));
   writePose(handle, pose);
   return handle;
 }
@@ -57,10 +57,32 @@ InstanceHandle SystemEngine::addInstance(const InstanceDescription& description)
   return must(system_.addInstance(description));
 }
 
-void SystemEngine::writePose(PoseHandle palette, std::span<const JointMatrix> pose) {
-  const std::span<JointMatrix> mapped = must(system_.writePose(palette));
-  if (mapped.size() != pose.size()) throw std::runtime_error("the pose has another size");
-  std::ranges::copy(pose, mapped.begin());
+void SystemEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matrices) {
+  if (system_.poseRange(pose).ok()) {
+    std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return write.pose == pose; });
+    gpuWrites_.push_back({pose, {matrices.begin(), matrices.end()}});
+    return;
+  }
+  const std::span<JointMatrix> mapped = must(system_.writePose(pose));
+  if (mapped.size() != matrices.size()) throw std::runtime_error("the pose has another size");
+  std::ranges::copy(matrices, mapped.begin());
+}
+
+void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
+  std::erase_if(gpuWrites_,
+                [&](const GpuWrite& write) { return !system_.poseRange(write.pose).ok(); });
+  if (gpuWrites_.empty()) return;
+  if (recordsBarriers)
+    recordBarrier(commandBuffer, vulkan::overwriteScope(vulkan::Writer::transfer));
+  for (const GpuWrite& write : gpuWrites_) {
+    const vulkan::BufferRange range = must(system_.poseRange(write.pose));
+    const std::size_t size = write.matrices.size() * sizeof(JointMatrix);
+    if (range.size != size) throw std::runtime_error("the pose has another size");
+    device_.functions().CmdUpdateBuffer(commandBuffer, range.buffer, range.offset, size,
+                                        write.matrices.data());
+    must(system_.markWritten({&write.pose, 1}));
+  }
+  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transferWrite));
 }
 
 void SystemEngine::begin(std::uint32_t underWay) {
@@ -72,6 +94,7 @@ void SystemEngine::begin(std::uint32_t underWay) {
 Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
                                        const vulkan::FrameDescription& frame) {
   if (beforeRecord) beforeRecord(commandBuffer);
+  writeGpuPoses(commandBuffer);
   if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transfer));
   const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
                                                  : system_.record(commandBuffer, frame);
@@ -101,6 +124,8 @@ Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
 Result<void> SystemEngine::trySubmit(const vulkan::FrameDescription& frame) {
   const VkCommandBuffer commandBuffer = beginCommands();
   const Result<void> recorded = recordFrame(commandBuffer, frame);
+  if (recorded && outputGrows_) outputSize_ = system_.statistics().outputs.capacity;
+  if (recorded) gpuWrites_.clear();
   submitted_.push_back({frame_, submitCommands(commandBuffer), commandBuffer});
   return recorded;
 }
@@ -169,7 +194,7 @@ void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer,
 }
 
 std::vector<std::byte> SystemEngine::readOutput() {
-  if (readBack_.bytes().empty()) {
+  if (readBack_.bytes().size() < outputSize_) {
     readBack_ = must(samples::MappedBuffer::create(device_, outputSize_,
                                                    VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   }
@@ -181,7 +206,7 @@ std::vector<std::byte> SystemEngine::readOutput() {
     recordBarrier(commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
                                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
   });
-  const std::span<const std::byte> bytes = readBack_.bytes();
+  const std::span<const std::byte> bytes = readBack_.bytes().first(outputSize_);
   return {bytes.begin(), bytes.end()};
 }
 

@@ -53,9 +53,11 @@ class SystemEngine {
 
   // -- What is in it. Vertices are counted, and pipelines prepared.
   MeshHandle addMesh(const PackedMesh& mesh);
-  PoseHandle addPose(std::span<const JointMatrix> pose, bool mayScale = true);
+  PoseHandle addPose(std::span<const JointMatrix> pose, const PoseOptions& options = {});
   InstanceHandle addInstance(const InstanceDescription& description);
-  void writePose(PoseHandle palette, std::span<const JointMatrix> pose);
+  /// A pose that the GPU writes is written by a command before `record`, and marked; again if the
+  /// frame is abandoned.
+  void writePose(PoseHandle pose, std::span<const JointMatrix> matrices);
 
   // -- Frames.
   /// Begins the next one, once at most `underWay` of those before are not complete.
@@ -106,6 +108,7 @@ class SystemEngine {
   static std::pair<std::uint32_t, std::uint32_t> key(MeshHandle mesh) {
     return {mesh.index, mesh.generation};
   }
+  void writeGpuPoses(VkCommandBuffer commandBuffer);
   VkCommandBuffer beginCommands();
   Result<void> recordInSecondary(VkCommandBuffer primary, const vulkan::FrameDescription& frame);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const vulkan::FrameDescription& frame);
@@ -114,11 +117,17 @@ class SystemEngine {
   void waitUntilUnderWay(std::uint32_t count);
 
   samples::Device& device_;
-  std::uint64_t outputSize_;
+  std::uint64_t outputSize_;  ///< as of the last `record`
+  bool outputGrows_;
   vulkan::SkinningSystem system_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
   std::deque<SubmittedFrame> submitted_;
   std::vector<VkCommandBuffer> secondaries_;
+  struct GpuWrite {
+    PoseHandle pose;
+    std::vector<JointMatrix> matrices;
+  };
+  std::vector<GpuWrite> gpuWrites_;  ///< not submitted yet
   std::uint64_t frame_ = 0, completedFrame_ = 0;
   samples::MappedBuffer readBack_;
 };

@@ -244,7 +244,7 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
   meshes,
-  poses,     ///< joint matrices
+  poses,     ///< joint matrices; of a scene, those that the CPU writes
   tables,    ///< what `writeTables` writes
   palettes,  ///< what the palette kernel makes of poses
   results,
@@ -253,13 +253,14 @@ enum class BufferRole : std::uint8_t {
   tangents,
   previousPositions,
   // Only of a scene (scene.h), whose attributes share one buffer.
+  gpuPoses,    ///< joint matrices that the engine's GPU writes
   upload,      ///< what `writeTables` writes; copied to `tables`
   readBack,    ///< what `Scene::readBack` reads; copied from counters and results
   visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
   history,     ///< what the visibility kernel remembers
   counters,    ///< what the visibility kernel counts
 };
-inline constexpr std::size_t bufferRoleCount = 14;
+inline constexpr std::size_t bufferRoleCount = 15;
 
 struct BufferRequirement {
   std::uint64_t size = 0;       ///< bytes, at least
@@ -295,6 +296,10 @@ struct DispatchCommand {
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
   std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel
+  /// What the kernel reads joints from. The palette kernel: `poses` or `gpuPoses`. The skin kernel:
+  /// `palettes`, but `poses` for `Method::linear` in a batch.
+  BufferRole joints = BufferRole::palettes;
+  std::uint32_t poseBuffer = 0;  ///< of a scene's palette kernel: which of `Scene::poseBuffer`
 };
 
 /// vkCmdCopyBuffer. Consecutive copies do not depend on each other.

@@ -13,8 +13,7 @@
 //   scene.commit();
 //   draw from the output buffer at scene.output(instance)
 //
-// Each buffer has the size and usage that `buffer` or, for tables and upload, `Plan::buffer`
-// returns.
+// `buffer`, `poseBuffer` and `Plan::buffer` return size and usage of each buffer.
 #pragma once
 
 #include <cstddef>
@@ -33,22 +32,67 @@
 
 namespace dermis {
 
+/// How much a buffer holds. It grows when something is added that does not fit.
+struct Capacity {
+  std::uint64_t initial = 0;
+  std::uint64_t maximum = ~std::uint64_t{0};  ///< then adding fails with `limitExceeded`
+
+  /// It never grows.
+  static constexpr Capacity fixed(std::uint64_t count) { return {count, count}; }
+};
+
+/// A buffer of a scene that is too small.
+struct BufferGrowth {
+  /// meshes, palettes, results, positions (the output). Or poses or gpuPoses: the scene gets one
+  /// more buffer, since poses never move.
+  BufferRole role = BufferRole::positions;
+  BufferRequirement requirement;  ///< of the larger buffer, or of the one that is added
+  std::uint32_t poseBuffer = 0;   ///< of poses, gpuPoses: its number
+};
+
+/// How an engine with its own RHI replaces a buffer by a larger one. Called by `addMesh`,
+/// `addPose`, `addPoses`, `addInstance` and `change`. The new buffer gets the contents of the old
+/// one (palettes need none) before the commands of the next plan. The old one stays until frames in
+/// flight are complete. If it fails, the call of the scene fails with its error and adds nothing.
+struct GrowthCallback {
+  void* user = nullptr;
+  /// Null: the initial capacities are the maximum.
+  Result<void> (*grow)(void* user, const BufferGrowth& growth) = nullptr;
+};
+
 struct SceneDescription {
   /// Maximum frames that are recorded and not yet complete, including the one that is being
   /// recorded. 1 or more.
   std::uint32_t framesInFlight = 2;
-  std::uint64_t meshBudget = std::uint64_t{32} << 20;  ///< bytes of packed meshes; at most a
-                                                       ///< storage buffer range
-  std::uint32_t jointBudget = 65536;                   ///< joints of all poses together
+  Capacity meshCapacity{64 << 10};  ///< bytes of packed meshes; at most a storage buffer range
+  Capacity jointCapacity{256};      ///< joints of all poses that the CPU writes
+  Capacity gpuJointCapacity{0};     ///< joints of all poses that the GPU writes
   /// Bytes of skinned vertices. May be more than a storage buffer range.
-  std::uint64_t outputBudget = std::uint64_t{64} << 20;
-  std::uint32_t instanceBudget = 65536;  ///< maximum live instances
-  /// Maximum live instances with bounds or snorm16 positions.
-  std::uint32_t boundsBudget = 16384;
+  Capacity outputCapacity{256 << 10};
+  Capacity instanceCapacity{256};  ///< live instances
+  Capacity boundsCapacity{64};     ///< live instances with bounds or snorm16 positions
   /// Those of the device. With fewer storage buffers than `storageBuffersWanted`, as in the
-  /// defaults, `boundsBudget` is taken for 0.
+  /// defaults, `boundsCapacity` is taken for 0.
   DeviceLimits limits;
   Tuning tuning;
+  GrowthCallback growth;
+};
+
+/// Who writes the joint matrices of a pose.
+enum class PoseWriter : std::uint8_t {
+  cpu,  ///< `writePose` gives memory for each frame
+  gpu,  ///< a pass of the engine overwrites the last pose; `markWritten` says so
+};
+
+struct PoseOptions {
+  PoseWriter writer = PoseWriter::cpu;
+  bool mayScale = true;  ///< as `PoseDescription::mayScale`
+};
+
+/// One of the buffers that poses stand in.
+struct PoseBuffer {
+  PoseWriter writer = PoseWriter::cpu;
+  BufferRequirement requirement;
 };
 
 /// One instance of a scene.
@@ -145,7 +189,8 @@ struct SceneStatistics {
 
 /// Where to write the joint matrices of a pose.
 struct PosePlace {
-  std::uint64_t offset = 0;  ///< bytes into the poses buffer
+  std::uint32_t poseBuffer = 0;
+  std::uint64_t offset = 0;  ///< bytes into the pose buffer
   std::uint32_t jointCount = 0;
 };
 
@@ -154,19 +199,28 @@ class SceneBooks;
 /// Not thread-safe.
 class Scene {
  public:
-  /// Fails with `invalidArgument` if a field makes no sense, and with `limitExceeded` if a budget
-  /// needs a buffer larger than a storage buffer range.
+  /// Fails with `invalidArgument` if a field makes no sense, and with `limitExceeded` if an initial
+  /// capacity needs a buffer larger than a storage buffer range.
   static Result<Scene> create(const SceneDescription& description);
   ~Scene();
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
 
-  /// Size and usage of a buffer, for as long as the scene lives. `tables` and `upload` have the
-  /// size that `Plan::buffer` returns, which differs from frame to frame; `upload` and `readBack`
-  /// exist once for each frame in flight. `history`, `counters` and `visibility` are needed only if
-  /// instances are culled on the GPU. An engine that replaces `tables` by a larger buffer keeps the
-  /// old one until frames in flight are complete.
+  /// Size and usage of a buffer as it is now. `GrowthCallback` is told when meshes, palettes,
+  /// results or the output grow. `tables` and `upload` have the size that `Plan::buffer` returns,
+  /// which differs from frame to frame; so do `readBack` and `history`, which grow only, and
+  /// `history` keeps its contents. `upload` and `readBack` exist once for each frame in flight.
+  /// `history`, `counters` and `visibility` are needed only if instances are culled on the GPU. An
+  /// engine that replaces a buffer by a larger one keeps the old one until frames in flight are
+  /// complete.
   BufferRequirement buffer(BufferRole role) const;
+  /// The same before there is a scene: with the initial capacities. `poses` and `gpuPoses`: of the
+  /// first pose buffer of that kind. Fails as `create`.
+  static Result<BufferRequirement> buffer(const SceneDescription& description, BufferRole role);
+  /// The buffers of poses. Buffer 0 is for poses that the CPU writes, the next one for poses that
+  /// the GPU writes, if there are any at first; others are added when they are full.
+  std::uint32_t poseBufferCount() const;
+  PoseBuffer poseBuffer(std::uint32_t number) const;
   const SceneDescription& description() const;
 
   // -- Meshes, poses, instances. They may come and go at any time. Memory of what is removed is
@@ -175,17 +229,22 @@ class Scene {
 
   /// Finds room for a packed mesh. The engine copies its bytes to `meshOffset` of the mesh buffer
   /// before the commands of the next plan, on the same queue; their first barrier covers the copy.
-  /// Fails with `limitExceeded` if the budget has no room,
-  /// and with `invalidArgument` if a promise is broken.
+  /// Fails with `limitExceeded` if there is no room, with `invalidArgument` if a promise is broken,
+  /// and as `GrowthCallback::grow`.
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes
   /// Fails with `invalidArgument` while an instance uses it.
   Result<void> removeMesh(MeshHandle mesh);
 
-  /// `mayScale` as in `PoseDescription`. The engine writes identity matrices to `posePlace`, unless
-  /// it calls `writePose` before the next `plan`. Fails as `addMesh`.
-  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale = true);
-  /// Where the current pose stands.
+  /// The engine writes identity matrices to `posePlace`, unless it writes the pose before the next
+  /// `plan`. Fails as `addMesh`.
+  Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
+  /// Adds as many poses as there are handles to fill in. They stand one behind the other: those
+  /// that the GPU writes, `jointCount` matrices from one to the next. Adds all, or fails and adds
+  /// none.
+  Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                        const PoseOptions& options = {});
+  /// Where the current pose stands. It never moves if the GPU writes it.
   Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` while an instance uses it.
   Result<void> removePose(PoseHandle pose);
@@ -206,8 +265,15 @@ class Scene {
 
   /// Where to write all joint matrices of this frame: the memory holds an older pose, which the GPU
   /// no longer reads. All instances of the pose are skinned again. Fails with `invalidArgument` if
-  /// it is not called between `beginFrame` and `plan`.
+  /// it is not called between `beginFrame` and `plan`, and for a pose that the GPU writes.
   Result<PosePlace> writePose(PoseHandle pose);
+  /// A pass of the engine writes these poses on the GPU before the commands of the next `plan`. All
+  /// their instances are skinned again. If the frame is abandoned, its pass is, too: the engine
+  /// writes and marks them again. Fails as `writePose`, and for a pose that the CPU writes; the
+  /// poses before it are marked then.
+  Result<void> markWritten(std::span<const PoseHandle> poses);
+  /// The same for all poses that the GPU writes.
+  Result<void> markAllWritten();
 
   /// Changes many instances, one after the other. If one fails, for a reason that the functions
   /// below and `addInstance` have, nothing about it changes; the changes before it stay, those
@@ -287,6 +353,8 @@ class Scene {
 
   /// The instance's word in the visibility buffer.
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
+  /// Larger than every `visibilityIndex`. It grows when instances are added.
+  std::uint32_t instanceCapacity() const;
 
   SceneStatistics statistics() const;
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "abi.h"
 #include "vulkan/descriptor_writes.h"
@@ -66,25 +67,25 @@ const BufferRange& BindingsState::output(std::size_t stream) const {
   }
 }
 
-BoundBuffers BindingsState::paletteKernel() const {
+BoundBuffers BindingsState::paletteKernel(std::uint32_t poseBuffer) const {
   const auto orElse = [](const BufferRange& range, const BufferRange& other) {
     return infoOf(range.buffer != VK_NULL_HANDLE ? range : other);
   };
   BoundBuffers bound;
   bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound.buffers[abi::BINDING_MESHES] = orElse(buffers.poses, buffers.tables);
+  bound.buffers[abi::BINDING_MESHES] = orElse(poseBuffers[poseBuffer], buffers.tables);
   bound.buffers[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
   if (context->bindingCount() == abi::BINDING_COUNT)
     bound.buffers[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
   return bound;
 }
 
-BoundBuffers BindingsState::skinKernel(Method method, const Windows& windows) const {
+BoundBuffers BindingsState::skinKernel(BufferRole joints, const Windows& windows) const {
   BoundBuffers bound;
   bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
   bound.buffers[abi::BINDING_MESHES] = infoOf(buffers.meshes);
   bound.buffers[abi::BINDING_PALETTES] =
-      infoOf(method == Method::linear ? buffers.poses : buffers.palettes);
+      infoOf(joints == BufferRole::poses ? buffers.poses : buffers.palettes);
   const bool oneOutput = context->bindingCount() != abi::BINDING_COUNT;
   for (std::size_t stream = 0; stream < (oneOutput ? 1 : streamCount); ++stream) {
     const BufferRange& range = output(stream);
@@ -102,7 +103,7 @@ BoundBuffers BindingsState::skinKernel(Method method, const Windows& windows) co
   bound.texels[abi::BINDING_MESH_TEXELS - abi::BINDING_COUNT] = meshTexels;
   bound.texels[abi::BINDING_MESH_WORDS - abi::BINDING_COUNT] = meshWords;
   bound.texels[abi::BINDING_PALETTE_TEXELS - abi::BINDING_COUNT] =
-      method == Method::linear ? matrixTexels : paletteTexels;
+      joints == BufferRole::poses ? matrixTexels : paletteTexels;
   // Not to an output: a layer would see results read there that another dispatch wrote.
   if (!oneOutput) {
     bound.buffers[abi::BINDING_RESULTS] =
@@ -226,7 +227,9 @@ Result<void> ContextState::allocateSets(std::uint32_t count, VkDescriptorPool& p
 /// Descriptor sets for every kernel and window.
 Result<void> BindingsState::createSets() {
   const std::uint32_t windows = mostWindows();
-  if (Result<void> made = context->allocateSets(1 + windows * 2, pool, sets); !made) return made;
+  const auto poses = static_cast<std::uint32_t>(poseBuffers.size());
+  if (Result<void> made = context->allocateSets(poses + windows * 2, pool, sets); !made)
+    return made;
   const auto update = [&](const BoundBuffers& bound, VkDescriptorSet set) {
     const DescriptorWrites writes(bound, set);
     if (writes.count() != 0) {
@@ -234,14 +237,11 @@ Result<void> BindingsState::createSets() {
                                           nullptr);
     }
   };
-  update(paletteKernel(), sets[0]);
+  for (std::uint32_t number = 0; number < poses; ++number)
+    update(paletteKernel(number), sets[number]);
   for (std::uint32_t window = 0; window < windows; ++window) {
-    for (const Method method : {Method::linear, Method::dualQuaternion}) {
-      Variant variant;
-      variant.method = method;
-      update(skinKernel(method, {window, window, window, window}),
-             sets[BindingsState::setIndex(variant, window)]);
-    }
+    for (const BufferRole joints : {BufferRole::poses, BufferRole::palettes})
+      update(skinKernel(joints, {window, window, window, window}), sets[skinSet(joints, window)]);
   }
   return {};
 }
@@ -255,7 +255,8 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   return state_->createBindings(buffers);
 }
 
-Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers) const {
+Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers,
+                                              std::vector<BufferRange> poseBuffers) const {
   const OutputBuffers& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
@@ -287,6 +288,8 @@ Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers) const
   BindingsState& state = *bindings.state_;
   state.context = this;
   state.buffers = buffers;
+  state.poseBuffers = std::move(poseBuffers);
+  if (state.poseBuffers.empty()) state.poseBuffers.push_back(buffers.poses);
   state.windowStep = outputWindowStep(limits);
   if (Result<void> good = state.createTexelViews(); !good) return good.error();
   if (pushesDescriptors()) return bindings;

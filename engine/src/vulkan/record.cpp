@@ -219,12 +219,13 @@ class Recorder {
   }
 
   BoundBuffers buffersOf(const DispatchCommand& dispatch) const {
-    if (dispatch.variant.kernel == Kernel::palette) return bound_.paletteKernel();
+    if (dispatch.variant.kernel == Kernel::palette)
+      return bound_.paletteKernel(dispatch.poseBuffer);
     if (dispatch.variant.kernel == Kernel::visibility) return bound_.visibilityKernel(*frame_);
     Windows windows;
     for (std::size_t stream = 0; stream < streamCount; ++stream)
       windows[stream] = dispatch.windows[stream].index;
-    return bound_.skinKernel(dispatch.variant.method, windows);
+    return bound_.skinKernel(dispatch.joints, windows);
   }
 
   void bindBuffers(const DispatchCommand& dispatch) {
@@ -244,8 +245,10 @@ class Recorder {
         table_.updateDescriptorSets(context_.device, writes.count(), writes.data(), 0, nullptr);
       }
       visibilityIsWritten_ = true;
+    } else if (dispatch.variant.kernel == Kernel::palette) {
+      set = bound_.sets[dispatch.poseBuffer];
     } else {
-      set = bound_.sets[BindingsState::setIndex(dispatch.variant, *bound_.commonWindow(dispatch))];
+      set = bound_.sets[bound_.skinSet(dispatch.joints, *bound_.commonWindow(dispatch))];
     }
     table_.cmdBindDescriptorSets(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
                                  context_.pipelineLayout, 0, 1, &set, 0, nullptr);

@@ -39,7 +39,9 @@ struct ContextState {
   /// destroyed even if it fails.
   Result<void> allocateSets(std::uint32_t count, VkDescriptorPool& pool,
                             std::vector<VkDescriptorSet>& sets) const;
-  Result<Bindings> createBindings(const BatchBuffers& buffers) const;
+  /// `poseBuffers`: of a scene, those that the palette kernel reads.
+  Result<Bindings> createBindings(const BatchBuffers& buffers,
+                                  std::vector<BufferRange> poseBuffers = {}) const;
 
   VkInstance instance;
   PFN_vkGetInstanceProcAddr getInstanceProcAddr;
@@ -77,6 +79,7 @@ struct BindingsState {
 
   const ContextState* context = nullptr;
   BatchBuffers buffers;
+  std::vector<BufferRange> poseBuffers;  ///< of a batch, its only one
   std::uint64_t windowStep = 0;
   /// Of buffers that kernels read through texels, where there are such buffers.
   VkBufferView tableTexels = VK_NULL_HANDLE;
@@ -90,21 +93,21 @@ struct BindingsState {
 
   /// Which buffers each kernel sees. What a variant does not use is bound to something that it
   /// uses: a descriptor that the module names must be valid.
-  BoundBuffers paletteKernel() const;
-  BoundBuffers skinKernel(Method method, const Windows& windows) const;
+  BoundBuffers paletteKernel(std::uint32_t poseBuffer) const;
+  BoundBuffers skinKernel(BufferRole joints, const Windows& windows) const;
   BoundBuffers visibilityKernel(const FrameBuffers& frame) const;
 
   Result<void> createTexelViews();
 
-  // Without push descriptors: a set for the palette kernel, then for each window one a kind of
-  // palette, all outputs at windows of one number.
+  // Without push descriptors: a set of the palette kernel for each pose buffer, then for each
+  // window one for those who read poses and one for those who read palettes, all outputs at windows
+  // of one number.
   VkDescriptorPool pool = VK_NULL_HANDLE;
   std::vector<VkDescriptorSet> sets;
 
   std::uint32_t mostWindows() const;
-  static std::size_t setIndex(const Variant& variant, std::uint32_t window) {
-    if (variant.kernel == Kernel::palette) return 0;
-    return 1 + std::size_t{window} * 2 + (variant.method == Method::linear ? 0 : 1);
+  std::size_t skinSet(BufferRole joints, std::uint32_t window) const {
+    return poseBuffers.size() + std::size_t{window} * 2 + (joints == BufferRole::poses ? 0 : 1);
   }
   /// The number of the windows in which a dispatch writes all that it writes; nothing where they
   /// differ.

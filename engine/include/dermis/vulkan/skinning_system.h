@@ -28,38 +28,43 @@
 #include "dermis/scene.h"
 #include "dermis/types.h"
 #include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/buffer_callbacks.h"
 #include "dermis/vulkan/context.h"
-#include "dermis/vulkan/memory.h"
 
 namespace dermis::vulkan {
 
-/// The usage that Dermis needs of `SkinningSystemDescription::output`.
-inline constexpr VkBufferUsageFlags outputRangeUsage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
-                                                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-                                                       VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+/// A part of a buffer that the CPU writes.
+struct MappedRange {
+  BufferRange range;
+  void* mapped = nullptr;  ///< the address of its first byte; host-coherent, and stays mapped
+};
 
-/// What a system can hold. Its buffers keep their size.
 struct SkinningSystemDescription {
   /// Borrowed: it, or the Context that it is moved to, must outlive the system.
   Context* context = nullptr;
-  /// As `SceneDescription::framesInFlight`, and so are the budgets.
+  /// This and the capacities: as those of `SceneDescription`.
   std::uint32_t framesInFlight = 2;
-  std::uint64_t meshBudget = std::uint64_t{32} << 20;    ///< bytes
-  std::uint32_t jointBudget = 65536;                     ///< joints of all poses together
-  std::uint64_t outputBudget = std::uint64_t{64} << 20;  ///< bytes
-  std::uint32_t instanceBudget = 65536;
-  std::uint32_t boundsBudget = 16384;
-  /// How the engine uses the output buffer that the system creates:
+  Capacity meshCapacity = SceneDescription().meshCapacity;  ///< bytes
+  Capacity jointCapacity = SceneDescription().jointCapacity;
+  Capacity gpuJointCapacity = SceneDescription().gpuJointCapacity;
+  Capacity outputCapacity = SceneDescription().outputCapacity;  ///< bytes
+  Capacity instanceCapacity = SceneDescription().instanceCapacity;
+  Capacity boundsCapacity = SceneDescription().boundsCapacity;
+
+  // -- Ranges of the engine's buffers. `SkinningSystem::requirement` tells their usage and
+  // alignment. A range does not grow: it is the capacity. Dermis uses nothing outside of it. The
+  // engine destroys the buffer after the system. Without a range the system creates a buffer.
+  BufferRange meshes;
+  MappedRange poses;     ///< that the CPU writes
+  BufferRange gpuPoses;  ///< that a pass of the engine writes
+  BufferRange output;
+  /// How the engine uses the output buffer if the system creates it:
   /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and `buildInputUsage`.
   VkBufferUsageFlags outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
-  /// Or a range of a buffer of the engine's, for all outputs: the system creates no output buffer,
-  /// and `outputBudget` and `outputUsage` do not matter. The buffer has `outputRangeUsage` and what
-  /// the engine needs; the offset is a multiple of minStorageBufferOffsetAlignment, the size of 4.
-  /// Nothing outside the range is written. The engine destroys it after the system.
-  BufferRange output;
 
-  /// Both functions, or none: then memory is allocated from the device in blocks of 64 MiB or more.
-  MemoryCallbacks memory;
+  /// How all other buffers are created. Both functions, or none: then the system allocates blocks
+  /// of memory, small ones first, of at most 64 MiB where no buffer is larger.
+  BufferCallbacks buffers;
   /// Measure the GPU time of each `record` with timestamps. The queue's family must support them.
   bool measuresGpuTime = false;
   std::optional<Tuning> tuning;  ///< nothing: `Context::tuning`
@@ -94,7 +99,8 @@ struct SystemStatistics {
   FrameStatistics lastFrame;
   GpuStatistics lastCompletedFrame;
   StoreStatistics meshes, palettes, outputs;
-  std::uint64_t deviceMemory = 0;  ///< bytes asked of the memory callbacks, of every use
+  /// Bytes of the memory blocks; with `BufferCallbacks`, of all buffers that these created.
+  std::uint64_t deviceMemory = 0;
 };
 
 /// One thread at a time may call a member function, except `prepare`. Any thread may write the
@@ -105,10 +111,17 @@ struct SystemStatistics {
 /// use tier 1 for that.
 class SkinningSystem {
  public:
-  /// Creates all buffers but tables, history and uploads, which `record` and `addMesh` create.
-  /// Fails with `invalidArgument` or `limitExceeded` as `Scene::create`, with `missingEntryPoint`,
-  /// `vulkanError`, or what `MemoryCallbacks::allocate` fails with.
+  /// Creates the buffers with their initial capacities. Fails with `invalidArgument` or
+  /// `limitExceeded` as `Scene::create`, with `missingEntryPoint`, `vulkanError`, or what
+  /// `BufferCallbacks::create` fails with.
   static Result<SkinningSystem> create(const SkinningSystemDescription& description);
+
+  /// What a range of the engine's needs, for `meshes`, `poses`, `gpuPoses` and `positions` (the
+  /// output): usage, alignment, and the size of the capacity in `description`. Of other roles: what
+  /// the system will create at first; tables and uploads as large as needed later. Creates nothing.
+  /// Fails as `Scene::create`.
+  static Result<BufferRequirement> requirement(const SkinningSystemDescription& description,
+                                               BufferRole role);
 
   /// Every recorded frame must be complete.
   ~SkinningSystem();
@@ -117,12 +130,19 @@ class SkinningSystem {
 
   // -- Meshes, poses, instances: as those of `Scene` (scene.h).
 
-  /// Copies the bytes; the next `record` uploads them. Fails also with `vulkanError`, or what
-  /// `MemoryCallbacks::allocate` fails with.
+  // What is added may make a buffer grow: a larger one is created at once, and the next `record`
+  // copies what the old one holds. The old one is destroyed when the frames that use it are
+  // complete. The call fails with `vulkanError`, or what `BufferCallbacks::create` fails with, if
+  // there is no memory.
+
+  /// Copies the bytes; the next `record` uploads them.
   Result<MeshHandle> addMesh(const PackedMesh& mesh);
   Result<void> removeMesh(MeshHandle mesh);
-  /// All joint matrices are the identity until `writePose`.
-  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale = true);
+  /// All joint matrices are the identity until `writePose`. Those of a pose that the GPU writes are
+  /// undefined until a pass of the engine writes them.
+  Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
+  Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                        const PoseOptions& options = {});
   Result<void> removePose(PoseHandle pose);
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
@@ -136,6 +156,14 @@ class SkinningSystem {
   /// Where to write the joint matrices of this frame: mapped memory, to be written as a whole and
   /// never read, until `record`.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
+  /// Where a pass of the engine writes the joint matrices of a pose that the GPU writes:
+  /// `JointMatrix` by `JointMatrix`, 48 bytes each. The same as long as the pose lives. Before its
+  /// writes the engine records a barrier `overwriteScope(Writer::compute)`, since frames in flight
+  /// may still read them, after them `inputScope(PreviousUse::computeWrite)`, and calls
+  /// `markWritten`. Fails with `invalidArgument` for a pose that the CPU writes.
+  Result<BufferRange> poseRange(PoseHandle pose) const;
+  Result<void> markWritten(std::span<const PoseHandle> poses);
+  Result<void> markAllWritten();
   Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
@@ -155,8 +183,8 @@ class SkinningSystem {
   /// Fails with `notPrepared` (`prepare` was not called for such instances), `invalidArgument` (no
   /// `beginFrame`; instances culled on the GPU without `FrameDescription::visibility`),
   /// `limitExceeded` (tables larger than a storage buffer range), `vulkanError`, or what
-  /// `MemoryCallbacks::allocate` fails with. Nothing is recorded then, and the next `record` does
-  /// all of it.
+  /// `BufferCallbacks::create` fails with. Nothing is recorded then, and the next `record` does all
+  /// of it.
   Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
 
   /// The engine did not submit what the last `record` recorded, and never will. As
@@ -166,16 +194,19 @@ class SkinningSystem {
 
   // -- Results, as of the last `record`: as `Scene`.
 
-  /// All outputs are in this buffer, as long as the system lives: the system's own, or that of
+  /// All outputs are in this buffer: the system's own, or that of
   /// `SkinningSystemDescription::output`. Offsets count from its beginning. In a range of the
   /// engine's they are multiples of the stride (interleaved layouts) if the range's offset is.
   VkBuffer outputBuffer() const;
+  /// Differs from what it was if `outputBuffer` is another buffer: it grew, or the frame in which
+  /// it grew was abandoned. All offsets stay when it grows.
+  std::uint64_t outputGeneration() const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
   std::span<const InstanceHandle> skinnedInstances() const;
   std::span<const InstanceHandle> settledInstances() const;
   std::span<const InstanceHandle> movedInstances() const;
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
-  /// The instance budget: larger than every `visibilityIndex`.
+  /// Larger than every `visibilityIndex`. It grows when instances are added.
   std::uint32_t instanceCapacity() const;
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
   SystemStatistics statistics() const;

@@ -158,6 +158,7 @@ void PlanBuilder::begin(PlanData& plan, Groups& groups, const DeviceLimits& limi
   plan.sizes = sizes;
   ++number_;
   paletteCount_ = 0;
+  for (PaletteList& list : palettes_) list.records.clear();
   cleared_.clear();
   entries_.clear();
   candidates_.clear();
@@ -172,7 +173,7 @@ void PlanBuilder::startGroup(Groups::Entry& entry) {
 }
 
 Result<void> PlanBuilder::finish(const FrameWork* frame) {
-  if (Result<void> good = addPaletteDispatch(); !good) return good;
+  if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
   writeInstances();
   if (!candidates_.empty()) {
@@ -232,15 +233,39 @@ Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t work
   return {};
 }
 
-/// Their records stand at the beginning of the tables already, the results to be cleared follow.
-Result<void> PlanBuilder::addPaletteDispatch() {
-  if (paletteCount_ == 0 && cleared_.empty()) return {};
-  plan_->tables.insert(plan_->tables.end(), cleared_.begin(), cleared_.end());
-  alignToUnit(plan_->tables);
+/// One for each pose buffer. The first clears the results too.
+Result<void> PlanBuilder::addPaletteDispatches() {
+  std::span<const std::uint32_t> cleared = cleared_;
+  for (std::uint32_t buffer = 0; buffer < palettes_.size(); ++buffer) {
+    if (palettes_[buffer].records.empty()) continue;
+    if (Result<void> good = addPaletteDispatch(palettes_[buffer], buffer, cleared); !good)
+      return good;
+    cleared = {};
+  }
+  return cleared.empty() ? Result<void>() : addPaletteDispatch({}, 0, cleared);
+}
+
+Result<void> PlanBuilder::addPaletteDispatch(const PaletteList& list, std::uint32_t buffer,
+                                             std::span<const std::uint32_t> cleared) {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::uint32_t first = wordsOf(tables);
+  const auto count = static_cast<std::uint32_t>(list.records.size());
+  tables.resize(tables.size() + std::size_t{count} * abi::PALETTE_WORDS);
+  if (count != 0) {
+    std::memcpy(&tables[first], list.records.data(), std::size_t{count} * abi::PALETTE_WORDS * 4);
+  }
+  tables.insert(tables.end(), cleared.begin(), cleared.end());
+  alignToUnit(tables);
   // Behind the workgroups of the palettes come those that clear the results.
-  return addDispatch(
-      paletteVariant(tuning_), paletteCount_ + divideUp(cleared_.size(), tuning_.workgroupSize),
-      abi::PalettePush{0, paletteCount_, 0, static_cast<std::uint32_t>(cleared_.size())});
+  if (Result<void> good = addDispatch(
+          paletteVariant(tuning_), count + divideUp(cleared.size(), tuning_.workgroupSize),
+          abi::PalettePush{first, count, 0, static_cast<std::uint32_t>(cleared.size())});
+      !good)
+    return good;
+  DispatchCommand& dispatch = dispatches_.back().command;
+  dispatch.joints = list.joints;
+  dispatch.poseBuffer = buffer;
+  return {};
 }
 
 /// A record for each group, and a dispatch for groups of one variant and output range.
@@ -298,10 +323,11 @@ Result<void> PlanBuilder::addDispatches() {
       const std::uint32_t window = group.key.windows[stream];
       dispatch.command.windows[stream] = {window, window * outputWindowStep(limits_)};
     }
+    const bool readsPoses = variant.method == Method::linear && !plan_->sizes.isScene;
+    dispatch.command.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
     // A kernel that may name the results counts as one that reads them.
     dispatch.isAfterPalettes =
-        palettesRun &&
-        (variant.method != Method::linear || variant.motion != Motion::none || hasResults(variant));
+        palettesRun && (!readsPoses || variant.motion != Motion::none || hasResults(variant));
     begin = end;
   }
   return {};
@@ -466,8 +492,11 @@ void PlanBuilder::listFrame(const FrameWork& frame) {
   };
   if (culls)
     commands.emplace_back(ClearCommand{BufferRole::counters, 0, sizeOf(BufferRole::counters)});
-  if (culls && frame.clearsHistory)
-    commands.emplace_back(ClearCommand{BufferRole::history, 0, sizeOf(BufferRole::history)});
+  const std::uint64_t clear = frame.clearHistory * std::uint64_t{sizeof(abi::HistoryRecord)};
+  if (culls && clear < sizeOf(BufferRole::history)) {
+    commands.emplace_back(
+        ClearCommand{BufferRole::history, clear, sizeOf(BufferRole::history) - clear});
+  }
   commands.emplace_back(BarrierCommand{Access::copyWrite, computeBoth});
   if (culls) {
     commands.emplace_back(visibility_[0]);

@@ -24,17 +24,19 @@ inline constexpr std::uint32_t notUsed = 0xffffffffu;
 // -- Palettes.
 
 /// What stands in the palettes buffer for a joint.
-enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms };
-inline constexpr std::size_t paletteFormCount = 2;
+enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
+inline constexpr std::size_t paletteFormCount = 3;
 
-/// What a method reads; nothing where it reads the joint matrices themselves.
-inline std::optional<PaletteForm> paletteForm(Method method) {
-  if (method == Method::linear) return std::nullopt;
+/// What a method reads. In a batch the matrices are not copied to the palettes buffer: they are
+/// read where they stand.
+inline PaletteForm paletteForm(Method method) {
+  if (method == Method::linear) return PaletteForm::matrices;
   return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
 }
 
-/// Units of a palette: its status, its joints, and their scale/shear parts.
+/// Units of a palette: its status, its joints, and their scale/shear parts; or its matrices alone.
 inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
+  if (form == PaletteForm::matrices) return std::uint64_t{jointCount} * abi::UNITS_OF_MATRIX;
   const std::uint32_t joint =
       form == PaletteForm::logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
   return 1 + std::uint64_t{jointCount} * (joint + (mayScale ? 2 : 0));
@@ -154,11 +156,18 @@ inline constexpr std::uint64_t readBackResults = sizeof(abi::CounterRecord);
 
 // -- Plans.
 
+/// Where joint matrices stand that become a palette.
+struct PoseSource {
+  std::uint32_t unit = 0;  ///< of the first
+  std::uint32_t buffer = 0;
+  BufferRole role = BufferRole::poses;
+};
+
 class PlanMaker;
 
 /// The sizes of the buffers that do not follow from a plan, in bytes.
 struct PlanSizes {
-  std::uint64_t meshes = 0, poses = 0, palettes = 0;
+  std::uint64_t meshes = 0, poses = 0, gpuPoses = 0, palettes = 0;
   std::uint32_t results = 0;  ///< their number
   OutputSizes outputs;
   bool isScene = false;  ///< there are the buffers of a scene
@@ -173,7 +182,7 @@ struct PlanSizes {
 /// What a frame of a scene does besides skinning.
 struct FrameWork {
   std::uint32_t frame = 0;               ///< counts records, from 1
-  bool clearsHistory = false;            ///< first frame with culling on the GPU
+  std::uint32_t clearHistory = 0;        ///< its records that are clear, or in use
   std::span<const CopyCommand> moves;    ///< of outputs
   std::span<const CopyCommand> results;  ///< to the read-back buffer
 };
@@ -212,12 +221,17 @@ class PlanBuilder {
   void begin(PlanData& plan, Groups& groups, const DeviceLimits& limits, const Tuning& tuning,
              const PlanSizes& sizes);
 
-  /// A palette to be converted. All palettes come before `finish`, in any order with the rest.
-  void addPalette(std::uint32_t matrixUnit, std::uint32_t outputUnit, std::uint32_t joints,
+  /// A palette to be converted, from one of the pose buffers of a scene. All palettes come before
+  /// `finish`, in any order with the rest.
+  void addPalette(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
                   PaletteForm form, bool mayScale) {
-    const std::uint32_t flags = (mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
-                                (form == PaletteForm::logarithms ? abi::PALETTE_LOGARITHMS : 0u);
-    plan_->tables.insert(plan_->tables.end(), {matrixUnit, outputUnit, joints, flags});
+    std::uint32_t flags = mayScale ? abi::PALETTE_MAY_SCALE : 0u;
+    if (form == PaletteForm::logarithms) flags |= abi::PALETTE_LOGARITHMS;
+    if (form == PaletteForm::matrices) flags |= abi::PALETTE_MATRICES;
+    while (palettes_.size() <= source.buffer) palettes_.emplace_back();
+    PaletteList& list = palettes_[source.buffer];
+    list.joints = source.role;
+    list.records.push_back({source.unit, outputUnit, joints, flags});
     ++paletteCount_;
   }
 
@@ -252,6 +266,11 @@ class PlanBuilder {
     std::uint32_t entry;
     Candidate candidate;
   };
+  /// Of one pose buffer: a dispatch.
+  struct PaletteList {
+    BufferRole joints = BufferRole::poses;
+    std::vector<abi::PaletteRecord> records;
+  };
   struct Dispatch {
     DispatchCommand command;
     /// It reads what the palette kernel writes, or adds to results that the palette kernel clears.
@@ -264,7 +283,9 @@ class PlanBuilder {
     ++planGroups_[entry.planGroup].instances;
   }
   void startGroup(Groups::Entry& entry);
-  Result<void> addPaletteDispatch();
+  Result<void> addPaletteDispatches();
+  Result<void> addPaletteDispatch(const PaletteList& list, std::uint32_t buffer,
+                                  std::span<const std::uint32_t> cleared);
   Result<void> addDispatches();
   template <typename Push>
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
@@ -283,6 +304,7 @@ class PlanBuilder {
   Tuning tuning_;
   std::uint64_t number_ = 0;  ///< of the plan, among those of this builder
   std::uint32_t paletteCount_ = 0;
+  std::vector<PaletteList> palettes_;  ///< by pose buffer
   std::vector<std::uint32_t> cleared_;
   std::vector<Entry> entries_;
   std::vector<CulledEntry> candidates_;

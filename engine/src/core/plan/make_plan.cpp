@@ -41,9 +41,9 @@ void PlanMaker::placePoses(const Batch& batch) {
       paletteUnits_[static_cast<std::size_t>(PaletteForm::dualQuaternions)][index] = 0;
   }
   for (const Job& job : batch.jobs) {
-    const std::optional<PaletteForm> form = paletteForm(job.method);
-    if (!form) continue;
-    std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(*form)];
+    const PaletteForm form = paletteForm(job.method);
+    if (form == PaletteForm::matrices) continue;
+    std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
     units[job.pose] = 0;
     if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
   }
@@ -69,9 +69,9 @@ Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limit
 }
 
 std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint32_t palette) const {
-  const std::optional<PaletteForm> form = paletteForm(method);
-  return form ? paletteUnits_[static_cast<std::size_t>(*form)][palette]
-              : static_cast<std::uint32_t>(batch.poses[palette].matrixOffset / unitBytes);
+  const PaletteForm form = paletteForm(method);
+  if (form != PaletteForm::matrices) return paletteUnits_[static_cast<std::size_t>(form)][palette];
+  return static_cast<std::uint32_t>(batch.poses[palette].matrixOffset / unitBytes);
 }
 
 /// Null if the job needs none. `extras_` has room for those of all jobs, so that none moves.
@@ -150,7 +150,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
     for (std::size_t index = 0; index < units.size(); ++index) {
       if (units[index] == notUsed) continue;
       const PoseDescription& pose = batch.poses[index];
-      builder_.addPalette(static_cast<std::uint32_t>(pose.matrixOffset / unitBytes), units[index],
+      builder_.addPalette({static_cast<std::uint32_t>(pose.matrixOffset / unitBytes)}, units[index],
                           pose.jointCount, form, pose.mayScale);
     }
   }

@@ -91,16 +91,21 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
   switch (role) {
     // What the host fills may be staged: written to another buffer, and copied.
     case BufferRole::meshes:
-      return {meshes, alignment, read | copiedTo, false, true};
+      return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0), false, true};
     case BufferRole::poses:
-      return {poses, alignment, read | copiedTo, !isScene, true};
+      // Kernels of scenes that skin read the palettes.
+      if (isScene) return {poses, alignment, storage, false, true};
+      return {poses, alignment, read | copiedTo, true, true};
+    case BufferRole::gpuPoses:
+      if (isScene) return {gpuPoses, alignment, storage, false, false};
+      break;
     case BufferRole::tables:
       if (isScene) return {tables, alignment, read | copiedTo | indirect, false, false};
       return {tables, alignment, read | copiedTo, true, true};
     case BufferRole::palettes:
       return {palettes, alignment, read, !isScene, false};
     case BufferRole::results:
-      return {resultBytes, alignment, storage | (isScene ? copiedFrom : 0), !isScene, false};
+      return {resultBytes, alignment, written, !isScene, false};
     case BufferRole::positions:
       return {outputs.positions, alignment, written, false, false};
     case BufferRole::normals:
@@ -118,8 +123,7 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::visibility:
       return {slots * std::uint64_t{4}, alignment, storage, false, false};
     case BufferRole::history:
-      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, storage | copiedTo,
-              false, false};
+      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, written, false, false};
     case BufferRole::counters:
       if (slots != 0)
         return {sizeof(abi::CounterRecord), alignment, storage | copiedTo | copiedFrom, false,

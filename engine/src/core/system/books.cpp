@@ -17,34 +17,65 @@ Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
                                           (users == 1 ? "" : "s")};
 }
 
-Error noRoom(const std::string& what, const RangeAllocator& store, const char* unit) {
-  return {ErrorCode::limitExceeded,
-          what + ", of " + std::to_string(store.capacity()) + " " + unit + " of the budget " +
-              std::to_string(store.capacity() - store.used()) + " are free, " +
-              std::to_string(store.largestFree()) + " in one piece"};
+/// Room for dual quaternions and scale of every joint, and the status of every pose of two joints.
+std::uint64_t firstUnits(const SceneDescription& description) {
+  return (description.jointCapacity.initial + description.gpuJointCapacity.initial) * 5;
+}
+
+/// Without a way to grow, what there is at first is all.
+Capacity capacityOf(const SceneDescription& description, const Capacity& capacity,
+                    std::uint64_t most) {
+  if (description.growth.grow == nullptr) return Capacity::fixed(capacity.initial);
+  return {capacity.initial, std::min(capacity.maximum, most)};
+}
+
+SceneDescription withLimits(SceneDescription description) {
+  constexpr std::uint64_t mostIndices = 0xffffffff;
+  const std::uint64_t range = description.limits.maxStorageBufferRange;
+  const auto limit = [&](Capacity& capacity, std::uint64_t most) {
+    capacity = capacityOf(description, capacity, most);
+  };
+  limit(description.meshCapacity, range / packedMeshAlignment * packedMeshAlignment);
+  limit(description.jointCapacity, mostIndices);
+  limit(description.gpuJointCapacity, mostIndices);
+  // Far from where sums overflow.
+  limit(description.outputCapacity, std::uint64_t{1} << 60);
+  limit(description.instanceCapacity, range / sizeof(abi::HistoryRecord));
+  limit(description.boundsCapacity, range / sizeof(InstanceResult));
+  return description;
 }
 
 }  // namespace
 
 SceneBooks::SceneBooks(const SceneDescription& description)
-    : description_(description),
-      meshStore_(description.meshBudget),
-      jointStore_(description.jointBudget),
-      unitStore_(sceneSizes(description).palettes / unitBytes),
-      outputStore_(description.outputBudget),
-      readBacks_(description.framesInFlight) {}
+    : description_(withLimits(description)),
+      meshStore_{BufferRole::meshes, description_.meshCapacity},
+      unitStore_{BufferRole::palettes,
+                 capacityOf(description, {firstUnits(description)},
+                            description.limits.maxStorageBufferRange / unitBytes),
+                 unitBytes},
+      outputStore_{BufferRole::positions, description_.outputCapacity},
+      resultStore_{BufferRole::results, description_.boundsCapacity, sizeof(InstanceResult)},
+      slotCapacity_(description.instanceCapacity.initial),
+      readBacks_(description.framesInFlight) {
+  for (const auto& [writer, joints] :
+       {std::pair{PoseWriter::cpu, description.jointCapacity.initial},
+        {PoseWriter::gpu, description.gpuJointCapacity.initial}}) {
+    if (joints != 0) poseBuffers_.push_back({writer, RangeAllocator(joints * slotsOf(writer))});
+  }
+}
 
 PlanSizes sceneSizes(const SceneDescription& description) {
   PlanSizes sizes;
-  sizes.meshes = description.meshBudget;
+  sizes.meshes = description.meshCapacity.initial;
   sizes.poses =
-      std::uint64_t{description.jointBudget} * description.framesInFlight * sizeof(JointMatrix);
-  // Room for the largest form of every joint, and the status of every pose of two joints.
-  sizes.palettes = std::uint64_t{description.jointBudget} * 6 * unitBytes;
-  sizes.results = description.boundsBudget;
-  sizes.outputs = OutputSizes::oneBuffer(description.outputBudget);
+      description.jointCapacity.initial * description.framesInFlight * sizeof(JointMatrix);
+  sizes.gpuPoses = description.gpuJointCapacity.initial * sizeof(JointMatrix);
+  sizes.palettes = firstUnits(description) * unitBytes;
+  sizes.results = static_cast<std::uint32_t>(description.boundsCapacity.initial);
+  sizes.outputs = OutputSizes::oneBuffer(description.outputCapacity.initial);
   sizes.isScene = true;
-  sizes.slots = description.instanceBudget;
+  sizes.slots = static_cast<std::uint32_t>(description.instanceCapacity.initial);
   return sizes;
 }
 
@@ -54,49 +85,69 @@ Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info) {
   if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
       !kept)
     return kept.error();
-  const std::optional<Range> bytes = meshStore_.allocate(info.byteSize, packedMeshAlignment);
-  if (!bytes) {
+  const Result<std::optional<Range>> bytes = take(meshStore_, info.byteSize, packedMeshAlignment);
+  if (!bytes) return bytes.error();
+  if (!*bytes) {
     return noRoom("a packed mesh takes " + std::to_string(info.byteSize) + " bytes", meshStore_,
-                  "bytes");
+                  "bytes of meshes");
   }
-  return meshes_.add({info, *bytes, 0});
+  return meshes_.add({info, **bytes, 0});
 }
 
 Result<void> SceneBooks::removeMesh(MeshHandle handle) {
   const SceneMesh* mesh = meshes_.find(handle);
   if (mesh == nullptr) return unknownHandle("mesh", handle);
   if (mesh->users != 0) return isUsed("mesh", handle.index, mesh->users);
-  retire(Retired::Store::meshes, mesh->bytes);
+  retire(meshStore_.ranges, mesh->bytes);
   meshes_.remove(handle);
   return {};
 }
 
-Result<PoseHandle> SceneBooks::addPose(std::uint32_t jointCount, bool mayScale) {
+Result<void> SceneBooks::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                                  const PoseOptions& options) {
   if (jointCount == 0 || jointCount > maxPoseJoints) {
     return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
-  if (Result<void> kept = checkPromisedPose(mayScale, description_.limits.promises, {"the pose"});
+  if (Result<void> kept =
+          checkPromisedPose(options.mayScale, description_.limits.promises, {"the pose"});
       !kept)
-    return kept.error();
-  const std::optional<Range> joints = jointStore_.allocate(jointCount, 1);
-  if (!joints) {
-    return noRoom("a pose takes " + std::to_string(jointCount) + " joints", jointStore_, "joints");
-  }
+    return kept;
+  if (poses.empty()) return {};
   ScenePose pose;
+  const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
+  const Result<std::optional<Range>> joints = takeJoints(count, options.writer, pose.buffer);
+  if (!joints) return joints.error();
+  if (!*joints) {
+    const bool isCpu = options.writer == PoseWriter::cpu;
+    return Error{
+        ErrorCode::limitExceeded,
+        (poses.size() == 1 ? std::string("a pose takes ")
+                           : std::to_string(poses.size()) + " poses take ") +
+            std::to_string(count) + " joints in one piece; of those of the poses that the " +
+            (isCpu ? "CPU" : "GPU") + " writes, at most " +
+            std::to_string(
+                (isCpu ? description_.jointCapacity : description_.gpuJointCapacity).maximum) +
+            ", so many are not free"};
+  }
   pose.jointCount = jointCount;
-  pose.mayScale = mayScale;
-  pose.joints = *joints;
-  return poses_.add(pose);
+  pose.mayScale = options.mayScale;
+  pose.writer = options.writer;
+  const std::uint64_t size = std::uint64_t{jointCount} * slotsOf(options.writer);
+  for (std::size_t index = 0; index < poses.size(); ++index) {
+    pose.joints = {(*joints)->offset + index * size, size};
+    poses[index] = poses_.add(pose);
+  }
+  return {};
 }
 
 Result<void> SceneBooks::removePose(PoseHandle handle) {
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->users != 0) return isUsed("pose", handle.index, pose->users);
-  retire(Retired::Store::joints, pose->joints);
+  retire(poseBuffers_[pose->buffer].joints, pose->joints);
   for (const ScenePose::Form& form : pose->forms) {
-    if (form.units) retire(Retired::Store::units, *form.units);
+    if (form.units) retire(unitStore_.ranges, *form.units);
   }
   poses_.remove(handle);
   return {};
@@ -122,58 +173,76 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
   completed_ = completedFrame;
   hasBegun_ = true;
   abandonable_.isPossible = false;
+  freeRetired();
+  return {};
+}
+
+void SceneBooks::retire(RangeAllocator& store, const Range& range) {
+  retired_.push_back({frame_, &store, range});
+  // What no frame has seen, or only complete ones, is free at once.
+  freeRetired();
+}
+
+void SceneBooks::freeRetired() {
   while (!retired_.empty() && retired_.front().frame <= completed_) {
-    free(retired_.front());
+    retired_.front().store->free(retired_.front().range);
     retired_.pop_front();
+  }
+}
+
+PosePlace SceneBooks::placeOf(const ScenePose& pose) {
+  const std::uint64_t joint = pose.joints.offset + std::uint64_t{pose.slot} * pose.jointCount;
+  return {pose.buffer, joint * sizeof(JointMatrix), pose.jointCount};
+}
+
+Result<void> SceneBooks::checkWrite(PoseHandle handle, PoseWriter writer) const {
+  if (!hasBegun_) {
+    return invalid(
+        "a pose is written between beginFrame and record, so that it is known which memory the GPU "
+        "is done with");
+  }
+  const ScenePose* pose = poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->writer == writer) return {};
+  return invalid("pose " + std::to_string(handle.index) +
+                 (writer == PoseWriter::cpu ? " is written by the GPU: markWritten"
+                                            : " is written by the CPU: writePose"));
+}
+
+void SceneBooks::markWritten(ScenePose& pose, PoseHandle handle) {
+  pose.poseFrame = frame_;
+  ++pose.version;
+  posed_.push_back(handle);
+}
+
+Result<PosePlace> SceneBooks::writePose(PoseHandle handle) {
+  if (Result<void> good = checkWrite(handle, PoseWriter::cpu); !good) return good.error();
+  ScenePose& pose = poses_.at(handle.index);
+  if (pose.poseFrame != frame_) {
+    // The next of its slots: the GPU is done with it, since it was superseded at least as many
+    // recorded frames ago as there may be in flight. What no recorded frame reads is overwritten.
+    if (pose.poseFrame <= recordedFrame_) pose.slot = (pose.slot + 1) % description_.framesInFlight;
+    markWritten(pose, handle);
+  }
+  return placeOf(pose);
+}
+
+Result<void> SceneBooks::markWritten(std::span<const PoseHandle> poses) {
+  for (const PoseHandle handle : poses) {
+    if (Result<void> good = checkWrite(handle, PoseWriter::gpu); !good) return good;
+    ScenePose& pose = poses_.at(handle.index);
+    if (pose.poseFrame != frame_) markWritten(pose, handle);
   }
   return {};
 }
 
-void SceneBooks::retire(Retired::Store store, const Range& range) {
-  retired_.push_back({frame_, store, range});
-  // What no frame has seen, or only complete ones, is free at once.
-  while (!retired_.empty() && retired_.front().frame <= completed_) {
-    free(retired_.front());
-    retired_.pop_front();
+Result<void> SceneBooks::markAllWritten() {
+  for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
+    if (!poses_.isUsed(index) || poses_.at(index).writer != PoseWriter::gpu) continue;
+    const PoseHandle handle = poses_.handleOf(index);
+    if (Result<void> marked = markWritten({&handle, 1}); !marked) return marked;
   }
-}
-
-void SceneBooks::free(const Retired& retired) {
-  switch (retired.store) {
-    case Retired::Store::meshes:
-      return meshStore_.free(retired.range);
-    case Retired::Store::joints:
-      return jointStore_.free(retired.range);
-    case Retired::Store::units:
-      return unitStore_.free(retired.range);
-    case Retired::Store::output:
-      return outputStore_.free(retired.range);
-  }
-}
-
-std::uint64_t SceneBooks::poseOffset(const ScenePose& pose) const {
-  return (std::uint64_t{pose.slot} * description_.jointBudget + pose.joints.offset) *
-         sizeof(JointMatrix);
-}
-
-Result<std::uint64_t> SceneBooks::writePose(PoseHandle handle) {
-  if (!hasBegun_) {
-    return Error{ErrorCode::invalidArgument,
-                 "a pose is written between beginFrame and record, so that it is known which "
-                 "memory the GPU is done with"};
-  }
-  ScenePose* pose = poses_.find(handle);
-  if (pose == nullptr) return unknownHandle("pose", handle);
-  if (pose->poseFrame != frame_) {
-    // The next of its slots: the GPU is done with it, since it was superseded at least as many
-    // recorded frames ago as there may be in flight. What no recorded frame reads is overwritten.
-    if (pose->poseFrame <= recordedFrame_)
-      pose->slot = (pose->slot + 1) % description_.framesInFlight;
-    pose->poseFrame = frame_;
-    ++pose->version;
-    posed_.push_back(handle);
-  }
-  return poseOffset(*pose);
+  return {};
 }
 
 // -- What engines set.
@@ -203,10 +272,7 @@ void SceneBooks::setVisible(SceneInstance& instance, InstanceHandle handle, bool
     instance.visibleFrom = record_ + 1;
     if (instance.isMoving) moving_.push_back(handle);
   }
-  if (instance.isStale) {
-    instance.isUrgent = true;
-    makePending(handle.index);
-  }
+  if (instance.isStale) makePending(handle.index);
 }
 
 Result<void> SceneBooks::setVisible(InstanceHandle handle, bool isVisible) {
@@ -262,12 +328,12 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
 }
 
 SceneStatistics SceneBooks::statistics() const {
-  const auto storeOf = [](const RangeAllocator& store, std::uint64_t unit) {
-    return StoreStatistics{store.capacity() * unit, store.used() * unit,
-                           store.largestFree() * unit};
+  const auto of = [](const Store& store) {
+    return StoreStatistics{store.ranges.capacity() * store.unitBytes,
+                           store.ranges.used() * store.unitBytes,
+                           store.ranges.largestFree() * store.unitBytes};
   };
-  return {committed_, culling_, storeOf(meshStore_, 1), storeOf(unitStore_, unitBytes),
-          storeOf(outputStore_, 1)};
+  return {committed_, culling_, of(meshStore_), of(unitStore_), of(outputStore_)};
 }
 
 }  // namespace dermis

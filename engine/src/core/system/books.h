@@ -19,8 +19,16 @@
 
 namespace dermis {
 
-/// The sizes of a scene's buffers.
+/// The sizes of a scene's buffers at first; poses: of the first buffer of each kind.
 PlanSizes sceneSizes(const SceneDescription& description);
+
+/// Room in a buffer that grows.
+struct Store {
+  BufferRole role;
+  Capacity capacity;            ///< in units
+  std::uint64_t unitBytes = 1;  ///< what the ranges count
+  RangeAllocator ranges{capacity.initial};
+};
 
 struct SceneMesh {
   MeshInfo info;
@@ -32,15 +40,18 @@ struct ScenePose {
   /// The pose as it was last converted to one of the forms that methods read.
   struct Form {
     std::optional<Range> units;
-    std::uint64_t version = 0;    ///< of the pose
+    std::uint64_t version = 0;    ///< of the pose; 0 where it is to be converted again
     std::uint64_t plannedIn = 0;  ///< the plan that converts it
   };
 
   std::uint32_t jointCount = 0;
   bool mayScale = true;
-  Range joints;  ///< among the joints of the budget
-  std::uint32_t slot =
-      0;  ///< which of its matrices are the pose of now: one for each frame in flight
+  PoseWriter writer = PoseWriter::cpu;
+  std::uint32_t buffer = 0;  ///< its number
+  Range joints;              ///< in that buffer; of each slot
+  /// Which of its matrices are the pose of now. Those that the CPU writes have one for each frame
+  /// in flight.
+  std::uint32_t slot = 0;
   std::uint64_t poseFrame = 0;  ///< the frame that it was last written in
   std::uint64_t version = 1;
   std::array<Form, paletteFormCount> forms;
@@ -104,14 +115,16 @@ class SceneBooks {
 
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<void> removeMesh(MeshHandle mesh);
-  Result<PoseHandle> addPose(std::uint32_t jointCount, bool mayScale);
+  Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                        const PoseOptions& options);
   Result<void> removePose(PoseHandle pose);
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
 
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
-  /// The byte of the matrices buffer at which the pose of this frame is to be written.
-  Result<std::uint64_t> writePose(PoseHandle pose);
+  Result<PosePlace> writePose(PoseHandle pose);
+  Result<void> markWritten(std::span<const PoseHandle> poses);
+  Result<void> markAllWritten();
   Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisible(InstanceHandle instance, bool isVisible);
   Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
@@ -131,7 +144,10 @@ class SceneBooks {
   const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
   const SlotMap<ScenePose, PoseHandle>& poses() const { return poses_; }
   const SlotMap<SceneInstance, InstanceHandle>& instances() const { return instances_; }
-  std::uint64_t poseOffset(const ScenePose& pose) const;
+  static PosePlace placeOf(const ScenePose& pose);
+  std::uint32_t poseBufferCount() const { return static_cast<std::uint32_t>(poseBuffers_.size()); }
+  PoseBuffer poseBuffer(std::uint32_t number) const;
+  PlanSizes sizes() const;
   Result<InstanceOutput> output(InstanceHandle instance) const;
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
   const SceneDescription& description() const { return description_; }
@@ -144,13 +160,18 @@ class SceneBooks {
  private:
   struct Retired {
     std::uint64_t frame;
-    enum class Store : std::uint8_t { meshes, joints, units, output } store;
+    RangeAllocator* store;
     Range range;
   };
+  /// Where poses stand. Addresses stay: `Retired` has them.
+  struct PoseStore {
+    PoseWriter writer;
+    RangeAllocator joints;
+  };
 
-  // placement.cpp
   Result<void> check(const SceneInstance& instance) const;
   Result<void> takeResult(SceneInstance& instance);
+  void freeResult(const SceneInstance& instance);
   Result<void> reserveUnits(const SceneInstance& instance);
   Result<void> findRoom(SceneInstance& instance);
   Result<void> makeRuns(SceneInstance& instance);
@@ -172,8 +193,22 @@ class SceneBooks {
   // scene.cpp
   void makeStale(std::uint32_t index);
   void makePending(std::uint32_t index);
-  void retire(Retired::Store store, const Range& range);
-  void free(const Retired& retired);
+  void retire(RangeAllocator& store, const Range& range);
+  Result<void> checkWrite(PoseHandle handle, PoseWriter writer) const;
+  void markWritten(ScenePose& pose, PoseHandle handle);
+  void freeRetired();
+
+  // stores.cpp
+  static Error noRoom(const std::string& what, const Store& store, const char* unit);
+  Result<std::optional<Range>> take(Store& store, std::uint64_t size, std::uint64_t alignment);
+  Result<void> grow(Store& store, std::uint64_t least);
+  Result<void> growBuffer(BufferRole role, const PlanSizes& sizes, std::uint32_t poseBuffer = 0);
+  Result<std::optional<Range>> takeJoints(std::uint64_t count, PoseWriter writer,
+                                          std::uint32_t& buffer);
+  std::uint32_t slotsOf(PoseWriter writer) const {
+    return writer == PoseWriter::cpu ? description_.framesInFlight : 1;
+  }
+  bool makeSlot();
 
   // gather.cpp
   void gatherPoses();
@@ -197,9 +232,9 @@ class SceneBooks {
   SlotMap<SceneMesh, MeshHandle> meshes_;
   SlotMap<ScenePose, PoseHandle> poses_;
   SlotMap<SceneInstance, InstanceHandle> instances_;
-  RangeAllocator meshStore_, jointStore_, unitStore_, outputStore_;
-  std::vector<std::uint32_t> freeResults_;
-  std::uint32_t nextResult_ = 0;
+  Store meshStore_, unitStore_, outputStore_, resultStore_;
+  std::deque<PoseStore> poseBuffers_;
+  std::uint64_t slotCapacity_ = 0;  ///< of instances
   Groups groups_;
   PlanBuilder builder_;
   std::deque<Retired> retired_;
@@ -255,13 +290,13 @@ class SceneBooks {
     };
     bool isPossible = false;
     std::uint64_t recordedFrame = 0;
-    bool historyIsClear = false;
+    std::uint32_t clearHistory = 0;
     std::vector<Instance> instances;
     std::vector<Shift> shifts;
     ReadBack readBack;
   } abandonable_;
 
-  bool historyIsClear_ = false;
+  std::uint32_t clearHistory_ = 0;   ///< records of the history that are clear, or in use
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
   CullingStatistics culling_;
   std::vector<InstanceResult> latestResults_;  ///< each of the newest complete frame that wrote it

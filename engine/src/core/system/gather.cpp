@@ -39,25 +39,23 @@ bool SceneBooks::isDue(const SceneInstance& instance) const {
 }
 
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
-  const ScenePose& pose = poses_.at(instance.pose);
-  const std::optional<PaletteForm> form = paletteForm(instance.method);
-  const std::uint64_t unit = form ? pose.forms[static_cast<std::size_t>(*form)].units->offset
-                                  : poseOffset(pose) / unitBytes;
-  return static_cast<std::uint32_t>(unit);
+  const auto form = static_cast<std::size_t>(paletteForm(instance.method));
+  return static_cast<std::uint32_t>(poses_.at(instance.pose).forms[form].units->offset);
 }
 
 /// Once for all instances that read it, and only where one does.
 void SceneBooks::convertPalette(const SceneInstance& instance) {
-  const std::optional<PaletteForm> form = paletteForm(instance.method);
-  if (!form) return;
+  const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.pose);
-  ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(*form)];
+  ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
-  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(*form)});
-  builder_.addPalette(static_cast<std::uint32_t>(poseOffset(pose) / unitBytes),
-                      static_cast<std::uint32_t>(converted.units->offset), pose.jointCount, *form,
-                      pose.mayScale);
+  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
+  const bool isCpu = pose.writer == PoseWriter::cpu;
+  const PoseSource source{static_cast<std::uint32_t>(placeOf(pose).offset / unitBytes), pose.buffer,
+                          isCpu ? BufferRole::poses : BufferRole::gpuPoses};
+  builder_.addPalette(source, static_cast<std::uint32_t>(converted.units->offset), pose.jointCount,
+                      form, pose.mayScale);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
@@ -204,7 +202,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   resultCopies_.clear();
   planned_ = {};
   PlanData& data = PlanData::of(out);
-  builder_.begin(data, groups_, description_.limits, description_.tuning, sceneSizes(description_));
+  builder_.begin(data, groups_, description_.limits, description_.tuning, sizes());
   gatherPoses();
   gatherMoves();
   gatherPending();
@@ -214,7 +212,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   for (const Conversion& conversion : conversions_)
     planned_.poseBytes += poses_.at(conversion.pose.index).jointCount * sizeof(JointMatrix);
   const auto record = static_cast<std::uint32_t>(record_ + 1);
-  const FrameWork frame{record, !historyIsClear_, moves_, resultCopies_};
+  const FrameWork frame{record, clearHistory_, moves_, resultCopies_};
   if (Result<void> good = builder_.finish(&frame); !good) {
     data.clear();
     return good;
@@ -236,7 +234,7 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
   abandonable_.shifts.push_back({handle, instance.shown});
   if (instance.shown && instance.shown != instance.target) {
-    retire(Retired::Store::output, instance.shown->bytes);
+    retire(outputStore_.ranges, instance.shown->bytes);
     moved_.push_back(handle);
   }
   instance.shown = instance.target;
@@ -247,7 +245,7 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
 void SceneBooks::keepForAbandoning() {
   abandonable_.isPossible = true;
   abandonable_.recordedFrame = recordedFrame_;
-  abandonable_.historyIsClear = historyIsClear_;
+  abandonable_.clearHistory = clearHistory_;
   abandonable_.instances.clear();
   abandonable_.shifts.clear();
 }
@@ -269,7 +267,7 @@ Result<void> SceneBooks::commit() {
   hasBegun_ = false;
   committed_ = planned_;
   const bool culls = planned_.culledCandidates != 0;
-  historyIsClear_ |= culls;
+  if (culls) clearHistory_ = static_cast<std::uint32_t>(slotCapacity_);
   ReadBack& readBack = readBacks_[record_ % readBacks_.size()];
   std::swap(abandonable_.readBack, readBack);
   readBack.frame = frame_;
@@ -343,13 +341,13 @@ void SceneBooks::abandonShifts() {
     instance->shown = shifted.shown;
     if (shifted.shown && shifted.shown != abandoned) {
       const auto isIts = [&](const Retired& retired) {
-        return retired.store == Retired::Store::output && retired.range == shifted.shown->bytes;
+        return retired.store == &outputStore_.ranges && retired.range == shifted.shown->bytes;
       };
       // The newest: an older one of the same range would have been freed before this one was taken.
       const auto found = std::find_if(retired_.rbegin(), retired_.rend(), isIts);
       if (found != retired_.rend()) retired_.erase(std::next(found).base());
     }
-    if (instance->target != abandoned) retire(Retired::Store::output, abandoned.bytes);
+    if (instance->target != abandoned) retire(outputStore_.ranges, abandoned.bytes);
     if (instance->shown != instance->target) shift(shifted.handle);
   }
 }
@@ -367,7 +365,7 @@ Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
     if (ScenePose* pose = poses_.find(conversion.pose)) pose->forms[conversion.form].version = 0;
   }
   std::swap(abandonable_.readBack, readBacks_[record_ % readBacks_.size()]);
-  historyIsClear_ = abandonable_.historyIsClear;
+  clearHistory_ = abandonable_.clearHistory;
   recordedFrame_ = abandonable_.recordedFrame;
   --record_;
   hasBegun_ = true;
@@ -385,10 +383,12 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     return invalid("frame " + std::to_string(frame) +
                    " cannot be read back: it is not one of the last frames committed");
   }
-  if ((found->hasCounters || !found->results.empty()) &&
-      bytes.size() < readBackResults + sceneSizes(description_).results * sizeof(InstanceResult)) {
+  std::uint64_t needed = found->hasCounters ? readBackResults : 0;
+  for (const CopyCommand& copy : found->results)
+    needed = std::max(needed, copy.toOffset + copy.size);
+  if (bytes.size() < needed) {
     return invalid("the read-back buffer of a frame has " + std::to_string(bytes.size()) +
-                   " bytes, fewer than Scene::buffer says");
+                   " bytes, fewer than Scene::buffer said");
   }
   culling_ = {};
   culling_.frame = frame;

@@ -39,52 +39,52 @@ Result<void> SceneBooks::check(const SceneInstance& instance) const {
     return invalid("the instance's layout says Motion::reskinned, a scene has Motion::kept only");
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
   if (!laidOut) return laidOut.error();
-  if (laidOut->size > description_.outputBudget) {
+  const std::uint64_t most = description_.outputCapacity.maximum;
+  if (laidOut->size > most) {
     return Error{ErrorCode::limitExceeded, "the instance takes " + std::to_string(laidOut->size) +
-                                               " bytes of output, the whole budget is " +
-                                               std::to_string(description_.outputBudget)};
+                                               " bytes of output, at most there are " +
+                                               std::to_string(most)};
   }
   const PoseDescription own{pose->jointCount, 0, pose->mayScale};
   Batch batch;
   batch.poses = {&own, 1};
-  batch.meshesSize = description_.meshBudget;
-  batch.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  batch.meshesSize = meshStore_.ranges.capacity();
+  batch.outputs = OutputSizes::oneBuffer(std::max(outputStore_.ranges.capacity(), laidOut->size));
   return checkJob(batch, jobOf(instance, *mesh, *laidOut), theInstance, description_.limits);
 }
 
 Result<void> SceneBooks::takeResult(SceneInstance& instance) {
   if (!instance.bounds && !isSnormPosition(instance.layout.positions)) return {};
-  if (!freeResults_.empty()) {
-    instance.extras.result = freeResults_.back();
-    freeResults_.pop_back();
-    return {};
-  }
-  if (nextResult_ == description_.boundsBudget) {
+  const Result<std::optional<Range>> result = take(resultStore_, 1, 1);
+  if (!result) return result.error();
+  if (!*result) {
     return Error{ErrorCode::limitExceeded,
-                 "the instance wants bounds, or positions in snorm16: as many as the budget has, " +
-                     std::to_string(description_.boundsBudget) + ", have them already"};
+                 "the instance wants bounds, or positions in snorm16: as many as there may be, " +
+                     std::to_string(resultStore_.ranges.capacity()) + ", have them already"};
   }
-  instance.extras.result = nextResult_++;
+  instance.extras.result = static_cast<std::uint32_t>((*result)->offset);
   return {};
+}
+
+void SceneBooks::freeResult(const SceneInstance& instance) {
+  if (instance.extras.result != notUsed) resultStore_.ranges.free({instance.extras.result, 1});
 }
 
 /// The pose's place in the form that the method reads; it stays until the pose is removed.
 Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
-  const std::optional<PaletteForm> form = paletteForm(instance.method);
-  if (!form) return {};
+  const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.poseHandle.index);
-  std::optional<Range>& units = pose.forms[static_cast<std::size_t>(*form)].units;
+  std::optional<Range>& units = pose.forms[static_cast<std::size_t>(form)].units;
   if (units) return {};
-  const std::uint64_t size = paletteSize(*form, pose.jointCount, pose.mayScale);
-  units = unitStore_.allocate(size, 1);
+  const std::uint64_t size = paletteSize(form, pose.jointCount, pose.mayScale);
+  const Result<std::optional<Range>> taken = take(unitStore_, size, 1);
+  if (!taken) return taken.error();
+  units = *taken;
   if (units) return {};
-  return Error{ErrorCode::limitExceeded,
-               "pose " + std::to_string(instance.poseHandle.index) + " takes " +
-                   std::to_string(size * unitBytes) + " bytes in the form that " +
-                   std::string(methodName(instance.method)) + " reads; of the " +
-                   std::to_string(unitStore_.capacity() * unitBytes) +
-                   " that go with the joint budget, " +
-                   std::to_string(unitStore_.largestFree() * unitBytes) + " are free in one piece"};
+  return noRoom("pose " + std::to_string(instance.poseHandle.index) + " takes " +
+                    std::to_string(size) + " times 16 bytes in the form that " +
+                    std::string(methodName(instance.method)) + " reads",
+                unitStore_, "such units of palettes");
 }
 
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
@@ -92,18 +92,16 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
-  const std::optional<Range> bytes = outputStore_.allocate(laidOut->size, laidOut->alignment);
-  if (!bytes) {
-    return Error{ErrorCode::limitExceeded,
-                 "the instance takes " + std::to_string(laidOut->size) + " bytes of output, of " +
-                     std::to_string(outputStore_.capacity()) + " in the budget " +
-                     std::to_string(outputStore_.capacity() - outputStore_.used()) + " are free, " +
-                     std::to_string(outputStore_.largestFree()) + " in one piece"};
+  const Result<std::optional<Range>> bytes = take(outputStore_, laidOut->size, laidOut->alignment);
+  if (!bytes) return bytes.error();
+  if (!*bytes) {
+    return noRoom("the instance takes " + std::to_string(laidOut->size) + " bytes", outputStore_,
+                  "bytes of output");
   }
-  instance.target = {*bytes, instance.mesh, mesh.info.vertexCount};
+  instance.target = {**bytes, instance.mesh, mesh.info.vertexCount};
   instance.vertexCount = mesh.info.vertexCount;
   Result<void> made = makeRuns(instance);
-  if (!made) outputStore_.free(*bytes);
+  if (!made) outputStore_.ranges.free(**bytes);
   return made;
 }
 
@@ -115,7 +113,7 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   if (!laidOut) return laidOut.error();
   Placing placing;
   placing.subject = theInstance;
-  placing.outputs = OutputSizes::oneBuffer(description_.outputBudget);
+  placing.outputs = OutputSizes::oneBuffer(outputStore_.ranges.capacity());
   placing.jointCount = pose.jointCount;
   placing.mayScale = instance.method != Method::linear && pose.mayScale;
   placing.isCulled = instance.isCulled;
@@ -138,7 +136,7 @@ void SceneBooks::releaseRuns(SceneInstance& instance) {
 /// What was recorded is still drawn from, and stays `shown`; what never was is free at once.
 void SceneBooks::releaseTarget(SceneInstance& instance) {
   releaseRuns(instance);
-  if (instance.shown != instance.target) outputStore_.free(instance.target.bytes);
+  if (instance.shown != instance.target) outputStore_.ranges.free(instance.target.bytes);
 }
 
 void SceneBooks::link(std::uint32_t index) {
@@ -177,15 +175,15 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
   if (Result<void> good = check(instance); !good) return good.error();
-  if (instances_.capacity() >= description_.instanceBudget && !instances_.hasHole()) {
-    return Error{ErrorCode::limitExceeded, "there are as many instances as the budget has, " +
-                                               std::to_string(description_.instanceBudget)};
+  if (!makeSlot()) {
+    return Error{ErrorCode::limitExceeded,
+                 "there are as many instances as there may be, " + std::to_string(slotCapacity_)};
   }
   if (Result<void> good = reserveUnits(instance); !good) return good.error();
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);
   if (Result<void> taken = takeResult(instance); !taken) return taken.error();
   if (Result<void> found = findRoom(instance); !found) {
-    if (instance.extras.result != notUsed) freeResults_.push_back(instance.extras.result);
+    freeResult(instance);
     return found.error();
   }
 
@@ -208,8 +206,8 @@ Result<void> SceneBooks::removeInstance(InstanceHandle handle) {
   unlink(handle.index);
   --meshes_.at(instance->mesh.index).users;
   releaseTarget(*instance);
-  if (instance->shown) retire(Retired::Store::output, instance->shown->bytes);
-  if (instance->extras.result != notUsed) freeResults_.push_back(instance->extras.result);
+  if (instance->shown) retire(outputStore_.ranges, instance->shown->bytes);
+  freeResult(*instance);
   if (instance->isCulled) {
     culled_[instance->culledIndex] = culled_.back();
     instances_.at(culled_.back()).culledIndex = instance->culledIndex;
@@ -373,13 +371,13 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
     if (moved + from.size > maxBytes) continue;
     const Result<VertexPlaces> laidOut = placeVertices(instance.layout, instance.vertexCount);
     const std::optional<Range> to =
-        outputStore_.allocateBelow(from.size, laidOut->alignment, from.offset);
+        outputStore_.ranges.allocateBelow(from.size, laidOut->alignment, from.offset);
     if (!to) continue;
     releaseRuns(instance);
     instance.target.bytes = *to;
     if (Result<void> made = makeRuns(instance); !made) {
       // A device with few storage buffers cannot have it there.
-      outputStore_.free(*to);
+      outputStore_.ranges.free(*to);
       instance.target.bytes = from;
       made = makeRuns(instance);
       continue;

@@ -75,6 +75,22 @@ void RangeAllocator::free(const Range& range) {
   addGap(offset, size);
 }
 
+std::uint64_t RangeAllocator::capacityFor(std::uint64_t size, std::uint64_t alignment) const {
+  std::uint64_t begin = capacity_;
+  if (!gaps_.empty()) {
+    const auto& [offset, gapSize] = *gaps_.rbegin();
+    if (offset + gapSize == capacity_) begin = offset;
+  }
+  return roundUp(begin, alignment) + size;
+}
+
+void RangeAllocator::grow(std::uint64_t capacity) {
+  const Range added{capacity_, capacity - capacity_};
+  capacity_ = capacity;
+  used_ += added.size;
+  free(added);
+}
+
 std::uint64_t RangeAllocator::largestFree() const {
   return bySize_.empty() ? 0 : bySize_.rbegin()->first;
 }

@@ -18,8 +18,8 @@ struct Range {
   friend bool operator==(const Range&, const Range&) = default;
 };
 
-/// Gives out ranges of [0, capacity). O(log of the number of gaps), but where an alignment makes
-/// gaps unfit.
+/// Gives out ranges of [0, capacity), which may grow. O(log of the number of gaps), but where an
+/// alignment makes gaps unfit.
 class RangeAllocator {
  public:
   explicit RangeAllocator(std::uint64_t capacity = 0);
@@ -31,6 +31,11 @@ class RangeAllocator {
   std::optional<Range> allocateBelow(std::uint64_t size, std::uint64_t alignment,
                                      std::uint64_t end);
   void free(const Range& range);
+
+  /// The least capacity with which `allocate` finds a place at the end.
+  std::uint64_t capacityFor(std::uint64_t size, std::uint64_t alignment) const;
+  /// `capacity` is larger than now.
+  void grow(std::uint64_t capacity);
 
   std::uint64_t capacity() const { return capacity_; }
   std::uint64_t used() const { return used_; }

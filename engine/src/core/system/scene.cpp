@@ -13,34 +13,44 @@ namespace dermis {
 namespace {
 
 Result<void> checkDescription(const SceneDescription& description) {
-  for (const auto& [field, value] :
-       {std::pair{"framesInFlight", std::uint64_t{description.framesInFlight}},
-        {"meshBudget", description.meshBudget},
-        {"jointBudget", description.jointBudget},
-        {"outputBudget", description.outputBudget},
-        {"instanceBudget", description.instanceBudget}}) {
-    if (value == 0) return invalid(std::string("the scene's ") + field + " is 0");
-  }
+  if (description.framesInFlight == 0) return invalid("the scene's framesInFlight is 0");
   if (Result<void> good = checkLimits(description.limits); !good) return good;
-  const std::uint64_t most = description.limits.maxStorageBufferRange;
-  // Their product, in bytes, might not fit 64 bits.
-  if (description.framesInFlight > most / sizeof(JointMatrix) / description.jointBudget) {
+  const std::uint64_t range = description.limits.maxStorageBufferRange;
+  constexpr std::uint64_t anySize = ~std::uint64_t{0};
+  struct Field {
+    const char* name;
+    const Capacity& capacity;
+    std::uint64_t most;  ///< at first
+    bool mayBeNone = false;
+  };
+  for (const Field& field :
+       {Field{"meshCapacity", description.meshCapacity, range},
+        {"jointCapacity (for each of framesInFlight)", description.jointCapacity,
+         range / sizeof(JointMatrix) / description.framesInFlight, true},
+        {"gpuJointCapacity", description.gpuJointCapacity, range / sizeof(JointMatrix), true},
+        {"outputCapacity", description.outputCapacity, anySize},
+        {"instanceCapacity", description.instanceCapacity, range / sizeof(abi::HistoryRecord)},
+        {"boundsCapacity", description.boundsCapacity, range / sizeof(InstanceResult), true}}) {
+    const Capacity& capacity = field.capacity;
+    if (capacity.maximum == 0 && !field.mayBeNone)
+      return invalid(std::string("the scene's ") + field.name + " is 0");
+    if (capacity.maximum < capacity.initial) {
+      return invalid(std::string("the scene's ") + field.name + " is " +
+                     std::to_string(capacity.initial) + " at first, more than its maximum, " +
+                     std::to_string(capacity.maximum));
+    }
+    if (capacity.initial <= field.most) continue;
     return Error{ErrorCode::limitExceeded,
-                 "the joint matrices of the scene's jointBudget, for each of framesInFlight, take "
-                 "more than this device's storage buffer range of " +
-                     std::to_string(most) + " bytes"};
+                 std::string("the scene's ") + field.name + " of " +
+                     std::to_string(capacity.initial) +
+                     " makes a buffer larger than this device's storage buffer range of " +
+                     std::to_string(range) + " bytes; the most is " + std::to_string(field.most)};
   }
-  const PlanSizes sizes = sceneSizes(description);
-  for (const auto& [field, role] : {std::pair{"meshBudget", BufferRole::meshes},
-                                    {"jointBudget (palettes)", BufferRole::palettes},
-                                    {"boundsBudget", BufferRole::results},
-                                    {"instanceBudget", BufferRole::history}}) {
-    const std::uint64_t bytes = sizes.requirement(role, 0, description.limits).size;
-    if (bytes <= most) continue;
-    return Error{
-        ErrorCode::limitExceeded,
-        std::string("the scene's ") + field + " makes a buffer of " + std::to_string(bytes) +
-            " bytes, more than this device's storage buffer range of " + std::to_string(most)};
+  if (sceneSizes(description).palettes > range) {
+    return Error{ErrorCode::limitExceeded,
+                 "the palettes of the scene's jointCapacity and gpuJointCapacity are larger than "
+                 "this device's storage buffer range of " +
+                     std::to_string(range) + " bytes"};
   }
   return checkTuning(description.tuning);
 }
@@ -49,6 +59,20 @@ Result<void> checkDescription(const SceneDescription& description) {
 std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
   const std::uint64_t up = value % multiple == 0 ? 0 : multiple - value % multiple;
   return up <= ~value ? value + up : value / multiple * multiple;
+}
+
+SceneDescription rounded(SceneDescription description) {
+  const auto round = [](Capacity& capacity, std::uint64_t multiple) {
+    const bool isFixed = capacity.maximum == capacity.initial;
+    capacity.initial = roundUp(capacity.initial, multiple);
+    if (isFixed) capacity.maximum = capacity.initial;
+  };
+  round(description.meshCapacity, packedMeshAlignment);
+  round(description.outputCapacity, 4);
+  // There are no results.
+  if (description.limits.maxStorageBuffersPerStage < storageBuffersWanted)
+    description.boundsCapacity = Capacity::fixed(0);
+  return description;
 }
 
 }  // namespace
@@ -60,17 +84,24 @@ Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 
 Result<Scene> Scene::create(const SceneDescription& description) {
-  SceneDescription rounded = description;
-  rounded.meshBudget = roundUp(description.meshBudget, packedMeshAlignment);
-  rounded.outputBudget = roundUp(description.outputBudget, 4);
-  if (description.limits.maxStorageBuffersPerStage < storageBuffersWanted)
-    rounded.boundsBudget = 0;  // there are no results
-  if (Result<void> good = checkDescription(rounded); !good) return good.error();
-  return Scene(rounded);
+  const SceneDescription usual = rounded(description);
+  if (Result<void> good = checkDescription(usual); !good) return good.error();
+  return Scene(usual);
 }
 
 BufferRequirement Scene::buffer(BufferRole role) const {
-  return sceneSizes(description()).requirement(role, 0, description().limits);
+  return books_->sizes().requirement(role, 0, description().limits);
+}
+Result<BufferRequirement> Scene::buffer(const SceneDescription& description, BufferRole role) {
+  const SceneDescription usual = rounded(description);
+  if (Result<void> good = checkDescription(usual); !good) return good.error();
+  return sceneSizes(usual).requirement(role, 0, usual.limits);
+}
+std::uint32_t Scene::poseBufferCount() const {
+  return books_->poseBufferCount();
+}
+PoseBuffer Scene::poseBuffer(std::uint32_t number) const {
+  return books_->poseBuffer(number);
 }
 const SceneDescription& Scene::description() const {
   return books_->description();
@@ -94,13 +125,19 @@ Result<std::uint64_t> Scene::meshOffset(MeshHandle handle) const {
 Result<void> Scene::removeMesh(MeshHandle mesh) {
   return change().removeMesh(mesh);
 }
-Result<PoseHandle> Scene::addPose(std::uint32_t jointCount, bool mayScale) {
-  return change().addPose(jointCount, mayScale);
+Result<PoseHandle> Scene::addPose(std::uint32_t jointCount, const PoseOptions& options) {
+  PoseHandle pose;
+  if (Result<void> added = addPoses({&pose, 1}, jointCount, options); !added) return added.error();
+  return pose;
+}
+Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                             const PoseOptions& options) {
+  return change().addPoses(poses, jointCount, options);
 }
 Result<PosePlace> Scene::posePlace(PoseHandle handle) const {
   const ScenePose* pose = books_->poses().find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
-  return PosePlace{books_->poseOffset(*pose), pose->jointCount};
+  return SceneBooks::placeOf(*pose);
 }
 Result<void> Scene::removePose(PoseHandle pose) {
   return change().removePose(pose);
@@ -118,9 +155,13 @@ Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame
   return change().beginFrame(frame, completedFrame);
 }
 Result<PosePlace> Scene::writePose(PoseHandle pose) {
-  const Result<std::uint64_t> offset = change().writePose(pose);
-  if (!offset) return offset.error();
-  return PosePlace{*offset, books_->poses().find(pose)->jointCount};
+  return change().writePose(pose);
+}
+Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
+  return change().markWritten(poses);
+}
+Result<void> Scene::markAllWritten() {
+  return change().markAllWritten();
 }
 Result<void> Scene::change(std::span<const InstanceChange> changes) {
   return change().change(changes);
@@ -179,6 +220,9 @@ Result<std::optional<Box>> Scene::bounds(InstanceHandle instance) const {
 Result<std::uint32_t> Scene::visibilityIndex(InstanceHandle instance) const {
   if (books_->instances().find(instance) == nullptr) return unknownHandle("instance", instance);
   return instance.index;
+}
+std::uint32_t Scene::instanceCapacity() const {
+  return books_->sizes().slots;
 }
 SceneStatistics Scene::statistics() const {
   return books_->statistics();

@@ -6,17 +6,16 @@
 #include <span>
 
 #include "dermis/vulkan/bindings.h"
-#include "dermis/vulkan/memory.h"
-#include "vulkan/system/functions.h"
+#include "dermis/vulkan/buffer_callbacks.h"
+#include "vulkan/state.h"
 
 namespace dermis::vulkan {
 
 /// What buffers are made with; outlives them.
 struct BufferSource {
   const ContextState* context = nullptr;
-  const SystemFunctions* functions = nullptr;
-  MemoryCallbacks memory;
-  std::uint64_t allocatedBytes = 0;  ///< that are not freed
+  BufferCallbacks callbacks;
+  std::uint64_t bytes = 0;  ///< of the buffers that there are
 };
 
 class SystemBuffer {
@@ -24,7 +23,7 @@ class SystemBuffer {
   struct Description {
     std::uint64_t size = 0;
     VkBufferUsageFlags usage = 0;
-    MemoryUse use = MemoryUse::device;
+    BufferUse use = BufferUse::device;
     const char* name = "";
   };
   static Result<SystemBuffer> create(BufferSource& source, const Description& description);
@@ -34,21 +33,34 @@ class SystemBuffer {
   SystemBuffer(SystemBuffer&& other) noexcept;
   SystemBuffer& operator=(SystemBuffer&& other) noexcept;
 
-  VkBuffer handle() const { return buffer_; }
+  VkBuffer handle() const { return created_.buffer; }
   std::uint64_t size() const { return size_; }
-  BufferRange range() const { return {buffer_, 0, size_}; }
+  BufferRange range() const { return {created_.buffer, 0, size_}; }
   std::span<std::byte> bytes() const {
-    return {static_cast<std::byte*>(memory_.mapped), static_cast<std::size_t>(size_)};
+    return {static_cast<std::byte*>(created_.mapped), static_cast<std::size_t>(size_)};
   }
 
  private:
   void release();
 
   BufferSource* source_ = nullptr;
-  VkBuffer buffer_ = VK_NULL_HANDLE;
-  MemoryBlock memory_;
+  CreatedBuffer created_;
   std::uint64_t size_ = 0;
-  std::uint64_t allocated_ = 0;
+};
+
+/// A buffer that a larger one replaces with the next `record`, which copies what it holds; or a
+/// range of the engine's, which stays.
+struct GrowingBuffer {
+  SystemBuffer own;     ///< as of the last `record`
+  SystemBuffer larger;  ///< from the next one on
+  BufferRange engines;
+
+  /// For the next `record`.
+  BufferRange range() const {
+    if (engines.buffer != VK_NULL_HANDLE) return engines;
+    return larger.size() != 0 ? larger.range() : own.range();
+  }
+  BufferRange lastRange() const { return engines.buffer != VK_NULL_HANDLE ? engines : own.range(); }
 };
 
 }  // namespace dermis::vulkan

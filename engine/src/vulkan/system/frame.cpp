@@ -1,6 +1,5 @@
 // The commands of a frame.
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -8,8 +7,6 @@
 
 namespace dermis::vulkan {
 namespace {
-
-constexpr std::uint64_t leastTables = 64 * 1024;
 
 class Stopwatch {
  public:
@@ -22,48 +19,6 @@ class Stopwatch {
 };
 
 }  // namespace
-
-/// Tables that are too small are replaced, the old ones kept until their frames are complete.
-Result<void> SkinningSystem::State::makeRoomForTables() {
-  const BufferRequirement needed = plan.buffer(BufferRole::tables);
-  std::uint64_t size = std::max(tables.size(), leastTables);
-  while (size < needed.size) size *= 2;
-  size = std::min(size, context->limits.maxStorageBufferRange & ~std::uint64_t{3});
-  if (tables.size() < needed.size || tables.size() == 0) {
-    Result<SystemBuffer> made =
-        SystemBuffer::create(source, {size, needed.usage, MemoryUse::device, "dermis tables"});
-    if (!made) return made.error();
-    BatchBuffers buffers{meshes.range(),
-                         poses.range(),
-                         made->range(),
-                         palettes.range(),
-                         OutputBuffers::oneBuffer(outputRange),
-                         results.range()};
-    Result<Bindings> bound = context->createBindings(buffers);
-    if (!bound) return bound.error();
-    retired.push_back({frameNumber, std::exchange(tables, std::move(*made)),
-                       std::exchange(bindings, std::move(*bound))});
-  }
-  FrameSlot& own = slot();
-  if (own.upload.size() >= needed.size && own.upload.size() != 0) return {};
-  Result<SystemBuffer> upload = SystemBuffer::create(
-      source,
-      {size, plan.buffer(BufferRole::upload).usage, MemoryUse::upload, "dermis table upload"});
-  if (!upload) return upload.error();
-  own.upload = std::move(*upload);  // its last frame is complete
-  return {};
-}
-
-/// With the first instance that is culled on the GPU.
-Result<void> SkinningSystem::State::makeHistory() {
-  if (history.size() != 0) return {};
-  const BufferRequirement needed = plan.buffer(BufferRole::history);
-  Result<SystemBuffer> made = SystemBuffer::create(
-      source, {needed.size, needed.usage, MemoryUse::device, "dermis history"});
-  if (!made) return made.error();
-  history = std::move(*made);
-  return {};
-}
 
 FrameBuffers SkinningSystem::State::buffersOf(const FrameDescription& frame) {
   FrameBuffers buffers;
@@ -87,11 +42,10 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
                    "FrameDescription::visibility is null, and there are instances that are culled "
                    "on the GPU"};
     }
-    if (Result<void> made = makeHistory(); !made) return made;
   }
-  const bool works = !plan.commands().empty() || !uploads.empty();
+  const bool works = !plan.commands().empty() || !uploads.empty() || isGrowing();
   if (works) {
-    if (Result<void> room = makeRoomForTables(); !room) return room;
+    if (Result<void> room = makeRoom(); !room) return room;
     if (Result<void> good = bindings.state_->check(plan); !good) return good;
     if (Result<void> written = writeTables(plan, slot().upload.bytes()); !written) return written;
   }
@@ -106,6 +60,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
     const Label label(context->table, commandBuffer, "dermis: skin a frame");
     timestamps.begin(commandBuffer, slotNumber());
     frameStatistics.uploadedBytes = plan.buffer(BufferRole::tables).size;
+    const Recorded grown = recordGrowth(commandBuffer);
     const Recorded uploaded = recordUploads(commandBuffer);
     const FrameBuffers buffers = buffersOf(frame);
     const Recorded recorded = recordCommands(commandBuffer, plan, *bindings.state_, &buffers);
@@ -113,7 +68,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
     own.hasTimestamps = timestamps.isCreated();
     frameStatistics.dispatches = recorded.dispatches;
     frameStatistics.workgroups = recorded.workgroups;
-    frameStatistics.copies = uploaded.copies + recorded.copies;
+    frameStatistics.copies = grown.copies + uploaded.copies + recorded.copies;
   }
   if (Result<void> committed = scene.commit(); !committed) return committed;
   ++recordCount;
@@ -129,22 +84,15 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
 Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   for (MeshUpload& upload : uploads) {
-    const VkBufferCopy region{0, upload.offset, upload.staging.size()};
-    context->table.cmdCopyBuffer(commandBuffer, upload.staging.handle(), meshes.handle(), 1,
-                                 &region);
+    const BufferRange to = meshes.range();
+    const VkBufferCopy region{0, to.offset + upload.offset, upload.staging.size()};
+    context->table.cmdCopyBuffer(commandBuffer, upload.staging.handle(), to.buffer, 1, &region);
     ++recorded.copies;
     frameStatistics.uploadedBytes += upload.staging.size();
     recordedUploads.push_back(std::move(upload));
   }
   uploads.clear();
   return recorded;
-}
-
-/// Of the last `record`, which can no longer be abandoned.
-void SkinningSystem::State::retireUploads() {
-  for (MeshUpload& upload : recordedUploads)
-    retired.push_back({frameNumber, std::move(upload.staging), {}});
-  recordedUploads.clear();
 }
 
 /// The GPU has seen nothing of it: its slot is free again, its meshes are not uploaded yet.
@@ -156,6 +104,7 @@ void SkinningSystem::State::abandonRecord() {
     if (scene.meshOffset(upload.mesh)) uploads.push_back(std::move(upload));
   }
   recordedUploads.clear();
+  abandonGrowth();
   frameStatistics = {};
 }
 

@@ -6,7 +6,10 @@
 namespace dermis::vulkan {
 namespace {
 
-constexpr VkDeviceSize blockSize = VkDeviceSize{64} << 20;
+// A block has a quarter of what there is of its kind, so that little scenes take little memory, and
+// large ones few blocks.
+constexpr VkDeviceSize leastBlock = VkDeviceSize{128} << 10;
+constexpr VkDeviceSize largestBlock = VkDeviceSize{64} << 20;
 
 /// Other properties need features that the engine may not have enabled, or are for other ends.
 constexpr VkMemoryPropertyFlags usualProperties =
@@ -17,13 +20,13 @@ struct Wishes {
   VkMemoryPropertyFlags required, preferred;
 };
 
-Wishes wishesOf(MemoryUse use) {
+Wishes wishesOf(BufferUse use) {
   constexpr VkMemoryPropertyFlags mapped =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   switch (use) {
-    case MemoryUse::upload:
+    case BufferUse::upload:
       return {mapped, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT};
-    case MemoryUse::readBack:
+    case BufferUse::readBack:
       return {mapped, VK_MEMORY_PROPERTY_HOST_CACHED_BIT};
     default:
       return {0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT};
@@ -42,26 +45,63 @@ MemoryBlocks::~MemoryBlocks() {
     functions_.freeMemory(context_.device, block->memory, context_.allocator);
 }
 
-MemoryCallbacks MemoryBlocks::callbacks() {
-  MemoryCallbacks callbacks;
+std::uint64_t MemoryBlocks::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const std::unique_ptr<Block>& block : blocks_) bytes += block->ranges.capacity();
+  return bytes;
+}
+
+BufferCallbacks MemoryBlocks::callbacks() {
+  BufferCallbacks callbacks;
   callbacks.user = this;
-  callbacks.allocate = [](void* user, const MemoryRequest& request) {
-    return static_cast<MemoryBlocks*>(user)->allocate(request);
+  callbacks.create = [](void* user, const BufferRequest& request) {
+    return static_cast<MemoryBlocks*>(user)->create(request);
   };
-  callbacks.free = [](void* user, const MemoryBlock& memory) {
-    static_cast<MemoryBlocks*>(user)->free(memory);
+  callbacks.destroy = [](void* user, const CreatedBuffer& buffer) {
+    auto& self = *static_cast<MemoryBlocks*>(user);
+    const std::unique_ptr<Part> part(static_cast<Part*>(buffer.allocation));
+    self.functions_.destroyBuffer(self.context_.device, buffer.buffer, self.context_.allocator);
+    self.free(*part);
   };
   return callbacks;
 }
 
+Result<CreatedBuffer> MemoryBlocks::create(const BufferRequest& request) {
+  CreatedBuffer buffer;
+  if (const VkResult result = functions_.createBuffer(context_.device, &request.info,
+                                                      context_.allocator, &buffer.buffer);
+      result != VK_SUCCESS)
+    return vulkanError("vkCreateBuffer", result);
+  Need need;
+  functions_.getBufferMemoryRequirements(context_.device, buffer.buffer, &need.requirements);
+  need.use = request.use;
+  need.hasAddress = (request.info.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+  const Result<Part> part = allocate(need, request.name);
+  if (!part) {
+    functions_.destroyBuffer(context_.device, buffer.buffer, context_.allocator);
+    return part.error();
+  }
+  const Block& block = *part->block;
+  if (const VkResult result = functions_.bindBufferMemory(context_.device, buffer.buffer,
+                                                          block.memory, part->range.offset);
+      result != VK_SUCCESS) {
+    functions_.destroyBuffer(context_.device, buffer.buffer, context_.allocator);
+    free(*part);
+    return vulkanError("vkBindBufferMemory", result);
+  }
+  if (block.mapped != nullptr) buffer.mapped = block.mapped + part->range.offset;
+  buffer.allocation = new Part(*part);
+  return buffer;
+}
+
 /// The types that will do: first those that have all that is preferred, each in the order of the
 /// device.
-std::vector<std::uint32_t> MemoryBlocks::typesFor(const MemoryRequest& request) const {
-  const auto [required, preferred] = wishesOf(request.use);
+std::vector<std::uint32_t> MemoryBlocks::typesFor(const Need& need) const {
+  const auto [required, preferred] = wishesOf(need.use);
   std::vector<std::uint32_t> types, others;
   for (std::uint32_t type = 0; type < properties_.memoryTypeCount; ++type) {
     const VkMemoryPropertyFlags flags = properties_.memoryTypes[type].propertyFlags;
-    const bool isAllowed = (request.requirements.memoryTypeBits >> type & 1) != 0;
+    const bool isAllowed = (need.requirements.memoryTypeBits >> type & 1) != 0;
     if (!isAllowed || (flags & required) != required || (flags & ~usualProperties) != 0) continue;
     ((flags & preferred) == preferred ? types : others).push_back(type);
   }
@@ -69,28 +109,37 @@ std::vector<std::uint32_t> MemoryBlocks::typesFor(const MemoryRequest& request) 
   return types;
 }
 
-Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type,
-                                                    const MemoryRequest& request) {
+bool MemoryBlocks::isOfKind(const Block& block, std::uint32_t type, const Need& need) {
+  return block.type == type && block.hasAddress == need.hasAddress &&
+         (block.mapped != nullptr) == (need.use != BufferUse::device);
+}
+
+Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type, const Need& need) {
   VkMemoryAllocateFlagsInfo flags{};
   flags.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO;
   flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
   VkMemoryAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-  info.pNext = request.hasDeviceAddress ? &flags : nullptr;
+  info.pNext = need.hasAddress ? &flags : nullptr;
   info.memoryTypeIndex = type;
   auto block = std::make_unique<Block>();
   block->type = type;
-  block->hasAddress = request.hasDeviceAddress;
+  block->hasAddress = need.hasAddress;
+  VkDeviceSize usual = 0;
+  for (const std::unique_ptr<Block>& other : blocks_)
+    if (isOfKind(*other, type, need)) usual += other->ranges.capacity() / 4;
+  usual = std::clamp(usual, leastBlock, largestBlock);
   VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
-  // Where a whole block is too much, what is needed may still be there.
-  for (const VkDeviceSize size :
-       {std::max(blockSize, request.requirements.size), request.requirements.size}) {
+  // What is large gets a block of its own. Where a whole block is too much, what is needed may
+  // still be there.
+  const VkDeviceSize needed = need.requirements.size;
+  for (const VkDeviceSize size : {needed > usual / 2 ? needed : usual, needed}) {
     info.allocationSize = size;
     result = functions_.allocateMemory(context_.device, &info, context_.allocator, &block->memory);
     if (result == VK_SUCCESS) break;
   }
   if (result != VK_SUCCESS) return vulkanError("vkAllocateMemory", result);
-  if (request.use != MemoryUse::device) {
+  if (need.use != BufferUse::device) {
     void* mapped = nullptr;
     result = functions_.mapMemory(context_.device, block->memory, 0, VK_WHOLE_SIZE, 0, &mapped);
     if (result != VK_SUCCESS) {
@@ -106,50 +155,35 @@ Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type,
 
 /// A heap may be full, such as the 256 MiB of many GPUs that are device-local and mapped, although
 /// another type that will do has memory.
-Result<MemoryBlock> MemoryBlocks::allocate(const MemoryRequest& request) {
-  Result<MemoryBlock> memory =
+Result<MemoryBlocks::Part> MemoryBlocks::allocate(const Need& need, const char* name) {
+  Result<Part> part =
       Error{ErrorCode::missingFeature,
-            std::string("no memory type of the device suits the buffer '") + request.name + "'"};
-  for (const std::uint32_t type : typesFor(request)) {
-    memory = allocateFrom(type, request);
-    if (memory) break;
+            std::string("no memory type of the device suits the buffer '") + name + "'"};
+  for (const std::uint32_t type : typesFor(need)) {
+    part = allocateFrom(type, need);
+    if (part) break;
   }
-  return memory;
+  return part;
 }
 
-Result<MemoryBlock> MemoryBlocks::allocateFrom(std::uint32_t type, const MemoryRequest& request) {
-  const bool isMapped = request.use != MemoryUse::device;
-  Block* found = nullptr;
-  std::optional<Range> range;
+Result<MemoryBlocks::Part> MemoryBlocks::allocateFrom(std::uint32_t type, const Need& need) {
+  const VkMemoryRequirements& needed = need.requirements;
   for (const std::unique_ptr<Block>& block : blocks_) {
-    if (block->type != type || block->hasAddress != request.hasDeviceAddress ||
-        (block->mapped != nullptr) != isMapped)
-      continue;
-    range = block->ranges.allocate(request.requirements.size, request.requirements.alignment);
-    found = block.get();
-    if (range) break;
+    if (!isOfKind(*block, type, need)) continue;
+    if (const std::optional<Range> range = block->ranges.allocate(needed.size, needed.alignment))
+      return Part{block.get(), *range};
   }
-  if (!range) {
-    Result<Block*> added = addBlock(type, request);
-    if (!added) return added.error();
-    found = *added;
-    range = found->ranges.allocate(request.requirements.size, request.requirements.alignment);
-  }
-  MemoryBlock memory;
-  memory.memory = found->memory;
-  memory.offset = range->offset;
-  memory.mapped = isMapped ? found->mapped + range->offset : nullptr;
-  memory.owner = new Part{found, *range};
-  return memory;
+  Result<Block*> added = addBlock(type, need);
+  if (!added) return added.error();
+  return Part{*added, *(*added)->ranges.allocate(needed.size, needed.alignment)};
 }
 
-void MemoryBlocks::free(const MemoryBlock& memory) {
-  const std::unique_ptr<Part> part(static_cast<Part*>(memory.owner));
-  part->block->ranges.free(part->range);
-  if (part->block->ranges.used() != 0) return;
-  functions_.freeMemory(context_.device, part->block->memory, context_.allocator);
+void MemoryBlocks::free(const Part& part) {
+  part.block->ranges.free(part.range);
+  if (part.block->ranges.used() != 0) return;
+  functions_.freeMemory(context_.device, part.block->memory, context_.allocator);
   std::erase_if(blocks_,
-                [&](const std::unique_ptr<Block>& block) { return block.get() == part->block; });
+                [&](const std::unique_ptr<Block>& block) { return block.get() == part.block; });
 }
 
 }  // namespace dermis::vulkan

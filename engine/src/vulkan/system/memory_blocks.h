@@ -1,11 +1,12 @@
-// What a SkinningSystem takes memory from where the engine has no allocator: large blocks.
+// Where a SkinningSystem has its buffers from if the engine has no allocator: parts of large blocks
+// of memory.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "dermis/vulkan/memory.h"
+#include "dermis/vulkan/buffer_callbacks.h"
 #include "system/range_allocator.h"
 #include "vulkan/system/functions.h"
 
@@ -18,7 +19,8 @@ class MemoryBlocks {
   MemoryBlocks(const MemoryBlocks&) = delete;
   MemoryBlocks& operator=(const MemoryBlocks&) = delete;
 
-  MemoryCallbacks callbacks();
+  BufferCallbacks callbacks();
+  std::uint64_t bytes() const;  ///< of all blocks
 
  private:
   struct Block {
@@ -32,12 +34,20 @@ class MemoryBlocks {
     Block* block;
     Range range;
   };
+  /// What a buffer needs of memory.
+  struct Need {
+    VkMemoryRequirements requirements{};
+    BufferUse use = BufferUse::device;
+    bool hasAddress = false;
+  };
 
-  Result<MemoryBlock> allocate(const MemoryRequest& request);
-  void free(const MemoryBlock& memory);
-  std::vector<std::uint32_t> typesFor(const MemoryRequest& request) const;
-  Result<MemoryBlock> allocateFrom(std::uint32_t type, const MemoryRequest& request);
-  Result<Block*> addBlock(std::uint32_t type, const MemoryRequest& request);
+  Result<CreatedBuffer> create(const BufferRequest& request);
+  Result<Part> allocate(const Need& need, const char* name);
+  void free(const Part& part);
+  std::vector<std::uint32_t> typesFor(const Need& need) const;
+  static bool isOfKind(const Block& block, std::uint32_t type, const Need& need);
+  Result<Part> allocateFrom(std::uint32_t type, const Need& need);
+  Result<Block*> addBlock(std::uint32_t type, const Need& need);
 
   const ContextState& context_;
   const SystemFunctions& functions_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "vulkan/system/state.h"
@@ -16,34 +17,64 @@ Error wrongField(const std::string& what) {
   return {ErrorCode::invalidArgument, "SkinningSystemDescription::" + what};
 }
 
-SceneDescription sceneOf(const SkinningSystemDescription& description,
-                         const ContextState& context) {
-  SceneDescription scene;
-  scene.framesInFlight = description.framesInFlight;
-  scene.meshBudget = description.meshBudget;
-  scene.jointBudget = description.jointBudget;
-  scene.outputBudget = description.output.buffer != VK_NULL_HANDLE ? description.output.size
-                                                                   : description.outputBudget;
-  scene.instanceBudget = description.instanceBudget;
-  scene.boundsBudget = description.boundsBudget;
-  scene.limits = context.limits;
-  scene.tuning = description.tuning.value_or(context.tuning);
-  return scene;
-}
-
-Result<void> checkOutput(const BufferRange& output, const DeviceLimits& limits) {
-  if (output.buffer == VK_NULL_HANDLE) {
-    if (output.offset == 0 && output.size == 0) return {};
-    return wrongField("output has no buffer");
+Result<void> checkRange(const char* name, const BufferRange& range, std::uint64_t unit,
+                        const DeviceLimits& limits) {
+  if (range.buffer == VK_NULL_HANDLE) {
+    if (range.offset == 0 && range.size == 0) return {};
+    return wrongField(std::string(name) + " has no buffer");
   }
-  if (output.size == 0 || output.size % 4 != 0)
-    return wrongField("output has " + std::to_string(output.size) + " bytes, not a multiple of 4");
-  if (output.offset % limits.minStorageBufferOffsetAlignment != 0) {
-    return wrongField("output begins at " + std::to_string(output.offset) +
+  if (range.size < unit || range.size % 4 != 0) {
+    return wrongField(std::string(name) + " has " + std::to_string(range.size) +
+                      " bytes, not a multiple of 4, at least " + std::to_string(unit));
+  }
+  if (range.offset % limits.minStorageBufferOffsetAlignment != 0) {
+    return wrongField(std::string(name) + " begins at " + std::to_string(range.offset) +
                       " bytes, not at a multiple of minStorageBufferOffsetAlignment, " +
                       std::to_string(limits.minStorageBufferOffsetAlignment));
   }
   return {};
+}
+
+Result<void> checkRanges(const SkinningSystemDescription& description, const DeviceLimits& limits) {
+  const std::uint64_t joint = sizeof(JointMatrix);
+  for (const auto& [name, range, unit] :
+       {std::tuple{"meshes", &description.meshes, std::uint64_t{packedMeshAlignment}},
+        {"poses.range", &description.poses.range, joint * description.framesInFlight},
+        {"gpuPoses", &description.gpuPoses, joint},
+        {"output", &description.output, std::uint64_t{4}}}) {
+    if (Result<void> good = checkRange(name, *range, unit, limits); !good) return good;
+  }
+  const MappedRange& poses = description.poses;
+  if ((poses.range.buffer == VK_NULL_HANDLE) != (poses.mapped == nullptr))
+    return wrongField("poses has only one of a range and an address where it is mapped");
+  return {};
+}
+
+/// A range holds what it holds.
+SceneDescription sceneOf(const SkinningSystemDescription& description,
+                         const ContextState& context) {
+  const auto capacity = [](const Capacity& wanted, const BufferRange& range, std::uint64_t unit) {
+    return range.buffer == VK_NULL_HANDLE ? wanted : Capacity::fixed(range.size / unit);
+  };
+  SceneDescription scene;
+  scene.framesInFlight = description.framesInFlight;
+  scene.meshCapacity =
+      capacity(description.meshCapacity,
+               {description.meshes.buffer, 0,
+                description.meshes.size / packedMeshAlignment * packedMeshAlignment},
+               1);
+  // 0 frames in flight are refused by the scene.
+  scene.jointCapacity =
+      capacity(description.jointCapacity, description.poses.range,
+               sizeof(JointMatrix) * std::uint64_t{std::max(description.framesInFlight, 1u)});
+  scene.gpuJointCapacity =
+      capacity(description.gpuJointCapacity, description.gpuPoses, sizeof(JointMatrix));
+  scene.outputCapacity = capacity(description.outputCapacity, description.output, 1);
+  scene.instanceCapacity = description.instanceCapacity;
+  scene.boundsCapacity = description.boundsCapacity;
+  scene.limits = context.limits;
+  scene.tuning = description.tuning.value_or(context.tuning);
+  return scene;
 }
 
 }  // namespace
@@ -60,60 +91,18 @@ SkinningSystem::State::~State() {
   context->table.destroyDescriptorPool(context->device, visibilityPool, context->allocator);
 }
 
-std::span<JointMatrix> SkinningSystem::State::poseAt(const PosePlace& place) {
-  return {reinterpret_cast<JointMatrix*>(poses.bytes().data() + place.offset), place.jointCount};
-}
-
-Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescription& description) {
-  struct Wanted {
-    SystemBuffer& buffer;
-    BufferRole role;
-    MemoryUse use;
-    const char* name;
-    VkBufferUsageFlags usage = 0;  ///< besides what the scene needs
-  };
-  const auto create = [&](const Wanted& wanted) -> Result<void> {
-    const BufferRequirement needed = scene.buffer(wanted.role);
-    if (needed.size == 0) return {};
-    Result<SystemBuffer> made = SystemBuffer::create(
-        source, {needed.size, needed.usage | wanted.usage, wanted.use, wanted.name});
-    if (!made) return made.error();
-    wanted.buffer = std::move(*made);
-    return {};
-  };
-  for (const Wanted& wanted :
-       {Wanted{meshes, BufferRole::meshes, MemoryUse::device, "dermis meshes"},
-        {poses, BufferRole::poses, MemoryUse::upload, "dermis poses"},
-        {palettes, BufferRole::palettes, MemoryUse::device, "dermis palettes"},
-        {counters, BufferRole::counters, MemoryUse::device, "dermis counters"},
-        {results, BufferRole::results, MemoryUse::device, "dermis results"}}) {
-    if (Result<void> made = create(wanted); !made) return made;
-  }
-  outputRange = description.output;
-  if (outputRange.buffer == VK_NULL_HANDLE) {
-    if (Result<void> made = create({output, BufferRole::positions, MemoryUse::device,
-                                    "dermis output", description.outputUsage});
-        !made)
-      return made;
-    outputRange = output.range();
-  }
-  for (FrameSlot& frameSlot : slots) {
-    if (Result<void> made = create(
-            {frameSlot.readBack, BufferRole::readBack, MemoryUse::readBack, "dermis read-back"});
-        !made)
-      return made;
-  }
-  return {};
-}
-
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
   if (description.context == nullptr) return wrongField("context is null");
-  if ((description.memory.allocate == nullptr) != (description.memory.free == nullptr))
-    return wrongField("memory has one of its two functions only");
+  if ((description.buffers.create == nullptr) != (description.buffers.destroy == nullptr))
+    return wrongField("buffers has one of its two functions only");
   ContextState& context = *description.context->state_;
-  if (Result<void> good = checkOutput(description.output, context.limits); !good)
-    return good.error();
-  Result<Scene> scene = Scene::create(sceneOf(description, context));
+  if (Result<void> good = checkRanges(description, context.limits); !good) return good.error();
+  SceneDescription ofScene = sceneOf(description, context);
+  auto self = std::make_unique<State*>(nullptr);
+  ofScene.growth = {self.get(), [](void* user, const BufferGrowth& growth) {
+                      return (*static_cast<State**>(user))->grow(growth);
+                    }};
+  Result<Scene> scene = Scene::create(ofScene);
   if (!scene) return scene.error();
   Result<SystemFunctions> functions = loadSystemFunctions(context);
   if (!functions) return functions.error();
@@ -121,13 +110,14 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   SkinningSystem system;
   system.state_ = std::make_unique<State>(context, std::move(*scene));
   State& state = *system.state_;
+  *self = &state;
+  state.self = std::move(self);
   state.functions = *functions;
   state.source.context = &context;
-  state.source.functions = &state.functions;
-  state.source.memory = description.memory;
-  if (description.memory.allocate == nullptr) {
+  state.source.callbacks = description.buffers;
+  if (description.buffers.create == nullptr) {
     state.blocks = std::make_unique<MemoryBlocks>(context, state.functions);
-    state.source.memory = state.blocks->callbacks();
+    state.source.callbacks = state.blocks->callbacks();
   }
   state.slots.resize(description.framesInFlight);
   if (Result<void> made = state.createBuffers(description); !made) return made.error();
@@ -146,6 +136,16 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   return system;
 }
 
+Result<BufferRequirement> SkinningSystem::requirement(const SkinningSystemDescription& description,
+                                                      BufferRole role) {
+  if (description.context == nullptr) return wrongField("context is null");
+  Result<BufferRequirement> needed =
+      Scene::buffer(sceneOf(description, *description.context->state_), role);
+  if (needed && role == BufferRole::positions && description.output.buffer == VK_NULL_HANDLE)
+    needed->usage |= description.outputUsage;
+  return needed;
+}
+
 // -- Meshes, poses, instances.
 
 Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
@@ -153,7 +153,7 @@ Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
   if (!handle) return handle;
   Result<SystemBuffer> staging =
       SystemBuffer::create(state_->source, {mesh.bytes().size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                                            MemoryUse::upload, "dermis mesh upload"});
+                                            BufferUse::upload, "dermis mesh upload"});
   if (!staging) {
     static_cast<void>(state_->scene.removeMesh(*handle).ok());
     return staging.error();
@@ -171,11 +171,18 @@ Result<void> SkinningSystem::removeMesh(MeshHandle mesh) {
   return removed;
 }
 
-Result<PoseHandle> SkinningSystem::addPose(std::uint32_t jointCount, bool mayScale) {
-  Result<PoseHandle> added = state_->scene.addPose(jointCount, mayScale);
-  if (!added) return added;
-  // No frame under way reads its memory: that of a pose before it was free.
-  std::ranges::fill(state_->poseAt(*state_->scene.posePlace(*added)), JointMatrix{});
+Result<PoseHandle> SkinningSystem::addPose(std::uint32_t jointCount, const PoseOptions& options) {
+  PoseHandle pose;
+  if (Result<void> added = addPoses({&pose, 1}, jointCount, options); !added) return added.error();
+  return pose;
+}
+Result<void> SkinningSystem::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                                      const PoseOptions& options) {
+  Result<void> added = state_->scene.addPoses(poses, jointCount, options);
+  if (!added || options.writer == PoseWriter::gpu) return added;
+  // No frame under way reads their memory: that of poses before them was free.
+  for (const PoseHandle pose : poses)
+    std::ranges::fill(state_->poseAt(*state_->scene.posePlace(pose)), JointMatrix{});
   return added;
 }
 Result<void> SkinningSystem::removePose(PoseHandle pose) {
@@ -196,7 +203,7 @@ Result<void> SkinningSystem::prepare(const PipelineNeeds& needs) const {
 
 Result<void> SkinningSystem::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
   if (Result<void> begun = state_->scene.beginFrame(frame, completedFrame); !begun) return begun;
-  state_->retireUploads();
+  state_->retireReplaced();
   state_->frameNumber = frame;
   state_->readBackUpTo(completedFrame);
   while (!state_->retired.empty() && state_->retired.front().frame <= completedFrame)
@@ -208,6 +215,23 @@ Result<std::span<JointMatrix>> SkinningSystem::writePose(PoseHandle pose) {
   const Result<PosePlace> place = state_->scene.writePose(pose);
   if (!place) return place.error();
   return state_->poseAt(*place);
+}
+Result<BufferRange> SkinningSystem::poseRange(PoseHandle pose) const {
+  const Result<PosePlace> place = state_->scene.posePlace(pose);
+  if (!place) return place.error();
+  const PoseMemory& memory = state_->poseBuffers[place->poseBuffer];
+  if (memory.mapped != nullptr) {
+    return Error{ErrorCode::invalidArgument,
+                 "pose " + std::to_string(pose.index) + " is written by the CPU: writePose"};
+  }
+  return BufferRange{memory.range.buffer, memory.range.offset + place->offset,
+                     place->jointCount * sizeof(JointMatrix)};
+}
+Result<void> SkinningSystem::markWritten(std::span<const PoseHandle> poses) {
+  return state_->scene.markWritten(poses);
+}
+Result<void> SkinningSystem::markAllWritten() {
+  return state_->scene.markAllWritten();
 }
 
 Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
@@ -246,12 +270,15 @@ Result<void> SkinningSystem::abandonFrame(std::uint64_t frame) {
 // -- What came of it.
 
 VkBuffer SkinningSystem::outputBuffer() const {
-  return state_->outputRange.buffer;
+  return state_->output.lastRange().buffer;
+}
+std::uint64_t SkinningSystem::outputGeneration() const {
+  return state_->outputGeneration;
 }
 Result<InstanceOutput> SkinningSystem::output(InstanceHandle instance) const {
   Result<InstanceOutput> output = state_->scene.output(instance);
   if (!output || output->size == 0) return output;
-  const VkDeviceSize begin = state_->outputRange.offset;
+  const VkDeviceSize begin = state_->output.lastRange().offset;
   output->offset += begin;
   for (OutputAttribute* attribute :
        {&output->positions, &output->normals, &output->tangents, &output->previousPositions}) {
@@ -269,7 +296,7 @@ std::span<const InstanceHandle> SkinningSystem::movedInstances() const {
   return state_->scene.movedInstances();
 }
 std::uint32_t SkinningSystem::instanceCapacity() const {
-  return state_->scene.description().instanceBudget;
+  return state_->scene.instanceCapacity();
 }
 Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) const {
   return state_->scene.visibilityIndex(instance);
@@ -277,8 +304,12 @@ Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) c
 
 SystemStatistics SkinningSystem::statistics() const {
   const SceneStatistics scene = state_->scene.statistics();
-  return {state_->frameStatistics, state_->gpuStatistics, scene.meshes,
-          scene.palettes,          scene.outputs,         state_->source.allocatedBytes};
+  return {state_->frameStatistics,
+          state_->gpuStatistics,
+          scene.meshes,
+          scene.palettes,
+          scene.outputs,
+          state_->blocks != nullptr ? state_->blocks->bytes() : state_->source.bytes};
 }
 
 Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle instance) const {

@@ -30,18 +30,29 @@ struct MeshUpload {
   SystemBuffer staging;
 };
 
+/// A buffer that poses stand in: the system's, or a range of the engine's.
+struct PoseMemory {
+  SystemBuffer own;
+  BufferRange range;
+  std::byte* mapped = nullptr;  ///< null if the GPU writes them
+};
+
 struct SkinningSystem::State {
   State(ContextState& context, Scene&& ownScene);
   ~State();
+
+  // system_buffers.cpp
   Result<void> createBuffers(const SkinningSystemDescription& description);
+  Result<void> grow(const BufferGrowth& growth);
+  Result<void> makeRoom();
+  bool isGrowing() const;
+  Recorded recordGrowth(VkCommandBuffer commandBuffer);
+  void retireReplaced();
+  void abandonGrowth();
 
   // frame.cpp
-  Result<void> makeRoomForTables();
-  Result<void> makeHistory();
-  std::span<JointMatrix> poseAt(const PosePlace& place);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   Recorded recordUploads(VkCommandBuffer commandBuffer);
-  void retireUploads();
   void abandonRecord();
   FrameBuffers buffersOf(const FrameDescription& frame);
 
@@ -53,17 +64,27 @@ struct SkinningSystem::State {
     return static_cast<std::uint32_t>(recordCount % slots.size());
   }
   FrameSlot& slot() { return slots[slotNumber()]; }
+  /// Of a pose that the CPU writes.
+  std::span<JointMatrix> poseAt(const PosePlace& place) {
+    std::byte* const begin = poseBuffers[place.poseBuffer].mapped + place.offset;
+    return {reinterpret_cast<JointMatrix*>(begin), place.jointCount};
+  }
 
   ContextState* context;  ///< stays where it is when the Context is moved
   SystemFunctions functions;
   std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
   BufferSource source;
   Scene scene;
-  Plan plan;  ///< of the frame
+  std::unique_ptr<State*> self;  ///< what the scene's growth callback is given
+  Plan plan;                     ///< of the frame
 
-  SystemBuffer meshes, poses, palettes, output, results, tables, history, counters;
-  BufferRange outputRange;  ///< of `output`, or the engine's
+  GrowingBuffer meshes, palettes, output, results, history;
+  std::vector<PoseMemory> poseBuffers;  ///< by their numbers
+  SystemBuffer tables, counters;
   Bindings bindings;
+  bool bindingsAreOld = true;
+  std::uint64_t outputGeneration = 1;
+  VkBufferUsageFlags outputUsage = 0;  ///< the engine's
   /// Without push descriptors: one for each slot.
   VkDescriptorPool visibilityPool = VK_NULL_HANDLE;
   std::vector<VkDescriptorSet> visibilitySets;
@@ -73,6 +94,12 @@ struct SkinningSystem::State {
   std::vector<FrameSlot> slots;
   std::vector<MeshUpload> uploads;
   std::vector<MeshUpload> recordedUploads;  ///< by the last `record`
+  /// What the last `record` replaced by larger buffers.
+  struct Replaced {
+    GrowingBuffer* buffer;
+    SystemBuffer old;
+  };
+  std::vector<Replaced> replaced;
 
   /// What frames in flight may still use.
   struct Retired {

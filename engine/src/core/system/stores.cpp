@@ -1,0 +1,142 @@
+// Room in the buffers of a scene, and how they grow.
+
+#include <algorithm>
+#include <string>
+
+#include "system/books.h"
+
+namespace dermis {
+namespace {
+
+constexpr std::uint64_t leastJoints = 256;  ///< of a pose buffer
+
+/// All sizes that one store has a part in. An output may be larger than a storage buffer range.
+void setSize(PlanSizes& sizes, BufferRole role, std::uint64_t units) {
+  switch (role) {
+    case BufferRole::meshes:
+      sizes.meshes = units;
+      break;
+    case BufferRole::palettes:
+      sizes.palettes = units * unitBytes;
+      break;
+    case BufferRole::results:
+      sizes.results = static_cast<std::uint32_t>(units);
+      break;
+    default:
+      sizes.outputs = OutputSizes::oneBuffer(units);
+  }
+}
+
+}  // namespace
+
+PlanSizes SceneBooks::sizes() const {
+  PlanSizes sizes;
+  sizes.isScene = true;
+  sizes.slots = static_cast<std::uint32_t>(slotCapacity_);
+  for (const Store* store : {&meshStore_, &unitStore_, &outputStore_, &resultStore_})
+    setSize(sizes, store->role, store->ranges.capacity());
+  return sizes;
+}
+
+Result<void> SceneBooks::growBuffer(BufferRole role, const PlanSizes& sizes,
+                                    std::uint32_t poseBuffer) {
+  const GrowthCallback& growth = description_.growth;
+  return growth.grow(growth.user,
+                     {role, sizes.requirement(role, 0, description_.limits), poseBuffer});
+}
+
+/// To at least so many units, which is not more than the maximum: at least twice as many as now, so
+/// that a scene that grows by small steps copies little.
+Result<void> SceneBooks::grow(Store& store, std::uint64_t least) {
+  const std::uint64_t twice = store.ranges.capacity() * 2;
+  const std::uint64_t capacity = std::min(std::max(least, twice), store.capacity.maximum);
+  PlanSizes grown = sizes();
+  setSize(grown, store.role, capacity);
+  if (Result<void> made = growBuffer(store.role, grown); !made) return made;
+  store.ranges.grow(capacity);
+  if (store.role != BufferRole::palettes) return {};
+  // The larger buffer is empty.
+  for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
+    if (!poses_.isUsed(index)) continue;
+    for (ScenePose::Form& form : poses_.at(index).forms) form.version = 0;
+  }
+  return {};
+}
+
+/// Nothing where the maximum is too small. Fails if growing does.
+Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
+                                              std::uint64_t alignment) {
+  if (const std::optional<Range> range = store.ranges.allocate(size, alignment)) return range;
+  if (size > store.capacity.maximum) return std::optional<Range>();
+  // Whole units that the buffer's readers read at once.
+  std::uint64_t least = store.ranges.capacityFor(size, alignment);
+  if (store.role == BufferRole::meshes) least = (least + 15) / 16 * 16;
+  if (store.role == BufferRole::positions) least = (least + 3) / 4 * 4;
+  if (least > store.capacity.maximum) return std::optional<Range>();
+  if (Result<void> grown = grow(store, least); !grown) return grown.error();
+  return store.ranges.allocate(size, alignment);
+}
+
+/// A store that is as large as it may become has no room.
+Error SceneBooks::noRoom(const std::string& what, const Store& store, const char* unit) {
+  const RangeAllocator& ranges = store.ranges;
+  return {ErrorCode::limitExceeded,
+          what + ", of " + std::to_string(ranges.capacity()) + " " + unit + ", " +
+              (ranges.capacity() < store.capacity.maximum
+                   ? "at most " + std::to_string(store.capacity.maximum) + ", "
+                   : std::string()) +
+              std::to_string(ranges.capacity() - ranges.used()) + " are free, " +
+              std::to_string(ranges.largestFree()) + " in one piece"};
+}
+
+PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
+  const PoseStore& store = poseBuffers_[number];
+  const bool isCpu = store.writer == PoseWriter::cpu;
+  PlanSizes sizes;
+  sizes.isScene = true;
+  sizes.poses = sizes.gpuPoses = store.joints.capacity() * sizeof(JointMatrix);
+  return {store.writer, sizes.requirement(isCpu ? BufferRole::poses : BufferRole::gpuPoses, 0,
+                                          description_.limits)};
+}
+
+/// Matrices one behind the other, in all slots, and their buffer: one more where none has room.
+Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
+                                                    std::uint32_t& buffer) {
+  const std::uint64_t slots = slotsOf(writer);
+  std::uint64_t total = 0;
+  for (buffer = 0; buffer < poseBuffers_.size(); ++buffer) {
+    PoseStore& store = poseBuffers_[buffer];
+    if (store.writer != writer) continue;
+    if (const std::optional<Range> range = store.joints.allocate(count * slots, 1)) return range;
+    total += store.joints.capacity() / slots;
+  }
+  const bool isCpu = writer == PoseWriter::cpu;
+  const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
+  const std::uint64_t largest =
+      description_.limits.maxStorageBufferRange / sizeof(JointMatrix) / slots;
+  const std::uint64_t most =
+      std::min(largest, capacity.maximum - std::min(capacity.maximum, total));
+  if (count > most) return std::optional<Range>();
+  const std::uint64_t joints = std::min(std::max({count, total, leastJoints}), most) * slots;
+  PlanSizes added;
+  added.isScene = true;
+  added.poses = added.gpuPoses = joints * sizeof(JointMatrix);
+  if (Result<void> made =
+          growBuffer(isCpu ? BufferRole::poses : BufferRole::gpuPoses, added, buffer);
+      !made)
+    return made.error();
+  return poseBuffers_.emplace_back(PoseStore{writer, RangeAllocator(joints)})
+      .joints.allocate(count * slots, 1);
+}
+
+/// Whether there may be one more instance. Nothing is allocated for it here: history and visibility
+/// words are as many as the next plan says.
+bool SceneBooks::makeSlot() {
+  if (instances_.hasHole() || instances_.capacity() < slotCapacity_) return true;
+  if (slotCapacity_ >= description_.instanceCapacity.maximum) return false;
+  slotCapacity_ = std::min(std::max<std::uint64_t>(slotCapacity_ * 2, 16),
+                           description_.instanceCapacity.maximum);
+  return true;
+}
+
+}  // namespace dermis

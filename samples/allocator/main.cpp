@@ -1,0 +1,272 @@
+// An engine with its own allocator and one global vertex buffer, which loses a frame: every buffer
+// of Dermis comes from the engine, and what was recorded in the frame that was never submitted is
+// recorded again.
+//
+//   dermis_allocator
+//
+// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+
+#include <vulkan/vulkan.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "dermis/verify/accuracy.h"
+#include "dermis/vulkan/vulkan.h"
+
+using namespace dermis;
+
+constexpr std::uint32_t vertexCount = 200, frameCount = 4, lostFrame = 3;
+
+/// The value, or the end of the program.
+template <typename T>
+T must(Result<T> result) {
+  if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
+  if constexpr (!std::is_void_v<T>) return *std::move(result);
+}
+void must(VkResult result) {
+  if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
+}
+
+/// A Vulkan structure of which nothing but the type is set.
+template <typename T>
+T structure(VkStructureType type) {
+  T made{};
+  made.sType = type;
+  return made;
+}
+
+// -- What an engine has anyway.
+
+struct Engine {
+  VkInstance instance;
+  VkPhysicalDevice physicalDevice;
+  VkDevice device;
+  VkQueue queue;
+  VkCommandBuffer commandBuffer;
+};
+
+Engine makeEngine() {
+  Engine engine{};
+  auto application = structure<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
+  application.apiVersion = VK_API_VERSION_1_1;
+  auto instanceInfo = structure<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
+  instanceInfo.pApplicationInfo = &application;
+  must(vkCreateInstance(&instanceInfo, nullptr, &engine.instance));
+  std::uint32_t one = 1;  // the first device, and its first family of queues
+  vkEnumeratePhysicalDevices(engine.instance, &one, &engine.physicalDevice);
+  if (one == 0) must(VK_ERROR_INITIALIZATION_FAILED);
+  const float priority = 1;
+  auto queueInfo = structure<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+  queueInfo.queueCount = 1;
+  queueInfo.pQueuePriorities = &priority;
+  auto deviceInfo = structure<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
+  deviceInfo.queueCreateInfoCount = 1;
+  deviceInfo.pQueueCreateInfos = &queueInfo;
+  must(vkCreateDevice(engine.physicalDevice, &deviceInfo, nullptr, &engine.device));
+  vkGetDeviceQueue(engine.device, 0, 0, &engine.queue);
+  auto poolInfo = structure<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+  poolInfo.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  VkCommandPool pool = VK_NULL_HANDLE;
+  must(vkCreateCommandPool(engine.device, &poolInfo, nullptr, &pool));
+  auto commandInfo =
+      structure<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  commandInfo.commandPool = pool;
+  commandInfo.commandBufferCount = 1;
+  must(vkAllocateCommandBuffers(engine.device, &commandInfo, &engine.commandBuffer));
+  return engine;
+}
+
+/// The engine's allocator: here a VkDeviceMemory for each buffer.
+struct Allocation {
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  void* mapped = nullptr;
+};
+class Allocator {
+ public:
+  explicit Allocator(const Engine& engine) : engine_(engine) {
+    vkGetPhysicalDeviceMemoryProperties(engine.physicalDevice, &properties_);
+  }
+
+  VkResult createBuffer(const VkBufferCreateInfo& info, VkMemoryPropertyFlags wanted,
+                        VkBuffer& buffer, Allocation& allocation) {
+    must(vkCreateBuffer(engine_.device, &info, nullptr, &buffer));
+    VkMemoryRequirements needed{};
+    vkGetBufferMemoryRequirements(engine_.device, buffer, &needed);
+    auto memoryInfo = structure<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
+    memoryInfo.allocationSize = needed.size;
+    while ((needed.memoryTypeBits >> memoryInfo.memoryTypeIndex & 1) == 0 ||
+           (properties_.memoryTypes[memoryInfo.memoryTypeIndex].propertyFlags & wanted) != wanted)
+      ++memoryInfo.memoryTypeIndex;
+    const VkResult result =
+        vkAllocateMemory(engine_.device, &memoryInfo, nullptr, &allocation.memory);
+    if (result != VK_SUCCESS) return result;
+    ++buffers;
+    bytes += info.size;
+    if ((wanted & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0)
+      must(vkMapMemory(engine_.device, allocation.memory, 0, VK_WHOLE_SIZE, 0, &allocation.mapped));
+    return vkBindBufferMemory(engine_.device, buffer, allocation.memory, 0);
+  }
+  void destroyBuffer(VkBuffer buffer, const Allocation& allocation) {
+    --buffers;
+    vkDestroyBuffer(engine_.device, buffer, nullptr);
+    vkFreeMemory(engine_.device, allocation.memory, nullptr);
+  }
+
+  std::uint32_t buffers = 0;  ///< that there are
+  std::uint64_t bytes = 0;    ///< that were ever asked for
+
+ private:
+  const Engine& engine_;
+  VkPhysicalDeviceMemoryProperties properties_{};
+};
+
+// -- The two functions that Dermis calls.
+
+constexpr VkMemoryPropertyFlags mappedMemory =
+    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
+Result<vulkan::CreatedBuffer> createForDermis(void* user, const vulkan::BufferRequest& request) {
+  vulkan::CreatedBuffer created;
+  auto* allocation = new Allocation;
+  const VkMemoryPropertyFlags wanted = request.use == vulkan::BufferUse::device ? 0 : mappedMemory;
+  const VkResult result = static_cast<Allocator*>(user)->createBuffer(request.info, wanted,
+                                                                      created.buffer, *allocation);
+  created.mapped = allocation->mapped;
+  created.allocation = allocation;
+  if (result == VK_SUCCESS) return created;
+  return Error{ErrorCode::vulkanError, "the engine is out of memory", result};
+}
+
+void destroyForDermis(void* user, const vulkan::CreatedBuffer& created) {
+  auto* allocation = static_cast<Allocation*>(created.allocation);
+  static_cast<Allocator*>(user)->destroyBuffer(created.buffer, *allocation);
+  delete allocation;
+}
+
+void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
+  const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
+  vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
+                       &memory, 0, nullptr, 0, nullptr);
+}
+
+// -- The character: a strip of two joints.
+
+struct Strip {
+  float positions[vertexCount][3], normals[vertexCount][3], weights[vertexCount][2];
+  std::uint8_t joints[vertexCount][2];
+};
+
+int main() {
+  static Strip strip{};
+  for (std::uint32_t i = 0; i < vertexCount; ++i) {
+    const float along = static_cast<float>(i / 2) / (vertexCount / 2 - 1);
+    strip.positions[i][0] = i % 2 == 0 ? -0.1f : 0.1f;
+    strip.positions[i][1] = 2 * along;
+    strip.normals[i][2] = 1;
+    strip.weights[i][0] = 1 - along;
+    strip.weights[i][1] = along;
+    strip.joints[i][1] = 1;
+  }
+  const Engine engine = makeEngine();
+  Allocator allocator(engine);
+
+  InfluenceSet influences;
+  influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
+  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  MeshView mesh;
+  mesh.name = "strip";
+  mesh.vertexCount = vertexCount;
+  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
+  mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
+  mesh.influenceSets = {&influences, 1};
+
+  vulkan::DeviceDescription device;
+  device.instance = engine.instance;
+  device.physicalDevice = engine.physicalDevice;
+  device.device = engine.device;
+  device.getInstanceProcAddr = vkGetInstanceProcAddr;
+  vulkan::Context context = must(vulkan::Context::create(device));
+
+  // -- Dermis: its outputs go to a part of the vertex buffer that the engine has for everything.
+  vulkan::SkinningSystemDescription description;
+  description.context = &context;
+  description.buffers = {&allocator, createForDermis, destroyForDermis};
+  description.outputCapacity = Capacity::fixed(64 << 10);
+  const BufferRequirement needed =
+      must(vulkan::SkinningSystem::requirement(description, BufferRole::positions));
+  auto vertexInfo = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+  vertexInfo.size = 1 << 20;
+  vertexInfo.usage = needed.usage | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
+  VkBuffer vertexBuffer = VK_NULL_HANDLE;
+  Allocation vertexMemory;  // mapped, to look at the vertices
+  must(allocator.createBuffer(vertexInfo, mappedMemory, vertexBuffer, vertexMemory));
+  const VkDeviceSize begin = (300'000 / needed.alignment + 1) * needed.alignment;
+  description.output = {vertexBuffer, begin, needed.size};
+
+  int status = 1;
+  {
+    vulkan::SkinningSystem scene = must(vulkan::SkinningSystem::create(description));
+    InstanceDescription figure;
+    figure.mesh = must(scene.addMesh(must(pack(mesh, 2))));
+    figure.pose = must(scene.addPose(2));
+    figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
+    must(scene.prepare(pipelineNeeds(figure)));
+    const InstanceHandle instance = must(scene.addInstance(figure));
+
+    // -- Each frame.
+    std::vector<JointMatrix> pose(2);
+    std::uint32_t submitted = 0;
+    for (std::uint32_t frame = 1; frame <= frameCount; ++frame) {
+      must(scene.beginFrame(frame, submitted));
+      if (frame <= lostFrame) {  // it rests from then on
+        const float angle = 0.5f * static_cast<float>(frame);
+        pose[1] = {{{std::cos(angle), 0, std::sin(angle), 0},
+                    {0, 1, 0, 0},
+                    {-std::sin(angle), 0, std::cos(angle), 0}}};
+        std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
+      }
+      auto beginInfo =
+          structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+      must(vkBeginCommandBuffer(engine.commandBuffer, &beginInfo));
+      barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+      must(scene.record(engine.commandBuffer));
+      barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput) |
+                                        vulkan::outputScope(vulkan::Consumer::hostRead));
+      must(vkEndCommandBuffer(engine.commandBuffer));
+      if (frame == lostFrame) {
+        // As after VK_ERROR_OUT_OF_DATE_KHR: the commands are not submitted.
+        must(scene.abandonFrame(frame));
+        continue;
+      }
+      auto submit = structure<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+      submit.commandBufferCount = 1;
+      submit.pCommandBuffers = &engine.commandBuffer;
+      must(vkQueueSubmit(engine.queue, 1, &submit, VK_NULL_HANDLE));
+      must(vkQueueWaitIdle(engine.queue));
+      submitted = frame;
+    }
+
+    // -- The proof: the pose of the lost frame, by the frame after it.
+    const InstanceOutput output = must(scene.output(instance));
+    const auto* vertices = reinterpret_cast<const float*>(
+        static_cast<const std::byte*>(vertexMemory.mapped) + output.offset);
+    SkinnedView skinned;
+    skinned.positions = {vertices, vertexCount, 24, VertexFormat::float32x3};
+    skinned.normals = {vertices + 3, vertexCount, 24, VertexFormat::float32x3};
+    const auto expected = must(reference::skin(mesh, pose, Method::dualQuaternion));
+    const Comparison comparison = must(compareWithReference(expected, skinned));
+    std::printf("%u buffers, %llu bytes from the engine, a lost frame: %s\n", allocator.buffers,
+                static_cast<unsigned long long>(allocator.bytes),
+                comparison.passed() ? "every vertex is right" : "WRONG");
+    status = comparison.passed() && output.offset >= begin ? 0 : 1;
+  }
+  allocator.destroyBuffer(vertexBuffer, vertexMemory);
+  return allocator.buffers == 0 ? status : 1;  // the operating system takes the device back
+}

@@ -1,0 +1,355 @@
+// Buffers that grow, ranges of the engine's, and poses from the GPU.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "buffer.h"
+#include "command_log.h"
+#include "system_test.h"
+
+namespace dermis::test {
+namespace {
+
+using vulkan::BufferRange;
+using vulkan::SkinningSystem;
+using vulkan::SkinningSystemDescription;
+
+class SystemGrowthTest : public SystemTest {
+ protected:
+  /// A system in which nearly nothing has room.
+  SkinningSystemDescription tiny() {
+    SkinningSystemDescription tiny = description();
+    tiny.meshCapacity = {16};
+    tiny.jointCapacity = {1};
+    tiny.gpuJointCapacity = {0};
+    tiny.outputCapacity = {4};
+    tiny.instanceCapacity = {1};
+    tiny.boundsCapacity = {0};
+    return tiny;
+  }
+};
+
+TEST_F(SystemGrowthTest, ASceneOfOneCharacterTakesLessThanAMebibyte) {
+  SkinningSystemDescription defaults;
+  defaults.context = &context();
+  defaults.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+  const PackedMesh character = systemMesh(1, 3273, 19);
+  SystemEngine engine(device(), defaults);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.bounds = true;
+  instance.mesh = engine.addMesh(character);
+  instance.pose = engine.addPose(systemPose(1, 19));
+  const InstanceHandle handle = engine.addInstance(instance);
+  engine.submit();
+  engine.runFrame();
+  engine.runFrame();
+  engine.begin();  // what the upload took is free
+  const vulkan::SystemStatistics statistics = engine->statistics();
+  const std::uint64_t beside = statistics.deviceMemory - statistics.outputs.capacity;
+  RecordProperty("kibibytes", static_cast<int>(beside >> 10));
+  std::printf("a character of %zu bytes takes %llu KiB beside its output\n",
+              character.bytes().size(), static_cast<unsigned long long>(beside >> 10));
+  EXPECT_LT(beside, 1u << 20);
+  engine.submit();
+  expectSkinned(engine.read(handle), alone(character, systemPose(1, 19), instance));
+}
+
+TEST_F(SystemGrowthTest, WhatStandsInAnOutputThatGrowsStaysAndTheEngineIsTold) {
+  SystemEngine engine(device(), tiny());
+  const PackedMesh mesh = systemMesh(1, 100);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.mesh = engine.addMesh(mesh);
+  instance.pose = engine.addPose(systemPose(1));
+  const InstanceHandle first = engine.addInstance(instance);
+  engine.submit();
+  engine.runFrame();
+  engine.begin();
+  const VkBuffer before = engine->outputBuffer();
+  const std::uint64_t generation = engine->outputGeneration();
+  const InstanceOutput place = must(engine->output(first));
+  for (std::uint32_t i = 0; i < 20; ++i) engine.addInstance(instance);
+  EXPECT_EQ(engine->outputBuffer(), before) << "until it is recorded";
+  EXPECT_EQ(engine->outputGeneration(), generation);
+  engine.submit();
+  EXPECT_NE(engine->outputBuffer(), before);
+  EXPECT_NE(engine->outputGeneration(), generation);
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 20u) << "the first one is copied";
+  EXPECT_TRUE(engine->movedInstances().empty());
+  EXPECT_EQ(must(engine->output(first)).offset, place.offset);
+  expectSkinned(engine.read(first), alone(mesh, systemPose(1), instance));
+}
+
+TEST_F(SystemGrowthTest, AnAbandonedFrameGrowsAgain) {
+  SystemEngine engine(device(), tiny());
+  const PackedMesh mesh = systemMesh(1, 100);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.mesh = engine.addMesh(mesh);
+  instance.pose = engine.addPose(systemPose(1));
+  std::vector<InstanceHandle> instances{engine.addInstance(instance)};
+  engine.submit();
+  engine.begin(1);
+  const VkBuffer before = engine->outputBuffer();
+  for (int i = 0; i < 5; ++i) instances.push_back(engine.addInstance(instance));
+  std::uint64_t recorded = 0;
+  engine.abandon({}, [&] {
+    EXPECT_NE(engine->outputBuffer(), before);
+    recorded = engine->outputGeneration();
+    // It has to grow once more before the last growth was ever executed.
+    for (int i = 0; i < 30; ++i) instances.push_back(engine.addInstance(instance));
+  });
+  EXPECT_EQ(engine->outputBuffer(), before);
+  EXPECT_NE(engine->outputGeneration(), recorded);
+  engine.begin(1);
+  engine.submit();
+  const std::vector<std::byte> bytes = engine.readOutput();
+  for (const InstanceHandle handle : instances)
+    expectSkinned(engine.read(bytes, handle), alone(mesh, systemPose(1), instance));
+}
+
+// With sets instead of pushed descriptors. The validation layer reports a set that is written, and
+// a buffer that is destroyed, while a frame in flight uses it.
+TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
+  vulkan::DeviceDescription lent = device().description();
+  lent.enabledExtensions = {};
+  vulkan::Context withSets = must(vulkan::Context::create(lent));
+  SkinningSystemDescription system = tiny();
+  system.context = &withSets;
+  system.framesInFlight = 3;
+  SystemEngine engine(device(), system);
+  const PackedMesh mesh = systemMesh(1, 100);
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.bounds = true;
+  std::vector<InstanceHandle> instances;
+  for (int frame = 0; frame < 12; ++frame) {
+    engine.begin(2);
+    instance.mesh = engine.addMesh(mesh);
+    instance.pose = engine.addPose(systemPose(1),
+                                   {.writer = frame % 2 == 0 ? PoseWriter::cpu : PoseWriter::gpu});
+    for (int i = 0; i <= frame * 2; ++i) instances.push_back(engine.addInstance(instance));
+    engine.submit();
+  }
+  const std::vector<std::byte> bytes = engine.readOutput();
+  for (const InstanceHandle handle : instances)
+    expectSkinned(engine.read(bytes, handle), alone(mesh, systemPose(1), instance));
+}
+
+TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
+  SkinningSystemDescription small = tiny();
+  const PackedMesh mesh = systemMesh(1, 100);
+  small.meshCapacity.maximum = 2 * mesh.bytes().size() + 64;
+  small.jointCapacity = {8, 20};
+  small.gpuJointCapacity.maximum = 20;
+  small.outputCapacity.maximum = 10'000;
+  small.boundsCapacity.maximum = 1;
+  small.instanceCapacity.maximum = 2;
+  SkinningSystem system = must(SkinningSystem::create(small));
+  const auto expectRefused = [](const auto& result, const std::string& text) {
+    ASSERT_FALSE(result.ok()) << text;
+    EXPECT_EQ(result.error().code, ErrorCode::limitExceeded) << result.error().message;
+    EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
+  };
+  const MeshHandle first = must(system.addMesh(mesh));
+  must(system.addMesh(mesh));
+  expectRefused(system.addMesh(mesh), "a packed mesh takes");
+  const PoseHandle pose = must(system.addPose(8));
+  must(system.addPose(12));
+  expectRefused(system.addPose(1), "the CPU writes, at most 20");
+  must(system.addPose(20, {.writer = PoseWriter::gpu}));
+  expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}), "the GPU writes, at most 20");
+  InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
+  instance.bounds = true;
+  must(system.addInstance(instance));
+  expectRefused(system.addInstance(instance), "as many as there may be, 1");
+  instance.bounds = false;
+  must(system.addInstance(instance));
+  expectRefused(system.addInstance(instance), "as many instances as there may be, 2");
+  const MeshHandle none = {};
+  EXPECT_FALSE(system.removeMesh(none).ok());
+}
+
+TEST_F(SystemGrowthTest, TheOutputGrowsToItsMaximumAndNoFurther) {
+  SkinningSystemDescription small = tiny();
+  small.outputCapacity.maximum = 9 * 100 * 36;
+  SystemEngine engine(device(), small);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.mesh = engine.addMesh(systemMesh(1, 100));
+  instance.pose = engine.addPose(systemPose(1));
+  for (int i = 0; i < 9; ++i) engine.addInstance(instance);
+  const Result<InstanceHandle> tenth = engine->addInstance(instance);
+  ASSERT_FALSE(tenth.ok());
+  EXPECT_EQ(tenth.error().code, ErrorCode::limitExceeded);
+  EXPECT_NE(tenth.error().message.find("of 32400 bytes of output, 0 are free"), std::string::npos)
+      << tenth.error().message;
+  EXPECT_EQ(engine->statistics().outputs.capacity, 32400u);
+  engine.submit();
+}
+
+/// Guards around what the system may use of one buffer of the engine's, in which all stands.
+TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
+  constexpr std::uint64_t part = 64 << 10, guard = 4096;
+  SkinningSystemDescription ranged = description();
+  VkBufferUsageFlags usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  for (const BufferRole role :
+       {BufferRole::meshes, BufferRole::poses, BufferRole::gpuPoses, BufferRole::positions}) {
+    const BufferRequirement needed = must(SkinningSystem::requirement(ranged, role));
+    EXPECT_EQ(guard % needed.alignment, 0u);
+    EXPECT_NE(needed.usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, 0u);
+    usage |= needed.usage;
+  }
+  samples::MappedBuffer heap =
+      must(samples::MappedBuffer::create(device(), 4 * part + 5 * guard, usage));
+  std::ranges::fill(heap.bytes(), std::byte{0x5a});
+  const auto rangeOf = [&](std::uint64_t number) {
+    return BufferRange{heap.handle(), guard + number * (part + guard), part};
+  };
+  ranged.meshes = rangeOf(0);
+  ranged.poses = {rangeOf(1), heap.bytes().data() + rangeOf(1).offset};
+  ranged.gpuPoses = rangeOf(2);
+  ranged.output = rangeOf(3);
+  ranged.outputCapacity = Capacity::fixed(heap.bytes().size());  // what the test reads
+  SystemEngine engine(device(), ranged);
+  engine.begin();
+  const PackedMesh mesh = systemMesh(1, 200);
+  std::vector<InstanceHandle> instances;
+  std::vector<InstanceDescription> descriptions;
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    if (i % 3 == 0) instance.mesh = engine.addMesh(mesh);
+    instance.method = i % 2 == 0 ? Method::linear : Method::dualQuaternion;
+    instance.pose =
+        engine.addPose(systemPose(i), {.writer = i < 3 ? PoseWriter::gpu : PoseWriter::cpu});
+    descriptions.push_back(instance);
+    instances.push_back(engine.addInstance(instance));
+  }
+  const BufferRange pose = must(engine->poseRange(descriptions[0].pose));
+  EXPECT_EQ(pose.buffer, heap.handle());
+  EXPECT_GE(pose.offset, ranged.gpuPoses.offset);
+  engine.submit();
+  const std::vector<std::byte> bytes = engine.readOutput();
+  for (std::uint32_t i = 0; i < 6; ++i)
+    expectSkinned(engine.read(bytes, instances[i]), alone(mesh, systemPose(i), descriptions[i]));
+  for (std::uint64_t byte = 0; byte < bytes.size(); ++byte) {
+    if (byte % (part + guard) >= guard) continue;
+    ASSERT_EQ(bytes[byte], std::byte{0x5a}) << "byte " << byte << " is the engine's";
+  }
+  // A range is full where it ends.
+  Result<MeshHandle> added = MeshHandle{};
+  while (added) added = engine->addMesh(mesh);
+  EXPECT_EQ(added.error().code, ErrorCode::limitExceeded);
+  Result<PoseHandle> another = PoseHandle{};
+  std::uint32_t count = 0;
+  for (; another; ++count) another = engine->addPose(100);
+  EXPECT_EQ(count - 1, (part - 3 * 8 * 2 * sizeof(JointMatrix)) / (100 * 2 * sizeof(JointMatrix)));
+  EXPECT_FALSE(engine->addPose(2000, {.writer = PoseWriter::gpu}).ok());
+}
+
+TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {
+  samples::MappedBuffer buffer =
+      must(samples::MappedBuffer::create(device(), 1 << 16, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+  const BufferRange good{buffer.handle(), 0, 4096}, odd{buffer.handle(), 0, 1026};
+  const auto expectRefused = [&](const char* field, const auto& change) {
+    SkinningSystemDescription bad = description();
+    change(bad);
+    const Result<SkinningSystem> system = SkinningSystem::create(bad);
+    ASSERT_FALSE(system.ok()) << field;
+    EXPECT_EQ(system.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(system.error().message.find(std::string("::") + field), std::string::npos)
+        << system.error().message;
+  };
+  using Description = SkinningSystemDescription;
+  expectRefused("meshes ", [&](Description& d) { d.meshes = odd; });
+  expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = odd; });
+  expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = {buffer.handle(), 0, 44}; });
+  expectRefused("poses.range ", [&](Description& d) { d.poses = {odd, buffer.bytes().data()}; });
+  expectRefused("poses ", [&](Description& d) { d.poses.range = good; });
+  expectRefused("poses ", [&](Description& d) { d.poses.mapped = buffer.bytes().data(); });
+}
+
+TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
+  SkinningSystem system = must(SkinningSystem::create(tiny()));
+  std::vector<PoseHandle> poses(1000);
+  must(system.addPoses(poses, 7, {.writer = PoseWriter::gpu}));
+  const BufferRange first = must(system.poseRange(poses[0]));
+  EXPECT_EQ(first.size, 7 * sizeof(JointMatrix));
+  for (std::uint32_t i = 0; i < poses.size(); ++i) {
+    const BufferRange range = must(system.poseRange(poses[i]));
+    EXPECT_EQ(range.buffer, first.buffer);
+    EXPECT_EQ(range.offset, first.offset + i * first.size);
+  }
+  std::vector<PoseHandle> others(50);
+  must(system.addPoses(others, 300, {.writer = PoseWriter::gpu}));
+  EXPECT_EQ(must(system.poseRange(poses[0])).buffer, first.buffer) << "poses never move";
+  must(system.addPoses({}, 7));
+}
+
+TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
+  SystemEngine engine(device(), tiny());
+  const PoseHandle ofGpu = must(engine->addPose(4, {.writer = PoseWriter::gpu}));
+  const PoseHandle ofCpu = must(engine->addPose(4));
+  EXPECT_FALSE(engine->markWritten({&ofGpu, 1}).ok()) << "no frame has begun";
+  engine.begin();
+  const auto expectRefused = [](const auto& result, const std::string& text) {
+    ASSERT_FALSE(result.ok()) << text;
+    EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
+  };
+  expectRefused(engine->writePose(ofGpu), "is written by the GPU: markWritten");
+  expectRefused(engine->markWritten({&ofCpu, 1}), "is written by the CPU: writePose");
+  expectRefused(engine->poseRange(ofCpu), "is written by the CPU: writePose");
+  must(engine->markWritten({&ofGpu, 1}));
+  must(engine->markAllWritten());
+  must(engine->removePose(ofGpu));
+  expectRefused(engine->markWritten({&ofGpu, 1}), "there is no pose");
+  engine.submit();
+}
+
+// Bounds, too: what the model of system_model_test.cpp does not know.
+TEST_F(SystemGrowthTest, MarkedPosesAreSkinnedAndOthersRest) {
+  SystemEngine engine(device(), tiny());
+  const PackedMesh mesh = systemMesh(1, 100);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  instance.bounds = true;
+  instance.mesh = engine.addMesh(mesh);
+  std::vector<InstanceHandle> instances;
+  std::vector<PoseHandle> poses;
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    poses.push_back(engine.addPose(systemPose(i), {.writer = PoseWriter::gpu}));
+    instance.pose = poses.back();
+    instances.push_back(engine.addInstance(instance));
+  }
+  engine.submit();
+  engine.begin();
+  const std::optional<Box> before = must(engine->bounds(instances[2]));
+  engine.writePose(poses[2], systemPose(20));
+  engine.submit();
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 1u);
+  EXPECT_EQ(engine.lastFrame().convertedPoses, 1u);
+  expectSkinned(engine.read(instances[2]), alone(mesh, systemPose(20), instance));
+  engine.begin();
+  const std::optional<Box> after = must(engine->bounds(instances[2]));
+  ASSERT_TRUE(before && after);
+  EXPECT_NE(before->min, after->min);
+  must(engine->markAllWritten());
+  engine.submit();
+  EXPECT_EQ(engine.lastFrame().skinnedInstances, 4u);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    expectSkinned(engine.read(instances[i]), alone(mesh, systemPose(i == 2 ? 20 : i), instance));
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
