@@ -5,7 +5,9 @@ target_compile_options(dermis_build_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Wold-style-cast
   -Wimplicit-fallthrough -Wundef
   # One rounding an operation, on every machine: the reference and the packing must not depend on fused operations.
-  -ffp-contract=off)
+  -ffp-contract=off
+  # Position-independent code may be inlined too: nobody replaces a function of Dermis while a program is loaded.
+  -fno-semantic-interposition)
 if(DERMIS_WARNINGS_AS_ERRORS)
   target_compile_options(dermis_build_flags INTERFACE -Werror)
 endif()
