@@ -211,7 +211,8 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
       std::ranges::copy(palette, place->begin());
     }
     if (part.primitive->morphTargets.empty()) continue;
-    if (Result<void> set = system_->setMorphWeights(*posed.instance, pose.morphs[i]); !set)
+    if (Result<void> set = system_->change({.instance = *posed.instance, .morphs = pose.morphs[i]});
+        !set)
       return set;
   }
   return {};

@@ -171,10 +171,12 @@ Result<void> Crowd::move(const CrowdFigure& figure) {
     std::ranges::copy(character_->pose(now.pose, skin), pose->begin());
   }
   for (const InstanceHandle instance : figure.instances) {
-    Result<void> done = system_.setUpdateInterval(instance, now.updateInterval);
-    if (done && !options_.culledOnGpu) done = system_.setVisible(instance, now.isInView);
-    if (done && now.teleports) done = system_.teleport(instance);
-    if (!done) return done;
+    InstanceChange change;
+    change.instance = instance;
+    change.updateInterval = now.updateInterval;
+    if (!options_.culledOnGpu) change.visible = now.isInView;
+    change.teleports = now.teleports;
+    if (Result<void> done = system_.change(change); !done) return done;
   }
   return {};
 }

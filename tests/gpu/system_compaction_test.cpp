@@ -166,7 +166,7 @@ TEST_F(SystemCompactionTest, WhatGoesBeforeItMovesIsNoTrouble) {
   EXPECT_GT(system().compact(1 << 20), 0u);
   must(system().removeInstance(instances_[5]));
   const PackedMesh coarse = systemMesh(2, 40);
-  must(system().setMesh(instances_[4], engine_->addMesh(coarse)));
+  must(system().change({.instance = instances_[4], .mesh = engine_->addMesh(coarse)}));
   engine_->submit();
   for (const std::uint32_t number : {2u, 3u}) expectPose(number, 0, 0);
   EXPECT_TRUE(engine_->read(instances_[4]) == alone(coarse, systemPose(4), instance_));

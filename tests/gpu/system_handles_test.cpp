@@ -39,11 +39,12 @@ class SystemHandlesTest : public SystemTest {
   void expectStaleInstance(InstanceHandle instance) {
     SkinningSystem& system = engine().system();
     expectInvalid(system.removeInstance(instance), "removeInstance");
-    expectInvalid(system.setVisible(instance, false), "setVisible");
-    expectInvalid(system.setUpdateInterval(instance, 2), "setUpdateInterval");
-    expectInvalid(system.teleport(instance), "teleport");
-    expectInvalid(system.setMorphWeights(instance, {}), "setMorphWeights");
-    expectInvalid(system.setMesh(instance, one_->description.mesh), "setMesh");
+    expectInvalid(system.change({.instance = instance, .visible = false}), "visible");
+    expectInvalid(system.change({.instance = instance, .updateInterval = 2}), "updateInterval");
+    expectInvalid(system.change({.instance = instance, .teleports = true}), "teleports");
+    expectInvalid(system.change({.instance = instance, .morphs = std::span<const MorphWeight>()}),
+                  "morphs");
+    expectInvalid(system.change({.instance = instance, .mesh = one_->description.mesh}), "mesh");
     expectInvalid(system.output(instance), "output");
     expectInvalid(system.bounds(instance), "bounds");
     expectInvalid(system.visibilityIndex(instance), "visibilityIndex");
@@ -84,7 +85,7 @@ TEST_F(SystemHandlesTest, MeshesThatAreGoneAreNoticed) {
       InstanceDescription instance = one_->description;
       instance.mesh = mesh;
       expectInvalid(engine()->addInstance(instance), "addInstance");
-      expectInvalid(engine()->setMesh(one_->instance, mesh), "setMesh");
+      expectInvalid(engine()->change({.instance = one_->instance, .mesh = mesh}), "mesh");
       expectInvalid(engine()->removeMesh(mesh), "removeMesh");
     }
     engine().submit();
@@ -115,7 +116,7 @@ TEST_F(SystemHandlesTest, WhatAnInstanceUsesStays) {
   expectInvalid(engine()->removeMesh(first), "removeMesh");
   expectInvalid(engine()->removePose(one_->description.pose), "removePose");
   const MeshHandle second = engine().addMesh(systemMesh(2, 30));
-  must(engine()->setMesh(one_->instance, second));
+  must(engine()->change({.instance = one_->instance, .mesh = second}));
   must(engine()->removeMesh(first));
   expectInvalid(engine()->removeMesh(second), "removeMesh");
   must(engine()->removeInstance(one_->instance));
@@ -169,14 +170,18 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
 TEST_F(SystemHandlesTest, ChangesThatBreakARuleAreRefused) {
   const MorphWeight missing{3, 1}, twice[] = {{1, 1}, {1, 0.5f}};
   const MorphWeight infinite{0, std::numeric_limits<float>::infinity()};
-  expectInvalid(engine()->setMorphWeights(one_->instance, {&missing, 1}), "target");
-  expectInvalid(engine()->setMorphWeights(one_->instance, twice), "a target twice");
-  expectInvalid(engine()->setMorphWeights(one_->instance, {&infinite, 1}), "weight");
-  expectInvalid(engine()->setUpdateInterval(one_->instance, 0), "interval");
+  expectInvalid(engine()->change({.instance = one_->instance,
+                                  .morphs = std::span<const MorphWeight>(&missing, 1)}),
+                "target");
+  expectInvalid(engine()->change({.instance = one_->instance, .morphs = twice}), "a target twice");
+  expectInvalid(engine()->change({.instance = one_->instance,
+                                  .morphs = std::span<const MorphWeight>(&infinite, 1)}),
+                "weight");
+  expectInvalid(engine()->change({.instance = one_->instance, .updateInterval = 0}), "interval");
   expectInvalid(engine()->addPose(0), "addPose");
   EXPECT_FALSE(engine()->addPose(maxPoseJoints + 1).ok());
   const MeshHandle wide = engine().addMesh(systemMesh(2, 30, 50));
-  expectInvalid(engine()->setMesh(one_->instance, wide), "setMesh");
+  expectInvalid(engine()->change({.instance = one_->instance, .mesh = wide}), "mesh");
   engine().submit();
   expectSkinned(engine().read(one_->instance),
                 alone(one_->packed, systemPose(1), one_->description));

@@ -83,7 +83,7 @@ TEST_F(SystemInvocationsTest, WhatIsHiddenRunsNoInvocation) {
   engine_->begin();
   moveAll(100);
   for (std::uint32_t i = 6; i < instanceCount; ++i)
-    must((*engine_)->setVisible(instances_[i], false));
+    must((*engine_)->change({.instance = instances_[i], .visible = false}));
   engine_->submit();
   EXPECT_LE(invocations() * 5, all);
 }

@@ -199,7 +199,9 @@ void SystemModelTest::setMesh(ModelInstance& instance) {
   const auto mesh = anyMesh();
   if (mesh->first == instance.mesh) return;
   const std::uint32_t vertexCount = kinds_[mesh->second.kind].vertexCount();
-  if (const Result<void> set = system().setMesh(instance.handle, mesh->second.handle); !set) {
+  if (const Result<void> set =
+          system().change({.instance = instance.handle, .mesh = mesh->second.handle});
+      !set) {
     expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
     return;
   }
@@ -216,19 +218,21 @@ void SystemModelTest::changeInstance() {
     case 0:
     case 1:
       instance.isVisible = !instance.isVisible || chance(30);
-      return must(system().setVisible(instance.handle, instance.isVisible));
+      return must(system().change({.instance = instance.handle, .visible = instance.isVisible}));
     case 2:
       instance.morphs = (instance.morphs + 1 + below(2)) % 3;
       instance.isChanged = true;
-      return must(system().setMorphWeights(instance.handle, morphSets[instance.morphs]));
+      return must(
+          system().change({.instance = instance.handle, .morphs = morphSets[instance.morphs]}));
     case 3:
       if (instance.description.culledOnGpu) return;
       instance.description.updateInterval = chance(50) ? 1 : 2 + below(4);
       instance.waitedFrames = 0;
-      return must(system().setUpdateInterval(instance.handle, instance.description.updateInterval));
+      return must(system().change(
+          {.instance = instance.handle, .updateInterval = instance.description.updateInterval}));
     case 4:
       instance.teleports = instance.isChanged = true;
-      return must(system().teleport(instance.handle));
+      return must(system().change({.instance = instance.handle, .teleports = true}));
     default:
       return setMesh(instance);
   }
@@ -273,7 +277,7 @@ void SystemModelTest::tryStaleHandle() {
   if (gone_.empty()) return;
   const InstanceHandle stale = gone_[below(gone_.size())];
   EXPECT_FALSE(system().removeInstance(stale).ok());
-  EXPECT_FALSE(system().setVisible(stale, true).ok());
+  EXPECT_FALSE(system().change({.instance = stale, .visible = true}).ok());
   EXPECT_FALSE(system().output(stale).ok());
 }
 

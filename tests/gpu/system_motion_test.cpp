@@ -93,7 +93,7 @@ TEST_F(SystemMotionTest, ATeleportLeavesNoMotionBehind) {
   moveInFrame(2);
   engine().begin();
   move(3);
-  must(engine()->teleport(one_->instance));
+  must(engine()->change({.instance = one_->instance, .teleports = true}));
   engine().submit();
   expectMotion(3, 3);
   moveInFrame(4);
@@ -104,14 +104,14 @@ TEST_F(SystemMotionTest, WhatComesBackIntoViewDoesNotMove) {
   engine().submit();
   moveInFrame(2);
   engine().begin();
-  must(engine()->setVisible(one_->instance, false));
+  must(engine()->change({.instance = one_->instance, .visible = false}));
   engine().submit();
   EXPECT_FALSE(wasSkinned());
   EXPECT_EQ(engine().lastFrame().skinnedVertices, 0u);
   moveInFrame(3);
   EXPECT_FALSE(wasSkinned());
   engine().begin();
-  must(engine()->setVisible(one_->instance, true));
+  must(engine()->change({.instance = one_->instance, .visible = true}));
   engine().submit();
   EXPECT_TRUE(wasSkinned());
   expectMotion(3, 3);
@@ -124,13 +124,13 @@ TEST_F(SystemMotionTest, WhatComesBackInTheSamePoseDoesNotMove) {
   engine().submit();
   moveInFrame(2);
   engine().begin();
-  must(engine()->setVisible(one_->instance, false));
+  must(engine()->change({.instance = one_->instance, .visible = false}));
   engine().submit();
   EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
   EXPECT_EQ(engine().lastFrame().dispatches, 0u);
   engine().runFrame();
   engine().begin();
-  must(engine()->setVisible(one_->instance, true));
+  must(engine()->change({.instance = one_->instance, .visible = true}));
   engine().submit();
   EXPECT_TRUE(wasSettled());
   EXPECT_FALSE(wasSkinned());
@@ -146,13 +146,13 @@ TEST_F(SystemMotionTest, WhatComesBackSettlesOnlyIfItHasTo) {
   moveInFrame(2);
   const auto leaveAndReturn = [this](std::optional<std::uint32_t> pose) {
     engine().begin();
-    must(engine()->setVisible(one_->instance, false));
+    must(engine()->change({.instance = one_->instance, .visible = false}));
     engine().submit();
     EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
     engine().begin();
     // Shown, hidden and shown again before the record is shown once.
     for (const bool isVisible : {true, false, true})
-      must(engine()->setVisible(one_->instance, isVisible));
+      must(engine()->change({.instance = one_->instance, .visible = isVisible}));
     if (pose) move(*pose);
     engine().submit();
     EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
@@ -173,13 +173,13 @@ TEST_F(SystemMotionTest, WhatHasAnotherMeshWhenItComesBackHasNothingToSettle) {
   engine().submit();
   moveInFrame(2);
   engine().begin();
-  must(engine()->setVisible(one_->instance, false));
+  must(engine()->change({.instance = one_->instance, .visible = false}));
   const PackedMesh coarse = systemMesh(9, 40);
-  must(engine()->setMesh(one_->instance, engine().addMesh(coarse)));
+  must(engine()->change({.instance = one_->instance, .mesh = engine().addMesh(coarse)}));
   engine().submit();
   EXPECT_EQ(engine().lastFrame().settledInstances, 0u);
   engine().begin();
-  must(engine()->setVisible(one_->instance, true));
+  must(engine()->change({.instance = one_->instance, .visible = true}));
   engine().submit();
   EXPECT_TRUE(wasSkinned());
   EXPECT_FALSE(wasSettled());
@@ -189,9 +189,9 @@ TEST_F(SystemMotionTest, WhatHasAnotherMeshWhenItComesBackHasNothingToSettle) {
 TEST_F(SystemMotionTest, HiddenAndShownBetweenTwoFramesWasNeverAway) {
   engine().submit();
   engine().begin();
-  must(engine()->setVisible(one_->instance, false));
+  must(engine()->change({.instance = one_->instance, .visible = false}));
   move(2);
-  must(engine()->setVisible(one_->instance, true));
+  must(engine()->change({.instance = one_->instance, .visible = true}));
   engine().submit();
   expectMotion(2, 1);
 }
@@ -199,11 +199,11 @@ TEST_F(SystemMotionTest, HiddenAndShownBetweenTwoFramesWasNeverAway) {
 TEST_F(SystemMotionTest, ATeleportOutOfViewIsOverWhenItComesBack) {
   engine().submit();
   engine().begin();
-  must(engine()->setVisible(one_->instance, false));
-  must(engine()->teleport(one_->instance));
+  must(engine()->change({.instance = one_->instance, .visible = false}));
+  must(engine()->change({.instance = one_->instance, .teleports = true}));
   engine().submit();
   engine().begin();
-  must(engine()->setVisible(one_->instance, true));
+  must(engine()->change({.instance = one_->instance, .visible = true}));
   move(2);
   engine().submit();
   expectMotion(2, 2);
@@ -216,7 +216,7 @@ TEST_F(SystemMotionTest, AnotherMeshHasNoMotionYet) {
   moveInFrame(2);
   engine().begin();
   const PackedMesh coarse = systemMesh(9, 40);
-  must(engine()->setMesh(one_->instance, engine().addMesh(coarse)));
+  must(engine()->change({.instance = one_->instance, .mesh = engine().addMesh(coarse)}));
   move(3);
   engine().submit();
   Streams streams = engine().read(one_->instance);
@@ -235,7 +235,7 @@ TEST_F(SystemMotionTest, MorphWeightsMoveToo) {
   engine().submit();
   engine().begin();
   const std::vector<MorphWeight> morphs{{1, 0.5f}};
-  must(engine()->setMorphWeights(one_->instance, morphs));
+  must(engine()->change({.instance = one_->instance, .morphs = morphs}));
   engine().submit();
   const Streams streams = engine().read(one_->instance);
   EXPECT_TRUE(streams[positionStream] ==
@@ -247,7 +247,7 @@ TEST_F(SystemMotionTest, MorphWeightsMoveToo) {
 
 // Skinned in one frame of three: in the frame after it stands still, and does so until its next.
 TEST_F(SystemMotionTest, WhatIsSkippedStandsStillAndThenMovesFromWhereItWas) {
-  must(engine()->setUpdateInterval(one_->instance, 3));
+  must(engine()->change({.instance = one_->instance, .updateInterval = 3}));
   move(100);
   engine().submit();
   EXPECT_TRUE(wasSkinned()) << "in its first frame, whatever its interval";
@@ -271,12 +271,12 @@ TEST_F(SystemMotionTest, WhatIsSkippedStandsStillAndThenMovesFromWhereItWas) {
 }
 
 TEST_F(SystemMotionTest, ATeleportDoesNotWaitForTheInterval) {
-  must(engine()->setUpdateInterval(one_->instance, 5));
+  must(engine()->change({.instance = one_->instance, .updateInterval = 5}));
   engine().submit();
   for (std::uint32_t frame = 0; frame < 10; ++frame) {
     engine().begin();
     move(200 + frame);
-    must(engine()->teleport(one_->instance));
+    must(engine()->change({.instance = one_->instance, .teleports = true}));
     engine().submit();
     EXPECT_TRUE(wasSkinned());
     expectMotion(200 + frame, 200 + frame);
@@ -285,7 +285,7 @@ TEST_F(SystemMotionTest, ATeleportDoesNotWaitForTheInterval) {
 
 // A pose that was written in a frame in which the instance is skipped is not lost.
 TEST_F(SystemMotionTest, ASkippedPoseIsSkinnedWithinItsInterval) {
-  must(engine()->setUpdateInterval(one_->instance, 4));
+  must(engine()->change({.instance = one_->instance, .updateInterval = 4}));
   engine().submit();
   for (std::uint32_t offset = 0; offset < 4; ++offset) {
     moveInFrame(300 + offset);
@@ -306,14 +306,15 @@ class SystemIntervalTest : public SystemTest {};
 TEST_F(SystemIntervalTest, InstancesOfAPoseKeepTogetherWhenOneChangesAlone) {
   SingleInstance body(device(), description(), plainLayout());
   body.description.updateInterval = 4;
-  must(body.engine->setUpdateInterval(body.instance, 4));
+  must(body.engine->change({.instance = body.instance, .updateInterval = 4}));
   const InstanceHandle clothes = body.engine.addInstance(body.description);
   body.engine.submit();
   for (std::uint32_t rest = 4; rest < 8; ++rest) {
     for (std::uint32_t frame = 0; frame < rest; ++frame) body.engine.runFrame();
     body.engine.begin();
     const MorphWeight morph{rest % 3, 0.5f};
-    must(body.engine->setMorphWeights(body.instance, {&morph, 1}));
+    must(body.engine->change(
+        {.instance = body.instance, .morphs = std::span<const MorphWeight>(&morph, 1)}));
     body.engine.submit();
     for (std::uint32_t pose = 0; pose < 8; ++pose) {
       body.engine.begin();
@@ -329,18 +330,18 @@ TEST_F(SystemIntervalTest, InstancesOfAPoseKeepTogetherWhenOneChangesAlone) {
 TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
   for (const bool poseFirst : {true, false}) {
     SingleInstance one(device(), description(), motionLayout());
-    must(one.engine->setUpdateInterval(one.instance, 5));
+    must(one.engine->change({.instance = one.instance, .updateInterval = 5}));
     one.engine.submit();
     for (std::uint32_t away = 1; away <= 10; ++away) {
       SCOPED_TRACE(away);
       one.engine.begin();
-      must(one.engine->setVisible(one.instance, false));
+      must(one.engine->change({.instance = one.instance, .visible = false}));
       one.engine.submit();
       for (std::uint32_t frame = 1; frame < away; ++frame) one.engine.runFrame();
       one.engine.begin();
-      if (!poseFirst) must(one.engine->setVisible(one.instance, true));
+      if (!poseFirst) must(one.engine->change({.instance = one.instance, .visible = true}));
       one.engine.writePose(one.description.pose, systemPose(away));
-      if (poseFirst) must(one.engine->setVisible(one.instance, true));
+      if (poseFirst) must(one.engine->change({.instance = one.instance, .visible = true}));
       one.engine.submit();
       EXPECT_EQ(one.engine.lastFrame().skinnedInstances, 1u);
       const Streams expected = alone(one.packed, systemPose(away), one.description);

@@ -221,18 +221,18 @@ TEST_F(SystemOutputTest, MorphWeightsAreThoseThatWereSetLast) {
   layout.tangents = VertexFormat::float32x4;
   SingleInstance one(device(), description(), layout);
   const std::vector<MorphWeight> smile{{0, 0.5f}, {2, 0.25f}}, frown{{1, 1.0f}};
-  must(one.engine->setMorphWeights(one.instance, frown));
-  must(one.engine->setMorphWeights(one.instance, smile));
+  must(one.engine->change({.instance = one.instance, .morphs = frown}));
+  must(one.engine->change({.instance = one.instance, .morphs = smile}));
   one.engine.submit();
   const Pose pose = systemPose(1);
   expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description, smile));
   one.engine.begin();
-  must(one.engine->setMorphWeights(one.instance, frown));
+  must(one.engine->change({.instance = one.instance, .morphs = frown}));
   one.engine.submit();
   EXPECT_EQ(one.engine.lastFrame().skinnedInstances, 1u);
   expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description, frown));
   one.engine.begin();
-  must(one.engine->setMorphWeights(one.instance, {}));
+  must(one.engine->change({.instance = one.instance, .morphs = std::span<const MorphWeight>()}));
   one.engine.submit();
   expectSkinned(one.engine.read(one.instance), alone(one.packed, pose, one.description));
 }

@@ -97,7 +97,7 @@ TEST_F(SystemOverflowTest, AMeshThatIsRefusedLeavesTheOldOne) {
   engine_->submit();
   engine_->begin();
   const MeshHandle dense = engine_->addMesh(systemMesh(2, 150));
-  const Result<void> changed = system().setMesh(first, dense);
+  const Result<void> changed = system().change({.instance = first, .mesh = dense});
   ASSERT_FALSE(changed.ok());
   EXPECT_EQ(changed.error().code, ErrorCode::limitExceeded);
   must(system().removeMesh(dense));
@@ -140,7 +140,7 @@ TEST_F(SystemOverflowTest, AFailedRecordChangesNothingThatIsShown) {
   const PackedMesh other = systemMesh(2, 90);
   const MeshHandle otherHandle = engine_->addMesh(other);
   instance_.culledOnGpu = true;
-  must(system().setMesh(first, otherHandle));
+  must(system().change({.instance = first, .mesh = otherHandle}));
   const InstanceOutput before = must(system().output(first));
   add(1);  // chosen by the GPU, but by what?
   ASSERT_FALSE(engine_->trySubmit().ok());
@@ -158,24 +158,24 @@ TEST_F(SystemOverflowTest, ALevelOfDetailMaySwitchOftenOutOfView) {
   const MeshHandle coarseHandle = engine_->addMesh(coarse);
   engine_->submit();
   engine_->begin();
-  must(system().setVisible(first, false));
+  must(system().change({.instance = first, .visible = false}));
   must(system().removeInstance(gap));
   engine_->submit();
   for (std::uint32_t i = 0; i < 5; ++i) {
     engine_->begin();
-    must(system().setMesh(first, coarseHandle));
+    must(system().change({.instance = first, .mesh = coarseHandle}));
     engine_->submit();
     engine_->begin();
-    must(system().setMesh(first, instance_.mesh));
+    must(system().change({.instance = first, .mesh = instance_.mesh}));
     engine_->submit();
   }
   engine_->runFrame();
   engine_->begin();
   EXPECT_EQ(system().statistics().outputs.used, instanceSize);
-  must(system().setMesh(first, coarseHandle));
-  must(system().setMesh(first, instance_.mesh));
+  must(system().change({.instance = first, .mesh = coarseHandle}));
+  must(system().change({.instance = first, .mesh = instance_.mesh}));
   EXPECT_EQ(system().compact(1 << 20), instanceSize);
-  must(system().setVisible(first, true));
+  must(system().change({.instance = first, .visible = true}));
   engine_->submit();
   EXPECT_EQ(engine_->lastFrame().movedBytes, instanceSize);
   EXPECT_EQ(indicesOf(system().movedInstances()), std::set<std::uint32_t>{first.index});

@@ -132,12 +132,14 @@ class BusyScene {
       must(engine_->removeInstance(instances_.back()));
       instances_.pop_back();
     }
-    must(engine_->setVisible(instances_[0], below(2) == 0));
+    must(engine_->change({.instance = instances_[0], .visible = below(2) == 0}));
     const MorphWeight morph{below(3), 0.5f};
-    must(engine_->setMorphWeights(instances_[1], {&morph, 1}));
+    must(engine_->change(
+        {.instance = instances_[1], .morphs = std::span<const MorphWeight>(&morph, 1)}));
     if (engine_.frame() % 4 == 0) engine_->compact(10'000);
     if (engine_.frame() % 7 == 0)
-      static_cast<void>(engine_->setMesh(instances_[2], meshes_[below(meshes_.size())]));
+      static_cast<void>(
+          engine_->change({.instance = instances_[2], .mesh = meshes_[below(meshes_.size())]}));
   }
 
   samples::Device& device_;

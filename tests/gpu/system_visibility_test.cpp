@@ -33,7 +33,7 @@ TEST_F(SystemVisibilityTest, HiddenInstancesAreNotDispatched) {
   engine_->begin();
   moveAll(100);
   for (std::uint32_t i = 0; i < instanceCount; ++i)
-    must((*engine_)->setVisible(instances_[i], i % 6 == 0));
+    must((*engine_)->change({.instance = instances_[i], .visible = i % 6 == 0}));
   engine_->submit();
   const vulkan::FrameStatistics few = engine_->lastFrame();
   EXPECT_EQ(few.skinnedInstances, 10u);
@@ -221,7 +221,7 @@ TEST_F(SystemVisibilityTest, SomeAreCulledOnTheGpuAndSomeAreNot) {
   EXPECT_EQ(completed().visibleInstances, 1u);
   // The engine hides one that the GPU would show.
   show(0, 2);
-  must((*engine_)->setVisible(instances_[1], false));
+  must((*engine_)->change({.instance = instances_[1], .visible = false}));
   moveAll(100);
   submit();
   EXPECT_EQ(completed().skinnedInstances, 1u);
@@ -233,7 +233,7 @@ TEST_F(SystemVisibilityTest, ATeleportReachesWhatIsCulledOnTheGpu) {
   submit();
   engine_->begin();
   moveAll(100);
-  must((*engine_)->teleport(instances_[3]));
+  must((*engine_)->change({.instance = instances_[3], .teleports = true}));
   submit();
   const std::vector<std::byte> bytes = engine_->readOutput();
   expectMotion(bytes, 3, 100, 100);

@@ -205,10 +205,10 @@ TEST(Scene, WhatWasHiddenInAnAbandonedFrameOnlySettles) {
     runFrame(frame);
   }
   ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
-  ASSERT_TRUE(one.scene.setVisible(moving, false).ok());
+  ASSERT_TRUE(one.scene.change({.instance = moving, .visible = false}).ok());
   runFrame(3);
   ASSERT_TRUE(one.scene.abandonFrame(3).ok());
-  ASSERT_TRUE(one.scene.setVisible(moving, true).ok());
+  ASSERT_TRUE(one.scene.change({.instance = moving, .visible = true}).ok());
   runFrame(3);
   ASSERT_EQ(one.scene.settledInstances().size(), 1u);
   EXPECT_EQ(one.scene.settledInstances()[0], moving);
@@ -266,8 +266,12 @@ TEST(Scene, AChangedSceneIsNotCommitted) {
   const std::vector<std::function<void(OneInstance&)>> changes{
       [](OneInstance& one) { EXPECT_TRUE(one.scene.removeInstance(one.instance).ok()); },
       [](OneInstance& one) { EXPECT_TRUE(one.scene.writePose(one.pose).ok()); },
-      [](OneInstance& one) { EXPECT_TRUE(one.scene.setVisible(one.instance, false).ok()); },
-      [](OneInstance& one) { EXPECT_TRUE(one.scene.teleport(one.instance).ok()); },
+      [](OneInstance& one) {
+        EXPECT_TRUE(one.scene.change({.instance = one.instance, .visible = false}).ok());
+      },
+      [](OneInstance& one) {
+        EXPECT_TRUE(one.scene.change({.instance = one.instance, .teleports = true}).ok());
+      },
       [](OneInstance& one) { EXPECT_TRUE(one.scene.beginFrame(2, 0).ok()); },
       [](OneInstance& one) { EXPECT_EQ(one.scene.compact(1000), 0u); }};
   for (const auto& change : changes) {

@@ -6,7 +6,7 @@
 //   scene.beginFrame(frame, completedFrame);
 //   for each frame f that has become complete: scene.readBack(f, bytes of its read-back buffer);
 //   write joint matrices at scene.writePose(pose)->offset of the poses buffer
-//   ... add, remove, setVisible, setMorphWeights ...
+//   ... add, remove, change ...
 //   scene.plan(plan);
 //   writeTables(plan, mapped upload buffer of this frame);
 //   for (const Command& command : plan.commands()) ...
@@ -102,14 +102,14 @@ struct InstanceDescription {
   Method method = Method::dualQuaternion;
   /// Formats and arrangement of the skinned vertices. With `Motion::kept`, previous positions are
   /// right on first frames, when poses rest or are skipped, and when an instance comes back into
-  /// view; `teleport` for jumps. `Motion::reskinned` is not possible.
+  /// view; `InstanceChange::teleports` is for jumps. `Motion::reskinned` is not possible.
   VertexLayout layout = {};
   Box box = {};  ///< of positions in snorm16, as `Job::box`
   /// Whether to compute the exact box of the skinned positions, for `Scene::bounds`.
   bool bounds = false;
   /// The instance is skinned every N-th frame; N is at least 1. Instances with the same pose and
-  /// interval are skinned in the same frames; poses are distributed over the frames. `teleport`,
-  /// `setMesh` and coming back into view take effect at once.
+  /// interval are skinned in the same frames; poses are distributed over the frames. A teleport,
+  /// another mesh and coming back into view take effect at once.
   std::uint32_t updateInterval = 1;
   /// The GPU decides whether the instance is skinned: its word in the visibility buffer is not 0.
   /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range
@@ -118,18 +118,31 @@ struct InstanceDescription {
 };
 
 /// What changes about an instance: everything that has a value. The next `plan` skins an instance
-/// that changes its mesh, pose, method or box, whatever its interval.
+/// that changes its mesh, pose, method or box, or teleports, whatever its interval.
 struct InstanceChange {
   InstanceHandle instance = {};
-  std::optional<bool> visible;                  ///< as `Scene::setVisible`
-  bool teleports = false;                       ///< as `Scene::teleport`
-  std::optional<Method> method;                 ///< motion goes on
-  std::optional<std::uint32_t> updateInterval;  ///< as `InstanceDescription::updateInterval`
-  std::optional<MeshHandle> mesh;               ///< as `Scene::setMesh`
-  std::optional<PoseHandle> pose;               ///< motion goes on
+  /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
+  /// positions are its current ones. Instances begin visible.
+  std::optional<bool> visible = {};
+  bool teleports = false;                            ///< previous positions become the current ones
+  std::optional<Method> method = {};                 ///< motion goes on
+  std::optional<std::uint32_t> updateInterval = {};  ///< as `InstanceDescription::updateInterval`
+  /// Another mesh (a level of detail): the output moves, motion restarts. Morph weights stay if
+  /// both meshes have the same number of targets, otherwise they are removed.
+  std::optional<MeshHandle> mesh = {};
+  std::optional<PoseHandle> pose = {};  ///< motion goes on
   /// Of positions in snorm16. Motion restarts: previous positions would be relative to the old box.
-  std::optional<Box> box;
-  std::optional<std::span<const MorphWeight>> morphs;  ///< as `Scene::setMorphWeights`
+  std::optional<Box> box = {};
+  /// The active targets, as `Job::morphs`. They are copied.
+  std::optional<std::span<const MorphWeight>> morphs = {};
+};
+
+/// Whether an instance is in view, and how often it is skinned: `InstanceChange::visible` and
+/// `updateInterval`, both of them.
+struct InstanceVisibility {
+  InstanceHandle instance = {};
+  bool isVisible = true;
+  std::uint32_t updateInterval = 1;
 };
 
 /// What `prepare` must be given before such an instance is recorded.
@@ -139,8 +152,9 @@ inline PipelineNeeds pipelineNeeds(const InstanceDescription& description) {
 
 /// Where the vertices of an instance stand in the output buffer.
 struct InstanceOutput {
-  /// The mesh that the instance was last skinned with. After `setMesh` it is the old one until the
-  /// instance is skinned again; of an instance that is culled on the GPU, until the next `commit`.
+  /// The mesh that the instance was last skinned with. After a change of mesh it is the old one
+  /// until the instance is skinned again; of an instance that is culled on the GPU, until the next
+  /// `commit`.
   MeshHandle mesh;
   /// Bytes. Interleaved: a multiple of the stride, so that a draw may use `firstVertex` instead of
   /// the offset of a vertex buffer.
@@ -275,28 +289,18 @@ class Scene {
   /// The same for all poses that the GPU writes.
   Result<void> markAllWritten();
 
-  /// Changes many instances, one after the other. If one fails, for a reason that the functions
-  /// below and `addInstance` have, nothing about it changes; the changes before it stay, those
-  /// after it are not made, and the message says which one it was.
+  /// Changes what has a value. Fails with `invalidArgument` for a stale handle, an interval of 0, a
+  /// target that the mesh does not have, one that is given twice, and a weight that is not finite,
+  /// and as `addInstance` if mesh, pose, method or box do not fit the instance. Nothing changes
+  /// then. While an instance with another mesh is not skinned yet, its old output stays, so there
+  /// must be room for both.
+  Result<void> change(const InstanceChange& change);
+  /// Many changes, one after the other. If one fails, those before it stay, those after it are not
+  /// made, and the message begins with its number.
   Result<void> change(std::span<const InstanceChange> changes);
-
-  /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
-  /// positions are its current ones. Instances begin visible.
-  Result<void> setVisible(InstanceHandle instance, bool isVisible);
-  /// As `InstanceDescription::updateInterval`. Fails with `invalidArgument` for 0.
-  Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
-  /// The next `plan` skins the instance, whatever its interval; previous positions are the current
-  /// ones then.
-  Result<void> teleport(InstanceHandle instance);
-  /// The active targets, as `Job::morphs`. They are copied. Fails with `invalidArgument` for a
-  /// target that the mesh does not have, one that is given twice, and a weight that is not finite.
-  Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
-  /// Gives an instance another mesh (a level of detail): its output moves, its motion restarts. Its
-  /// morph weights stay if both meshes have the same number of targets, otherwise they are removed.
-  /// The old output stays until frames in flight are complete, so there must be room for both:
-  /// otherwise it fails with `limitExceeded`, and the instance keeps its mesh. Fails as
-  /// `addInstance` if the mesh does not fit the instance.
-  Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
+  /// What engines decide about many instances in every frame, in less time than `change` takes.
+  /// Fails as `change`.
+  Result<void> setVisibility(std::span<const InstanceVisibility> instances);
 
   /// Moves outputs from the end of the output buffer into free ranges before them, at most
   /// `maxBytes` bytes, with the next `plan`. Returns how many bytes it will move. The old output

@@ -7,7 +7,7 @@
 //
 //   system.beginFrame(frame, completedFrame);      // the engine's own count of frames
 //   std::span<JointMatrix> matrices = *system.writePose(pose);   // for poses that change
-//   ... add, remove, setVisible, setMorphWeights ...
+//   ... add, remove, change ...
 //   system.record(commandBuffer);                  // with the engine's barriers around it
 //   draw from system.outputBuffer() at system.output(instance)
 #pragma once
@@ -164,12 +164,9 @@ class SkinningSystem {
   Result<BufferRange> poseRange(PoseHandle pose) const;
   Result<void> markWritten(std::span<const PoseHandle> poses);
   Result<void> markAllWritten();
+  Result<void> change(const InstanceChange& change);
   Result<void> change(std::span<const InstanceChange> changes);
-  Result<void> setVisible(InstanceHandle instance, bool isVisible);
-  Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
-  Result<void> teleport(InstanceHandle instance);
-  Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
-  Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
+  Result<void> setVisibility(std::span<const InstanceVisibility> instances);
   std::uint64_t compact(std::uint64_t maxBytes);
 
   // -- Recording.

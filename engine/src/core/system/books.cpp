@@ -146,8 +146,11 @@ Result<void> SceneBooks::removePose(PoseHandle handle) {
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->users != 0) return isUsed("pose", handle.index, pose->users);
   retire(poseBuffers_[pose->buffer].joints, pose->joints);
-  for (const ScenePose::Form& form : pose->forms) {
-    if (form.units) retire(unitStore_.ranges, *form.units);
+  for (std::size_t form = 0; form < paletteFormCount; ++form) {
+    const std::uint32_t unit = pose->forms[form].unit;
+    if (unit == notUsed) continue;
+    retire(unitStore_.ranges,
+           {unit, paletteSize(static_cast<PaletteForm>(form), pose->jointCount, pose->mayScale)});
   }
   poses_.remove(handle);
   return {};
@@ -242,88 +245,6 @@ Result<void> SceneBooks::markAllWritten() {
     const PoseHandle handle = poses_.handleOf(index);
     if (Result<void> marked = markWritten({&handle, 1}); !marked) return marked;
   }
-  return {};
-}
-
-// -- What engines set.
-
-void SceneBooks::makeStale(std::uint32_t index) {
-  SceneInstance& instance = instances_.at(index);
-  instance.isStale = true;
-  makePending(index);
-}
-
-void SceneBooks::makePending(std::uint32_t index) {
-  SceneInstance& instance = instances_.at(index);
-  if (instance.isListed || !instance.isVisible || instance.isCulled) return;
-  instance.isListed = true;
-  pending_.push_back(instances_.handleOf(index));
-}
-
-void SceneBooks::setVisible(SceneInstance& instance, InstanceHandle handle, bool isVisible) {
-  if (instance.isVisible == isVisible) return;
-  instance.isVisible = isVisible;
-  if (!isVisible) {
-    instance.hiddenAfter = record_;
-    return;
-  }
-  if (instance.hiddenAfter != record_) {
-    // Not displayed by the last record: what it showed before is no motion.
-    instance.visibleFrom = record_ + 1;
-    if (instance.isMoving) moving_.push_back(handle);
-  }
-  if (instance.isStale) makePending(handle.index);
-}
-
-Result<void> SceneBooks::setVisible(InstanceHandle handle, bool isVisible) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  setVisible(*instance, handle, isVisible);
-  return {};
-}
-
-Result<void> SceneBooks::setUpdateInterval(InstanceHandle handle, std::uint32_t interval) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  if (interval == 0) {
-    return Error{ErrorCode::invalidArgument, "instance " + std::to_string(handle.index) +
-                                                 ": an update interval is 1 or more frames, not 0"};
-  }
-  instance->updateInterval = interval;
-  return {};
-}
-
-void SceneBooks::teleport(SceneInstance& instance, InstanceHandle handle) {
-  instance.restartsMotion = true;
-  instance.isUrgent = true;
-  makeStale(handle.index);
-}
-
-Result<void> SceneBooks::teleport(InstanceHandle handle) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  teleport(*instance, handle);
-  return {};
-}
-
-Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
-                                         std::span<const MorphWeight> morphs) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  const SceneMesh& mesh = meshes_.at(instance->mesh.index);
-  if (Result<void> good =
-          checkMorphs(morphs, mesh.info.morphTargetCount, {"instance", handle.index});
-      !good)
-    return good;
-  std::vector<MorphWeight>& active = instance->extras.morphs;
-  const bool hadMorphs = !active.empty();
-  assignActive(morphs, active);
-  // With and without are two kernels.
-  if (hadMorphs == active.empty()) {
-    releaseRuns(*instance);
-    if (Result<void> good = makeRuns(*instance); !good) return good;
-  }
-  makeStale(handle.index);
   return {};
 }
 

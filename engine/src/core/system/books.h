@@ -7,6 +7,7 @@
 #include <deque>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "dermis/handle.h"
@@ -39,9 +40,9 @@ struct SceneMesh {
 struct ScenePose {
   /// The pose as it was last converted to one of the forms that methods read.
   struct Form {
-    std::optional<Range> units;
-    std::uint64_t version = 0;    ///< of the pose; 0 where it is to be converted again
-    std::uint64_t plannedIn = 0;  ///< the plan that converts it
+    std::uint32_t unit = notUsed;  ///< the first of its palette
+    std::uint64_t version = 0;     ///< of the pose; 0 where it is to be converted again
+    std::uint64_t plannedIn = 0;   ///< the plan that converts it
   };
 
   std::uint32_t jointCount = 0;
@@ -68,26 +69,32 @@ struct Place {
   friend bool operator==(const Place&, const Place&) = default;
 };
 
-struct SceneInstance {
-  // What frames and changes look at stands together, the first of it in the cache line of the slot:
-  // where the GPU is the CPU, as in software Vulkan, the caches hold vertices when the next frame
-  // begins.
+/// What changes and frames look at of all instances. It stands apart from the rest, so that caches
+/// hold it for many.
+struct InstanceState {
+  std::uint32_t generation = 0;  ///< of its handle; 0: there is none
+  std::uint32_t updateInterval = 1;
   bool isStale = false;   ///< something changed since it was skinned
   bool isListed = false;  ///< among the pending
   bool isVisible = true;
   bool isCulled = false;
   bool hasMotion = false;
-  bool restartsMotion = true;  ///< when it is skinned next
-  bool isUrgent = true;        ///< whatever its interval
-  bool willMove = false;       ///< the plan skins it, and its previous positions are others
-  bool isMoving = false;       ///< its previous positions are others, as of the last record
-  bool isShifting = false;     ///< among the shifting
-  Method method = Method::dualQuaternion;
-  std::uint32_t pose = 0;  ///< index
-  std::uint32_t updateInterval = 1;
-  std::uint32_t vertexCount = 0;
+  bool restartsMotion = true;     ///< when it is skinned next
+  bool isUrgent = true;           ///< whatever its interval
+  bool isMoving = false;          ///< its previous positions are others, as of the last record
   std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
   std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
+};
+
+struct SceneInstance {
+  // What a frame that skins it looks at stands together, the first of it in the cache line of the
+  // slot: where the GPU is the CPU, as in software Vulkan, the caches hold vertices when the next
+  // frame begins.
+  bool isShifting = false;  ///< among the shifting
+  Method method = Method::dualQuaternion;
+  std::uint32_t pose = 0;  ///< index
+  std::uint32_t vertexCount = 0;
+  std::uint32_t vertexBytes = 0;  ///< that are written for a vertex
   std::uint64_t plannedIn = 0;    ///< the last plan that skins it
   std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
   std::uint64_t firstFrame = 0;  ///< in which it was skinned
@@ -125,12 +132,9 @@ class SceneBooks {
   Result<PosePlace> writePose(PoseHandle pose);
   Result<void> markWritten(std::span<const PoseHandle> poses);
   Result<void> markAllWritten();
+  Result<void> change(const InstanceChange& change);
   Result<void> change(std::span<const InstanceChange> changes);
-  Result<void> setVisible(InstanceHandle instance, bool isVisible);
-  Result<void> setUpdateInterval(InstanceHandle instance, std::uint32_t interval);
-  Result<void> teleport(InstanceHandle instance);
-  Result<void> setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs);
-  Result<void> setMesh(InstanceHandle instance, MeshHandle mesh);
+  Result<void> setVisibility(std::span<const InstanceVisibility> instances);
   std::uint64_t compact(std::uint64_t maxBytes);
 
   /// Plans all that has to be done; nothing of it counts as done before `commit`.
@@ -169,30 +173,46 @@ class SceneBooks {
     RangeAllocator joints;
   };
 
-  Result<void> check(const SceneInstance& instance) const;
+  Result<void> check(const SceneInstance& instance, std::uint32_t updateInterval) const;
   Result<void> takeResult(SceneInstance& instance);
   void freeResult(const SceneInstance& instance);
   Result<void> reserveUnits(const SceneInstance& instance);
-  Result<void> findRoom(SceneInstance& instance);
-  Result<void> makeRuns(SceneInstance& instance);
+  Result<void> findRoom(SceneInstance& instance, bool isCulled);
+  Result<void> makeRuns(SceneInstance& instance, bool isCulled);
   void releaseRuns(SceneInstance& instance);
   void releaseTarget(SceneInstance& instance);
   void link(std::uint32_t index);
   void unlink(std::uint32_t index);
 
   // instances.cpp
-  Result<void> takeBackOrFindRoom(SceneInstance& changed);
-  Result<void> changeOne(SceneInstance& instance, const InstanceChange& change);
-  void setSmall(SceneInstance& instance, const InstanceChange& change);
+  Result<void> takeBackOrFindRoom(SceneInstance& changed, bool isCulled);
   Result<void> rebuild(SceneInstance& instance, const InstanceChange& change);
-  Result<void> setBox(SceneInstance& instance, InstanceHandle handle, const Box& box);
-  void setVisible(SceneInstance& instance, InstanceHandle handle, bool isVisible);
-  void teleport(SceneInstance& instance, InstanceHandle handle);
+  Result<void> setBox(InstanceHandle handle, const Box& box);
+  Result<void> setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs);
+  void show(InstanceState& state, InstanceHandle handle);
+  void hide(InstanceState& state) const {
+    state.isVisible = false;
+    state.hiddenAfter = record_;
+  }
   void shift(InstanceHandle handle);
 
   // scene.cpp
-  void makeStale(std::uint32_t index);
-  void makePending(std::uint32_t index);
+  void makeStale(std::uint32_t index) {
+    InstanceState& state = states_[index];
+    state.isStale = true;
+    makePending(state, index);
+  }
+  void makePending(InstanceState& state, std::uint32_t index) {
+    if (state.isListed || !state.isVisible || state.isCulled) return;
+    state.isListed = true;
+    pending_.push_back({index, state.generation});
+  }
+  /// Null for a handle of no instance.
+  InstanceState* findState(InstanceHandle handle) {
+    if (handle.index >= states_.size() || handle.generation == 0) return nullptr;
+    InstanceState& state = states_[handle.index];
+    return state.generation == handle.generation ? &state : nullptr;
+  }
   void retire(RangeAllocator& store, const Range& range);
   Result<void> checkWrite(PoseHandle handle, PoseWriter writer) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
@@ -219,11 +239,15 @@ class SceneBooks {
   void gatherResults();
   void addDue(std::uint32_t index);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
-  bool isDue(const SceneInstance& instance) const;
+  bool isDue(const InstanceState& state, std::uint32_t pose) const;
+  /// Whether its previous positions become its current ones, if that record skins it.
+  static bool restarts(const InstanceState& state, std::uint64_t record) {
+    return state.restartsMotion || state.visibleFrom == record;
+  }
   void convertPalette(const SceneInstance& instance);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
-  void commitInstance(SceneInstance& instance, InstanceHandle handle);
+  void commitInstance(std::uint32_t index);
   void keepForAbandoning();
   void abandonInstances();
   void abandonShifts();
@@ -232,6 +256,7 @@ class SceneBooks {
   SlotMap<SceneMesh, MeshHandle> meshes_;
   SlotMap<ScenePose, PoseHandle> poses_;
   SlotMap<SceneInstance, InstanceHandle> instances_;
+  std::vector<InstanceState> states_;  ///< of each instance, by index
   Store meshStore_, unitStore_, outputStore_, resultStore_;
   std::deque<PoseStore> poseBuffers_;
   std::uint64_t slotCapacity_ = 0;  ///< of instances
@@ -275,6 +300,12 @@ class SceneBooks {
     std::uint64_t frame = 0;
     bool hasCounters = false;
     std::vector<CopyCommand> results;
+
+    void swap(ReadBack& other) {
+      std::swap(frame, other.frame);
+      std::swap(hasCounters, other.hasCounters);
+      results.swap(other.results);
+    }
   };
 
   /// What the last `commit` changed, as it was before, so that `abandonFrame` can put it back.

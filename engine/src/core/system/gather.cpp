@@ -10,37 +10,29 @@
 namespace dermis {
 namespace {
 
-std::uint32_t culledFlags(const SceneInstance& instance) {
+std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion) {
   std::uint32_t flags = instance.extras.result != notUsed ? abi::INSTANCE_HAS_RESULT : 0u;
-  if (instance.hasMotion) {
+  if (hasMotion) {
     flags |= abi::INSTANCE_HAS_MOTION;
     if (instance.restartVersion == instance.version) flags |= abi::INSTANCE_RESTARTS;
   }
   return flags;
 }
 
-/// Of one vertex, without gaps.
-std::uint32_t attributeBytes(const VertexLayout& layout) {
-  const std::uint32_t positions = layout.motion == Motion::none ? 1 : 2;
-  return positions * formatSize(layout.positions) + formatSize(layout.normals) +
-         formatSize(layout.tangents);
-}
-
 }  // namespace
 
 /// In frames that are the same for all instances of a pose with one interval, also where the
 /// engine leaves frames out: a multiple of the interval lies between the last record and this one.
-bool SceneBooks::isDue(const SceneInstance& instance) const {
-  const bool cameBack = instance.visibleFrom == record_ + 1;
-  if (instance.isUrgent || cameBack || instance.updateInterval == 1) return true;
-  const std::uint64_t beat = instance.pose;
-  return (frame_ + beat) / instance.updateInterval !=
-         (recordedFrame_ + beat) / instance.updateInterval;
+bool SceneBooks::isDue(const InstanceState& state, std::uint32_t pose) const {
+  const bool cameBack = state.visibleFrom == record_ + 1;
+  if (state.isUrgent || cameBack || state.updateInterval == 1) return true;
+  const std::uint64_t beat = pose;
+  return (frame_ + beat) / state.updateInterval != (recordedFrame_ + beat) / state.updateInterval;
 }
 
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
   const auto form = static_cast<std::size_t>(paletteForm(instance.method));
-  return static_cast<std::uint32_t>(poses_.at(instance.pose).forms[form].units->offset);
+  return poses_.at(instance.pose).forms[form].unit;
 }
 
 /// Once for all instances that read it, and only where one does.
@@ -54,8 +46,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   const bool isCpu = pose.writer == PoseWriter::cpu;
   const PoseSource source{static_cast<std::uint32_t>(placeOf(pose).offset / unitBytes), pose.buffer,
                           isCpu ? BufferRole::poses : BufferRole::gpuPoses};
-  builder_.addPalette(source, static_cast<std::uint32_t>(converted.units->offset), pose.jointCount,
-                      form, pose.mayScale);
+  builder_.addPalette(source, converted.unit, pose.jointCount, form, pose.mayScale);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
@@ -89,15 +80,15 @@ void SceneBooks::addDue(std::uint32_t index) {
   instance.plannedIn = planNumber_;
   due_.push_back(index);
   convertPalette(instance);
-  const bool restarts = instance.restartsMotion || instance.visibleFrom == record_ + 1;
-  instance.willMove = instance.hasMotion && !restarts;
-  addRuns(instance, instance.hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
+  const InstanceState& state = states_[index];
+  addRuns(instance, state.hasMotion && restarts(state, record_ + 1) ? abi::INSTANCE_RESTARTS : 0u,
+          nullptr);
   if (instance.extras.result != notUsed) {
     builder_.clearResult(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
   }
   planned_.skinnedVertices += instance.vertexCount;
-  planned_.writtenBytes += std::uint64_t{instance.vertexCount} * attributeBytes(instance.layout);
+  planned_.writtenBytes += std::uint64_t{instance.vertexCount} * instance.vertexBytes;
 }
 
 /// Those that have to wait stay in the list; so do those that are due, until `commit`.
@@ -105,13 +96,13 @@ void SceneBooks::gatherPending() {
   std::size_t kept = 0;
   for (std::size_t entry = 0; entry < pending_.size(); ++entry) {
     const InstanceHandle handle = pending_[entry];
-    SceneInstance* instance = instances_.find(handle);
-    if (instance == nullptr) continue;
-    if (!instance->isStale || !instance->isVisible) {
-      instance->isListed = false;
+    InstanceState* const state = findState(handle);
+    if (state == nullptr) continue;
+    if (!state->isStale || !state->isVisible) {
+      state->isListed = false;
       continue;
     }
-    if (isDue(*instance)) addDue(handle.index);
+    if (isDue(*state, instances_.at(handle.index).pose)) addDue(handle.index);
     pending_[kept++] = handle;
   }
   pending_.resize(kept);
@@ -123,7 +114,9 @@ void SceneBooks::gatherPending() {
 void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
     const SceneInstance* instance = instances_.find(handle);
-    if (instance == nullptr || instance->plannedIn == planNumber_ || !instance->isVisible) continue;
+    if (instance == nullptr || instance->plannedIn == planNumber_ ||
+        !states_[handle.index].isVisible)
+      continue;
     settling_.push_back(handle.index);
     addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
@@ -133,10 +126,11 @@ void SceneBooks::gatherSettling() {
 void SceneBooks::gatherCulled() {
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
-    if (!instance.isVisible) continue;
-    if (instance.version == 0 || (instance.isStale && isDue(instance))) {
+    const InstanceState& state = states_[index];
+    if (!state.isVisible) continue;
+    if (instance.version == 0 || (state.isStale && isDue(state, instance.pose))) {
       instance.version = ++nextVersion_;
-      if (instance.restartsMotion) instance.restartVersion = instance.version;
+      if (state.restartsMotion) instance.restartVersion = instance.version;
       versioned_.push_back(index);
     }
     // Nobody knows when the GPU will skin it for the first time; until then there is no box.
@@ -146,7 +140,7 @@ void SceneBooks::gatherCulled() {
     }
     convertPalette(instance);
     const Candidate candidate{index, instance.version};
-    addRuns(instance, culledFlags(instance), &candidate);
+    addRuns(instance, culledFlags(instance, state.hasMotion), &candidate);
   }
 }
 
@@ -231,7 +225,8 @@ Result<void> SceneBooks::plan(Plan& out) {
 /// Whether `target` has now been recorded, and so is shown.
 bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
-  if (!isMove && !instance.isCulled && instance.plannedIn != planNumber_) return false;
+  const bool isCulled = states_[handle.index].isCulled;
+  if (!isMove && !isCulled && instance.plannedIn != planNumber_) return false;
   abandonable_.shifts.push_back({handle, instance.shown});
   if (instance.shown && instance.shown != instance.target) {
     retire(outputStore_.ranges, instance.shown->bytes);
@@ -251,10 +246,15 @@ void SceneBooks::keepForAbandoning() {
 }
 
 /// The instance shows what it should, as far as the books go.
-void SceneBooks::commitInstance(SceneInstance& instance, InstanceHandle handle) {
-  abandonable_.instances.push_back({handle, instance.restartsMotion, instance.isUrgent,
-                                    instance.isMoving, instance.firstFrame == 0});
-  instance.isStale = instance.isUrgent = instance.restartsMotion = false;
+void SceneBooks::commitInstance(std::uint32_t index) {
+  InstanceState& state = states_[index];
+  SceneInstance& instance = instances_.at(index);
+  abandonable_.instances.push_back({{index, state.generation},
+                                    state.restartsMotion,
+                                    state.isUrgent,
+                                    state.isMoving,
+                                    instance.firstFrame == 0});
+  state.isStale = state.isUrgent = state.restartsMotion = false;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
 }
 
@@ -269,10 +269,10 @@ Result<void> SceneBooks::commit() {
   const bool culls = planned_.culledCandidates != 0;
   if (culls) clearHistory_ = static_cast<std::uint32_t>(slotCapacity_);
   ReadBack& readBack = readBacks_[record_ % readBacks_.size()];
-  std::swap(abandonable_.readBack, readBack);
+  readBack.swap(abandonable_.readBack);
   readBack.frame = frame_;
   readBack.hasCounters = culls;
-  std::swap(readBack.results, resultCopies_);
+  readBack.results.swap(resultCopies_);
   skinned_.clear();
   settled_.clear();
   moved_.clear();
@@ -282,22 +282,22 @@ Result<void> SceneBooks::commit() {
     pose.forms[conversion.form].version = pose.version;
   }
   for (const std::uint32_t index : due_) {
-    SceneInstance& instance = instances_.at(index);
-    const InstanceHandle handle = instances_.handleOf(index);
-    commitInstance(instance, handle);
-    instance.isListed = false;
-    instance.isMoving = instance.willMove;
-    if (instance.isMoving) moving_.push_back(handle);
+    InstanceState& state = states_[index];
+    const InstanceHandle handle{index, state.generation};
+    // As it was when it was planned: nothing changed since.
+    const bool moves = state.hasMotion && !restarts(state, record_);
+    commitInstance(index);
+    state.isListed = false;
+    state.isMoving = moves;
+    if (moves) moving_.push_back(handle);
     skinned_.push_back(handle);
   }
-  std::erase_if(pending_,
-                [this](InstanceHandle handle) { return !instances_.at(handle.index).isStale; });
+  std::erase_if(pending_, [this](InstanceHandle handle) { return !states_[handle.index].isStale; });
   for (const std::uint32_t index : settling_) {
-    instances_.at(index).isMoving = false;
+    states_[index].isMoving = false;
     settled_.push_back(instances_.handleOf(index));
   }
-  for (const std::uint32_t index : versioned_)
-    commitInstance(instances_.at(index), instances_.handleOf(index));
+  for (const std::uint32_t index : versioned_) commitInstance(index);
   std::erase_if(shifting_, [this](InstanceHandle handle) {
     SceneInstance* instance = instances_.find(handle);
     return instance == nullptr || commitShift(*instance, handle);
@@ -308,26 +308,26 @@ Result<void> SceneBooks::commit() {
 /// They are skinned again, as they would have been without the frame.
 void SceneBooks::abandonInstances() {
   for (const Abandonable::Instance& before : abandonable_.instances) {
-    SceneInstance* instance = instances_.find(before.handle);
-    if (instance == nullptr) continue;
-    instance->restartsMotion |= before.restartsMotion;
-    instance->isUrgent |= before.isUrgent;
-    instance->isMoving = before.isMoving;
-    if (before.isFirst) instance->firstFrame = 0;
+    InstanceState* const state = findState(before.handle);
+    if (state == nullptr) continue;
+    state->restartsMotion |= before.restartsMotion;
+    state->isUrgent |= before.isUrgent;
+    state->isMoving = before.isMoving;
+    if (before.isFirst) instances_.at(before.handle.index).firstFrame = 0;
     makeStale(before.handle.index);
   }
   for (const InstanceHandle handle : settled_) {
-    if (SceneInstance* instance = instances_.find(handle)) instance->isMoving = true;
+    if (InstanceState* const state = findState(handle)) state->isMoving = true;
   }
   moving_.clear();
-  for (std::uint32_t index = 0; index < instances_.capacity(); ++index) {
-    if (!instances_.isUsed(index)) continue;
-    SceneInstance& instance = instances_.at(index);
+  for (std::uint32_t index = 0; index < states_.size(); ++index) {
+    InstanceState& state = states_[index];
+    if (state.generation == 0) continue;
     // They count records, and the frame's does not count.
-    if (instance.visibleFrom == record_ + 1) --instance.visibleFrom;
-    if (instance.hiddenAfter == record_) --instance.hiddenAfter;
-    const bool mayReturn = instance.isVisible || instance.hiddenAfter + 1 == record_;
-    if (instance.isMoving && mayReturn) moving_.push_back(instances_.handleOf(index));
+    if (state.visibleFrom == record_ + 1) --state.visibleFrom;
+    if (state.hiddenAfter == record_) --state.hiddenAfter;
+    const bool mayReturn = state.isVisible || state.hiddenAfter + 1 == record_;
+    if (state.isMoving && mayReturn) moving_.push_back({index, state.generation});
   }
 }
 
@@ -364,7 +364,7 @@ Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
   for (const Conversion& conversion : conversions_) {
     if (ScenePose* pose = poses_.find(conversion.pose)) pose->forms[conversion.form].version = 0;
   }
-  std::swap(abandonable_.readBack, readBacks_[record_ % readBacks_.size()]);
+  readBacks_[record_ % readBacks_.size()].swap(abandonable_.readBack);
   clearHistory_ = abandonable_.clearHistory;
   recordedFrame_ = abandonable_.recordedFrame;
   --record_;

@@ -11,6 +11,19 @@ namespace {
 
 constexpr Subject theInstance{"the instance"};
 
+/// Of one vertex, without gaps.
+std::uint32_t attributeBytes(const VertexLayout& layout) {
+  const std::uint32_t positions = layout.motion == Motion::none ? 1 : 2;
+  return positions * formatSize(layout.positions) + formatSize(layout.normals) +
+         formatSize(layout.tangents);
+}
+
+/// Of one of many changes.
+Error numbered(Error error, std::ptrdiff_t number) {
+  error.message = "change " + std::to_string(number) + ": " + error.message;
+  return error;
+}
+
 /// The job that skins an instance, but for what changes from frame to frame.
 Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlaces& places) {
   Job job;
@@ -27,14 +40,13 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
 }  // namespace
 
 /// Whether it could be skinned, were there room.
-Result<void> SceneBooks::check(const SceneInstance& instance) const {
+Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t updateInterval) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
   if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
   const ScenePose* pose = poses_.find(instance.poseHandle);
   if (pose == nullptr) return unknownHandle("pose", instance.poseHandle);
-  if (instance.updateInterval == 0) {
+  if (updateInterval == 0)
     return invalid("the instance's update interval is 1 or more frames, not 0");
-  }
   if (instance.layout.motion == Motion::reskinned)
     return invalid("the instance's layout says Motion::reskinned, a scene has Motion::kept only");
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
@@ -74,13 +86,15 @@ void SceneBooks::freeResult(const SceneInstance& instance) {
 Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
   const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.poseHandle.index);
-  std::optional<Range>& units = pose.forms[static_cast<std::size_t>(form)].units;
-  if (units) return {};
+  std::uint32_t& unit = pose.forms[static_cast<std::size_t>(form)].unit;
+  if (unit != notUsed) return {};
   const std::uint64_t size = paletteSize(form, pose.jointCount, pose.mayScale);
   const Result<std::optional<Range>> taken = take(unitStore_, size, 1);
   if (!taken) return taken.error();
-  units = *taken;
-  if (units) return {};
+  if (*taken) {
+    unit = static_cast<std::uint32_t>((*taken)->offset);
+    return {};
+  }
   return noRoom("pose " + std::to_string(instance.poseHandle.index) + " takes " +
                     std::to_string(size) + " times 16 bytes in the form that " +
                     std::string(methodName(instance.method)) + " reads",
@@ -88,7 +102,7 @@ Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
 }
 
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
-Result<void> SceneBooks::findRoom(SceneInstance& instance) {
+Result<void> SceneBooks::findRoom(SceneInstance& instance, bool isCulled) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh.info.vertexCount);
   if (!laidOut) return laidOut.error();
@@ -100,12 +114,12 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance) {
   }
   instance.target = {**bytes, instance.mesh, mesh.info.vertexCount};
   instance.vertexCount = mesh.info.vertexCount;
-  Result<void> made = makeRuns(instance);
+  Result<void> made = makeRuns(instance, isCulled);
   if (!made) outputStore_.ranges.free(**bytes);
   return made;
 }
 
-Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
+Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const ScenePose& pose = poses_.at(instance.poseHandle.index);
   const Result<VertexPlaces> laidOut =
@@ -116,7 +130,7 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance) {
   placing.outputs = OutputSizes::oneBuffer(outputStore_.ranges.capacity());
   placing.jointCount = pose.jointCount;
   placing.mayScale = instance.method != Method::linear && pose.mayScale;
-  placing.isCulled = instance.isCulled;
+  placing.isCulled = isCulled;
   runsScratch_.clear();
   if (Result<void> placed = groups_.place(jobOf(instance, mesh, *laidOut), placing,
                                           description_.limits, description_.tuning, runsScratch_);
@@ -165,16 +179,15 @@ void SceneBooks::unlink(std::uint32_t index) {
 Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& description) {
   SceneInstance instance;
   instance.pose = description.pose.index;
-  instance.updateInterval = description.updateInterval;
   instance.method = description.method;
-  instance.isCulled = description.culledOnGpu;
-  instance.hasMotion = description.layout.motion != Motion::none;
+  const bool isCulled = description.culledOnGpu;
   instance.mesh = description.mesh;
   instance.poseHandle = description.pose;
   instance.layout = description.layout;
+  instance.vertexBytes = attributeBytes(description.layout);
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
-  if (Result<void> good = check(instance); !good) return good.error();
+  if (Result<void> good = check(instance, description.updateInterval); !good) return good.error();
   if (!makeSlot()) {
     return Error{ErrorCode::limitExceeded,
                  "there are as many instances as there may be, " + std::to_string(slotCapacity_)};
@@ -182,17 +195,23 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   if (Result<void> good = reserveUnits(instance); !good) return good.error();
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);
   if (Result<void> taken = takeResult(instance); !taken) return taken.error();
-  if (Result<void> found = findRoom(instance); !found) {
+  if (Result<void> found = findRoom(instance, isCulled); !found) {
     freeResult(instance);
     return found.error();
   }
 
   ++meshes_.at(instance.mesh.index).users;
   const InstanceHandle handle = instances_.add(std::move(instance));
-  SceneInstance& added = instances_.at(handle.index);
+  if (handle.index >= states_.size()) states_.resize(handle.index + std::size_t{1});
+  InstanceState& state = states_[handle.index];
+  state = {};
+  state.generation = handle.generation;
+  state.updateInterval = description.updateInterval;
+  state.isCulled = isCulled;
+  state.hasMotion = description.layout.motion != Motion::none;
   link(handle.index);
-  if (added.isCulled) {
-    added.culledIndex = static_cast<std::uint32_t>(culled_.size());
+  if (isCulled) {
+    instances_.at(handle.index).culledIndex = static_cast<std::uint32_t>(culled_.size());
     culled_.push_back(handle.index);
   }
   shift(handle);
@@ -208,11 +227,12 @@ Result<void> SceneBooks::removeInstance(InstanceHandle handle) {
   releaseTarget(*instance);
   if (instance->shown) retire(outputStore_.ranges, instance->shown->bytes);
   freeResult(*instance);
-  if (instance->isCulled) {
+  if (states_[handle.index].isCulled) {
     culled_[instance->culledIndex] = culled_.back();
     instances_.at(culled_.back()).culledIndex = instance->culledIndex;
     culled_.pop_back();
   }
+  states_[handle.index] = {};
   instances_.remove(handle);
   return {};
 }
@@ -226,11 +246,11 @@ void SceneBooks::shift(InstanceHandle handle) {
 }
 
 /// Room for an instance that gets another mesh: if it is still shown with that mesh, it stays.
-Result<void> SceneBooks::takeBackOrFindRoom(SceneInstance& changed) {
-  if (!changed.shown || changed.shown->mesh != changed.mesh) return findRoom(changed);
+Result<void> SceneBooks::takeBackOrFindRoom(SceneInstance& changed, bool isCulled) {
+  if (!changed.shown || changed.shown->mesh != changed.mesh) return findRoom(changed, isCulled);
   changed.target = *changed.shown;
   changed.vertexCount = changed.shown->vertexCount;
-  return makeRuns(changed);
+  return makeRuns(changed, isCulled);
 }
 
 /// Gives an instance another mesh, pose or method, and sets its box and morph weights with it. The
@@ -258,9 +278,12 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
       return good;
     assignActive(*change.morphs, changed.extras.morphs);
   }
-  if (Result<void> good = check(changed); !good) return good;
+  InstanceState& state = states_[handle.index];
+  if (Result<void> good = check(changed, state.updateInterval); !good) return good;
   if (Result<void> good = reserveUnits(changed); !good) return good;
-  if (Result<void> room = hasNewMesh ? takeBackOrFindRoom(changed) : makeRuns(changed); !room)
+  if (Result<void> room = hasNewMesh ? takeBackOrFindRoom(changed, state.isCulled)
+                                     : makeRuns(changed, state.isCulled);
+      !room)
     return room;
 
   --meshes_.at(instance.mesh.index).users;
@@ -272,8 +295,8 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
     releaseRuns(instance);
   }
   const bool hasNewBox = change.box && isSnormPosition(changed.layout.positions);
-  changed.restartsMotion |= hasNewMesh || hasNewBox;
-  changed.isUrgent = true;
+  state.restartsMotion |= hasNewMesh || hasNewBox;
+  state.isUrgent = true;
   instance = std::move(changed);
   link(handle.index);
   if (hasNewMesh) shift(handle);
@@ -281,73 +304,123 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
   return {};
 }
 
-Result<void> SceneBooks::setMesh(InstanceHandle handle, MeshHandle mesh) {
-  SceneInstance* instance = instances_.find(handle);
-  if (instance == nullptr) return unknownHandle("instance", handle);
-  if (instance->mesh == mesh && meshes_.contains(mesh)) return {};
-  InstanceChange change;
-  change.instance = handle;
-  change.mesh = mesh;
-  return rebuild(*instance, change);
-}
-
-Result<void> SceneBooks::setBox(SceneInstance& instance, InstanceHandle handle, const Box& box) {
+Result<void> SceneBooks::setBox(InstanceHandle handle, const Box& box) {
+  SceneInstance& instance = instances_.at(handle.index);
   if (!isSnormPosition(instance.layout.positions)) return {};
   if (!isBox(box)) {
     return invalid("instance " + std::to_string(handle.index) +
                    ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
   instance.extras.box = box;
-  instance.isUrgent = true;
-  instance.restartsMotion = true;
+  states_[handle.index].isUrgent = true;
+  states_[handle.index].restartsMotion = true;
   makeStale(handle.index);
   return {};
 }
 
-Result<void> SceneBooks::changeOne(SceneInstance& instance, const InstanceChange& change) {
-  if (change.updateInterval && *change.updateInterval == 0) {
+Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
+                                         std::span<const MorphWeight> morphs) {
+  SceneInstance& instance = instances_.at(handle.index);
+  const SceneMesh& mesh = meshes_.at(instance.mesh.index);
+  if (Result<void> good =
+          checkMorphs(morphs, mesh.info.morphTargetCount, {"instance", handle.index});
+      !good)
+    return good;
+  std::vector<MorphWeight>& active = instance.extras.morphs;
+  const bool hadMorphs = !active.empty();
+  assignActive(morphs, active);
+  // With and without are two kernels.
+  if (hadMorphs == active.empty()) {
+    releaseRuns(instance);
+    if (Result<void> good = makeRuns(instance, states_[handle.index].isCulled); !good) return good;
+  }
+  makeStale(handle.index);
+  return {};
+}
+
+/// Of one that was invisible.
+void SceneBooks::show(InstanceState& state, InstanceHandle handle) {
+  state.isVisible = true;
+  if (state.hiddenAfter != record_) {
+    // Not displayed by the last record: what it showed before is no motion.
+    state.visibleFrom = record_ + 1;
+    if (state.isMoving) moving_.push_back(handle);
+  }
+  if (state.isStale) makePending(state, handle.index);
+}
+
+Result<void> SceneBooks::change(const InstanceChange& change) {
+  InstanceState* const state = findState(change.instance);
+  if (state == nullptr) return unknownHandle("instance", change.instance);
+  if (change.updateInterval == 0u) {
     return invalid("instance " + std::to_string(change.instance.index) +
                    ": an update interval is 1 or more frames, not 0");
   }
+  SceneInstance& instance = instances_.at(change.instance.index);
+  const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
   // A box and morph weights alone need neither other kernels nor room.
   Result<void> done;
-  if (change.mesh || change.pose || change.method || (change.box && change.morphs)) {
+  if (hasNewMesh || change.pose || change.method || (change.box && change.morphs)) {
     done = rebuild(instance, change);
   } else if (change.box) {
-    done = setBox(instance, change.instance, *change.box);
+    done = setBox(change.instance, *change.box);
   } else if (change.morphs) {
     done = setMorphWeights(change.instance, *change.morphs);
   }
-  if (done) setSmall(instance, change);
+  if (!done) return done;
+  if (change.updateInterval) state->updateInterval = *change.updateInterval;
+  if (change.visible && *change.visible != state->isVisible) {
+    if (*change.visible) {
+      show(*state, change.instance);
+    } else {
+      hide(*state);
+    }
+  }
+  if (change.teleports) {
+    state->restartsMotion = true;
+    state->isUrgent = true;
+    makeStale(change.instance.index);
+  }
   return done;
 }
 
-/// What cannot fail.
-void SceneBooks::setSmall(SceneInstance& instance, const InstanceChange& change) {
-  if (change.updateInterval) instance.updateInterval = *change.updateInterval;
-  if (change.visible) setVisible(instance, change.instance, *change.visible);
-  if (change.teleports) teleport(instance, change.instance);
+Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
+  for (const InstanceChange& one : changes) {
+    if (Result<void> done = change(one); !done)
+      return numbered(done.error(), &one - changes.data());
+  }
+  return {};
 }
 
-Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
-  for (const InstanceChange& change : changes) {
-    SceneInstance* instance = instances_.find(change.instance);
-    const bool isSmall = !change.mesh && !change.pose && !change.method && !change.box &&
-                         !change.morphs && change.updateInterval != 0u;
-    if (instance != nullptr && isSmall) {
-      setSmall(*instance, change);
+Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> instances) {
+  // Copies, which no store into a state can change.
+  const std::span<InstanceState> states = states_;
+  const std::uint64_t record = record_;
+  for (const InstanceVisibility& wanted : instances) {
+    const InstanceHandle handle = wanted.instance;
+    const bool isKnown = handle.index < states.size() && handle &&
+                         states[handle.index].generation == handle.generation;
+    if (!isKnown || wanted.updateInterval == 0) {
+      InstanceChange change;
+      change.instance = handle;
+      change.updateInterval = wanted.updateInterval;
+      return numbered(this->change(change).error(), &wanted - instances.data());
+    }
+    InstanceState& state = states[handle.index];
+    state.updateInterval = wanted.updateInterval;
+    if (state.isVisible == wanted.isVisible) continue;
+    const bool mayNeedMore = state.isStale || (state.isMoving && state.hiddenAfter != record);
+    if (wanted.isVisible && mayNeedMore) {
+      show(state, handle);
       continue;
     }
-    Result<void> done;
-    if (instance == nullptr) {
-      done = unknownHandle("instance", change.instance);
-    } else {
-      done = changeOne(*instance, change);
+    // The same without calls: neither list gets longer.
+    state.isVisible = wanted.isVisible;
+    if (!wanted.isVisible) {
+      state.hiddenAfter = record;
+    } else if (state.hiddenAfter != record) {
+      state.visibleFrom = record + 1;
     }
-    if (done) continue;
-    Error error = done.error();
-    error.message = "change " + std::to_string(&change - changes.data()) + ": " + error.message;
-    return error;
   }
   return {};
 }
@@ -375,11 +448,12 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
     if (!to) continue;
     releaseRuns(instance);
     instance.target.bytes = *to;
-    if (Result<void> made = makeRuns(instance); !made) {
+    const bool isCulled = states_[handle.index].isCulled;
+    if (Result<void> made = makeRuns(instance, isCulled); !made) {
       // A device with few storage buffers cannot have it there.
       outputStore_.ranges.free(*to);
       instance.target.bytes = from;
-      made = makeRuns(instance);
+      made = makeRuns(instance, isCulled);
       continue;
     }
     shift(handle);

@@ -163,23 +163,14 @@ Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
 Result<void> Scene::markAllWritten() {
   return change().markAllWritten();
 }
+Result<void> Scene::change(const InstanceChange& change) {
+  return this->change().change(change);
+}
 Result<void> Scene::change(std::span<const InstanceChange> changes) {
   return change().change(changes);
 }
-Result<void> Scene::setVisible(InstanceHandle instance, bool isVisible) {
-  return change().setVisible(instance, isVisible);
-}
-Result<void> Scene::setUpdateInterval(InstanceHandle instance, std::uint32_t interval) {
-  return change().setUpdateInterval(instance, interval);
-}
-Result<void> Scene::teleport(InstanceHandle instance) {
-  return change().teleport(instance);
-}
-Result<void> Scene::setMorphWeights(InstanceHandle instance, std::span<const MorphWeight> morphs) {
-  return change().setMorphWeights(instance, morphs);
-}
-Result<void> Scene::setMesh(InstanceHandle instance, MeshHandle mesh) {
-  return change().setMesh(instance, mesh);
+Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances) {
+  return change().setVisibility(instances);
 }
 std::uint64_t Scene::compact(std::uint64_t maxBytes) {
   return change().compact(maxBytes);

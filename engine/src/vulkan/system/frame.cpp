@@ -43,7 +43,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
                    "on the GPU"};
     }
   }
-  const bool works = !plan.commands().empty() || !uploads.empty() || isGrowing();
+  const bool works = !plan.commands().empty() || !uploads.empty() || isGrowing;
   if (works) {
     if (Result<void> room = makeRoom(); !room) return room;
     if (Result<void> good = bindings.state_->check(plan); !good) return good;
@@ -72,8 +72,6 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   }
   if (Result<void> committed = scene.commit(); !committed) return committed;
   ++recordCount;
-  static_cast<FrameWorkStatistics&>(frameStatistics) = scene.statistics().lastFrame;
-  frameStatistics.uploadedBytes += frameStatistics.poseBytes;
   frameStatistics.planSeconds = planSeconds;
   frameStatistics.recordSeconds = recording.seconds();
   return {};

@@ -234,24 +234,14 @@ Result<void> SkinningSystem::markAllWritten() {
   return state_->scene.markAllWritten();
 }
 
+Result<void> SkinningSystem::change(const InstanceChange& change) {
+  return state_->scene.change(change);
+}
 Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
   return state_->scene.change(changes);
 }
-Result<void> SkinningSystem::setVisible(InstanceHandle instance, bool isVisible) {
-  return state_->scene.setVisible(instance, isVisible);
-}
-Result<void> SkinningSystem::setUpdateInterval(InstanceHandle instance, std::uint32_t interval) {
-  return state_->scene.setUpdateInterval(instance, interval);
-}
-Result<void> SkinningSystem::teleport(InstanceHandle instance) {
-  return state_->scene.teleport(instance);
-}
-Result<void> SkinningSystem::setMorphWeights(InstanceHandle instance,
-                                             std::span<const MorphWeight> morphs) {
-  return state_->scene.setMorphWeights(instance, morphs);
-}
-Result<void> SkinningSystem::setMesh(InstanceHandle instance, MeshHandle mesh) {
-  return state_->scene.setMesh(instance, mesh);
+Result<void> SkinningSystem::setVisibility(std::span<const InstanceVisibility> instances) {
+  return state_->scene.setVisibility(instances);
 }
 std::uint64_t SkinningSystem::compact(std::uint64_t maxBytes) {
   return state_->scene.compact(maxBytes);
@@ -304,12 +294,13 @@ Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) c
 
 SystemStatistics SkinningSystem::statistics() const {
   const SceneStatistics scene = state_->scene.statistics();
-  return {state_->frameStatistics,
-          state_->gpuStatistics,
-          scene.meshes,
-          scene.palettes,
-          scene.outputs,
-          state_->blocks != nullptr ? state_->blocks->bytes() : state_->source.bytes};
+  FrameStatistics lastFrame = state_->frameStatistics;
+  static_cast<FrameWorkStatistics&>(lastFrame) = scene.lastFrame;
+  lastFrame.uploadedBytes += scene.lastFrame.poseBytes;
+  return {
+      lastFrame,     state_->gpuStatistics,
+      scene.meshes,  scene.palettes,
+      scene.outputs, state_->blocks != nullptr ? state_->blocks->bytes() : state_->source.bytes};
 }
 
 Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle instance) const {

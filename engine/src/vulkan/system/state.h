@@ -45,7 +45,6 @@ struct SkinningSystem::State {
   Result<void> createBuffers(const SkinningSystemDescription& description);
   Result<void> grow(const BufferGrowth& growth);
   Result<void> makeRoom();
-  bool isGrowing() const;
   Recorded recordGrowth(VkCommandBuffer commandBuffer);
   void retireReplaced();
   void abandonGrowth();
@@ -83,6 +82,7 @@ struct SkinningSystem::State {
   SystemBuffer tables, counters;
   Bindings bindings;
   bool bindingsAreOld = true;
+  bool isGrowing = false;  ///< one of the buffers has a larger one
   std::uint64_t outputGeneration = 1;
   VkBufferUsageFlags outputUsage = 0;  ///< the engine's
   /// Without push descriptors: one for each slot.

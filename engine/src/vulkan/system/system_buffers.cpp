@@ -82,6 +82,7 @@ Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescriptio
   // Nothing stands in them yet.
   for (GrowingBuffer* buffer : {&meshes, &palettes, &output, &results})
     buffer->own = std::exchange(buffer->larger, {});
+  isGrowing = false;
   if (const BufferRequirement needed = scene.buffer(BufferRole::counters); needed.size != 0) {
     Result<SystemBuffer> made = createBuffer(source, BufferRole::counters, needed);
     if (!made) return made.error();
@@ -109,17 +110,18 @@ Result<void> SkinningSystem::State::grow(const BufferGrowth& growth) {
     }
     case BufferRole::meshes:
       meshes.larger = std::move(*made);
-      return {};
+      break;
     case BufferRole::palettes:
       palettes.larger = std::move(*made);
-      return {};
+      break;
     case BufferRole::results:
       results.larger = std::move(*made);
-      return {};
+      break;
     default:
       output.larger = std::move(*made);
-      return {};
   }
+  isGrowing = true;
+  return {};
 }
 
 /// What is as large as a plan says. Tables that are too small are replaced, and the old ones kept
@@ -130,6 +132,7 @@ Result<void> SkinningSystem::State::makeRoom() {
     Result<SystemBuffer> made = createBuffer(source, BufferRole::history, needed);
     if (!made) return made.error();
     history.larger = std::move(*made);
+    isGrowing = true;
   }
   BufferRequirement needed = plan.buffer(BufferRole::tables);
   const std::uint64_t used = needed.size;
@@ -176,16 +179,11 @@ Result<void> SkinningSystem::State::makeRoom() {
   return {};
 }
 
-bool SkinningSystem::State::isGrowing() const {
-  return std::ranges::any_of(
-      std::array{&meshes, &palettes, &output, &results, &history},
-      [](const GrowingBuffer* buffer) { return buffer->larger.size() != 0; });
-}
-
 /// What frames in flight and this one read, write or copy stays in order by two barriers.
 Recorded SkinningSystem::State::recordGrowth(VkCommandBuffer commandBuffer) {
   Recorded recorded;
-  if (!isGrowing()) return recorded;
+  if (!isGrowing) return recorded;
+  isGrowing = false;
   const auto barrier = [&](const Scope& before, const Scope& after) {
     const VkMemoryBarrier memory = memoryBarrier({before, after});
     context->table.cmdPipelineBarrier(commandBuffer, before.stages, after.stages, 0, 1, &memory, 0,
@@ -229,6 +227,7 @@ void SkinningSystem::State::abandonGrowth() {
     GrowingBuffer& buffer = *old.buffer;
     SystemBuffer unused = std::exchange(buffer.own, std::move(old.old));
     if (buffer.larger.size() == 0) buffer.larger = std::move(unused);
+    isGrowing = true;
     if (&buffer == &output) ++outputGeneration;
   }
   replaced.clear();
