@@ -45,7 +45,14 @@ get_property(skinInclude GLOBAL PROPERTY DERMIS_SKIN_INCLUDE)
 if(skinInclude)
   install(FILES ${skinInclude} DESTINATION ${dermisShaderDir} COMPONENT dermis)
 endif()
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/dermis COMPONENT dermis)
+set(dermisDocDir ${CMAKE_INSTALL_DATADIR}/doc/dermis)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+        DESTINATION ${dermisDocDir} COMPONENT dermis)
+install(FILES ${PROJECT_SOURCE_DIR}/engine/README.md DESTINATION ${dermisDocDir}/engine COMPONENT dermis)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${dermisDocDir} COMPONENT dermis)
+foreach(sample IN ITEMS minimal allocator gpu_poses)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples/${sample} DESTINATION ${dermisDocDir}/samples COMPONENT dermis)
+endforeach()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
   ${PROJECT_BINARY_DIR}/dermisConfig.cmake

@@ -290,6 +290,12 @@ TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
   }
   std::vector<PoseHandle> others(50);
   must(system.addPoses(others, 300, {.writer = PoseWriter::gpu}));
+  const PoseHandle single = must(system.addPose(1, {.writer = PoseWriter::gpu}));
+  for (const PoseHandle bound : {poses[0], others[0], single}) {
+    EXPECT_EQ(
+        must(system.poseRange(bound)).offset % context().limits().minStorageBufferOffsetAlignment,
+        0u);
+  }
   EXPECT_EQ(must(system.poseRange(poses[0])).buffer, first.buffer) << "poses never move";
   must(system.addPoses({}, 7));
 }
@@ -313,6 +319,42 @@ TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
   must(engine->removePose(ofGpu));
   expectRefused(engine->markWritten({&ofGpu, 1}), "there is no pose");
   engine.submit();
+}
+
+// As the plan decides.
+TEST_F(SystemGrowthTest, WhatIsDueIsSkinned) {
+  SystemEngine engine(device(), tiny());
+  engine.begin();
+  InstanceDescription instance;
+  instance.mesh = engine.addMesh(systemMesh(1, 20));
+  instance.layout = motionLayout();
+  std::vector<InstanceHandle> instances;
+  std::vector<PoseHandle> poses;
+  for (std::uint32_t interval = 1; interval <= 4; ++interval) {
+    poses.push_back(engine.addPose(systemPose(interval)));
+    instance.pose = poses.back();
+    instance.updateInterval = interval;
+    instances.push_back(engine.addInstance(instance));
+  }
+  must(engine->change({.instance = instances[0], .visible = false}));
+  EXPECT_FALSE(must(engine->isDue(instances[0])));
+  for (std::uint32_t i = 1; i < 4; ++i) EXPECT_TRUE(must(engine->isDue(instances[i]))) << "new";
+  engine.submit();
+  EXPECT_FALSE(must(engine->isDue(instances[1]))) << "no frame has begun";
+  std::uint32_t due = 0;
+  for (std::uint32_t frame = 0; frame < 12; ++frame) {
+    engine.begin();
+    std::set<std::uint32_t> expected;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      if (must(engine->isDue(instances[i]))) expected.insert(instances[i].index);
+      engine.writePose(poses[i], systemPose(frame));
+    }
+    engine.submit();
+    EXPECT_EQ(indicesOf(engine->skinnedInstances()), expected);
+    due += static_cast<std::uint32_t>(expected.size());
+  }
+  EXPECT_EQ(due, 6u + 4u + 3u);
+  EXPECT_FALSE(engine->isDue({}).ok());
 }
 
 // Bounds, too: what the model of system_model_test.cpp does not know.

@@ -19,6 +19,8 @@ using vulkan::Writer;
 
 constexpr Scope nothing{0, 0};
 constexpr Scope computeReads{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT};
+constexpr Scope computeUses{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT};
 constexpr Scope kernelsRead{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0};
 constexpr Scope computeWrites{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT};
 
@@ -83,9 +85,9 @@ TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
        "hostWrite"},
       {PreviousUse::transferWrite,
        {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-       computeReads,
+       computeUses,
        "transferWrite"},
-      {PreviousUse::computeWrite, computeWrites, computeReads, "computeWrite"},
+      {PreviousUse::computeWrite, computeWrites, computeUses, "computeWrite"},
       {PreviousUse::vertexInput,
        {VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, 0},
        computeWaits,
@@ -116,11 +118,7 @@ TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
        computeWaits,
        "accelerationStructureBuild"},
       {PreviousUse::transfer, {VK_PIPELINE_STAGE_TRANSFER_BIT, 0}, computeWaits, "transfer"},
-      {PreviousUse::previousRecord,
-       computeWrites,
-       {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-        VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT},
-       "previousRecord"},
+      {PreviousUse::previousRecord, computeWrites, computeUses, "previousRecord"},
   };
   for (const Case& expected : cases) {
     const Dependency dependency = vulkan::inputScope(expected.use);
@@ -172,7 +170,7 @@ TEST(ScopeTest, TwoNeedsFitIntoOneBarrier) {
               {VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_VERTEX_INPUT_BIT,
                VK_ACCESS_TRANSFER_WRITE_BIT},
               "source");
-  expectScope(both.destination, computeReads, "destination");
+  expectScope(both.destination, computeUses, "destination");
   const VkMemoryBarrier barrier = vulkan::memoryBarrier(both);
   EXPECT_EQ(barrier.sType, VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   EXPECT_EQ(barrier.pNext, nullptr);

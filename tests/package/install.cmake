@@ -14,7 +14,12 @@ foreach(component IN ITEMS core gltf shader_compiler verify vulkan)
        ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
 endforeach()
 list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/cmake/dermis/dermisConfigVersion.cmake
-     ${dataFolder}/doc/dermis/LICENSE)
+     ${dataFolder}/doc/dermis/LICENSE ${dataFolder}/doc/dermis/README.md ${dataFolder}/doc/dermis/CHANGELOG.md
+     ${dataFolder}/doc/dermis/engine/README.md)
+file(GLOB_RECURSE documents RELATIVE "${sourceFolder}" "${sourceFolder}/docs/*" "${sourceFolder}/samples/minimal/*"
+     "${sourceFolder}/samples/allocator/*" "${sourceFolder}/samples/gpu_poses/*")
+list(TRANSFORM documents PREPEND ${dataFolder}/doc/dermis/)
+list(APPEND expected ${documents})
 file(GLOB_RECURSE headers RELATIVE "${sourceFolder}/engine/include" "${sourceFolder}/engine/include/*.h")
 list(TRANSFORM headers PREPEND ${includeFolder}/)
 file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"

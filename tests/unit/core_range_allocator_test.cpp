@@ -28,6 +28,26 @@ TEST(RangeAllocator, AlignsToNumbersThatAreNoPowerOfTwo) {
   EXPECT_EQ(allocator.allocate(26, 1), (Range{10, 26}));
 }
 
+TEST(RangeAllocator, AlignmentsCountFromItsBase) {
+  RangeAllocator allocator(1000, 16);
+  EXPECT_EQ(allocator.allocate(72, 36), (Range{20, 72})) << "36 from the base";
+  EXPECT_EQ(allocator.capacityFor(10, 36), 92u + 10);
+  EXPECT_EQ(allocator.allocate(36, 36), (Range{92, 36}));
+}
+
+TEST(RangeAllocator, GrowsAtItsEnd) {
+  RangeAllocator allocator(10);
+  const Range first = *allocator.allocate(8, 1);
+  EXPECT_EQ(allocator.capacityFor(12, 4), 20u) << "behind the 2 at its end, aligned";
+  allocator.grow(allocator.capacityFor(12, 4));
+  EXPECT_EQ(allocator.allocate(12, 4), (Range{8, 12}));
+  EXPECT_EQ(allocator.used(), 20u);
+  allocator.grow(30);
+  allocator.free(first);
+  EXPECT_EQ(allocator.largestFree(), 10u);
+  EXPECT_EQ(allocator.capacityFor(40, 1), 60u);
+}
+
 TEST(RangeAllocator, TakesTheSmallestGapThatFits) {
   RangeAllocator allocator(100);
   const Range large = *allocator.allocate(30, 1);

@@ -52,7 +52,8 @@ class PackedMesh {
   std::vector<std::uint32_t> words_;
 };
 
-/// Packs a mesh for poses of `jointCount` joints. Per vertex: attributes as float32; weights of
+/// Packs a mesh for poses of `jointCount` joints or more: no influence may name another joint. Per
+/// vertex: attributes as float32; weights of
 /// one joint added up, zero weights dropped, the pivot chosen (the strongest influence, the lowest
 /// joint index on a tie) and stored first, the rest by falling weight; weights normalised in double
 /// precision and rounded to float32 so that they sum to exactly 1. A vertex takes 8 bytes for each

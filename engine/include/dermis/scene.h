@@ -67,12 +67,16 @@ struct SceneDescription {
   Capacity meshCapacity{64 << 10};  ///< bytes of packed meshes; at most a storage buffer range
   Capacity jointCapacity{256};      ///< joints of all poses that the CPU writes
   Capacity gpuJointCapacity{0};     ///< joints of all poses that the GPU writes
-  /// Bytes of skinned vertices. May be more than a storage buffer range.
+  /// Bytes of skinned vertices: `VertexPlaces::size` of each instance, and what is left between
+  /// them. May be more than a storage buffer range.
   Capacity outputCapacity{256 << 10};
+  /// Where the output begins in its buffer: `InstanceOutput` counts from the beginning of the
+  /// buffer, commands count from here. A multiple of the alignment that `buffer` tells.
+  std::uint64_t outputOffset = 0;
   Capacity instanceCapacity{256};  ///< live instances
   Capacity boundsCapacity{64};     ///< live instances with bounds or snorm16 positions
-  /// Those of the device. With fewer storage buffers than `storageBuffersWanted`, as in the
-  /// defaults, `boundsCapacity` is taken for 0.
+  /// Those of the device: `vulkan::Context::limits`, or an engine's own. With fewer storage buffers
+  /// than `storageBuffersWanted`, as in the defaults here, `boundsCapacity` is taken for 0.
   DeviceLimits limits;
   Tuning tuning;
   GrowthCallback growth;
@@ -107,9 +111,10 @@ struct InstanceDescription {
   Box box = {};  ///< of positions in snorm16, as `Job::box`
   /// Whether to compute the exact box of the skinned positions, for `Scene::bounds`.
   bool bounds = false;
-  /// The instance is skinned every N-th frame; N is at least 1. Instances with the same pose and
-  /// interval are skinned in the same frames; poses are distributed over the frames. A teleport,
-  /// another mesh and coming back into view take effect at once.
+  /// The instance is skinned every N-th frame; N is at least 1. After a frame that was abandoned or
+  /// left out it is skinned in the next one, if it was due in between. Instances with the same pose
+  /// and interval are skinned in the same frames; poses are distributed over the frames. A
+  /// teleport, another mesh and coming back into view take effect at once.
   std::uint32_t updateInterval = 1;
   /// The GPU decides whether the instance is skinned: its word in the visibility buffer is not 0.
   /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range
@@ -124,8 +129,9 @@ struct InstanceChange {
   /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
   /// positions are its current ones. Instances begin visible.
   std::optional<bool> visible = {};
-  bool teleports = false;                            ///< previous positions become the current ones
-  std::optional<Method> method = {};                 ///< motion goes on
+  bool teleports = false;  ///< previous positions become the current ones
+  /// Motion goes on. `prepare` is needed for the method too, as in `pipelineNeeds`.
+  std::optional<Method> method = {};
   std::optional<std::uint32_t> updateInterval = {};  ///< as `InstanceDescription::updateInterval`
   /// Another mesh (a level of detail): the output moves, motion restarts. Morph weights stay if
   /// both meshes have the same number of targets, otherwise they are removed.
@@ -156,8 +162,8 @@ struct InstanceOutput {
   /// until the instance is skinned again; of an instance that is culled on the GPU, until the next
   /// `commit`.
   MeshHandle mesh;
-  /// Bytes. Interleaved: a multiple of the stride, so that a draw may use `firstVertex` instead of
-  /// the offset of a vertex buffer.
+  /// Bytes from the beginning of the buffer. Interleaved: a multiple of the stride, so that a draw
+  /// may use `firstVertex` instead of the offset of a vertex buffer.
   std::uint64_t offset = 0;
   std::uint64_t size = 0;  ///< bytes; 0: the instance has not been skinned yet
   /// Their offsets count from the beginning of the buffer.
@@ -258,14 +264,16 @@ class Scene {
   /// none.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
-  /// Where the current pose stands. It never moves if the GPU writes it.
+  /// Where the current pose stands. It never moves if the GPU writes it. The first pose of a call
+  /// of `addPose` or `addPoses` that the GPU writes begins at a multiple of
+  /// `DeviceLimits::minStorageBufferOffsetAlignment`, the others at multiples of 16 bytes.
   Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` while an instance uses it.
   Result<void> removePose(PoseHandle pose);
 
   /// The next `plan` skins it. Fails with `invalidArgument` if the description breaks a rule of
   /// `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with `limitExceeded`
-  /// if a budget has no room for it; nothing changes then. `compact` may make room in the output.
+  /// if there is no room for it; nothing changes then. `compact` may make room in the output.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   Result<void> removeInstance(InstanceHandle instance);
 
@@ -282,9 +290,10 @@ class Scene {
   /// it is not called between `beginFrame` and `plan`, and for a pose that the GPU writes.
   Result<PosePlace> writePose(PoseHandle pose);
   /// A pass of the engine writes these poses on the GPU before the commands of the next `plan`. All
-  /// their instances are skinned again. If the frame is abandoned, its pass is, too: the engine
-  /// writes and marks them again. Fails as `writePose`, and for a pose that the CPU writes; the
-  /// poses before it are marked then.
+  /// their instances are skinned again, with what stands there when they are: there is one copy of
+  /// such a pose. If the frame is abandoned, its pass is, too: the engine writes and marks them
+  /// again. Fails as `writePose`, and for a pose that the CPU writes; the poses before it are
+  /// marked then.
   Result<void> markWritten(std::span<const PoseHandle> poses);
   /// The same for all poses that the GPU writes.
   Result<void> markAllWritten();
@@ -301,6 +310,11 @@ class Scene {
   /// What engines decide about many instances in every frame, in less time than `change` takes.
   /// Fails as `change`.
   Result<void> setVisibility(std::span<const InstanceVisibility> instances);
+
+  /// Whether the next `plan` skins the instance if its pose is written: it is visible, and its
+  /// interval lets it. An engine need not animate others. false without `beginFrame`. The GPU may
+  /// still find that an instance is out of view.
+  Result<bool> isDue(InstanceHandle instance) const;
 
   /// Moves outputs from the end of the output buffer into free ranges before them, at most
   /// `maxBytes` bytes, with the next `plan`. Returns how many bytes it will move. The old output
@@ -320,12 +334,14 @@ class Scene {
   Result<void> commit();
 
   /// The commands of the last `commit` will never be executed, because the engine did not submit
-  /// the frame. The scene forgets that frame: `output`, motion and update intervals are as they
-  /// were before it, and the next `plan` lists its work again. What the engine changed meanwhile
-  /// stays changed. The frame may be planned again, or the engine begins another one. Copies of
-  /// packed meshes that went with the frame are the engine's to repeat. O(instances). Fails with
-  /// `invalidArgument` if the frame is not the one that was committed last, or if `beginFrame` was
-  /// called since: older frames cannot be abandoned.
+  /// the frame. What that `commit` did is undone: `output`, motion and update intervals are as they
+  /// were before it, and the next `plan` lists its work again. What was added, removed, changed or
+  /// written, before the `commit` or after it, stays; poses that the GPU writes are written again.
+  /// It is then as after `beginFrame`: the engine may change more, write poses, and plan the same
+  /// frame again, or begin another one. Copies of packed meshes that went with the frame are the
+  /// engine's to repeat. O(instances). Fails with `invalidArgument` if the frame is not the one
+  /// that was committed last, or if `beginFrame` was called since: older frames cannot be
+  /// abandoned.
   Result<void> abandonFrame(std::uint64_t frame);
 
   /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
@@ -350,8 +366,9 @@ class Scene {
   /// Instances whose output stands elsewhere than before.
   std::span<const InstanceHandle> movedInstances() const;
 
-  /// The exact box of the positions in the newest frame that was read back. Nothing before the
-  /// first one, without `InstanceDescription::bounds`, and if there is none
+  /// The exact box of the positions in the newest frame that skinned the instance and was read
+  /// back. Nothing before the first one, without `InstanceDescription::bounds`, and if there is
+  /// none
   /// (`InstanceResult::box`).
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
 

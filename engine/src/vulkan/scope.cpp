@@ -65,6 +65,7 @@ void setRange(Barrier& barrier, const BufferRange& range, std::uint32_t sourceFa
 
 Dependency inputScope(PreviousUse use) {
   const Scope reads{compute, VK_ACCESS_SHADER_READ_BIT};
+  const Scope uses{compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT};
   // Overwriting what was only read needs no memory made visible: an execution dependency.
   const auto afterReader = [](Consumer reader) {
     return Dependency{{scopeOf(reader).stages, 0}, {compute, 0}};
@@ -73,9 +74,9 @@ Dependency inputScope(PreviousUse use) {
     case PreviousUse::hostWrite:
       return {{VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_WRITE_BIT}, reads};
     case PreviousUse::transferWrite:
-      return {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}, reads};
+      return {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}, uses};
     case PreviousUse::computeWrite:
-      return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, reads};
+      return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, uses};
     case PreviousUse::vertexInput:
       return afterReader(Consumer::vertexInput);
     case PreviousUse::vertexShader:
@@ -95,8 +96,7 @@ Dependency inputScope(PreviousUse use) {
     case PreviousUse::transfer:
       return afterReader(Consumer::transfer);
     case PreviousUse::previousRecord:
-      return {{compute, VK_ACCESS_SHADER_WRITE_BIT},
-              {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT}};
+      return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, uses};
   }
   return {};
 }

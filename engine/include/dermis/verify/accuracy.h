@@ -79,10 +79,10 @@ struct SkinnedAttribute {
 
 /// What a kernel made of a mesh.
 struct SkinnedView {
-  SkinnedAttribute positions;
-  SkinnedAttribute normals;   ///< may be absent
-  SkinnedAttribute tangents;  ///< may be absent
-  Box box;                    ///< of positions in snorm16
+  SkinnedAttribute positions = {};
+  SkinnedAttribute normals = {};   ///< may be absent
+  SkinnedAttribute tangents = {};  ///< may be absent
+  Box box = {};                    ///< of positions in snorm16
 };
 
 /// Compares skinned positions, normals and tangents with the reference's, each against the bound of

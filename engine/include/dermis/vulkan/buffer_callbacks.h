@@ -19,11 +19,12 @@ enum class BufferUse : std::uint8_t {
 };
 
 struct BufferRequest {
-  /// With VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT the memory must be allocated with
+  /// Size and usage; exclusive to a queue family, nothing in pNext. With
+  /// VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT the memory must be allocated with
   /// VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
   VkBufferCreateInfo info{};
   BufferUse use = BufferUse::device;
-  const char* name = "";  ///< "dermis output"; it is a constant
+  const char* name = "";  ///< "dermis output": the same for all buffers of a kind; a constant
 };
 
 /// A buffer with its memory.

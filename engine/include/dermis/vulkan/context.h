@@ -28,8 +28,9 @@ struct DeviceDescription {
   /// them. The instance extension VK_EXT_debug_utils may be named too; Dermis then names its
   /// objects and labels its commands.
   std::span<const char* const> enabledExtensions;
-  /// The enabled features: the pNext chain of VkDeviceCreateInfo. Dermis uses these if they are
-  /// enabled: storageBuffer16BitAccess and storageBuffer8BitAccess of
+  /// The enabled features: the pNext chain of VkDeviceCreateInfo. An engine that gave
+  /// `pEnabledFeatures` instead points to a VkPhysicalDeviceFeatures2. Dermis uses these if they
+  /// are enabled: storageBuffer16BitAccess and storageBuffer8BitAccess of
   /// VkPhysicalDevice16BitStorageFeatures, VkPhysicalDevice8BitStorageFeatures, or
   /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64 of VkPhysicalDeviceFeatures2.
   /// Only `create` reads the chain.

@@ -34,7 +34,7 @@ inline Dependency operator|(const Dependency& a, const Dependency& b) {
 
 /// The last use of a buffer before `record`.
 enum class PreviousUse : std::uint8_t {
-  // A write to what `record` reads: meshes, poses, tables.
+  // A write to what `record` reads or overwrites: meshes, poses, tables, the output.
   hostWrite,  ///< through a mapping, before the submission: `vkQueueSubmit` makes it visible, no
               ///< barrier is needed
   transferWrite,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
@@ -50,7 +50,8 @@ enum class PreviousUse : std::uint8_t {
   accelerationStructureBuild,  ///< a build or refit
   transfer,                    ///< vkCmdCopyBuffer
   // Both: the palettes, and the output.
-  previousRecord,  ///< an earlier `record` used the same buffer
+  previousRecord,  ///< an earlier `Context::record` used the same buffer; a SkinningSystem records
+                   ///< this barrier itself
 };
 
 /// The next use of the skinned vertices.

@@ -52,8 +52,10 @@ struct SkinningSystemDescription {
   Capacity boundsCapacity = SceneDescription().boundsCapacity;
 
   // -- Ranges of the engine's buffers. `SkinningSystem::requirement` tells their usage and
-  // alignment. A range does not grow: it is the capacity. Dermis uses nothing outside of it. The
-  // engine destroys the buffer after the system. Without a range the system creates a buffer.
+  // alignment. A range does not grow: its size is the capacity, and the one above is not used.
+  // Dermis uses nothing outside of it. The engine destroys the buffer after the system. Without a
+  // range the system creates a buffer, and without joints at first the one for poses with the first
+  // pose.
   BufferRange meshes;
   MappedRange poses;     ///< that the CPU writes
   BufferRange gpuPoses;  ///< that a pass of the engine writes
@@ -62,8 +64,10 @@ struct SkinningSystemDescription {
   /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and `buildInputUsage`.
   VkBufferUsageFlags outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
 
-  /// How all other buffers are created. Both functions, or none: then the system allocates blocks
-  /// of memory, small ones first, of at most 64 MiB where no buffer is larger.
+  /// How all other buffers are created: by `create`, by what is added, and by `record` (tables, and
+  /// what is copied to and from them, until a frame needs no more than those before it). Both
+  /// functions, or none: then the system allocates blocks of memory, small ones first, of at most
+  /// 64 MiB where no buffer is larger.
   BufferCallbacks buffers;
   /// Measure the GPU time of each `record` with timestamps. The queue's family must support them.
   bool measuresGpuTime = false;
@@ -117,9 +121,9 @@ class SkinningSystem {
   static Result<SkinningSystem> create(const SkinningSystemDescription& description);
 
   /// What a range of the engine's needs, for `meshes`, `poses`, `gpuPoses` and `positions` (the
-  /// output): usage, alignment, and the size of the capacity in `description`. Of other roles: what
-  /// the system will create at first; tables and uploads as large as needed later. Creates nothing.
-  /// Fails as `Scene::create`.
+  /// output): usage, alignment, and the size of the capacity in `description`, in which the range
+  /// is then set. Of other roles: what the system will create at first; tables and uploads as large
+  /// as needed later. Creates nothing. Fails as `Scene::create`.
   static Result<BufferRequirement> requirement(const SkinningSystemDescription& description,
                                                BufferRole role);
 
@@ -128,7 +132,8 @@ class SkinningSystem {
   SkinningSystem(SkinningSystem&&) noexcept;
   SkinningSystem& operator=(SkinningSystem&&) noexcept;
 
-  // -- Meshes, poses, instances: as those of `Scene` (scene.h).
+  // -- Meshes, poses, instances: as those of `Scene` (scene.h). What is said there of `plan` and
+  // `commit` is true of `record`.
 
   // What is added may make a buffer grow: a larger one is created at once, and the next `record`
   // copies what the old one holds. The old one is destroyed when the frames that use it are
@@ -152,14 +157,20 @@ class SkinningSystem {
 
   // -- What changes: as `Scene`.
 
+  /// Also reads back what complete frames found out: `bounds`, `statistics`.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
   /// Where to write the joint matrices of this frame: mapped memory, to be written as a whole and
   /// never read, until `record`.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
   /// Where a pass of the engine writes the joint matrices of a pose that the GPU writes:
-  /// `JointMatrix` by `JointMatrix`, 48 bytes each. The same as long as the pose lives. Before its
-  /// writes the engine records a barrier `overwriteScope(Writer::compute)`, since frames in flight
-  /// may still read them, after them `inputScope(PreviousUse::computeWrite)`, and calls
+  /// `JointMatrix` by `JointMatrix`, 48 bytes each. The same as long as the pose lives. Poses of
+  /// one call of `addPoses` are in one buffer, and the first of them can be bound: its offset is a
+  /// multiple of minStorageBufferOffsetAlignment, that of others of 16. Other calls may use other
+  /// buffers. A buffer of the system's own has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and
+  /// VK_BUFFER_USAGE_TRANSFER_DST_BIT.
+  ///
+  /// Before its writes the engine records a barrier `overwriteScope(Writer::compute)`, since frames
+  /// in flight may still read them, after them `inputScope(PreviousUse::computeWrite)`, and calls
   /// `markWritten`. Fails with `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
   Result<void> markWritten(std::span<const PoseHandle> poses);
@@ -167,6 +178,7 @@ class SkinningSystem {
   Result<void> change(const InstanceChange& change);
   Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisibility(std::span<const InstanceVisibility> instances);
+  Result<bool> isDue(InstanceHandle instance) const;
   std::uint64_t compact(std::uint64_t maxBytes);
 
   // -- Recording.
@@ -184,16 +196,22 @@ class SkinningSystem {
   /// of it.
   Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
 
-  /// The engine did not submit what the last `record` recorded, and never will. As
-  /// `Scene::abandonFrame`: the next `record` does all of it again, uploads included, in the same
-  /// frame or in another one.
+  /// The engine did not submit what the last `record` recorded, and never will: that command buffer
+  /// may be reset or freed at once. What `record` did is undone, and the next one does all of it
+  /// again, uploads included. What was added, removed, changed or written, before that `record` or
+  /// after it, stays; poses that the GPU writes are written and marked again. It is then as after
+  /// `beginFrame`: the engine may `record` the same frame again, or begin another one. The frame
+  /// does not count as in flight. O(instances).
+  ///
+  /// To be called for every frame that is recorded and not submitted, before the next `beginFrame`:
+  /// if not, the system takes it for executed as soon as a later frame is complete. Fails with
+  /// `invalidArgument` if `frame` is not the one that was recorded last, or if another has begun.
   Result<void> abandonFrame(std::uint64_t frame);
 
   // -- Results, as of the last `record`: as `Scene`.
 
   /// All outputs are in this buffer: the system's own, or that of
-  /// `SkinningSystemDescription::output`. Offsets count from its beginning. In a range of the
-  /// engine's they are multiples of the stride (interleaved layouts) if the range's offset is.
+  /// `SkinningSystemDescription::output`. Offsets count from its beginning.
   VkBuffer outputBuffer() const;
   /// Differs from what it was if `outputBuffer` is another buffer: it grew, or the frame in which
   /// it grew was abandoned. All offsets stay when it grows.

@@ -2,6 +2,7 @@
 // instances, and this is the one place that writes their records.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -178,6 +179,12 @@ struct PlanSizes {
   BufferRequirement requirement(BufferRole role, std::uint64_t tables,
                                 const DeviceLimits& limits) const;
 };
+
+/// Of the offset of a scene's output in its buffer. Kernels store units of 8 bytes, which count
+/// from there.
+inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
+  return std::max(limits.minStorageBufferOffsetAlignment, 16u);
+}
 
 /// What a frame of a scene does besides skinning.
 struct FrameWork {

@@ -107,7 +107,8 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::results:
       return {resultBytes, alignment, written, !isScene, false};
     case BufferRole::positions:
-      return {outputs.positions, alignment, written, false, false};
+      return {outputs.positions, isScene ? outputRangeAlignment(limits) : alignment, written, false,
+              false};
     case BufferRole::normals:
       return {outputs.normals, alignment, written, false, false};
     case BufferRole::tangents:

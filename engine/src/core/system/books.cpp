@@ -54,7 +54,8 @@ SceneBooks::SceneBooks(const SceneDescription& description)
                  capacityOf(description, {firstUnits(description)},
                             description.limits.maxStorageBufferRange / unitBytes),
                  unitBytes},
-      outputStore_{BufferRole::positions, description_.outputCapacity},
+      outputStore_{BufferRole::positions, description_.outputCapacity, 1,
+                   description_.outputOffset},
       resultStore_{BufferRole::results, description_.boundsCapacity, sizeof(InstanceResult)},
       slotCapacity_(description.instanceCapacity.initial),
       readBacks_(description.framesInFlight) {
@@ -170,7 +171,9 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
     return Error{ErrorCode::invalidArgument,
                  "frame " + std::to_string(frame) + " begins while the GPU has completed frame " +
                      std::to_string(completedFrame) + ": that makes more than the " +
-                     std::to_string(description_.framesInFlight) + " frames in flight described"};
+                     std::to_string(description_.framesInFlight) +
+                     " frames in flight described; was one of them recorded and never submitted? "
+                     "Then abandonFrame must say so"};
   }
   frame_ = frame;
   completed_ = completedFrame;

@@ -28,7 +28,8 @@ struct Store {
   BufferRole role;
   Capacity capacity;            ///< in units
   std::uint64_t unitBytes = 1;  ///< what the ranges count
-  RangeAllocator ranges{capacity.initial};
+  std::uint64_t base = 0;       ///< bytes before it in its buffer
+  RangeAllocator ranges{capacity.initial, base};
 };
 
 struct SceneMesh {
@@ -135,6 +136,7 @@ class SceneBooks {
   Result<void> change(const InstanceChange& change);
   Result<void> change(std::span<const InstanceChange> changes);
   Result<void> setVisibility(std::span<const InstanceVisibility> instances);
+  Result<bool> isDue(InstanceHandle instance) const;
   std::uint64_t compact(std::uint64_t maxBytes);
 
   /// Plans all that has to be done; nothing of it counts as done before `commit`.

@@ -122,9 +122,14 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance, bool isCulled) {
 Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const ScenePose& pose = poses_.at(instance.poseHandle.index);
-  const Result<VertexPlaces> laidOut =
-      placeVertices(instance.layout, mesh.info.vertexCount, instance.target.bytes.offset);
+  Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh.info.vertexCount,
+                                               outputStore_.base + instance.target.bytes.offset);
   if (!laidOut) return laidOut.error();
+  // Kernels count from the beginning of the output.
+  for (OutputAttribute* attribute :
+       {&laidOut->positions, &laidOut->normals, &laidOut->tangents, &laidOut->previousPositions}) {
+    if (attribute->format != VertexFormat::none) attribute->offset -= outputStore_.base;
+  }
   Placing placing;
   placing.subject = theInstance;
   placing.outputs = OutputSizes::oneBuffer(outputStore_.ranges.capacity());
@@ -425,6 +430,13 @@ Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> insta
   return {};
 }
 
+Result<bool> SceneBooks::isDue(InstanceHandle handle) const {
+  const SceneInstance* instance = instances_.find(handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
+  const InstanceState& state = states_[handle.index];
+  return hasBegun_ && state.isVisible && isDue(state, instance->pose);
+}
+
 std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
   std::vector<InstanceHandle> fromEnd;
   for (std::uint32_t index = 0; index < instances_.capacity(); ++index) {
@@ -468,11 +480,11 @@ Result<InstanceOutput> SceneBooks::output(InstanceHandle handle) const {
   InstanceOutput output;
   if (!instance->shown) return output;
   const Place& place = *instance->shown;
-  const Result<VertexPlaces> places =
-      placeVertices(instance->layout, place.vertexCount, place.bytes.offset);
+  const std::uint64_t offset = outputStore_.base + place.bytes.offset;
+  const Result<VertexPlaces> places = placeVertices(instance->layout, place.vertexCount, offset);
   if (!places) return places.error();
   output.mesh = place.mesh;
-  output.offset = place.bytes.offset;
+  output.offset = offset;
   output.size = place.bytes.size;
   output.positions = places->positions;
   output.normals = places->normals;

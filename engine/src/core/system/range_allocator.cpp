@@ -3,16 +3,15 @@
 #include <iterator>
 
 namespace dermis {
-namespace {
 
-std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
-  return (value + multiple - 1) / multiple * multiple;
+RangeAllocator::RangeAllocator(std::uint64_t capacity, std::uint64_t base)
+    : capacity_(capacity), base_(base) {
+  if (capacity != 0) addGap(0, capacity);
 }
 
-}  // namespace
-
-RangeAllocator::RangeAllocator(std::uint64_t capacity) : capacity_(capacity) {
-  if (capacity != 0) addGap(0, capacity);
+std::uint64_t RangeAllocator::aligned(std::uint64_t offset, std::uint64_t alignment) const {
+  const std::uint64_t over = (base_ + offset) % alignment;
+  return over == 0 ? offset : offset + alignment - over;
 }
 
 void RangeAllocator::addGap(std::uint64_t offset, std::uint64_t size) {
@@ -39,7 +38,7 @@ Range RangeAllocator::take(Gaps::iterator gap, std::uint64_t offset, std::uint64
 std::optional<Range> RangeAllocator::allocate(std::uint64_t size, std::uint64_t alignment) {
   for (auto entry = bySize_.lower_bound({size, 0}); entry != bySize_.end(); ++entry) {
     const auto [gapSize, gapOffset] = *entry;
-    const std::uint64_t offset = roundUp(gapOffset, alignment);
+    const std::uint64_t offset = aligned(gapOffset, alignment);
     if (offset - gapOffset <= gapSize - size) return take(gaps_.find(gapOffset), offset, size);
   }
   return std::nullopt;
@@ -48,7 +47,7 @@ std::optional<Range> RangeAllocator::allocate(std::uint64_t size, std::uint64_t 
 std::optional<Range> RangeAllocator::allocateBelow(std::uint64_t size, std::uint64_t alignment,
                                                    std::uint64_t end) {
   for (auto gap = gaps_.begin(); gap != gaps_.end() && gap->first + size <= end; ++gap) {
-    const std::uint64_t offset = roundUp(gap->first, alignment);
+    const std::uint64_t offset = aligned(gap->first, alignment);
     if (offset + size <= end && gap->second >= size && offset - gap->first <= gap->second - size)
       return take(gap, offset, size);
   }
@@ -81,7 +80,7 @@ std::uint64_t RangeAllocator::capacityFor(std::uint64_t size, std::uint64_t alig
     const auto& [offset, gapSize] = *gaps_.rbegin();
     if (offset + gapSize == capacity_) begin = offset;
   }
-  return roundUp(begin, alignment) + size;
+  return aligned(begin, alignment) + size;
 }
 
 void RangeAllocator::grow(std::uint64_t capacity) {

@@ -22,7 +22,8 @@ struct Range {
 /// alignment makes gaps unfit.
 class RangeAllocator {
  public:
-  explicit RangeAllocator(std::uint64_t capacity = 0);
+  /// Alignments count from so many units before the first one.
+  explicit RangeAllocator(std::uint64_t capacity = 0, std::uint64_t base = 0);
 
   /// The smallest gap that holds `size` at a multiple of `alignment`, which need not be a power of
   /// two; nothing where there is none. `size` is not 0.
@@ -48,7 +49,10 @@ class RangeAllocator {
   void addGap(std::uint64_t offset, std::uint64_t size);
   void removeGap(Gaps::iterator gap);
 
+  std::uint64_t aligned(std::uint64_t offset, std::uint64_t alignment) const;
+
   std::uint64_t capacity_;
+  std::uint64_t base_;
   std::uint64_t used_ = 0;
   Gaps gaps_;
   std::set<std::pair<std::uint64_t, std::uint64_t>> bySize_;  // size, offset

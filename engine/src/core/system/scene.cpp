@@ -46,6 +46,12 @@ Result<void> checkDescription(const SceneDescription& description) {
                      " makes a buffer larger than this device's storage buffer range of " +
                      std::to_string(range) + " bytes; the most is " + std::to_string(field.most)};
   }
+  if (description.outputOffset % outputRangeAlignment(description.limits) != 0 ||
+      description.outputOffset > anySize / 2) {
+    return invalid("the scene's outputOffset of " + std::to_string(description.outputOffset) +
+                   " is not a multiple of " +
+                   std::to_string(outputRangeAlignment(description.limits)));
+  }
   if (sceneSizes(description).palettes > range) {
     return Error{ErrorCode::limitExceeded,
                  "the palettes of the scene's jointCapacity and gpuJointCapacity are larger than "
@@ -171,6 +177,9 @@ Result<void> Scene::change(std::span<const InstanceChange> changes) {
 }
 Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances) {
   return change().setVisibility(instances);
+}
+Result<bool> Scene::isDue(InstanceHandle instance) const {
+  return books_->isDue(instance);
 }
 std::uint64_t Scene::compact(std::uint64_t maxBytes) {
   return change().compact(maxBytes);

@@ -1,6 +1,7 @@
 // Room in the buffers of a scene, and how they grow.
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 
 #include "system/books.h"
@@ -103,11 +104,16 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);
+  // So that what the GPU writes can be bound where it begins.
+  const std::uint64_t bound = description_.limits.minStorageBufferOffsetAlignment;
+  const std::uint64_t alignment =
+      writer == PoseWriter::gpu ? bound / std::gcd(bound, sizeof(JointMatrix)) : 1;
   std::uint64_t total = 0;
   for (buffer = 0; buffer < poseBuffers_.size(); ++buffer) {
     PoseStore& store = poseBuffers_[buffer];
     if (store.writer != writer) continue;
-    if (const std::optional<Range> range = store.joints.allocate(count * slots, 1)) return range;
+    if (const std::optional<Range> range = store.joints.allocate(count * slots, alignment))
+      return range;
     total += store.joints.capacity() / slots;
   }
   const bool isCpu = writer == PoseWriter::cpu;

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "plan/builder.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {
@@ -18,7 +19,7 @@ Error wrongField(const std::string& what) {
 }
 
 Result<void> checkRange(const char* name, const BufferRange& range, std::uint64_t unit,
-                        const DeviceLimits& limits) {
+                        std::uint32_t alignment) {
   if (range.buffer == VK_NULL_HANDLE) {
     if (range.offset == 0 && range.size == 0) return {};
     return wrongField(std::string(name) + " has no buffer");
@@ -27,22 +28,23 @@ Result<void> checkRange(const char* name, const BufferRange& range, std::uint64_
     return wrongField(std::string(name) + " has " + std::to_string(range.size) +
                       " bytes, not a multiple of 4, at least " + std::to_string(unit));
   }
-  if (range.offset % limits.minStorageBufferOffsetAlignment != 0) {
+  if (range.offset % alignment != 0) {
     return wrongField(std::string(name) + " begins at " + std::to_string(range.offset) +
-                      " bytes, not at a multiple of minStorageBufferOffsetAlignment, " +
-                      std::to_string(limits.minStorageBufferOffsetAlignment));
+                      " bytes, not at a multiple of " + std::to_string(alignment) +
+                      ", which SkinningSystem::requirement tells");
   }
   return {};
 }
 
 Result<void> checkRanges(const SkinningSystemDescription& description, const DeviceLimits& limits) {
   const std::uint64_t joint = sizeof(JointMatrix);
-  for (const auto& [name, range, unit] :
-       {std::tuple{"meshes", &description.meshes, std::uint64_t{packedMeshAlignment}},
-        {"poses.range", &description.poses.range, joint * description.framesInFlight},
-        {"gpuPoses", &description.gpuPoses, joint},
-        {"output", &description.output, std::uint64_t{4}}}) {
-    if (Result<void> good = checkRange(name, *range, unit, limits); !good) return good;
+  const std::uint32_t alignment = limits.minStorageBufferOffsetAlignment;
+  for (const auto& [name, range, unit, multiple] :
+       {std::tuple{"meshes", &description.meshes, std::uint64_t{packedMeshAlignment}, alignment},
+        {"poses.range", &description.poses.range, joint * description.framesInFlight, alignment},
+        {"gpuPoses", &description.gpuPoses, joint, alignment},
+        {"output", &description.output, std::uint64_t{4}, outputRangeAlignment(limits)}}) {
+    if (Result<void> good = checkRange(name, *range, unit, multiple); !good) return good;
   }
   const MappedRange& poses = description.poses;
   if ((poses.range.buffer == VK_NULL_HANDLE) != (poses.mapped == nullptr))
@@ -70,6 +72,7 @@ SceneDescription sceneOf(const SkinningSystemDescription& description,
   scene.gpuJointCapacity =
       capacity(description.gpuJointCapacity, description.gpuPoses, sizeof(JointMatrix));
   scene.outputCapacity = capacity(description.outputCapacity, description.output, 1);
+  scene.outputOffset = description.output.offset;
   scene.instanceCapacity = description.instanceCapacity;
   scene.boundsCapacity = description.boundsCapacity;
   scene.limits = context.limits;
@@ -243,6 +246,9 @@ Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
 Result<void> SkinningSystem::setVisibility(std::span<const InstanceVisibility> instances) {
   return state_->scene.setVisibility(instances);
 }
+Result<bool> SkinningSystem::isDue(InstanceHandle instance) const {
+  return state_->scene.isDue(instance);
+}
 std::uint64_t SkinningSystem::compact(std::uint64_t maxBytes) {
   return state_->scene.compact(maxBytes);
 }
@@ -266,15 +272,7 @@ std::uint64_t SkinningSystem::outputGeneration() const {
   return state_->outputGeneration;
 }
 Result<InstanceOutput> SkinningSystem::output(InstanceHandle instance) const {
-  Result<InstanceOutput> output = state_->scene.output(instance);
-  if (!output || output->size == 0) return output;
-  const VkDeviceSize begin = state_->output.lastRange().offset;
-  output->offset += begin;
-  for (OutputAttribute* attribute :
-       {&output->positions, &output->normals, &output->tangents, &output->previousPositions}) {
-    if (attribute->format != VertexFormat::none) attribute->offset += begin;
-  }
-  return output;
+  return state_->scene.output(instance);
 }
 std::span<const InstanceHandle> SkinningSystem::skinnedInstances() const {
   return state_->scene.skinnedInstances();
