@@ -317,5 +317,72 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   EXPECT_EQ(engine.read(bytes, culled), engine.read(bytes, instances[3]));
 }
 
+// Systems of one context, each a thread's own: created, grown and recorded at the same time.
+TEST_F(ThreadsTest, ManyRecordSystemsOfOneContext) {
+  constexpr std::uint32_t frames = 10, vertexCount = 300;
+  OwnedMesh mesh = randomMesh(1, vertexCount, 10, 4);
+  const PackedMesh packed = *pack(mesh.view(), 10);
+  struct Engine {
+    samples::MappedBuffer output;
+    std::optional<vulkan::SkinningSystem> system;
+    std::vector<InstanceHandle> instances;
+    ThreadCommands commands;
+  };
+  std::array<Engine, threadCount> engines;
+  constexpr std::uint64_t outputSize = frames * vertexCount * 12;
+  for (Engine& engine : engines) {
+    engine.output = must(samples::MappedBuffer::create(device(), outputSize,
+                                                       VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                                                           VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                                                           VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                                       true));
+  }
+  std::atomic<int> failures = 0;
+  runOnThreads([&](std::size_t thread) {
+    Engine& engine = engines[thread];
+    engine.commands.begin(device());
+    vulkan::SkinningSystemDescription description;
+    description.context = &context();
+    description.framesInFlight = frames;
+    description.meshCapacity = {16};
+    description.jointCapacity = {1};
+    description.output = engine.output.range();
+    engine.system.emplace(must(vulkan::SkinningSystem::create(description)));
+    vulkan::SkinningSystem& system = *engine.system;
+    InstanceDescription instance;
+    for (std::uint32_t frame = 1; frame <= frames; ++frame) {
+      must(system.beginFrame(frame, 0));
+      instance.mesh = must(system.addMesh(packed));
+      instance.pose = must(system.addPose(10));
+      must(system.prepare(pipelineNeeds(instance)));
+      engine.instances.push_back(must(system.addInstance(instance)));
+      const std::uint32_t seed = frame + (thread == 0 ? 100 : 0);
+      std::ranges::copy(randomPose(seed, 10, Rigidity::rigid),
+                        must(system.writePose(instance.pose)).begin());
+      if (!system.record(engine.commands.buffer)) ++failures;
+    }
+  });
+  EXPECT_EQ(failures, 0);
+  for (Engine& engine : engines) {
+    device().functions().EndCommandBuffer(engine.commands.buffer);
+    ASSERT_TRUE(device().submitAndWait(engine.commands.buffer).ok());
+  }
+  const auto outputOf = [&](std::size_t thread) {
+    const Engine& engine = engines[thread];
+    std::vector<std::byte> bytes;
+    for (const InstanceHandle instance : engine.instances) {
+      const std::vector<std::byte> one = readAttribute(
+          engine.output.bytes(), must(engine.system->output(instance)).positions, vertexCount);
+      bytes.insert(bytes.end(), one.begin(), one.end());
+    }
+    return bytes;
+  };
+  EXPECT_EQ(outputOf(1), outputOf(2));
+  EXPECT_EQ(outputOf(1), outputOf(3));
+  EXPECT_NE(outputOf(0), outputOf(1));
+  for (Engine& engine : engines)
+    device().functions().DestroyCommandPool(device().handle(), engine.commands.pool, nullptr);
+}
+
 }  // namespace
 }  // namespace dermis::test

@@ -276,8 +276,10 @@ Result<void> PlanBuilder::addDispatches() {
   };
   order_.resize(planGroups_.size());
   for (std::uint32_t index = 0; index < order_.size(); ++index) order_[index] = index;
-  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return dispatchOrder(a) < dispatchOrder(b);
+  // As a stable sort, which would allocate.
+  std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::tuple_cat(dispatchOrder(a), std::tie(a)) <
+           std::tuple_cat(dispatchOrder(b), std::tie(b));
   });
 
   std::vector<std::uint32_t>& tables = plan_->tables;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "dermis/vulkan/scope.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {
@@ -77,10 +78,15 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   return {};
 }
 
-/// Packed meshes. No frame in flight reads their bytes; the first barrier of the plan, or of a
-/// later one, makes them visible.
+/// Packed meshes. No frame in flight reads their bytes, but those around them: layers do not tell
+/// them apart. The first barrier of the plan, or of a later one, makes them visible.
 Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   Recorded recorded;
+  if (uploads.empty()) return recorded;
+  const Dependency afterReads = overwriteScope(Writer::transfer);
+  context->table.cmdPipelineBarrier(commandBuffer, afterReads.source.stages,
+                                    afterReads.destination.stages, 0, 0, nullptr, 0, nullptr, 0,
+                                    nullptr);
   for (MeshUpload& upload : uploads) {
     const BufferRange to = meshes.range();
     const VkBufferCopy region{0, to.offset + upload.offset, upload.staging.size()};

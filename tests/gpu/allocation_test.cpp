@@ -1,0 +1,144 @@
+// Frames of a scene that is warm allocate nothing on the CPU: every `operator new` of this thread
+// is counted while Dermis works. A program of its own, since it replaces that operator.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "open_device.h"
+#include "system_test.h"
+
+namespace {
+
+thread_local bool isCounting = false;
+thread_local std::uint32_t allocations = 0;
+
+void* allocate(std::size_t size) {
+  if (isCounting) ++allocations;
+  if (void* const memory = std::malloc(size != 0 ? size : 1)) return memory;
+  std::abort();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return allocate(size);
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace dermis::test {
+namespace {
+
+/// Counts while it lives.
+class Counting {
+ public:
+  Counting() { isCounting = true; }
+  ~Counting() { isCounting = false; }
+};
+
+class AllocationTest : public SystemTest {
+ protected:
+  void SetUp() override {
+    SystemTest::SetUp();
+    if (device_ == nullptr) return;
+    samples::DeviceOptions options = testDeviceOptions();
+    options.validation = false;  // the layer allocates in the same thread
+    open_.emplace(must(samples::openDevice(options)));
+  }
+  void TearDown() override {
+    open_.reset();
+    SystemTest::TearDown();
+  }
+
+  std::optional<samples::OpenDevice> open_;
+};
+
+/// All that a frame may have: poses by both writers, intervals, culling by both, morph weights,
+/// bounds, motion, teleports, and now and then a frame that is not submitted.
+TEST_F(AllocationTest, WarmFramesAllocateNothing) {
+  constexpr std::uint32_t count = 200;
+  samples::Device& device = *open_->device;
+  vulkan::SkinningSystemDescription description;
+  description.context = &open_->context;
+  description.measuresGpuTime = true;
+  description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+  std::optional<vulkan::SkinningSystem> system = must(vulkan::SkinningSystem::create(description));
+  const PackedMesh mesh = systemMesh(1, 50);
+  InstanceDescription instance;
+  instance.mesh = must(system->addMesh(mesh));
+  instance.layout = motionLayout();
+  std::vector<PoseHandle> cpuPoses, gpuPoses;
+  std::vector<InstanceHandle> instances;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const PoseWriter writer = i % 3 == 0 ? PoseWriter::gpu : PoseWriter::cpu;
+    instance.pose = must(system->addPose(8, {.writer = writer}));
+    (writer == PoseWriter::gpu ? gpuPoses : cpuPoses).push_back(instance.pose);
+    instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;
+    instance.bounds = i % 5 == 0;
+    instance.culledOnGpu = i % 7 == 0;
+    instance.updateInterval = 1 + i % 3;
+    must(system->prepare(pipelineNeeds(instance)));
+    instances.push_back(must(system->addInstance(instance)));
+  }
+  const samples::MappedBuffer words = must(samples::MappedBuffer::create(
+      device, system->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+  std::ranges::fill(words.bytes(), std::byte{1});
+  const Pose pose = systemPose(1);
+  const std::array<MorphWeight, 2> morphs{{{0, 0.5f}, {1, 0.25f}}};
+  for (const InstanceHandle each : instances)
+    must(system->change({.instance = each, .morphs = morphs}));
+  std::vector<InstanceVisibility> views(count);
+  std::vector<InstanceChange> changes(20);
+
+  std::uint32_t counted = 0;
+  const auto expect = [](bool isRight) {
+    if (!isRight) std::abort();
+  };
+  for (std::uint32_t frame = 1; frame <= 60; ++frame) {
+    const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
+    VkCommandBufferBeginInfo begin{};
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    device.functions().BeginCommandBuffer(commandBuffer, &begin);
+    const bool isLost = frame % 9 == 8;
+    {
+      const Counting counting;
+      expect(system->beginFrame(frame, frame - 1 - (frame % 9 == 0 ? 1 : 0)).ok());
+      for (std::uint32_t i = 0; i < cpuPoses.size(); ++i) {
+        if ((i + frame) % 4 == 0) continue;
+        const Result<std::span<JointMatrix>> place = system->writePose(cpuPoses[i]);
+        expect(place.ok());
+        std::ranges::copy(pose, place->begin());
+      }
+      expect(frame % 2 == 0 ? system->markAllWritten().ok() : system->markWritten(gpuPoses).ok());
+      for (std::uint32_t i = 0; i < count; ++i) views[i] = {instances[i], (i + frame) % 6 != 0, 2};
+      expect(system->setVisibility(views).ok());
+      for (std::uint32_t i = 0; i < changes.size(); ++i) {
+        changes[i].instance = instances[(i * 7 + frame) % count];
+        changes[i].teleports = i % 3 == 0;
+        changes[i].morphs = std::span(morphs).first((i + frame) % 3);
+        changes[i].updateInterval = 1 + i % 2;
+      }
+      expect(system->change(changes).ok());
+      expect(system->record(commandBuffer, {words.handle(), 0}).ok());
+      if (isLost) expect(system->abandonFrame(frame).ok());
+      expect(system->output(instances[3]).ok());
+      expect(system->bounds(instances[5]).ok());
+      expect(system->statistics().lastFrame.instances == (isLost ? 0 : count));
+    }
+    device.functions().EndCommandBuffer(commandBuffer);
+    if (!isLost) must(device.submitAndWait(commandBuffer));
+    device.freeCommandBuffer(commandBuffer);
+    if (frame == 40) counted = allocations;  // it is warm
+  }
+  EXPECT_GT(counted, 0u) << "the first frames have to allocate, or nothing is counted";
+  EXPECT_EQ(allocations, counted);
+}
+
+}  // namespace
+}  // namespace dermis::test
