@@ -63,6 +63,7 @@ void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer commandBuffer, VkPipelineStag
                                    std::uint32_t bufferCount, const VkBufferMemoryBarrier* buffers,
                                    std::uint32_t imageCount, const VkImageMemoryBarrier* images) {
   const std::uint32_t number = commandLog->calls["vkCmdPipelineBarrier"]++;
+  commandLog->barriers.emplace_back(source, destination);
   if (commandLog->forgetsBarrier && commandLog->forgetsBarrier(number)) return;
   real.CmdPipelineBarrier(commandBuffer, source, destination, flags, memoryCount, memory,
                           bufferCount, buffers, imageCount, images);

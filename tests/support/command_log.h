@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "intercepted_device.h"
@@ -32,6 +33,9 @@ class CommandLog {
   /// Objects that live: created and not destroyed, allocated and not freed.
   std::int64_t buffersAlive = 0, allocationsAlive = 0;
   std::uint64_t allocatedBytes = 0;  ///< of all allocations there were
+
+  /// The stages of each vkCmdPipelineBarrier, in order.
+  std::vector<std::pair<VkPipelineStageFlags, VkPipelineStageFlags>> barriers;
 
   /// Asked of every vkCmdPipelineBarrier, with its number since `calls` was cleared: whether it is
   /// forgotten.

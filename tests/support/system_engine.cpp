@@ -72,7 +72,7 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
   std::erase_if(gpuWrites_,
                 [&](const GpuWrite& write) { return !system_.poseRange(write.pose).ok(); });
   if (gpuWrites_.empty()) return;
-  if (recordsBarriers)
+  if (recordsPoseBarriers)
     recordBarrier(commandBuffer, vulkan::overwriteScope(vulkan::Writer::transfer));
   for (const GpuWrite& write : gpuWrites_) {
     const vulkan::BufferRange range = must(system_.poseRange(write.pose));
@@ -82,7 +82,8 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
                                         write.matrices.data());
     must(system_.markWritten({&write.pose, 1}));
   }
-  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transferWrite));
+  if (recordsPoseBarriers)
+    recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transferWrite));
 }
 
 void SystemEngine::begin(std::uint32_t underWay) {
@@ -187,6 +188,7 @@ void SystemEngine::submitNow(const std::function<void(VkCommandBuffer)>& record)
 
 void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer,
                                  const Dependency& dependency) const {
+  if (forgetsBarrier && forgetsBarrier(dependency)) return;
   const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
   device_.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
                                          dependency.destination.stages, 0, 1, &barrier, 0, nullptr,

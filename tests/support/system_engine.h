@@ -96,8 +96,10 @@ class SystemEngine {
   std::function<void(VkCommandBuffer)> beforeRecord, afterRecord;
   /// The system records into a secondary command buffer, which the frame's executes.
   bool recordsSecondary = false;
-  /// For tests of what happens without: the engine's own barriers.
-  bool recordsBarriers = true;
+  /// For tests of what happens without: the engine's own barriers around `record`, those around
+  /// writes to poses, and each of them.
+  bool recordsBarriers = true, recordsPoseBarriers = true;
+  std::function<bool(const vulkan::Dependency&)> forgetsBarrier;
 
  private:
   struct SubmittedFrame {
