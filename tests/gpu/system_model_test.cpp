@@ -93,6 +93,7 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   void changeInstance();
   void setMesh(ModelInstance& instance);
   void changeSeveral();
+  void setVisibility();
   void tryStaleHandle();
   void runFrame();
   void beginFrame();
@@ -273,12 +274,28 @@ void SystemModelTest::changeSeveral() {
   must(system().change(changes));
 }
 
+/// Of all instances, as culling decides.
+void SystemModelTest::setVisibility() {
+  std::vector<InstanceVisibility> wanted;
+  for (ModelInstance& instance : model_->instances) {
+    if (chance(20)) instance.isVisible = !instance.isVisible;
+    if (chance(10) && !instance.description.culledOnGpu) {
+      instance.description.updateInterval = 1 + below(4);
+      instance.waitedFrames = 0;
+    }
+    wanted.push_back({instance.handle, instance.isVisible, instance.description.updateInterval});
+  }
+  must(system().setVisibility(wanted));
+}
+
 void SystemModelTest::tryStaleHandle() {
   if (gone_.empty()) return;
   const InstanceHandle stale = gone_[below(gone_.size())];
   EXPECT_FALSE(system().removeInstance(stale).ok());
   EXPECT_FALSE(system().change({.instance = stale, .visible = true}).ok());
   EXPECT_FALSE(system().output(stale).ok());
+  const InstanceVisibility shown{stale, true, 1};
+  EXPECT_FALSE(system().setVisibility({&shown, 1}).ok());
 }
 
 void SystemModelTest::showSome(std::span<std::byte> words) {
@@ -385,7 +402,8 @@ void SystemModelTest::step() {
   if (kind < 38) return isCrowded ? removeInstance() : addInstance();
   if (kind < 50) return removeInstance();
   if (kind < 65) return changeInstance();
-  if (kind < 75) return changeSeveral();
+  if (kind < 73) return changeSeveral();
+  if (kind < 75) return setVisibility();
   if (kind < 78) return tryStaleHandle();
   runFrame();
 }
@@ -408,7 +426,7 @@ TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
   EXPECT_GT(growths_, 100u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, SystemModelTest, ::testing::Values(1u, 2u));
+INSTANTIATE_TEST_SUITE_P(Seeds, SystemModelTest, ::testing::Values(1u, 2u, 3u));
 
 }  // namespace
 }  // namespace dermis::test

@@ -84,7 +84,7 @@ struct InstanceState {
   bool isUrgent = true;           ///< whatever its interval
   bool isMoving = false;          ///< its previous positions are others, as of the last record
   std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
-  std::uint64_t hiddenAfter = 0;  ///< the last record before it was made invisible
+  std::uint64_t hiddenAfter = 0;  ///< the last record that displayed it before it was hidden
 };
 
 struct SceneInstance {
@@ -96,7 +96,8 @@ struct SceneInstance {
   std::uint32_t pose = 0;  ///< index
   std::uint32_t vertexCount = 0;
   std::uint32_t vertexBytes = 0;  ///< that are written for a vertex
-  std::uint64_t plannedIn = 0;    ///< the last plan that skins it
+  std::uint64_t plannedIn = 0;    ///< the last plan that skins it …
+  std::uint64_t settledIn = 0;    ///< … and the last that settles it
   std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
   std::uint64_t firstFrame = 0;  ///< in which it was skinned
   PlacedRun run;                 ///< the first, and mostly the only one
@@ -194,7 +195,7 @@ class SceneBooks {
   void show(InstanceState& state, InstanceHandle handle);
   void hide(InstanceState& state) const {
     state.isVisible = false;
-    state.hiddenAfter = record_;
+    if (state.visibleFrom != record_ + 1) state.hiddenAfter = record_;
   }
   void shift(InstanceHandle handle);
 
@@ -277,7 +278,8 @@ class SceneBooks {
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;  ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;     ///< all that are culled on the GPU
-  std::vector<InstanceHandle> moving_;    ///< to settle if they are not skinned: in view
+  std::vector<InstanceHandle> moving_;    ///< to settle if they are in view and not skinned; some
+                                          ///< more than once
 
   // Of the plan.
   bool isPlanned_ = false;

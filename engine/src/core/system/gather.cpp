@@ -113,10 +113,11 @@ void SceneBooks::gatherPending() {
 /// it returns.
 void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
-    const SceneInstance* instance = instances_.find(handle);
+    SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr || instance->plannedIn == planNumber_ ||
-        !states_[handle.index].isVisible)
+        instance->settledIn == planNumber_ || !states_[handle.index].isVisible)
       continue;
+    instance->settledIn = planNumber_;
     settling_.push_back(handle.index);
     addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
@@ -324,10 +325,11 @@ void SceneBooks::abandonInstances() {
     InstanceState& state = states_[index];
     if (state.generation == 0) continue;
     // They count records, and the frame's does not count.
-    if (state.visibleFrom == record_ + 1) --state.visibleFrom;
-    if (state.hiddenAfter == record_) --state.hiddenAfter;
-    const bool mayReturn = state.isVisible || state.hiddenAfter + 1 == record_;
-    if (state.isMoving && mayReturn) moving_.push_back({index, state.generation});
+    if (state.visibleFrom == record_ + 1)
+      state.visibleFrom = state.hiddenAfter + 1 == record_ ? 0 : record_;
+    if (state.hiddenAfter == record_)
+      state.hiddenAfter = state.visibleFrom == record_ ? 0 : record_ - 1;
+    if (state.isMoving) moving_.push_back({index, state.generation});
   }
 }
 

@@ -346,11 +346,9 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
 /// Of one that was invisible.
 void SceneBooks::show(InstanceState& state, InstanceHandle handle) {
   state.isVisible = true;
-  if (state.hiddenAfter != record_) {
-    // Not displayed by the last record: what it showed before is no motion.
-    state.visibleFrom = record_ + 1;
-    if (state.isMoving) moving_.push_back(handle);
-  }
+  // Not displayed by the last record: what it showed before is no motion.
+  if (state.hiddenAfter != record_) state.visibleFrom = record_ + 1;
+  if (state.isMoving) moving_.push_back(handle);
   if (state.isStale) makePending(state, handle.index);
 }
 
@@ -414,15 +412,14 @@ Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> insta
     InstanceState& state = states[handle.index];
     state.updateInterval = wanted.updateInterval;
     if (state.isVisible == wanted.isVisible) continue;
-    const bool mayNeedMore = state.isStale || (state.isMoving && state.hiddenAfter != record);
-    if (wanted.isVisible && mayNeedMore) {
+    if (wanted.isVisible && (state.isStale || state.isMoving)) {
       show(state, handle);
       continue;
     }
-    // The same without calls: neither list gets longer.
+    // `show` and `hide` without calls: no list gets longer.
     state.isVisible = wanted.isVisible;
     if (!wanted.isVisible) {
-      state.hiddenAfter = record;
+      if (state.visibleFrom != record + 1) state.hiddenAfter = record;
     } else if (state.hiddenAfter != record) {
       state.visibleFrom = record + 1;
     }
