@@ -24,12 +24,14 @@ namespace {
 
 struct DeviceFunctions {
   PFN_vkGetDeviceProcAddr GetDeviceProcAddr = nullptr;
+  PFN_vkDestroyDevice DestroyDevice = nullptr;
   PFN_vkCreateBuffer CreateBuffer = nullptr;
   PFN_vkDestroyBuffer DestroyBuffer = nullptr;
   PFN_vkBindBufferMemory BindBufferMemory = nullptr;
   PFN_vkMapMemory MapMemory = nullptr;
   PFN_vkFreeMemory FreeMemory = nullptr;
   PFN_vkWaitForFences WaitForFences = nullptr;
+  PFN_vkQueueWaitIdle QueueWaitIdle = nullptr;
 };
 
 struct Buffer {
@@ -160,6 +162,24 @@ VKAPI_ATTR VkResult VKAPI_CALL waitForFences(VkDevice device, std::uint32_t coun
   return result;
 }
 
+/// The loader puts the same table at the beginning of a device and of its queues.
+const void* loaderTable(const void* handle) {
+  return *static_cast<const void* const*>(handle);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL queueWaitIdle(VkQueue queue) {
+  PFN_vkQueueWaitIdle next = nullptr;
+  {
+    const std::lock_guard lock(layer().mutex);
+    for (const auto& [device, functions] : layer().devices) {
+      if (loaderTable(device) == loaderTable(queue)) next = functions.QueueWaitIdle;
+    }
+  }
+  const VkResult result = next(queue);
+  if (result == VK_SUCCESS) changeBytes();
+  return result;
+}
+
 /// The link of the chain that the loader made for this layer, which is taken off it.
 template <typename Info, typename CreateInfo>
 auto* takeLink(const CreateInfo* createInfo, VkStructureType type) {
@@ -202,25 +222,39 @@ VKAPI_ATTR VkResult VKAPI_CALL createDevice(VkPhysicalDevice physicalDevice,
     function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(
         link.pfnNextGetDeviceProcAddr(*device, name));
   };
+  load(functions.DestroyDevice, "vkDestroyDevice");
   load(functions.CreateBuffer, "vkCreateBuffer");
   load(functions.DestroyBuffer, "vkDestroyBuffer");
   load(functions.BindBufferMemory, "vkBindBufferMemory");
   load(functions.MapMemory, "vkMapMemory");
   load(functions.FreeMemory, "vkFreeMemory");
   load(functions.WaitForFences, "vkWaitForFences");
+  load(functions.QueueWaitIdle, "vkQueueWaitIdle");
   const std::lock_guard lock(layer().mutex);
   layer().devices[*device] = functions;
   return result;
 }
 
+VKAPI_ATTR void VKAPI_CALL destroyDevice(VkDevice device, const VkAllocationCallbacks* callbacks) {
+  DeviceFunctions functions;
+  {
+    const std::lock_guard lock(layer().mutex);
+    functions = layer().devices[device];
+    layer().devices.erase(device);
+  }
+  functions.DestroyDevice(device, callbacks);
+}
+
 PFN_vkVoidFunction deviceFunction(const std::string& name) {
   const std::map<std::string, PFN_vkVoidFunction> own{
+      {"vkDestroyDevice", reinterpret_cast<PFN_vkVoidFunction>(destroyDevice)},
       {"vkCreateBuffer", reinterpret_cast<PFN_vkVoidFunction>(createBuffer)},
       {"vkDestroyBuffer", reinterpret_cast<PFN_vkVoidFunction>(destroyBuffer)},
       {"vkBindBufferMemory", reinterpret_cast<PFN_vkVoidFunction>(bindBufferMemory)},
       {"vkMapMemory", reinterpret_cast<PFN_vkVoidFunction>(mapMemory)},
       {"vkFreeMemory", reinterpret_cast<PFN_vkVoidFunction>(freeMemory)},
-      {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(waitForFences)}};
+      {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(waitForFences)},
+      {"vkQueueWaitIdle", reinterpret_cast<PFN_vkVoidFunction>(queueWaitIdle)}};
   const auto found = own.find(name);
   return found == own.end() ? nullptr : found->second;
 }
