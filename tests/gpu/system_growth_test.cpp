@@ -162,9 +162,10 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   expectRefused(system.addMesh(mesh), "a packed mesh takes");
   const PoseHandle pose = must(system.addPose(8));
   must(system.addPose(12));
-  expectRefused(system.addPose(1), "the CPU writes, at most 20");
+  expectRefused(system.addPose(1), "the CPU writes hold 20, of which 20 are in use");
   must(system.addPose(20, {.writer = PoseWriter::gpu}));
-  expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}), "the GPU writes, at most 20");
+  expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}),
+                "the GPU writes hold 20, of which 20 are in use, and may hold 20");
   InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
   instance.bounds = true;
   must(system.addInstance(instance));
@@ -253,6 +254,37 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   for (; another; ++count) another = engine->addPose(100);
   EXPECT_EQ(count - 1, (part - 3 * 8 * 2 * sizeof(JointMatrix)) / (100 * 2 * sizeof(JointMatrix)));
   EXPECT_FALSE(engine->addPose(2000, {.writer = PoseWriter::gpu}).ok());
+}
+
+// Bytes behind the last whole joint, or mesh, are not bound.
+TEST_F(SystemGrowthTest, RangesOfNoWholeJointsAreNotBoundToTheirEnd) {
+  constexpr std::uint64_t most = 65536;
+  InterceptedDevice small(device().description());
+  small.changeLimits([](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = most; });
+  CommandLog log(small);
+  vulkan::Context narrow = must(vulkan::Context::create(small.description()));
+  SkinningSystemDescription ranged = tiny();
+  ranged.context = &narrow;
+  ranged.framesInFlight = 1;
+  const VkBufferUsageFlags usage =
+      must(SkinningSystem::requirement(ranged, BufferRole::meshes)).usage |
+      must(SkinningSystem::requirement(ranged, BufferRole::gpuPoses)).usage |
+      VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  samples::MappedBuffer heap = must(samples::MappedBuffer::create(device(), 4 * most, usage));
+  ranged.meshes = {heap.handle(), 0, most + 8};
+  ranged.gpuPoses = {heap.handle(), 2 * most, most + 8};
+  SystemEngine engine(device(), ranged);
+  engine.begin();
+  InstanceDescription instance;
+  instance.layout = motionLayout();
+  const PackedMesh mesh = systemMesh(1, 100);
+  instance.mesh = engine.addMesh(mesh);
+  instance.pose = engine.addPose(systemPose(1), {.writer = PoseWriter::gpu});
+  const InstanceHandle handle = engine.addInstance(instance);
+  engine.submit();
+  expectSkinned(engine.read(handle), alone(mesh, systemPose(1), instance));
+  EXPECT_LE(log.longestRange, most);
+  EXPECT_GT(log.longestRange, most - sizeof(JointMatrix));
 }
 
 TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {

@@ -159,6 +159,14 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuReachesEveryRange) {
   expectCulledCrowd(engine, 600);
 }
 
+TEST_F(SystemLimitsTest, CullingOnTheGpuNeedsNoInstancesAtFirst) {
+  vulkan::SkinningSystemDescription system = description();
+  system.instanceCapacity = {0};
+  SystemEngine engine(device(), system);
+  engine.begin();
+  expectCulledCrowd(engine, 5);
+}
+
 // A promise fails where something is added, never in a frame. What keeps it is skinned as ever.
 TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
   for (const bool noMorphTargets : {true, false}) {

@@ -152,6 +152,19 @@ TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
 // An allocator that fails in the middle of a game, at each allocation for a frame whose tables have
 // outgrown their buffers, and which is the first of its slot: nothing is recorded, and all is tried
 // again.
+TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
+  static int destroyed;
+  destroyed = 0;
+  vulkan::SkinningSystemDescription own = description();
+  own.buffers.create = [](void*, const BufferRequest&) { return Result(CreatedBuffer{}); };
+  own.buffers.destroy = [](void*, const CreatedBuffer&) { ++destroyed; };
+  const Result<SkinningSystem> system = SkinningSystem::create(own);
+  ASSERT_FALSE(system.ok());
+  EXPECT_NE(system.error().message.find("gave no buffer for 'dermis "), std::string::npos)
+      << system.error().message;
+  EXPECT_EQ(destroyed, 0);
+}
+
 TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);

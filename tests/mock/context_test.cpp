@@ -311,6 +311,7 @@ TEST(ContextTest, LimitsAreTheDevices) {
   expected.maxWorkgroupCountX = 1000;
   expected.maxWorkgroupCountY = 70000;
   expected.maxStorageBuffersPerStage = 35;
+  expected.separateRanges = false;
   EXPECT_TRUE(context->limits() == expected);
 }
 

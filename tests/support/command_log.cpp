@@ -1,5 +1,7 @@
 #include "command_log.h"
 
+#include <algorithm>
+
 namespace dermis::test {
 namespace {
 
@@ -13,6 +15,7 @@ struct RealFunctions {
   PFN_vkCmdFillBuffer CmdFillBuffer;
   PFN_vkCmdUpdateBuffer CmdUpdateBuffer;
   PFN_vkCmdPipelineBarrier CmdPipelineBarrier;
+  PFN_vkCmdPushDescriptorSetKHR CmdPushDescriptorSetKHR;
   PFN_vkCreateBuffer CreateBuffer;
   PFN_vkDestroyBuffer DestroyBuffer;
   PFN_vkAllocateMemory AllocateMemory;
@@ -56,6 +59,16 @@ void VKAPI_CALL cmdUpdateBuffer(VkCommandBuffer commandBuffer, VkBuffer buffer, 
                                 VkDeviceSize size, const void* data) {
   ++commandLog->calls["vkCmdUpdateBuffer"];
   real.CmdUpdateBuffer(commandBuffer, buffer, offset, size, data);
+}
+void VKAPI_CALL cmdPushDescriptorSet(VkCommandBuffer commandBuffer, VkPipelineBindPoint bindPoint,
+                                     VkPipelineLayout layout, std::uint32_t set,
+                                     std::uint32_t count, const VkWriteDescriptorSet* writes) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (std::uint32_t j = 0; writes[i].pBufferInfo != nullptr && j < writes[i].descriptorCount;
+         ++j)
+      commandLog->longestRange = std::max(commandLog->longestRange, writes[i].pBufferInfo[j].range);
+  }
+  real.CmdPushDescriptorSetKHR(commandBuffer, bindPoint, layout, set, count, writes);
 }
 void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer commandBuffer, VkPipelineStageFlags source,
                                    VkPipelineStageFlags destination, VkDependencyFlags flags,
@@ -132,6 +145,7 @@ CommandLog::CommandLog(InterceptedDevice& device) {
   intercept("vkCmdDispatchIndirect", real.CmdDispatchIndirect, cmdDispatchIndirect);
   intercept("vkCmdCopyBuffer", real.CmdCopyBuffer, cmdCopyBuffer);
   intercept("vkCmdFillBuffer", real.CmdFillBuffer, cmdFillBuffer);
+  intercept("vkCmdPushDescriptorSetKHR", real.CmdPushDescriptorSetKHR, cmdPushDescriptorSet);
   intercept("vkCmdUpdateBuffer", real.CmdUpdateBuffer, cmdUpdateBuffer);
   intercept("vkCmdPipelineBarrier", real.CmdPipelineBarrier, cmdPipelineBarrier);
   intercept("vkCreateBuffer", real.CreateBuffer, createBuffer);

@@ -34,6 +34,8 @@ class CommandLog {
   std::int64_t buffersAlive = 0, allocationsAlive = 0;
   std::uint64_t allocatedBytes = 0;  ///< of all allocations there were
 
+  /// Bytes, of storage buffers in pushed descriptors.
+  VkDeviceSize longestRange = 0;
   /// The stages of each vkCmdPipelineBarrier, in order.
   std::vector<std::pair<VkPipelineStageFlags, VkPipelineStageFlags>> barriers;
 

@@ -232,18 +232,24 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   EXPECT_EQ(normals, std::set<std::uint32_t>{0});
 }
 
-TEST(Plan, AnOutputOfExactlyOneRangeIsNotCut) {
+// What lies in one range is not cut; what does not is, and only that.
+TEST(Plan, OnlyWhatLiesInTwoRangesIsCut) {
   OwnedBatch batch;
   batch.addMesh(meshOf(1234, 1, 1, true));
   batch.addPose(1, false);
-  batch.addJob(0, 0, Method::linear, true, 68);
+  Job& job = batch.addJob(0, 0, Method::linear, true, 68);
   const DeviceLimits limits = limitsOf(1234 * 68, 256);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
-  EXPECT_EQ(dispatchesOf(out).size(), 1u);
-  batch.outputSize += 4;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
-  EXPECT_GT(dispatchesOf(out).size(), 1u);
+  const auto runs = [&] {
+    Plan out;
+    expectPlanned(batch, limits, {}, out);
+    return dispatchesOf(out)[0].skinPush().groupCount;
+  };
+  EXPECT_EQ(runs(), 1u);
+  batch.outputSize += 68;
+  EXPECT_EQ(runs(), 1u);
+  job.positions.offset += 68;
+  job.normals.offset += 68;
+  EXPECT_GT(runs(), 16u);
 }
 
 // Farther into the output than 32 bits can count.

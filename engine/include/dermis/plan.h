@@ -49,6 +49,10 @@ struct DeviceLimits {
   /// of a job must go to one buffer, close to each other, at multiples of 4 bytes, and bounds and
   /// snorm16 positions are not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
+  /// Whether a dispatch may bind another range of the output buffer for each attribute. If not, and
+  /// an output buffer is larger than a storage buffer range, attributes of one job must not lie in
+  /// different ranges. False on devices without VK_KHR_push_descriptor, see `Context::limits`.
+  bool separateRanges = true;
   /// Whether kernels may store 2 bytes and 1 byte (VkPhysicalDevice16BitStorageFeatures::
   /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess). If
   /// not, attributes must stand at multiples of 4 bytes. Must be false if Dermis was built without

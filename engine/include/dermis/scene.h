@@ -35,7 +35,7 @@ namespace dermis {
 /// How much a buffer holds. It grows when something is added that does not fit.
 struct Capacity {
   std::uint64_t initial = 0;
-  std::uint64_t maximum = ~std::uint64_t{0};  ///< then adding fails with `limitExceeded`
+  std::uint64_t maximum = ~std::uint64_t{0};  ///< beyond it adding fails with `limitExceeded`
 
   /// It never grows.
   static constexpr Capacity fixed(std::uint64_t count) { return {count, count}; }
@@ -52,8 +52,11 @@ struct BufferGrowth {
 
 /// How an engine with its own RHI replaces a buffer by a larger one. Called by `addMesh`,
 /// `addPose`, `addPoses`, `addInstance` and `change`. The new buffer gets the contents of the old
-/// one (palettes need none) before the commands of the next plan. The old one stays until frames in
-/// flight are complete. If it fails, the call of the scene fails with its error and adds nothing.
+/// one (palettes need none) before the commands of the next plan; if that frame is abandoned, the
+/// engine copies again with the next one. The old buffer stays until frames in flight are complete.
+///
+/// A scene asks for more than it needs at once. If that fails, it asks for the least that it needs.
+/// If that fails too, the call of the scene fails with this error and adds nothing.
 struct GrowthCallback {
   void* user = nullptr;
   /// Null: the initial capacities are the maximum.
@@ -65,10 +68,12 @@ struct SceneDescription {
   /// recorded. 1 or more.
   std::uint32_t framesInFlight = 2;
   Capacity meshCapacity{64 << 10};  ///< bytes of packed meshes; at most a storage buffer range
-  Capacity jointCapacity{256};      ///< joints of all poses that the CPU writes
-  Capacity gpuJointCapacity{0};     ///< joints of all poses that the GPU writes
+  /// Joints that the buffers of poses hold which the CPU writes, and the GPU. The poses of one call
+  /// stand in one buffer, so some joints of a buffer may stay unused.
+  Capacity jointCapacity{256};
+  Capacity gpuJointCapacity{0};
   /// Bytes of skinned vertices: `VertexPlaces::size` of each instance, and what is left between
-  /// them. May be more than a storage buffer range.
+  /// them. May be more than a storage buffer range. A maximum counts in whole words.
   Capacity outputCapacity{256 << 10};
   /// Where the output begins in its buffer: `InstanceOutput` counts from the beginning of the
   /// buffer, commands count from here. A multiple of the alignment that `buffer` tells.
@@ -117,8 +122,9 @@ struct InstanceDescription {
   /// teleport, another mesh and coming back into view take effect at once.
   std::uint32_t updateInterval = 1;
   /// The GPU decides whether the instance is skinned: its word in the visibility buffer is not 0.
-  /// Its output must lie in one storage buffer range. An output of at most 1/32 of that range
-  /// always does.
+  /// Its output must lie in one storage buffer range. An output of at most 1/32 of such a range
+  /// always does. A longer one may not, where the output buffer is larger than one range: then
+  /// `addInstance` and `change` fail with `limitExceeded`.
   bool culledOnGpu = false;
 };
 
@@ -189,7 +195,7 @@ struct FrameWorkStatistics {
   std::uint64_t skinnedVertices = 0;
   std::uint64_t writtenBytes = 0;  ///< of skinned vertices
   std::uint64_t movedBytes = 0;    ///< by `compact`
-  std::uint64_t poseBytes = 0;     ///< joint matrices read by the palette kernel
+  std::uint64_t poseBytes = 0;     ///< joint matrices of the CPU's, read by the palette kernel
 };
 
 /// What the visibility kernel counted in a complete frame.
@@ -226,19 +232,19 @@ class Scene {
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
 
-  /// Size and usage of a buffer as it is now. `GrowthCallback` is told when meshes, palettes,
-  /// results or the output grow. `tables` and `upload` have the size that `Plan::buffer` returns,
-  /// which differs from frame to frame; so do `readBack` and `history`, which grow only, and
-  /// `history` keeps its contents. `upload` and `readBack` exist once for each frame in flight.
-  /// `history`, `counters` and `visibility` are needed only if instances are culled on the GPU. An
-  /// engine that replaces a buffer by a larger one keeps the old one until frames in flight are
-  /// complete.
+  /// Size and usage of a buffer as it is now; for poses see `poseBuffer`. `GrowthCallback` is told
+  /// when meshes, palettes, results or the output grow. `tables` and `upload` have the size that
+  /// `Plan::buffer` returns, which differs from frame to frame. So have `readBack` and `history`,
+  /// which only grow; `history` keeps its contents. `upload` and `readBack` exist once for each
+  /// frame in flight. `history`, `counters` and `visibility` are needed only if instances are
+  /// culled on the GPU. An engine that replaces a buffer by a larger one keeps the old one until
+  /// frames in flight are complete.
   BufferRequirement buffer(BufferRole role) const;
   /// The same before there is a scene: with the initial capacities. `poses` and `gpuPoses`: of the
   /// first pose buffer of that kind. Fails as `create`.
   static Result<BufferRequirement> buffer(const SceneDescription& description, BufferRole role);
-  /// The buffers of poses. Buffer 0 is for poses that the CPU writes, the next one for poses that
-  /// the GPU writes, if there are any at first; others are added when they are full.
+  /// The buffers of poses. At first one for each writer whose initial capacity is not 0, that of
+  /// the CPU before that of the GPU. Others are added when these are full.
   std::uint32_t poseBufferCount() const;
   PoseBuffer poseBuffer(std::uint32_t number) const;
   const SceneDescription& description() const;
@@ -249,8 +255,8 @@ class Scene {
 
   /// Finds room for a packed mesh. The engine copies its bytes to `meshOffset` of the mesh buffer
   /// before the commands of the next plan, on the same queue; their first barrier covers the copy.
-  /// Fails with `limitExceeded` if there is no room, with `invalidArgument` if a promise is broken,
-  /// and as `GrowthCallback::grow`.
+  /// Fails with `limitExceeded` if there is no room, with `invalidArgument` if a promise is broken
+  /// or the mesh is not a packed one, and as `GrowthCallback::grow`.
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes
   /// Fails with `invalidArgument` while an instance uses it.
@@ -266,7 +272,8 @@ class Scene {
                         const PoseOptions& options = {});
   /// Where the current pose stands. It never moves if the GPU writes it. The first pose of a call
   /// of `addPose` or `addPoses` that the GPU writes begins at a multiple of
-  /// `DeviceLimits::minStorageBufferOffsetAlignment`, the others at multiples of 16 bytes.
+  /// `DeviceLimits::minStorageBufferOffsetAlignment` of its pose buffer, the others at multiples of
+  /// 16 bytes.
   Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` while an instance uses it.
   Result<void> removePose(PoseHandle pose);
@@ -338,17 +345,17 @@ class Scene {
   /// were before it, and the next `plan` lists its work again. What was added, removed, changed or
   /// written, before the `commit` or after it, stays; poses that the GPU writes are written again.
   /// It is then as after `beginFrame`: the engine may change more, write poses, and plan the same
-  /// frame again, or begin another one. Copies of packed meshes that went with the frame are the
-  /// engine's to repeat. O(instances). Fails with `invalidArgument` if the frame is not the one
-  /// that was committed last, or if `beginFrame` was called since: older frames cannot be
-  /// abandoned.
+  /// frame again, or begin another one. Copies that went with the frame are the engine's to repeat:
+  /// of packed meshes, and of what larger buffers, `history` among them, got from smaller ones.
+  /// O(instances). Fails with `invalidArgument` if the frame is not the one that was committed
+  /// last, or if `beginFrame` was called since: older frames cannot be abandoned.
   Result<void> abandonFrame(std::uint64_t frame);
 
   /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
   /// frame in rising order, before its buffer is used again. Fails with `invalidArgument` if
   /// the frame is not one of the last `framesInFlight` that were committed, and if `bytes` is
-  /// smaller than `buffer(BufferRole::readBack).size`. Frames that had nothing to read back may be
-  /// given an empty span.
+  /// smaller than what `Plan::buffer(BufferRole::readBack)` said of the frame. Frames that had
+  /// nothing to read back may be given an empty span.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   // -- Results, as of the last `commit`.

@@ -184,14 +184,9 @@ bool writesStream(const Variant& variant, std::size_t stream) {
   }
 }
 
-std::optional<std::uint32_t> BindingsState::commonWindow(const DispatchCommand& dispatch) const {
+std::uint32_t BindingsState::commonWindow(const DispatchCommand& dispatch) {
   std::uint32_t common = 0;
   for (const OutputWindow& window : dispatch.windows) common = std::max(common, window.index);
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (writesStream(dispatch.variant, stream) && windowCount(stream) > 1 &&
-        dispatch.windows[stream].index != common)
-      return std::nullopt;
-  }
   return common;
 }
 

@@ -135,6 +135,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxWorkgroupCountX = properties.limits.maxComputeWorkGroupCount[0];
   state.limits.maxWorkgroupCountY = properties.limits.maxComputeWorkGroupCount[1];
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
+  state.limits.separateRanges = state.pushesDescriptors();
   state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
   // What this build has kernels for.

@@ -99,17 +99,7 @@ Result<void> BindingsState::check(const Plan& plan) const {
         "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
   }
   if (Result<void> good = checkPairs(plan); !good) return good;
-  if (Result<void> good = checkVariants(plan); !good) return good;
-  if (context->pushesDescriptors()) return {};
-  for (const Command& command : plan.commands()) {
-    const auto* dispatch = std::get_if<DispatchCommand>(&command);
-    if (dispatch != nullptr && !commonWindow(*dispatch)) {
-      return Error{ErrorCode::limitExceeded,
-                   "the attributes of an instance lie in different windows of outputs that are "
-                   "larger than a storage buffer range: that needs VK_KHR_push_descriptor"};
-    }
-  }
-  return {};
+  return checkVariants(plan);
 }
 
 namespace {
@@ -248,7 +238,7 @@ class Recorder {
     } else if (dispatch.variant.kernel == Kernel::palette) {
       set = bound_.sets[dispatch.poseBuffer];
     } else {
-      set = bound_.sets[bound_.skinSet(dispatch.joints, *bound_.commonWindow(dispatch))];
+      set = bound_.sets[bound_.skinSet(dispatch.joints, bound_.commonWindow(dispatch))];
     }
     table_.cmdBindDescriptorSets(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
                                  context_.pipelineLayout, 0, 1, &set, 0, nullptr);

@@ -109,9 +109,9 @@ struct BindingsState {
   std::size_t skinSet(BufferRole joints, std::uint32_t window) const {
     return poseBuffers.size() + std::size_t{window} * 2 + (joints == BufferRole::poses ? 0 : 1);
   }
-  /// The number of the windows in which a dispatch writes all that it writes; nothing where they
-  /// differ.
-  std::optional<std::uint32_t> commonWindow(const DispatchCommand& dispatch) const;
+  /// The number of the windows that a dispatch writes to, where it is one
+  /// (`DeviceLimits::separateRanges`).
+  static std::uint32_t commonWindow(const DispatchCommand& dispatch);
 
   /// Whether a plan can be recorded with these buffers and the pipelines that there are.
   Result<void> check(const Plan& plan) const;

@@ -12,7 +12,7 @@ namespace dermis::vulkan {
 /// What the memory of a buffer is for.
 enum class BufferUse : std::uint8_t {
   device,    ///< only the GPU uses it: device-local if possible
-  upload,    ///< the CPU writes it, front to back, and the GPU reads it: host-visible and coherent,
+  upload,    ///< the CPU writes it and never reads it, the GPU reads it: host-visible and coherent,
              ///< also device-local if possible
   readBack,  ///< the GPU writes it and the CPU reads it: host-visible and coherent, also cached if
              ///< possible

@@ -100,10 +100,8 @@ class Context {
   /// plan stand in the tables buffer when the GPU gets there, and keeps the bindings until the GPU
   /// is done.
   ///
-  /// Fails with `notPrepared` if `prepare` was not called for a method or layout, with
-  /// `invalidArgument` where a buffer is smaller than the plan needs, and with `limitExceeded`
-  /// where, without VK_KHR_push_descriptor, the attributes of an instance lie in different windows
-  /// of outputs that are larger than a storage buffer range; nothing is recorded then.
+  /// Fails with `notPrepared` if `prepare` was not called for a method or layout, and with
+  /// `invalidArgument` where a buffer is smaller than the plan needs; nothing is recorded then.
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 

@@ -89,7 +89,7 @@ struct FrameStatistics : FrameWorkStatistics {
   std::uint32_t dispatches = 0;     ///< all of them, indirect ones too
   std::uint64_t workgroups = 0;     ///< of direct dispatches
   std::uint32_t copies = 0;         ///< commands that copy: tables, meshes, moves, results
-  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and joint matrices
+  std::uint64_t uploadedBytes = 0;  ///< tables, meshes, `poseBytes`
   double planSeconds = 0;           ///< CPU time: choosing, and writing the tables
   double recordSeconds = 0;         ///< CPU time: the commands
 };
@@ -137,8 +137,9 @@ class SkinningSystem {
 
   // What is added may make a buffer grow: a larger one is created at once, and the next `record`
   // copies what the old one holds. The old one is destroyed when the frames that use it are
-  // complete. The call fails with `vulkanError`, or what `BufferCallbacks::create` fails with, if
-  // there is no memory.
+  // complete. If there is no memory for twice the size, the least that is needed is tried; if there
+  // is none for that, the call fails with `vulkanError`, or what `BufferCallbacks::create` fails
+  // with.
 
   /// Copies the bytes; the next `record` uploads them.
   Result<MeshHandle> addMesh(const PackedMesh& mesh);
@@ -164,8 +165,8 @@ class SkinningSystem {
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
   /// Where a pass of the engine writes the joint matrices of a pose that the GPU writes:
   /// `JointMatrix` by `JointMatrix`, 48 bytes each. The same as long as the pose lives. Poses of
-  /// one call of `addPoses` are in one buffer, and the first of them can be bound: its offset is a
-  /// multiple of minStorageBufferOffsetAlignment, that of others of 16. Other calls may use other
+  /// one call of `addPoses` are in one buffer, one behind the other, and the first of them can be
+  /// bound: its offset is a multiple of minStorageBufferOffsetAlignment. Other calls may use other
   /// buffers. A buffer of the system's own has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and
   /// VK_BUFFER_USAGE_TRANSFER_DST_BIT.
   ///

@@ -57,9 +57,11 @@ void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>&
 Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceLimits& limits,
                            const Tuning& tuning, std::vector<PlacedRun>& runs) {
   const OutputStreams streams = outputStreams(job);
-  cutIntoRuns(streams, job.mesh.vertexCount, outputSizes(placing.outputs), limits, vertexRuns_);
+  const std::array<std::uint64_t, streamCount> sizes = outputSizes(placing.outputs);
+  cutIntoRuns(streams, job.mesh.vertexCount, sizes, limits, vertexRuns_);
   for (const VertexRun& run : vertexRuns_) {
-    if (Result<void> good = checkWindows(streams, run.windows, placing.subject, limits); !good)
+    if (Result<void> good = checkWindows(streams, run.windows, sizes, placing.subject, limits);
+        !good)
       return good;
   }
   if (placing.isCulled && vertexRuns_.size() > 1) {

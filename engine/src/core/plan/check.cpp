@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <string>
 
 namespace dermis {
@@ -221,16 +222,23 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
 
 Result<void> checkWindows(const OutputStreams& streams,
                           const std::array<std::uint32_t, streamCount>& windows,
+                          const std::array<std::uint64_t, streamCount>& sizes,
                           const Subject& subject, const DeviceLimits& limits) {
-  if (limits.maxStorageBuffersPerStage >= storageBuffersWanted) return {};
+  const bool hasFewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
+  if (!hasFewBuffers && limits.separateRanges) return {};
+  std::optional<std::uint32_t> common;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size != 0 && windows[stream] != windows[0]) {
+    if (streams[stream].size == 0 || sizes[stream] <= limits.maxStorageBufferRange) continue;
+    if (common.value_or(windows[stream]) != windows[stream]) {
       return Error{ErrorCode::limitExceeded,
                    subject.name() + ": its " + streamName(stream) +
-                       " lie too far from its positions for a device with " +
-                       std::to_string(limits.maxStorageBuffersPerStage) +
-                       " storage buffers a stage"};
+                       " lie too far from the attribute before for a device " +
+                       (hasFewBuffers ? "with " + std::to_string(limits.maxStorageBuffersPerStage) +
+                                            " storage buffers a stage"
+                                      : "that cannot bind another range of the output for each "
+                                        "attribute (DeviceLimits::separateRanges)")};
     }
+    common = windows[stream];
   }
   return {};
 }

@@ -40,9 +40,10 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
 bool isBox(const Box& box);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
                          const Subject& subject);
-/// Whether a kernel can see all windows that a run is written to.
+/// Whether a kernel can see all windows that a run is written to. `sizes`: of the outputs.
 Result<void> checkWindows(const OutputStreams& streams,
                           const std::array<std::uint32_t, streamCount>& windows,
+                          const std::array<std::uint64_t, streamCount>& sizes,
                           const Subject& subject, const DeviceLimits& limits);
 
 }  // namespace dermis

@@ -222,7 +222,8 @@ std::uint64_t longestRun(const DeviceLimits& limits) {
 
 using Oversized = std::array<bool, streamCount>;
 
-void chooseWindows(const OutputStreams& streams, const Oversized& oversized,
+/// Returns whether the run lies in the windows that it begins in.
+bool chooseWindows(const OutputStreams& streams, const Oversized& oversized,
                    const DeviceLimits& limits, VertexRun& run) {
   const std::uint64_t step = outputWindowStep(limits);
   std::uint64_t common = std::numeric_limits<std::uint64_t>::max();
@@ -232,14 +233,20 @@ void chooseWindows(const OutputStreams& streams, const Oversized& oversized,
     run.windows[stream] = static_cast<std::uint32_t>(window);
     common = std::min(common, window);
   }
+  bool isInCommon = true;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (oversized[stream] &&
         streams[stream].end(run.vertexEnd) > common * step + limits.maxStorageBufferRange)
-      return;
+      isInCommon = false;
   }
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (oversized[stream]) run.windows[stream] = static_cast<std::uint32_t>(common);
+    if (!oversized[stream]) continue;
+    if (isInCommon) run.windows[stream] = static_cast<std::uint32_t>(common);
+    if (streams[stream].end(run.vertexEnd) >
+        run.windows[stream] * step + limits.maxStorageBufferRange)
+      return false;
   }
+  return true;
 }
 
 }  // namespace
@@ -262,6 +269,9 @@ void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
         std::min(longest, (longestRun(limits) - streams[stream].size) / streams[stream].stride +
                               std::uint64_t{1});
   }
+  VertexRun whole;
+  whole.vertexEnd = vertexCount;
+  if (chooseWindows(streams, oversized, limits, whole)) longest = vertexCount;
   for (std::uint64_t vertex = 0; vertex < vertexCount; vertex += longest) {
     VertexRun run;
     run.firstVertex = static_cast<std::uint32_t>(vertex);

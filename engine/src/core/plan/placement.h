@@ -58,8 +58,8 @@ struct VertexRun {
   std::array<std::uint32_t, streamCount> windows{};
 };
 
-/// Cuts a job's vertices into runs. Attributes that lie near to each other get windows of one
-/// number.
+/// Cuts a job's vertices into runs: one where all of an attribute lies in one window. Attributes
+/// that lie near to each other get windows of one number.
 void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
                  const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
                  std::vector<VertexRun>& runs);

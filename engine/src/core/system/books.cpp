@@ -17,9 +17,11 @@ Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
                                           (users == 1 ? "" : "s")};
 }
 
-/// Room for dual quaternions and scale of every joint, and the status of every pose of two joints.
+/// Room for dual quaternions and scale of every joint, and the status of every pose of two joints,
+/// as far as a storage buffer range holds them.
 std::uint64_t firstUnits(const SceneDescription& description) {
-  return (description.jointCapacity.initial + description.gpuJointCapacity.initial) * 5;
+  return std::min((description.jointCapacity.initial + description.gpuJointCapacity.initial) * 5,
+                  description.limits.maxStorageBufferRange / unitBytes);
 }
 
 /// Without a way to grow, what there is at first is all.
@@ -83,6 +85,11 @@ PlanSizes sceneSizes(const SceneDescription& description) {
 // -- Meshes and poses.
 
 Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info) {
+  if (info.byteSize == 0 || info.byteSize % packedMeshAlignment != 0) {
+    return invalid("the mesh has " + std::to_string(info.byteSize) +
+                   " bytes; a packed mesh has a multiple of " +
+                   std::to_string(packedMeshAlignment));
+  }
   if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
       !kept)
     return kept.error();
@@ -119,18 +126,7 @@ Result<void> SceneBooks::addPoses(std::span<PoseHandle> poses, std::uint32_t joi
   const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
   const Result<std::optional<Range>> joints = takeJoints(count, options.writer, pose.buffer);
   if (!joints) return joints.error();
-  if (!*joints) {
-    const bool isCpu = options.writer == PoseWriter::cpu;
-    return Error{
-        ErrorCode::limitExceeded,
-        (poses.size() == 1 ? std::string("a pose takes ")
-                           : std::to_string(poses.size()) + " poses take ") +
-            std::to_string(count) + " joints in one piece; of those of the poses that the " +
-            (isCpu ? "CPU" : "GPU") + " writes, at most " +
-            std::to_string(
-                (isCpu ? description_.jointCapacity : description_.gpuJointCapacity).maximum) +
-            ", so many are not free"};
-  }
+  if (!*joints) return noJoints(poses.size(), count, options.writer);
   pose.jointCount = jointCount;
   pose.mayScale = options.mayScale;
   pose.writer = options.writer;

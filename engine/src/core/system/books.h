@@ -182,6 +182,7 @@ class SceneBooks {
   Result<void> reserveUnits(const SceneInstance& instance);
   Result<void> findRoom(SceneInstance& instance, bool isCulled);
   Result<void> makeRuns(SceneInstance& instance, bool isCulled);
+  Result<void> remakeRuns(SceneInstance& instance, bool isCulled);
   void releaseRuns(SceneInstance& instance);
   void releaseTarget(SceneInstance& instance);
   void link(std::uint32_t index);
@@ -192,6 +193,8 @@ class SceneBooks {
   Result<void> rebuild(SceneInstance& instance, const InstanceChange& change);
   Result<void> setBox(InstanceHandle handle, const Box& box);
   Result<void> setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs);
+  Result<void> changeSkinning(const InstanceChange& change);
+  void changeState(InstanceState& state, const InstanceChange& change);
   void show(InstanceState& state, InstanceHandle handle);
   void hide(InstanceState& state) const {
     state.isVisible = false;
@@ -228,6 +231,11 @@ class SceneBooks {
   Result<void> growBuffer(BufferRole role, const PlanSizes& sizes, std::uint32_t poseBuffer = 0);
   Result<std::optional<Range>> takeJoints(std::uint64_t count, PoseWriter writer,
                                           std::uint32_t& buffer);
+  Error noJoints(std::size_t poses, std::uint64_t count, PoseWriter writer) const;
+  /// In joints.
+  std::uint64_t largestPoseBuffer(PoseWriter writer) const {
+    return description_.limits.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writer);
+  }
   std::uint32_t slotsOf(PoseWriter writer) const {
     return writer == PoseWriter::cpu ? description_.framesInFlight : 1;
   }
@@ -273,6 +281,7 @@ class SceneBooks {
   bool hasBegun_ = false;
   std::uint32_t nextVersion_ = 0;
   std::vector<PlacedRun> runsScratch_;
+  std::vector<MorphWeight> morphsScratch_;
 
   std::vector<PoseHandle> posed_;         ///< written since the last plan
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled

@@ -204,8 +204,10 @@ Result<void> SceneBooks::plan(Plan& out) {
   gatherSettling();
   gatherCulled();
   gatherResults();
-  for (const Conversion& conversion : conversions_)
-    planned_.poseBytes += poses_.at(conversion.pose.index).jointCount * sizeof(JointMatrix);
+  for (const Conversion& conversion : conversions_) {
+    const ScenePose& pose = poses_.at(conversion.pose.index);
+    if (pose.writer == PoseWriter::cpu) planned_.poseBytes += pose.jointCount * sizeof(JointMatrix);
+  }
   const auto record = static_cast<std::uint32_t>(record_ + 1);
   const FrameWork frame{record, clearHistory_, moves_, resultCopies_};
   if (Result<void> good = builder_.finish(&frame); !good) {
@@ -390,7 +392,7 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     needed = std::max(needed, copy.toOffset + copy.size);
   if (bytes.size() < needed) {
     return invalid("the read-back buffer of a frame has " + std::to_string(bytes.size()) +
-                   " bytes, fewer than Scene::buffer said");
+                   " bytes, fewer than the " + std::to_string(needed) + " that Plan::buffer said");
   }
   culling_ = {};
   culling_.frame = frame;

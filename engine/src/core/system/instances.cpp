@@ -119,6 +119,7 @@ Result<void> SceneBooks::findRoom(SceneInstance& instance, bool isCulled) {
   return made;
 }
 
+/// Leaves the runs it had to the caller. If it fails, the instance is as it was.
 Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   const ScenePose& pose = poses_.at(instance.poseHandle.index);
@@ -143,6 +144,16 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
     return placed;
   instance.run = runsScratch_.front();
   instance.furtherRuns.assign(runsScratch_.begin() + 1, runsScratch_.end());
+  return {};
+}
+
+/// Other runs for an instance that has some. If it fails, the instance is as it was.
+Result<void> SceneBooks::remakeRuns(SceneInstance& instance, bool isCulled) {
+  const PlacedRun first = instance.run;
+  const std::vector<PlacedRun> further = instance.furtherRuns;
+  if (Result<void> made = makeRuns(instance, isCulled); !made) return made;
+  groups_.release(first.group);
+  for (const PlacedRun& run : further) groups_.release(run.group);
   return {};
 }
 
@@ -310,13 +321,11 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
 }
 
 Result<void> SceneBooks::setBox(InstanceHandle handle, const Box& box) {
-  SceneInstance& instance = instances_.at(handle.index);
-  if (!isSnormPosition(instance.layout.positions)) return {};
   if (!isBox(box)) {
     return invalid("instance " + std::to_string(handle.index) +
                    ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
-  instance.extras.box = box;
+  instances_.at(handle.index).extras.box = box;
   states_[handle.index].isUrgent = true;
   states_[handle.index].restartsMotion = true;
   makeStale(handle.index);
@@ -332,12 +341,14 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
       !good)
     return good;
   std::vector<MorphWeight>& active = instance.extras.morphs;
-  const bool hadMorphs = !active.empty();
-  assignActive(morphs, active);
+  assignActive(morphs, morphsScratch_);
+  active.swap(morphsScratch_);
   // With and without are two kernels.
-  if (hadMorphs == active.empty()) {
-    releaseRuns(instance);
-    if (Result<void> good = makeRuns(instance, states_[handle.index].isCulled); !good) return good;
+  if (active.empty() != morphsScratch_.empty()) {
+    if (Result<void> good = remakeRuns(instance, states_[handle.index].isCulled); !good) {
+      active.swap(morphsScratch_);
+      return good;
+    }
   }
   makeStale(handle.index);
   return {};
@@ -352,6 +363,36 @@ void SceneBooks::show(InstanceState& state, InstanceHandle handle) {
   if (state.isStale) makePending(state, handle.index);
 }
 
+/// What decides by which kernel the instance is skinned, from where, and to where.
+Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
+  SceneInstance& instance = instances_.at(change.instance.index);
+  const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
+  const bool hasNewBox = change.box && isSnormPosition(instance.layout.positions);
+  // A box and morph weights alone need neither other kernels nor room.
+  if (hasNewMesh || change.pose || change.method || (hasNewBox && change.morphs))
+    return rebuild(instance, change);
+  if (hasNewBox) return setBox(change.instance, *change.box);
+  if (change.morphs) return setMorphWeights(change.instance, *change.morphs);
+  return {};
+}
+
+/// All the rest, which cannot fail.
+void SceneBooks::changeState(InstanceState& state, const InstanceChange& change) {
+  if (change.updateInterval) state.updateInterval = *change.updateInterval;
+  if (change.visible && *change.visible != state.isVisible) {
+    if (*change.visible) {
+      show(state, change.instance);
+    } else {
+      hide(state);
+    }
+  }
+  if (change.teleports) {
+    state.restartsMotion = true;
+    state.isUrgent = true;
+    makeStale(change.instance.index);
+  }
+}
+
 Result<void> SceneBooks::change(const InstanceChange& change) {
   InstanceState* const state = findState(change.instance);
   if (state == nullptr) return unknownHandle("instance", change.instance);
@@ -359,38 +400,21 @@ Result<void> SceneBooks::change(const InstanceChange& change) {
     return invalid("instance " + std::to_string(change.instance.index) +
                    ": an update interval is 1 or more frames, not 0");
   }
-  SceneInstance& instance = instances_.at(change.instance.index);
-  const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
-  // A box and morph weights alone need neither other kernels nor room.
-  Result<void> done;
-  if (hasNewMesh || change.pose || change.method || (change.box && change.morphs)) {
-    done = rebuild(instance, change);
-  } else if (change.box) {
-    done = setBox(change.instance, *change.box);
-  } else if (change.morphs) {
-    done = setMorphWeights(change.instance, *change.morphs);
-  }
-  if (!done) return done;
-  if (change.updateInterval) state->updateInterval = *change.updateInterval;
-  if (change.visible && *change.visible != state->isVisible) {
-    if (*change.visible) {
-      show(*state, change.instance);
-    } else {
-      hide(*state);
-    }
-  }
-  if (change.teleports) {
-    state->restartsMotion = true;
-    state->isUrgent = true;
-    makeStale(change.instance.index);
-  }
-  return done;
+  if (Result<void> done = changeSkinning(change); !done) return done;
+  changeState(*state, change);
+  return {};
 }
 
 Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
   for (const InstanceChange& one : changes) {
-    if (Result<void> done = change(one); !done)
+    const bool changesSkinning =
+        one.mesh || one.pose || one.method || one.box || one.morphs || one.updateInterval == 0u;
+    InstanceState* const state = findState(one.instance);
+    if (!changesSkinning && state != nullptr) {
+      changeState(*state, one);
+    } else if (Result<void> done = change(one); !done) {
       return numbered(done.error(), &one - changes.data());
+    }
   }
   return {};
 }
@@ -455,14 +479,11 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
     const std::optional<Range> to =
         outputStore_.ranges.allocateBelow(from.size, laidOut->alignment, from.offset);
     if (!to) continue;
-    releaseRuns(instance);
     instance.target.bytes = *to;
-    const bool isCulled = states_[handle.index].isCulled;
-    if (Result<void> made = makeRuns(instance, isCulled); !made) {
-      // A device with few storage buffers cannot have it there.
+    if (!remakeRuns(instance, states_[handle.index].isCulled)) {
+      // It would lie in two storage buffer ranges, and must not.
       outputStore_.ranges.free(*to);
       instance.target.bytes = from;
-      made = makeRuns(instance, isCulled);
       continue;
     }
     shift(handle);

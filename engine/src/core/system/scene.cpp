@@ -2,6 +2,7 @@
 
 #include "dermis/scene.h"
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <utility>
@@ -52,12 +53,6 @@ Result<void> checkDescription(const SceneDescription& description) {
                    " is not a multiple of " +
                    std::to_string(outputRangeAlignment(description.limits)));
   }
-  if (sceneSizes(description).palettes > range) {
-    return Error{ErrorCode::limitExceeded,
-                 "the palettes of the scene's jointCapacity and gpuJointCapacity are larger than "
-                 "this device's storage buffer range of " +
-                     std::to_string(range) + " bytes"};
-  }
   return checkTuning(description.tuning);
 }
 
@@ -69,9 +64,9 @@ std::uint64_t roundUp(std::uint64_t value, std::uint64_t multiple) {
 
 SceneDescription rounded(SceneDescription description) {
   const auto round = [](Capacity& capacity, std::uint64_t multiple) {
-    const bool isFixed = capacity.maximum == capacity.initial;
+    if (capacity.maximum < capacity.initial) return;  // to be refused
     capacity.initial = roundUp(capacity.initial, multiple);
-    if (isFixed) capacity.maximum = capacity.initial;
+    capacity.maximum = std::max(capacity.maximum / multiple * multiple, capacity.initial);
   };
   round(description.meshCapacity, packedMeshAlignment);
   round(description.outputCapacity, 4);

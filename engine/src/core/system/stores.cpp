@@ -46,14 +46,20 @@ Result<void> SceneBooks::growBuffer(BufferRole role, const PlanSizes& sizes,
                      {role, sizes.requirement(role, 0, description_.limits), poseBuffer});
 }
 
-/// To at least so many units, which is not more than the maximum: at least twice as many as now, so
-/// that a scene that grows by small steps copies little.
+/// To at least so many units, which is not more than the maximum. To twice as many as now if it
+/// can, so that a scene that grows by small steps copies little.
 Result<void> SceneBooks::grow(Store& store, std::uint64_t least) {
   const std::uint64_t twice = store.ranges.capacity() * 2;
-  const std::uint64_t capacity = std::min(std::max(least, twice), store.capacity.maximum);
+  std::uint64_t capacity = std::min(std::max(least, twice), store.capacity.maximum);
   PlanSizes grown = sizes();
   setSize(grown, store.role, capacity);
-  if (Result<void> made = growBuffer(store.role, grown); !made) return made;
+  Result<void> made = growBuffer(store.role, grown);
+  if (!made && capacity > least) {
+    capacity = least;
+    setSize(grown, store.role, capacity);
+    made = growBuffer(store.role, grown);
+  }
+  if (!made) return made;
   store.ranges.grow(capacity);
   if (store.role != BufferRole::palettes) return {};
   // The larger buffer is empty.
@@ -101,6 +107,7 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
 }
 
 /// Matrices one behind the other, in all slots, and their buffer: one more where none has room.
+/// Nothing where there may be no other.
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);
@@ -118,21 +125,42 @@ Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWri
   }
   const bool isCpu = writer == PoseWriter::cpu;
   const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
-  const std::uint64_t largest =
-      description_.limits.maxStorageBufferRange / sizeof(JointMatrix) / slots;
   const std::uint64_t most =
-      std::min(largest, capacity.maximum - std::min(capacity.maximum, total));
+      std::min(largestPoseBuffer(writer), capacity.maximum - std::min(capacity.maximum, total));
   if (count > most) return std::optional<Range>();
-  const std::uint64_t joints = std::min(std::max({count, total, leastJoints}), most) * slots;
-  PlanSizes added;
-  added.isScene = true;
-  added.poses = added.gpuPoses = joints * sizeof(JointMatrix);
-  if (Result<void> made =
-          growBuffer(isCpu ? BufferRole::poses : BufferRole::gpuPoses, added, buffer);
-      !made)
-    return made.error();
-  return poseBuffers_.emplace_back(PoseStore{writer, RangeAllocator(joints)})
+  std::uint64_t joints = std::min(std::max({count, total, leastJoints}), most);
+  const auto make = [&] {
+    PlanSizes added;
+    added.isScene = true;
+    added.poses = added.gpuPoses = joints * slots * sizeof(JointMatrix);
+    return growBuffer(isCpu ? BufferRole::poses : BufferRole::gpuPoses, added, buffer);
+  };
+  Result<void> made = make();
+  if (!made && joints > count) {
+    joints = count;
+    made = make();
+  }
+  if (!made) return made.error();
+  return poseBuffers_.emplace_back(PoseStore{writer, RangeAllocator(joints * slots)})
       .joints.allocate(count * slots, 1);
+}
+
+Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, PoseWriter writer) const {
+  const bool isCpu = writer == PoseWriter::cpu;
+  std::uint64_t held = 0, used = 0;
+  for (const PoseStore& store : poseBuffers_) {
+    if (store.writer != writer) continue;
+    held += store.joints.capacity() / slotsOf(writer);
+    used += store.joints.used() / slotsOf(writer);
+  }
+  const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
+  return {ErrorCode::limitExceeded,
+          (poses == 1 ? std::string("a pose takes ") : std::to_string(poses) + " poses take ") +
+              std::to_string(count) + " joints in one pose buffer, which holds at most " +
+              std::to_string(largestPoseBuffer(writer)) + "; those that the " +
+              (isCpu ? "CPU" : "GPU") + " writes hold " + std::to_string(held) + ", of which " +
+              std::to_string(used) + " are in use, and may hold " +
+              std::to_string(capacity.maximum)};
 }
 
 /// Whether there may be one more instance. Nothing is allocated for it here: history and visibility

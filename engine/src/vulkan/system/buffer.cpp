@@ -52,7 +52,8 @@ SystemBuffer& SystemBuffer::operator=(SystemBuffer&& other) noexcept {
 
 void SystemBuffer::release() {
   if (source_ == nullptr) return;
-  source_->callbacks.destroy(source_->callbacks.user, created_);
+  if (created_.buffer != VK_NULL_HANDLE)
+    source_->callbacks.destroy(source_->callbacks.user, created_);
   source_->bytes -= size_;
   source_ = nullptr;
 }

@@ -54,6 +54,8 @@ Result<SystemBuffer> createBuffer(BufferSource& source, BufferRole role,
 
 Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescription& description) {
   meshes.engines = description.meshes;
+  if (meshes.engines.buffer != VK_NULL_HANDLE)
+    meshes.engines.size = scene.buffer(BufferRole::meshes).size;
   output.engines = description.output;
   outputUsage = description.outputUsage;
   for (const BufferRole role :
@@ -72,6 +74,7 @@ Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescriptio
     if (range.buffer != VK_NULL_HANDLE) {
       PoseMemory& memory = poseBuffers.emplace_back();
       memory.range = range;
+      memory.range.size = needed.requirement.size;  // whole joints, of which kernels can see all
       if (isCpu) memory.mapped = static_cast<std::byte*>(description.poses.mapped);
     } else if (Result<void> made = grow(
                    {isCpu ? BufferRole::poses : BufferRole::gpuPoses, needed.requirement, number});
@@ -83,11 +86,6 @@ Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescriptio
   for (GrowingBuffer* buffer : {&meshes, &palettes, &output, &results})
     buffer->own = std::exchange(buffer->larger, {});
   isGrowing = false;
-  if (const BufferRequirement needed = scene.buffer(BufferRole::counters); needed.size != 0) {
-    Result<SystemBuffer> made = createBuffer(source, BufferRole::counters, needed);
-    if (!made) return made.error();
-    counters = std::move(*made);
-  }
   return {};
 }
 
@@ -133,6 +131,12 @@ Result<void> SkinningSystem::State::makeRoom() {
     if (!made) return made.error();
     history.larger = std::move(*made);
     isGrowing = true;
+  }
+  if (const BufferRequirement needed = plan.buffer(BufferRole::counters);
+      needed.size > counters.size()) {
+    Result<SystemBuffer> made = createBuffer(source, BufferRole::counters, needed);
+    if (!made) return made.error();
+    counters = std::move(*made);  // there was none
   }
   BufferRequirement needed = plan.buffer(BufferRole::tables);
   const std::uint64_t used = needed.size;

@@ -1,0 +1,220 @@
+// How the buffers of a scene grow, without a device: what the engine is asked for, and what happens
+// where a storage buffer range, a maximum or the engine's memory ends.
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "dermis/scene.h"
+#include "plan_commands.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint64_t range = 65536;
+constexpr std::uint32_t vertices = 1000;  ///< of 24 bytes: three outputs in 65536 bytes, not more
+
+MeshInfo meshInfo() {
+  MeshInfo info;
+  info.vertexCount = vertices;
+  info.requiredJoints = 4;
+  info.maxInfluences = 4;
+  info.morphTargetCount = 2;
+  info.hasNormals = true;
+  info.byteSize = 4096;
+  return info;
+}
+
+/// An engine whose memory ends at `most` bytes for each buffer.
+struct Memory {
+  std::uint64_t most = ~std::uint64_t{0};
+  std::vector<BufferGrowth> asked;
+
+  GrowthCallback callback() {
+    return {this, [](void* user, const BufferGrowth& growth) -> Result<void> {
+              auto& memory = *static_cast<Memory*>(user);
+              memory.asked.push_back(growth);
+              if (growth.requirement.size <= memory.most) return {};
+              return Error{ErrorCode::vulkanError, "no memory"};
+            }};
+  }
+};
+
+class SceneGrowthTest : public ::testing::Test {
+ protected:
+  SceneGrowthTest() {
+    description.limits.maxStorageBufferRange = range;
+    description.limits.maxStorageBuffersPerStage = storageBuffersWanted;
+    description.meshCapacity = {4096};
+    description.outputCapacity = {range};
+    description.growth = memory.callback();
+  }
+
+  void create() {
+    scene.emplace(Scene::create(description).value());
+    instance.mesh = scene->addMesh(meshInfo()).value();
+    instance.pose = scene->addPose(4).value();
+    instance.layout.normals = VertexFormat::float32x3;
+  }
+
+  /// Number of the runs in which a frame skins what is due.
+  std::size_t plannedRuns() {
+    ++frame;
+    EXPECT_TRUE(scene->beginFrame(frame, frame - 1).ok());
+    EXPECT_TRUE(scene->plan(plan).ok());
+    EXPECT_TRUE(scene->commit().ok());
+    std::size_t runs = 0;
+    for (const PlannedDispatch& dispatch : dispatchesOf(plan)) {
+      if (dispatch.variant.kernel == Kernel::skin) runs += dispatch.skinPush().groupCount;
+    }
+    return runs;
+  }
+
+  template <typename T>
+  static void expectRefused(const Result<T>& result, ErrorCode code, const std::string& text) {
+    ASSERT_FALSE(result.ok()) << text;
+    EXPECT_EQ(result.error().code, code) << result.error().message;
+    EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
+  }
+
+  Memory memory;
+  SceneDescription description;
+  std::optional<Scene> scene;
+  InstanceDescription instance;
+  std::uint64_t frame = 0;
+  Plan plan;
+};
+
+// It is longer than what always fits into one range, and lies in one.
+TEST_F(SceneGrowthTest, AnInstanceThatIsCulledOnTheGpuChangesAfterTheOutputHasGrownBeyondARange) {
+  create();
+  instance.culledOnGpu = true;
+  const InstanceHandle culled = scene->addInstance(instance).value();
+  instance.culledOnGpu = false;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(scene->addInstance(instance).ok());
+  ASSERT_GT(scene->statistics().outputs.capacity, range);
+  const MorphWeight morph{1, 0.5f};
+  InstanceChange change{.instance = culled, .method = Method::linear};
+  change.morphs = std::span(&morph, 1);
+  const Result<void> changed = scene->change(change);
+  EXPECT_TRUE(changed.ok()) << changed.error().message;
+  change.method.reset();
+  change.morphs = std::span<const MorphWeight>();
+  EXPECT_TRUE(scene->change(change).ok());
+  // One beyond the end of the first range is in two runs; the GPU would choose each for itself.
+  EXPECT_GT(plannedRuns(), 4u);
+  instance.culledOnGpu = true;
+  bool isRefused = false;
+  for (int i = 0; i < 3; ++i) isRefused |= !scene->addInstance(instance);
+  EXPECT_TRUE(isRefused);
+}
+
+TEST_F(SceneGrowthTest, WhatWouldLieInTwoRangesStaysWhereItIs) {
+  description.outputCapacity = {range * 4};
+  create();
+  std::vector<InstanceHandle> before;
+  for (int i = 0; i < 3; ++i) before.push_back(scene->addInstance(instance).value());
+  instance.culledOnGpu = true;
+  Result<InstanceHandle> culled = scene->addInstance(instance);
+  while (!culled) {
+    // Room between, until it lies in one range.
+    instance.culledOnGpu = false;
+    before.push_back(scene->addInstance(instance).value());
+    instance.culledOnGpu = true;
+    culled = scene->addInstance(instance);
+  }
+  plannedRuns();
+  const std::uint64_t offset = scene->output(*culled)->offset;
+  ASSERT_TRUE(scene->removeInstance(before[2]).ok());
+  plannedRuns();
+  scene->compact(~std::uint64_t{0});
+  plannedRuns();
+  plannedRuns();
+  EXPECT_EQ(scene->output(*culled)->offset, offset);
+  const MorphWeight morph{0, 1};
+  const InstanceChange change{.instance = *culled, .morphs = std::span(&morph, 1)};
+  EXPECT_TRUE(scene->change(change).ok()) << "it is skinned to where it is";
+}
+
+TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereTheyAreAdded) {
+  description.outputCapacity = {range * 2};
+  for (const bool separate : {true, false}) {
+    description.limits.separateRanges = separate;
+    create();
+    instance.layout.arrangement = Arrangement::planar;
+    bool isRefused = false;
+    for (int i = 0; i < 8; ++i) {
+      const Result<InstanceHandle> added = scene->addInstance(instance);
+      if (added) continue;
+      isRefused = true;
+      expectRefused(added, ErrorCode::limitExceeded, "separateRanges");
+      break;
+    }
+    EXPECT_NE(isRefused, separate);
+    instance.layout.arrangement = Arrangement::interleaved;
+    for (int i = 0; i < 8; ++i) EXPECT_TRUE(scene->addInstance(instance).ok());
+    frame = 0;
+    EXPECT_GT(plannedRuns(), 2u);
+  }
+}
+
+TEST_F(SceneGrowthTest, TheLeastIsAskedForWhereThereIsNoMemoryForTwice) {
+  create();
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(scene->addInstance(instance).ok());
+  memory.most = range + 24'000;
+  ASSERT_TRUE(scene->addInstance(instance).ok());
+  ASSERT_EQ(memory.asked.size(), 2u);
+  EXPECT_EQ(memory.asked[0].requirement.size, 2 * range);
+  EXPECT_EQ(memory.asked[1].requirement.size, 3 * 24'000u);
+  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 3 * 24'000u);
+  expectRefused(scene->addInstance(instance), ErrorCode::vulkanError, "no memory");
+  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 3 * 24'000u);
+  // Of poses, another buffer.
+  memory.asked.clear();
+  memory.most = 200 * 2 * sizeof(JointMatrix);
+  ASSERT_TRUE(scene->addPose(100).ok());
+  ASSERT_TRUE(scene->addPose(200).ok());
+  ASSERT_EQ(memory.asked.size(), 2u);
+  EXPECT_EQ(memory.asked[0].requirement.size, 256 * 2 * sizeof(JointMatrix));
+  EXPECT_EQ(memory.asked[1].requirement.size, 200 * 2 * sizeof(JointMatrix));
+  expectRefused(scene->addPose(201), ErrorCode::vulkanError, "no memory");
+}
+
+TEST_F(SceneGrowthTest, MaximaThatAreNoWholeUnitsEndBeforeThem) {
+  description.meshCapacity = {4096, 3 * 4096 + 9};
+  description.outputCapacity = {24'000, 72'003};
+  create();
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(scene->addMesh(meshInfo()).ok());
+  expectRefused(scene->addMesh(meshInfo()), ErrorCode::limitExceeded, "of 12288 bytes");
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene->addInstance(instance).ok());
+  expectRefused(scene->addInstance(instance), ErrorCode::limitExceeded, "of 72000 bytes");
+  EXPECT_EQ(scene->buffer(BufferRole::meshes).size, 12'288u);
+  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 72'000u);
+  description.outputCapacity = {5, 6};
+  EXPECT_EQ(Scene::buffer(description, BufferRole::positions).value().size, 8u);
+}
+
+TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
+  description.jointCapacity = {256, 600};
+  create();
+  ASSERT_TRUE(scene->addPose(250).ok());
+  expectRefused(scene->addPose(400), ErrorCode::limitExceeded,
+                "a pose takes 400 joints in one pose buffer, which holds at most 682; those that "
+                "the CPU writes hold 256, of which 254 are in use, and may hold 600");
+  std::vector<PoseHandle> poses(1000);
+  expectRefused(scene->addPoses(poses, 20, {.writer = PoseWriter::gpu}), ErrorCode::limitExceeded,
+                "1000 poses take 20000 joints in one pose buffer, which holds at most 1365");
+}
+
+TEST_F(SceneGrowthTest, MeshesThatAreNotPackedAreRefused) {
+  create();
+  for (const std::uint32_t size : {0u, 8u, 4095u}) {
+    MeshInfo info = meshInfo();
+    info.byteSize = size;
+    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument, std::to_string(size));
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
