@@ -1,6 +1,7 @@
 # Every option of Dermis, with defaults that suit both a checkout of its own and an engine's add_subdirectory.
 
 option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" ON)
+option(DERMIS_BUILD_CPU "Build dermis::cpu, skinning by SIMD instructions of the CPU; needs Highway" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy contract" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
@@ -22,6 +23,9 @@ if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_BUILD_VERIFY AND DERMIS_BUILD_VULKAN AND
 endif()
 if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_COMPARISON_METHODS AND DERMIS_SUBWORD_STORES))
   message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES")
+endif()
+if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_CPU)
+  message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_CPU")
 endif()
 if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_SAMPLES)
   message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_SAMPLES: the tests use its device and its models")

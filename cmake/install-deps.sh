@@ -9,6 +9,7 @@ packages="
 cmake ninja-build g++
 libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
 glslang-dev glslang-tools spirv-tools
+libhwy-dev
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
 libpng-dev libstb-dev fonts-dejavu-core

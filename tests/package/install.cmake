@@ -9,7 +9,7 @@ file(RENAME "${staging}" "${prefix}")
 
 say("Compare the list of files")
 set(expected)
-foreach(component IN ITEMS core gltf shader_compiler verify vulkan)
+foreach(component IN ITEMS core cpu gltf shader_compiler verify vulkan)
   list(APPEND expected ${libFolder}/libdermis_${component}.a
        ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
 endforeach()

@@ -1,4 +1,4 @@
-# A tool that uses dermis::shader_compiler and dermis::gltf.
+# A tool that uses dermis::shader_compiler, dermis::gltf, dermis::cpu and dermis::verify.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 build_consumer(others)

@@ -1,5 +1,5 @@
 // Compiles the installed kernels at run time, and reads glTF from memory: a skinned and morphed
-// triangle, viewed, packed and skinned.
+// triangle, viewed, packed and skinned on the CPU.
 //
 //   others_consumer SHADERS
 
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "dermis/cpu/skin.h"
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
@@ -58,7 +59,27 @@ Result<bool> skinTriangle() {
   const auto vertices = reference::skin(view.mesh(), palette, Method::dualQuaternion, {&morph, 1});
   if (!vertices) return vertices.error();
   const std::vector<reference::Double3> expected{{0, 0, 3}, {1.5, 0, 3}, {0, 1.5, 3}};
-  return packed->info().morphTargetCount == 1 && vertices->positions == expected;
+  if (packed->info().morphTargetCount != 1 || vertices->positions != expected) return false;
+
+  const Result<cpu::Mesh> mesh = cpu::Mesh::create(*packed);
+  const Result<VertexPlaces> places = placeVertices({}, 3);
+  if (!mesh || !places) return false;
+  float skinnedFloats[3][3] = {};
+  cpu::Instance instance;
+  instance.pose = palette;
+  instance.output = skinnedFloats;
+  instance.morphs = {&morph, 1};
+  cpu::Job job;
+  job.mesh = &*mesh;
+  job.places = *places;
+  job.instances = {&instance, 1};
+  if (const Result<void> done = cpu::skin(job); !done) return done.error();
+  for (std::size_t vertex = 0; vertex < 3; ++vertex) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (static_cast<double>(skinnedFloats[vertex][axis]) != expected[vertex][axis]) return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace

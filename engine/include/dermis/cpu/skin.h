@@ -1,0 +1,75 @@
+// Skinning on the CPU, by the everyday methods, with SIMD instructions of the processor that it
+// runs on. No Vulkan, no threads of its own: a Job is what one thread does.
+//
+//   const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
+//   cpu::Job job;
+//   job.mesh = &mesh;
+//   job.places = *placeVertices(layout, mesh.info().vertexCount);
+//   job.instances = instances;             // each with its pose, and memory for its vertices
+//   cpu::skin(job);
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "dermis/cpu/mesh.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
+#include "dermis/method.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/types.h"
+
+namespace dermis::cpu {
+
+/// One instance of a job.
+struct Instance {
+  std::span<const JointMatrix> pose;  ///< at least `MeshInfo::requiredJoints`
+  bool mayScale = true;               ///< as `PoseDescription::mayScale`
+  /// Where its vertices are written: `Job::places` counts from here. Any alignment.
+  void* output = nullptr;
+  Box box;                              ///< as `dermis::Job::box`
+  std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, rising by target
+  bool restartsMotion = false;          ///< as `dermis::Job::restartsMotion`
+  bool settles = false;                 ///< as `dermis::Job::settles`
+  /// Motion::reskinned: the previous pose, and the previous morph weights, rising by target.
+  std::span<const JointMatrix> previousPose;
+  std::span<const MorphWeight> previousMorphs;
+  /// Not null: what was found out about the vertices of this job is written here. Results of
+  /// several jobs of an instance are put together by `addResult`.
+  InstanceResult* result = nullptr;
+};
+
+/// Vertices of one mesh, for some instances that are skinned alike. Instances in one job take less
+/// time than in a job each.
+struct Job {
+  const Mesh* mesh = nullptr;
+  Method method = Method::dualQuaternion;  ///< not for comparison
+  VertexPlaces places;                     ///< `placeVertices`, or arranged otherwise
+  std::uint32_t firstVertex = 0;
+  std::uint32_t vertexEnd = 0xffffffff;  ///< or the end of the mesh
+  std::span<const Instance> instances;
+};
+
+/// Writes the vertices. Every vertex comes out the same, to the bit, whatever the range, the other
+/// instances, the thread and the processor. Any number of threads may call it at once, with output
+/// that does not overlap. It uses memory of the thread, some 100 KiB, which the thread keeps.
+///
+/// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
+/// then.
+Result<void> skin(const Job& job);
+
+/// Adds to the result of some vertices of an instance that of others.
+void addResult(InstanceResult& result, const InstanceResult& other);
+
+/// The names of the instruction sets that `skin` was compiled for and that this processor has, the
+/// best one first: "AVX3", "AVX2", "SSE4", "EMU128" (none), "NEON".
+std::vector<std::string_view> targetNames();
+/// Has `skin` use one of them from now on, in the whole process, to test or measure it. Fails with
+/// `invalidArgument` for a name that is not in `targetNames`. Empty: the best one again.
+Result<void> setTarget(std::string_view name);
+
+}  // namespace dermis::cpu

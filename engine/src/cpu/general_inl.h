@@ -1,0 +1,603 @@
+// Every method, format and extra, one instance at a time. What most instances need has a quicker
+// way (plain_inl.h), by the same operations in the same order.
+
+// clang-format off
+#if defined(DERMIS_CPU_GENERAL_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef DERMIS_CPU_GENERAL_INL_H
+#undef DERMIS_CPU_GENERAL_INL_H
+#else
+#define DERMIS_CPU_GENERAL_INL_H
+#endif
+// clang-format on
+
+#include <bit>
+#include <cstring>
+
+#include "abi.h"
+#include "cpu/encode_inl.h"
+#include "cpu/pose_inl.h"
+#include "cpu/task.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dermis::cpu::HWY_NAMESPACE {
+
+// -- Vertices.
+
+template <class D>
+struct Vertex {
+  Vec3<D> position;
+  Vec3<D> normal, tangent;            ///< of unit length, or zero
+  Vec3<D> givenNormal, givenTangent;  ///< as the mesh has them: what scales starts from these
+  Vec<D> hand;
+};
+
+template <class D>
+HWY_INLINE Vec3<D> loadVector(D d, const Lanes* lanes, std::size_t first) {
+  return {hn::Load(d, lanes[0].v + first), hn::Load(d, lanes[1].v + first),
+          hn::Load(d, lanes[2].v + first)};
+}
+
+/// v turned by q, 2 / |q|² being `factor`: v + factor r × (r × v + w v).
+template <class D>
+HWY_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>& v) {
+  const Vec3<D> axis{q.x, q.y, q.z};
+  const Vec3<D> inner = add3(cross3(axis, v), scale3(v, q.w));
+  return add3(v, scale3(cross3(axis, inner), factor));
+}
+
+/// A point turned and moved: p + factor (r × (r × p + w p + d) + w d − dw r).
+template <class D>
+HWY_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> factor,
+                             const Vec3<D>& p) {
+  const Vec3<D> axis{q.x, q.y, q.z}, shift{dual.x, dual.y, dual.z};
+  const Vec3<D> inner = add3(add3(cross3(axis, p), scale3(p, q.w)), shift);
+  const Vec3<D> outer = sub3(add3(cross3(axis, inner), scale3(shift, q.w)), scale3(axis, dual.w));
+  return add3(p, scale3(outer, factor));
+}
+
+template <class D>
+HWY_INLINE Vec<D> turningFactor(D d, const Vec4<D>& q) {
+  const Vec<D> square = hn::Add(dot3(q.x, q.y, q.z, q.x, q.y, q.z), hn::Mul(q.w, q.w));
+  return hn::Div(hn::Set(d, 2.0f), square);
+}
+
+/// Rows of a 3×4 matrix.
+template <class D>
+struct Matrix {
+  Vec4<D> r0, r1, r2;
+};
+
+template <class D>
+HWY_INLINE Vec3<D> throughMatrix(const Matrix<D>& m, const Vec3<D>& p) {
+  return {hn::Add(dot3(m.r0.x, m.r0.y, m.r0.z, p.x, p.y, p.z), m.r0.w),
+          hn::Add(dot3(m.r1.x, m.r1.y, m.r1.z, p.x, p.y, p.z), m.r1.w),
+          hn::Add(dot3(m.r2.x, m.r2.y, m.r2.z, p.x, p.y, p.z), m.r2.w)};
+}
+
+/// A 3×3 matrix by its rows, scaled so that no product of two of them leaves the range of a float,
+/// and the sign of its determinant: what directions are transformed by.
+template <class D>
+struct DirectionMap {
+  Vec3<D> r0, r1, r2;
+  Vec<D> side;
+};
+
+template <class D>
+HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r1,
+                                        const Vec3<D>& r2) {
+  const Vec<D> scale = powerScale(d, hn::Max(largest3(r0), hn::Max(largest3(r1), largest3(r2))));
+  DirectionMap<D> map{scale3(r0, scale), scale3(r1, scale), scale3(r2, scale), scale};
+  map.side = sideOf(d, dot3(map.r0, cross3(map.r1, map.r2)));
+  return map;
+}
+/// By the cofactors; a mirror turns normals over once.
+template <class D>
+HWY_INLINE Vec3<D> mapNormal(const DirectionMap<D>& map, const Vec3<D>& n) {
+  const Vec3<D> turned{dot3(cross3(map.r1, map.r2), n), dot3(cross3(map.r2, map.r0), n),
+                       dot3(cross3(map.r0, map.r1), n)};
+  return scale3(turned, map.side);
+}
+template <class D>
+HWY_INLINE Vec3<D> mapTangent(const DirectionMap<D>& map, const Vec3<D>& t) {
+  return {dot3(map.r0, t), dot3(map.r1, t), dot3(map.r2, t)};
+}
+
+/// A vertex through a blended matrix.
+template <class D>
+HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v) {
+  Vertex<D> skinned = v;
+  skinned.position = throughMatrix(m, v.position);
+  const DirectionMap<D> map =
+      directionMap(d, Vec3<D>{m.r0.x, m.r0.y, m.r0.z}, Vec3<D>{m.r1.x, m.r1.y, m.r1.z},
+                   Vec3<D>{m.r2.x, m.r2.y, m.r2.z});
+  skinned.normal = unitOr(d, mapNormal(map, v.normal), v.normal);
+  skinned.tangent = unitOr(d, mapTangent(map, v.tangent), v.tangent);
+  skinned.hand = hn::Mul(v.hand, map.side);
+  return skinned;
+}
+
+/// A blended scale/shear part.
+template <class D>
+struct Part {
+  Vec3<D> r0, r1, r2;
+};
+
+template <class D>
+HWY_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
+  return {dot3(part.r0, p), dot3(part.r1, p), dot3(part.r2, p)};
+}
+
+// -- Sums over influences.
+
+/// The slots of a block's vertices, from one of its lanes on.
+struct Slots {
+  const std::uint16_t* joints;
+  const std::uint16_t* pairs;
+  const float* weights;
+  std::uint32_t influences;
+};
+
+/// Σ w e of each lane's entries. An entry has 4 K floats in `units` times 8 floats.
+template <std::size_t K, class D>
+HWY_INLINE void sumEntries(D d, const float* entries, std::size_t units,
+                           const std::uint16_t* numbers, const Slots& slots, Vec4<D>* sums) {
+  const Four four;
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  HWY_ALIGN float all[lanes * 4 * K];
+  const float* weights = slots.weights;
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    Vec<Four> sum[K];
+    for (std::size_t k = 0; k < K; ++k)
+      sum[k] =
+          hn::Mul(hn::Set(four, weights[0]), hn::Load(four, entries + numbers[0] * units + k * 4));
+    for (std::uint32_t slot = 1; slot < slots.influences; ++slot) {
+      const Vec<Four> weight = hn::Set(four, weights[slot]);
+      const float* const entry = entries + numbers[slot] * units;
+      for (std::size_t k = 0; k < K; ++k)
+        sum[k] = hn::Add(sum[k], hn::Mul(weight, hn::Load(four, entry + k * 4)));
+    }
+    for (std::size_t k = 0; k < K; ++k) hn::Store(sum[k], four, all + lane * 4 * K + k * 4);
+    numbers += slots.influences;
+    weights += slots.influences;
+  }
+  for (std::size_t k = 0; k < K; ++k) sums[k] = loadRows(d, all + k * 4, 4 * K);
+}
+
+/// The pivot's entry of each lane.
+template <std::size_t K, class D>
+HWY_INLINE void pivotEntries(D d, const float* entries, const Slots& slots, Vec4<D>* found) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  HWY_ALIGN float all[lanes * 4 * K];
+  for (std::size_t lane = 0; lane < lanes; ++lane)
+    std::memcpy(all + lane * 4 * K, entries + slots.joints[lane * slots.influences], 16 * K);
+  for (std::size_t k = 0; k < K; ++k) found[k] = loadRows(d, all + k * 4, 4 * K);
+}
+
+// -- Palettes: what the vertices of a section read of one instance's pose.
+
+struct Palette {
+  const float* pairs = nullptr;        ///< dual quaternions, 8 floats each
+  const float* scaleShears = nullptr;  ///< of joints, 8 floats each
+  const float* scalePairs = nullptr;   ///< the joint's part less the pivot's
+  const float* rows = nullptr;         ///< of joints, 16 floats each
+  bool scales = false;
+};
+
+inline float* floatsOf(std::vector<Lanes>& memory, std::size_t count) {
+  const std::size_t lanes = (count + blockVertices - 1) / blockVertices;
+  if (memory.size() < lanes) memory.resize(lanes);
+  return memory.data()->v;
+}
+
+inline bool needsRows(Method method) {
+  return method == Method::linear || method == Method::blended || needsCentersOfRotation(method);
+}
+
+/// R S | t of a joint that was taken apart.
+inline void writeRows(const float* q, const float* part, const JointMatrix& matrix, float* to) {
+  const float x = q[0], y = q[1], z = q[2], w = q[3];
+  const float r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                         {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                         {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+  for (int row = 0; row < 3; ++row) {
+    float* const out = to + row * 4;
+    if (part == nullptr) {
+      std::memcpy(out, r[row], sizeof(r[row]));
+    } else {
+      const float a = r[row][0], b = r[row][1], c = r[row][2];
+      out[0] = part[0] * a + part[3] * b + part[4] * c;
+      out[1] = part[3] * a + part[1] * b + part[5] * c;
+      out[2] = part[4] * a + part[5] * b + part[2] * c;
+    }
+    out[3] = matrix.m[row][3];
+  }
+}
+
+inline std::span<const std::uint32_t> jointsOf(const MeshData& mesh, const Section& section) {
+  return std::span(mesh.joints).subspan(section.firstJoint, section.jointCount());
+}
+inline std::span<const Pair> pairsOf(const MeshData& mesh, const Section& section) {
+  return std::span(mesh.pairs).subspan(section.firstPair, section.pairCount());
+}
+
+inline const JointMatrix stillMatrix;
+
+inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section, Method method,
+                                    std::span<const JointMatrix> pose, bool mayScale,
+                                    Scratch& scratch) {
+  Palette palette;
+  const std::span<const std::uint32_t> joints = jointsOf(mesh, section);
+  const std::span<const Pair> pairs = pairsOf(mesh, section);
+  const auto matrixOf = [&](std::size_t joint) -> const JointMatrix& {
+    return joints[joint] == stillJoint ? stillMatrix : pose[joints[joint]];
+  };
+  float* const rows = needsRows(method) ? floatsOf(scratch.rows, joints.size() * 16) : nullptr;
+  palette.rows = rows;
+  if (method == Method::linear) {
+    for (std::size_t joint = 0; joint < joints.size(); ++joint)
+      std::memcpy(rows + joint * 16, &matrixOf(joint), sizeof(JointMatrix));
+    return palette;
+  }
+  // Joints are converted as many at a time as there are lanes.
+  float* const converted = floatsOf(scratch.dualQuaternions, (joints.size() + 8) * 8);
+  float* const parts = floatsOf(scratch.scaleShears, (joints.size() + 8) * 8);
+  palette.scales = convertJoints({joints, pose, converted, parts}) && mayScale;
+  float* const signedPairs = floatsOf(scratch.pairs, pairs.size() * 8);
+  convertPairs(pairs, converted, signedPairs, 4);
+  palette.pairs = signedPairs;
+  if (palette.scales) {
+    float* const differences = floatsOf(scratch.scalePairs, pairs.size() * 8);
+    for (std::size_t pair = 0; pair < pairs.size(); ++pair) {
+      for (std::size_t k = 0; k < 8; ++k) {
+        differences[pair * 8 + k] = parts[std::size_t{pairs[pair].joint} * 8 + k] -
+                                    parts[std::size_t{pairs[pair].pivot} * 8 + k];
+      }
+    }
+    palette.scaleShears = parts;
+    palette.scalePairs = differences;
+  }
+  if (rows != nullptr) {
+    for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+      writeRows(converted + joint * 8, palette.scales ? parts + joint * 8 : nullptr,
+                matrixOf(joint), rows + joint * 16);
+    }
+  }
+  return palette;
+}
+
+// -- Methods.
+
+/// What some methods read of a vertex besides.
+template <class D>
+struct MethodInputs {
+  Vec3<D> center;
+  Vec<D> share;  ///< of dual quaternions, or the strength of bulge control
+};
+
+template <class D>
+HWY_INLINE Part<D> blendParts(D d, const Palette& palette, const Slots& slots) {
+  Vec4<D> pivot[2], sum[2];
+  pivotEntries<2>(d, palette.scaleShears, slots, pivot);
+  sumEntries<2>(d, palette.scalePairs, 1, slots.pairs, slots, sum);
+  const Vec<D> xx = hn::Add(pivot[0].x, sum[0].x), yy = hn::Add(pivot[0].y, sum[0].y),
+               zz = hn::Add(pivot[0].z, sum[0].z), xy = hn::Add(pivot[0].w, sum[0].w),
+               xz = hn::Add(pivot[1].x, sum[1].x), yz = hn::Add(pivot[1].y, sum[1].y);
+  return {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
+}
+
+template <class D>
+HWY_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) {
+  Vec4<D> rows[3];
+  sumEntries<3>(d, palette.rows, 2, slots.joints, slots, rows);
+  return {rows[0], rows[1], rows[2]};
+}
+
+/// Between a vertex that went straight and one that was turned. A mirror shows in the latter's.
+template <class D>
+HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
+                                 Vec<D> share) {
+  const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
+  const auto mix = [&](const Vec3<D>& a, const Vec3<D>& b)
+                       HWY_ATTR { return add3(scale3(a, rest), scale3(b, share)); };
+  Vertex<D> mixed = turned;
+  mixed.position = mix(straight.position, turned.position);
+  mixed.normal = unitOr(d, mix(straight.normal, turned.normal), turned.normal);
+  mixed.tangent = unitOr(d, mix(straight.tangent, turned.tangent), turned.tangent);
+  const auto isTurned = hn::Ge(share, one);
+  mixed.position = choose3(isTurned, turned.position, mixed.position);
+  mixed.normal = choose3(isTurned, turned.normal, mixed.normal);
+  mixed.tangent = choose3(isTurned, turned.tangent, mixed.tangent);
+  return mixed;
+}
+
+template <class D>
+HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const Slots& slots,
+                                const Palette& palette, const MethodInputs<D>& inputs) {
+  if (method == Method::linear) return throughMatrix(d, blendRows(d, palette, slots), bind);
+  Vec4<D> blend[2];
+  sumEntries<2>(d, palette.pairs, 1, slots.pairs, slots, blend);
+  const Vec4<D>&real = blend[0], &dual = blend[1];
+  const Vec<D> factor = turningFactor(d, real);
+
+  // First phase: scaled and sheared in bind space.
+  Vertex<D> scaled = bind;
+  Vec3<D> center = inputs.center;
+  const bool isAboutCenter = method == Method::centerOfRotation;
+  Part<D> part{};
+  if (palette.scales) {
+    part = blendParts(d, palette, slots);
+    const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2);
+    scaled.normal = unitOr(d, mapNormal(map, bind.givenNormal), bind.normal);
+    scaled.tangent = unitOr(d, mapTangent(map, bind.givenTangent), bind.tangent);
+    scaled.hand = hn::Mul(bind.hand, map.side);
+  }
+  const Vec3<D> point = isAboutCenter ? sub3(bind.position, center) : bind.position;
+  const Vec3<D> scaledPoint = palette.scales ? throughPart(part, point) : point;
+
+  // Second phase: turned and moved.
+  Vertex<D> turned = scaled;
+  turned.normal = turnDirection(real, factor, scaled.normal);
+  turned.tangent = turnDirection(real, factor, scaled.tangent);
+  if (isAboutCenter) {
+    const Matrix<D> rows = blendRows(d, palette, slots);
+    turned.position = add3(turnDirection(real, factor, scaledPoint), throughMatrix(rows, center));
+    return turned;
+  }
+  turned.position = movePoint(real, dual, factor, scaledPoint);
+  if (method == Method::bulgeControlled) {
+    const Matrix<D> rows = blendRows(d, palette, slots);
+    if (palette.scales) center = throughPart(part, center);
+    const Vec3<D> bulged = movePoint(real, dual, factor, center);
+    const Vec3<D> pull = sub3(throughMatrix(rows, inputs.center), bulged);
+    turned.position = add3(turned.position, scale3(pull, inputs.share));
+  }
+  if (method == Method::blended) {
+    const Vertex<D> straight = throughMatrix(d, blendRows(d, palette, slots), bind);
+    return mixVertices(d, straight, turned, inputs.share);
+  }
+  return turned;
+}
+
+// -- Morph targets.
+
+/// Adds to a block what the active targets displace. `lanes` are its positions, normals and
+/// tangents, three components each; null where they are not wanted.
+inline void morphBlock(const MeshData& mesh, std::uint32_t block,
+                       std::span<const MorphWeight> morphs, Lanes* positions, Lanes* normals,
+                       Lanes* tangents) {
+  const std::span<const std::uint32_t> words(mesh.packed);
+  const auto header = abi::load<abi::MeshHeader>(words, 0);
+  const std::uint32_t first = block * blockVertices;
+  const std::uint32_t shift = first % abi::MORPH_BLOCK_VERTICES;
+  for (const MorphWeight& morph : morphs) {
+    if (morph.weight == 0) continue;
+    const auto target = abi::load<abi::MorphRecord>(
+        words, header.morphs + std::size_t{morph.target} * abi::MORPH_WORDS);
+    const std::uint32_t number = first / abi::MORPH_BLOCK_VERTICES - target.firstBlock;
+    if (number >= target.blockCount) continue;  // one before the first wraps around
+    const auto record = abi::load<abi::MorphBlockRecord>(
+        words, target.blocks + std::size_t{number} * abi::MORPH_BLOCK_WORDS);
+    const std::uint64_t mask = record.maskLow | std::uint64_t{record.maskHigh} << 32;
+    const auto before =
+        static_cast<std::uint32_t>(std::popcount(mask & ((std::uint64_t{1} << shift) - 1)));
+    const auto attributes = static_cast<std::uint32_t>(std::popcount(target.attributes));
+    std::size_t word = record.displacements + std::size_t{before} * attributes * 3;
+    for (std::uint32_t lane = 0; lane < blockVertices; ++lane) {
+      if ((mask >> (shift + lane) & 1) == 0) continue;
+      for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, positions},
+                                             {abi::MORPH_HAS_NORMALS, normals},
+                                             {abi::MORPH_HAS_TANGENTS, tangents}}) {
+        if ((target.attributes & attribute) == 0) continue;
+        for (std::size_t k = 0; lanes != nullptr && k < 3; ++k)
+          lanes[k].v[lane] += morph.weight * std::bit_cast<float>(words[word + k]);
+        word += 3;
+      }
+    }
+  }
+}
+
+// -- Instances.
+
+/// What is found out about the vertices of one instance.
+struct Findings {
+  float least[3], greatest[3];
+  std::uint32_t clamped = 0;
+
+  Findings() {
+    std::fill(least, least + 3, std::numeric_limits<float>::infinity());
+    std::fill(greatest, greatest + 3, -std::numeric_limits<float>::infinity());
+  }
+};
+
+template <class D>
+HWY_INLINE void addPositions(D d, const Vec3<D>& position, std::size_t first, std::size_t end,
+                             Findings& findings) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  HWY_ALIGN float all[3][lanes];
+  hn::Store(position.x, d, all[0]);
+  hn::Store(position.y, d, all[1]);
+  hn::Store(position.z, d, all[2]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t lane = first; lane < end; ++lane) {
+      // NaN is in no box.
+      const float value = all[axis][lane];
+      if (value < findings.least[axis]) findings.least[axis] = value;
+      if (value > findings.greatest[axis]) findings.greatest[axis] = value;
+    }
+  }
+}
+
+/// Vertices of a run, of one instance.
+struct GeneralTask {
+  const Job& job;
+  const MeshData& mesh;
+  const Run& run;
+  const Instance& instance;
+  const Palette& palette;
+  const Palette* previous;  ///< Motion::reskinned
+  std::uint32_t firstVertex, vertexEnd;
+};
+
+/// One block's vertices in bind pose, displaced.
+struct BlockVertices {
+  Lanes positions[3], normals[3], tangents[4];
+};
+
+inline void loadBlock(const MeshData& mesh, std::uint32_t block,
+                      std::span<const MorphWeight> morphs, bool withDirections, BlockVertices& to) {
+  const auto copy = [&](const std::vector<Lanes>& from, std::size_t components, Lanes* lanes) {
+    if (!from.empty()) std::copy_n(from.data() + block * components, components, lanes);
+  };
+  copy(mesh.positions, 3, to.positions);
+  if (withDirections) {
+    copy(mesh.givenNormals, 3, to.normals);
+    copy(mesh.givenTangents, 4, to.tangents);
+  }
+  morphBlock(mesh, block, morphs, to.positions, withDirections ? to.normals : nullptr,
+             withDirections ? to.tangents : nullptr);
+}
+
+template <class D>
+HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, std::size_t lane,
+                                const BlockVertices* morphed) {
+  const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  Vertex<D> v{none, none, none, none, none, hn::Set(d, 1.0f)};
+  const auto at = [&](const std::vector<Lanes>& lanes, std::size_t components)
+                      HWY_ATTR { return loadVector(d, lanes.data() + block * components, lane); };
+  if (morphed != nullptr) {
+    v.position = loadVector(d, morphed->positions, lane);
+    v.givenNormal = loadVector(d, morphed->normals, lane);
+    v.givenTangent = loadVector(d, morphed->tangents, lane);
+    v.normal = unitOr(d, v.givenNormal, none);
+    v.tangent = unitOr(d, v.givenTangent, none);
+  } else {
+    v.position = at(mesh.positions, 3);
+    if (!mesh.normals.empty()) {
+      v.normal = at(mesh.normals, 3);
+      v.givenNormal = at(mesh.givenNormals, 3);
+    }
+    if (!mesh.tangents.empty()) {
+      v.tangent = at(mesh.tangents, 4);
+      v.givenTangent = at(mesh.givenTangents, 4);
+    }
+  }
+  if (!mesh.tangents.empty())
+    v.hand = hn::Load(d, mesh.tangents[std::size_t{block} * 4 + 3].v + lane);
+  return v;
+}
+
+/// Relative to the box of the instance, where the format is.
+template <class D>
+HWY_INLINE Vec3<D> relativeTo(D d, const Box& box, const Vec3<D>& position) {
+  const auto along = [&](Vec<D> v, std::size_t axis) HWY_ATTR {
+    const double least = double{box.min[axis]}, greatest = double{box.max[axis]};
+    const auto centre = static_cast<float>((least + greatest) / 2);
+    const auto inverse = static_cast<float>(2 / (greatest - least));
+    return hn::Mul(hn::Sub(v, hn::Set(d, centre)), hn::Set(d, inverse));
+  };
+  return {along(position.x, 0), along(position.y, 1), along(position.z, 2)};
+}
+
+/// Copies an attribute of some vertices.
+inline void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
+                      std::size_t fromStride, std::size_t bytes, std::size_t first,
+                      std::size_t end) {
+  for (std::size_t lane = first; lane < end; ++lane)
+    std::memcpy(to + lane * toStride, from + lane * fromStride, bytes);
+}
+
+/// Lanes `first` to `end` of those from `lane` of a block on.
+template <class D>
+HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
+                          std::size_t first, std::size_t end, const BlockVertices* morphed,
+                          const BlockVertices* morphedBefore, Findings& findings) {
+  const Job& job = task.job;
+  const MeshData& mesh = task.mesh;
+  const VertexPlaces& places = job.places;
+  const std::size_t vertex = std::size_t{block} * blockVertices + lane;
+  const auto placeOf = [&](const OutputAttribute& attribute) {
+    return static_cast<std::byte*>(task.instance.output) + attribute.offset +
+           vertex * attribute.stride;
+  };
+  const std::uint64_t slot = task.run.slotOf(block) + lane * task.run.influences;
+  const Slots slots{mesh.jointNumbers.data() + slot, mesh.pairNumbers.data() + slot,
+                    mesh.weights.data() + slot, task.run.influences};
+  MethodInputs<D> inputs{{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, hn::Zero(d)};
+  if (needsCentersOfRotation(job.method))
+    inputs.center = loadVector(d, mesh.centers.data() + std::size_t{block} * 3, lane);
+  if (job.method == Method::blended)
+    inputs.share = hn::Load(d, mesh.dualQuaternionWeights[block].v + lane);
+  if (job.method == Method::bulgeControlled)
+    inputs.share = hn::Load(d, mesh.bulgeStrengths[block].v + lane);
+
+  const Vertex<D> skinned = skinVertex(d, job.method, bindVertex(d, mesh, block, lane, morphed),
+                                       slots, task.palette, inputs);
+  const VertexFormat format = places.positions.format;
+  const std::uint32_t bytes = formatSize(format);
+  const auto encode = [&](const Vec3<D>& position, bool mayCount) HWY_ATTR {
+    if (!isSnormPosition(format)) return encodePosition(d, format, position);
+    const Vec3<D> relative = relativeTo(d, task.instance.box, position);
+    if (mayCount) {
+      // A vertex of the engine's own box may stand a rounding outside.
+      HWY_ALIGN float outside[hn::MaxLanes(d)];
+      hn::Store(largest3(relative), d, outside);
+      for (std::size_t i = first; i < end; ++i) findings.clamped += outside[i] > 1.00001f ? 1 : 0;
+    }
+    return encodePosition(d, format, relative);
+  };
+  addPositions(d, skinned.position, first, end, findings);
+  std::byte* const to = placeOf(places.positions);
+  std::byte* const toPrevious = placeOf(places.previousPositions);
+  const Encoded<D> encoded = encode(skinned.position, true);
+  if (places.motion == Motion::kept && !task.instance.restartsMotion) {
+    copyLanes(toPrevious, places.previousPositions.stride, to, places.positions.stride, bytes,
+              first, end);
+  } else if (places.motion != Motion::none) {
+    Encoded<D> before = encoded;
+    if (places.motion == Motion::reskinned && !task.instance.restartsMotion) {
+      const Vertex<D> old =
+          skinVertex(d, job.method, bindVertex(d, mesh, block, lane, morphedBefore), slots,
+                     *task.previous, inputs);
+      before = encode(old.position, false);
+    }
+    storeLanes(d, before, bytes, toPrevious, places.previousPositions.stride, first, end);
+  }
+  storeLanes(d, encoded, bytes, to, places.positions.stride, first, end);
+  if (places.normals.format != VertexFormat::none) {
+    storeLanes(d, encodeNormal(d, places.normals.format, skinned.normal),
+               formatSize(places.normals.format), placeOf(places.normals), places.normals.stride,
+               first, end);
+  }
+  if (places.tangents.format != VertexFormat::none) {
+    storeLanes(d, encodeTangent(d, places.tangents.format, skinned.tangent, skinned.hand),
+               formatSize(places.tangents.format), placeOf(places.tangents), places.tangents.stride,
+               first, end);
+  }
+}
+
+inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
+  const Wide d;
+  constexpr std::uint32_t lanes = hn::MaxLanes(d);
+  const bool reskins = task.previous != nullptr;
+  BlockVertices morphed, morphedBefore;
+  for (std::uint32_t block = task.firstVertex / blockVertices;
+       block * blockVertices < task.vertexEnd; ++block) {
+    const bool isMorphed = !task.instance.morphs.empty();
+    const bool wasMorphed = reskins && !task.instance.previousMorphs.empty();
+    if (isMorphed) loadBlock(task.mesh, block, task.instance.morphs, true, morphed);
+    if (wasMorphed) loadBlock(task.mesh, block, task.instance.previousMorphs, false, morphedBefore);
+    for (std::uint32_t lane = 0; lane < blockVertices; lane += lanes) {
+      const std::uint32_t vertex = block * blockVertices + lane;
+      const std::uint32_t first = std::max(vertex, task.firstVertex);
+      const std::uint32_t end = std::min(vertex + lanes, task.vertexEnd);
+      if (first >= end) continue;
+      skinLanes(d, task, block, lane, first - vertex, end - vertex, isMorphed ? &morphed : nullptr,
+                wasMorphed ? &morphedBefore : nullptr, findings);
+    }
+  }
+}
+
+}  // namespace dermis::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per target

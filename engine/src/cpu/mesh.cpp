@@ -1,0 +1,237 @@
+#include "dermis/cpu/mesh.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "abi.h"
+#include "cpu/mesh_data.h"
+
+namespace dermis::cpu {
+namespace {
+
+constexpr std::uint32_t mostInfluences = 1000;
+/// A section's dual quaternions stay in the cache of first level, for four instances at a time.
+constexpr std::size_t sectionPairs = 1024;
+static_assert(blockVertices * mostInfluences < 65536 / indexScale);
+
+/// Reads a packed mesh, whose contents were checked when it was made.
+class Reader {
+ public:
+  explicit Reader(const PackedMesh& packed)
+      : words_(reinterpret_cast<const std::uint32_t*>(packed.bytes().data()),
+               packed.bytes().size() / 4),
+        header(abi::load<abi::MeshHeader>(words_, 0)) {}
+
+  std::span<const std::uint32_t> words() const { return words_; }
+  float word(std::uint32_t section, std::uint64_t vertex, std::uint32_t component,
+             std::uint32_t stride = abi::VERTEX_WORDS) const {
+    return std::bit_cast<float>(words_[section + vertex * stride + component]);
+  }
+  std::vector<abi::InfluenceRecord> influences(std::uint32_t vertex) const {
+    const auto begin = abi::load<abi::PositionRecord>(
+        words_, header.positions + std::uint64_t{vertex} * abi::VERTEX_WORDS);
+    const auto end = abi::load<abi::PositionRecord>(
+        words_, header.positions + (std::uint64_t{vertex} + 1) * abi::VERTEX_WORDS);
+    const std::uint32_t count =
+        (end.influences / 2 - begin.influences / 2) * 2 - begin.influences % 2;
+    std::vector<abi::InfluenceRecord> all;
+    for (std::uint32_t slot = 0; slot < count; ++slot) {
+      all.push_back(abi::load<abi::InfluenceRecord>(
+          words_, header.influences + std::uint64_t{begin.influences / 2} * 4 +
+                      std::uint64_t{slot} * abi::INFLUENCE_WORDS));
+    }
+    return all;
+  }
+
+ private:
+  std::span<const std::uint32_t> words_;
+
+ public:
+  abi::MeshHeader header;
+};
+
+std::vector<Lanes> lanesOf(const Reader& reader, std::uint32_t section, std::uint32_t components,
+                           std::uint32_t stride = abi::VERTEX_WORDS) {
+  const std::uint32_t count = reader.header.vertexCount;
+  std::vector<Lanes> lanes(std::size_t{(count + blockVertices - 1) / blockVertices} * components);
+  for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
+    for (std::uint32_t component = 0; component < components; ++component) {
+      lanes[std::size_t{vertex / blockVertices} * components + component]
+          .v[vertex % blockVertices] = reader.word(section, vertex, component, stride);
+    }
+  }
+  return lanes;
+}
+
+/// A number for each vertex, or the same for all.
+std::vector<Lanes> sharesOf(const Reader& reader, std::uint32_t section, float all) {
+  if (section != 0) return lanesOf(reader, section, 1, 1);
+  Lanes lanes;
+  std::ranges::fill(lanes.v, all);
+  return std::vector<Lanes>((reader.header.vertexCount + blockVertices - 1) / blockVertices, lanes);
+}
+
+/// As `unitOr` of the kernels, to the bit: vertices that are displaced are made unit there.
+std::array<float, 3> unitOrZero(float x, float y, float z) {
+  const float largest = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
+  const std::uint32_t exponent = std::bit_cast<std::uint32_t>(largest) >> 23;
+  const float scale = std::bit_cast<float>((253 - std::min(exponent, 252u)) << 23);
+  x *= scale;
+  y *= scale;
+  z *= scale;
+  const float square = x * x + y * y + z * z;
+  if (square == 0) return {0, 0, 0};
+  const float inverse = 1 / std::sqrt(square);
+  return {x * inverse, y * inverse, z * inverse};
+}
+
+/// Directions, and the handedness behind them where there are four components.
+void makeUnit(std::vector<Lanes>& lanes, std::size_t components) {
+  for (std::size_t block = 0; block < lanes.size(); block += components) {
+    for (std::uint32_t lane = 0; lane < blockVertices; ++lane) {
+      const std::array<float, 3> unit =
+          unitOrZero(lanes[block].v[lane], lanes[block + 1].v[lane], lanes[block + 2].v[lane]);
+      for (std::size_t component = 0; component < 3; ++component)
+        lanes[block + component].v[lane] = unit[component];
+      if (components < 4) continue;
+      float& hand = lanes[block + 3].v[lane];
+      hand = hand < 0 ? -1.0f : 1.0f;
+    }
+  }
+}
+
+/// Lists the joints and pairs of sections, and the slots of vertices.
+class Slots {
+ public:
+  explicit Slots(MeshData& data) : data_(data) {}
+
+  /// Adds a block.
+  void add(std::span<const std::vector<abi::InfluenceRecord>> vertices) {
+    std::size_t most = 1, all = 0;
+    for (const auto& vertex : vertices) {
+      most = std::max(most, vertex.size());
+      all += std::max(vertex.size(), std::size_t{1});
+    }
+    if (pairs_.size() + all > sectionPairs) endSection();
+    if (data_.runs.empty() || isNewSection_ || data_.runs.back().influences != most) {
+      const auto section = static_cast<std::uint32_t>(data_.sections.size());
+      data_.runs.push_back({section, block_, block_, static_cast<std::uint32_t>(most),
+                            static_cast<std::uint64_t>(data_.weights.size())});
+      isNewSection_ = false;
+    }
+    for (const auto& vertex : vertices) addVertex(vertex, most);
+    data_.runs.back().blockEnd = ++block_;
+  }
+
+  void endSection() {
+    if (joints_.empty()) return;
+    Section section;
+    section.firstJoint = firstJoint_;
+    section.firstPair = firstPair_;
+    section.jointEnd = firstJoint_ = static_cast<std::uint32_t>(data_.joints.size());
+    section.pairEnd = firstPair_ = static_cast<std::uint32_t>(data_.pairs.size());
+    data_.mostJoints = std::max(data_.mostJoints, section.jointCount());
+    data_.mostPairs = std::max(data_.mostPairs, section.pairCount());
+    data_.sections.push_back(section);
+    joints_.clear();
+    pairs_.clear();
+    isNewSection_ = true;
+  }
+
+ private:
+  std::uint16_t jointNumber(std::uint32_t joint) {
+    const auto [found, isNew] =
+        joints_.try_emplace(joint, static_cast<std::uint16_t>(joints_.size()));
+    if (isNew) data_.joints.push_back(joint);
+    return found->second;
+  }
+  std::uint16_t pairNumber(Pair pair) {
+    const auto [found, isNew] =
+        pairs_.try_emplace({pair.pivot, pair.joint}, static_cast<std::uint16_t>(pairs_.size()));
+    if (isNew) data_.pairs.push_back(pair);
+    return found->second;
+  }
+  void addVertex(const std::vector<abi::InfluenceRecord>& influences, std::size_t slots) {
+    const std::uint16_t pivot = jointNumber(influences.empty() ? stillJoint : influences[0].joint);
+    for (std::size_t slot = 0; slot < slots; ++slot) {
+      const bool isUsed = slot < influences.size();
+      const std::uint16_t joint = isUsed ? jointNumber(influences[slot].joint) : pivot;
+      const float still = influences.empty() && slot == 0 ? 1.0f : 0.0f;
+      data_.weights.push_back(isUsed ? influences[slot].weight : still);
+      data_.jointNumbers.push_back(static_cast<std::uint16_t>(joint * indexScale));
+      data_.pairNumbers.push_back(
+          static_cast<std::uint16_t>(pairNumber({pivot, joint}) * indexScale));
+    }
+  }
+
+  MeshData& data_;
+  std::map<std::uint32_t, std::uint16_t> joints_;
+  std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> pairs_;
+  std::uint32_t block_ = 0, firstJoint_ = 0, firstPair_ = 0;
+  bool isNewSection_ = true;
+};
+
+}  // namespace
+
+std::uint32_t MeshData::runOf(std::uint32_t block) const {
+  const auto after =
+      std::ranges::upper_bound(runs, block, {}, [](const Run& run) { return run.firstBlock; });
+  return static_cast<std::uint32_t>(after - runs.begin()) - 1;
+}
+
+Mesh::Mesh(std::unique_ptr<const MeshData> data) : data_(std::move(data)) {}
+Mesh::~Mesh() = default;
+Mesh::Mesh(Mesh&&) noexcept = default;
+Mesh& Mesh::operator=(Mesh&&) noexcept = default;
+
+const MeshInfo& Mesh::info() const {
+  return data_->info;
+}
+
+Result<Mesh> Mesh::create(const PackedMesh& packed) {
+  auto data = std::make_unique<MeshData>();
+  data->info = packed.info();
+  if (data->info.maxInfluences > mostInfluences) {
+    return Error{ErrorCode::limitExceeded,
+                 "a vertex has " + std::to_string(data->info.maxInfluences) +
+                     " influences, the CPU path takes at most " + std::to_string(mostInfluences)};
+  }
+  const Reader reader(packed);
+  const abi::MeshHeader& header = reader.header;
+  data->blockCount = (header.vertexCount + blockVertices - 1) / blockVertices;
+  data->positions = lanesOf(reader, header.positions, 3);
+  if (header.normals != 0) {
+    data->givenNormals = lanesOf(reader, header.normals, 3);
+    data->normals = data->givenNormals;
+    makeUnit(data->normals, 3);
+  }
+  if (header.tangents != 0) {
+    data->givenTangents = lanesOf(reader, header.tangents, 4);
+    data->tangents = data->givenTangents;
+    makeUnit(data->tangents, 4);
+  }
+  if (header.centers != 0) data->centers = lanesOf(reader, header.centers, 3);
+  data->dualQuaternionWeights =
+      sharesOf(reader, header.dualQuaternionWeights, header.dualQuaternionWeight);
+  data->bulgeStrengths = sharesOf(reader, header.bulgeStrengths, header.bulgeStrength);
+  if (header.morphCount != 0) data->packed.assign(reader.words().begin(), reader.words().end());
+
+  Slots slots(*data);
+  std::array<std::vector<abi::InfluenceRecord>, blockVertices> vertices;
+  for (std::uint32_t block = 0; block < data->blockCount; ++block) {
+    for (std::uint32_t lane = 0; lane < blockVertices; ++lane) {
+      const std::uint32_t vertex = block * blockVertices + lane;
+      vertices[lane].clear();
+      if (vertex < header.vertexCount) vertices[lane] = reader.influences(vertex);
+    }
+    slots.add(vertices);
+  }
+  slots.endSection();
+  return Mesh(std::move(data));
+}
+
+}  // namespace dermis::cpu

@@ -1,0 +1,205 @@
+// What most instances need, as fast as it can be: positions and normals in float32, side by side,
+// by dual quaternions that do not scale. Several instances at a time: weights and numbers of joints
+// are read once for all of them, and each has its own 128 bits of a vector, so that nothing crosses
+// from one to another before it is stored.
+
+// clang-format off
+#if defined(DERMIS_CPU_PLAIN_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef DERMIS_CPU_PLAIN_INL_H
+#undef DERMIS_CPU_PLAIN_INL_H
+#else
+#define DERMIS_CPU_PLAIN_INL_H
+#endif
+// clang-format on
+
+#include "cpu/general_inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dermis::cpu::HWY_NAMESPACE {
+
+/// Whole blocks of a run.
+struct PlainTask {
+  const MeshData& mesh;
+  const Run& run;
+  std::uint32_t firstBlock, blockEnd;
+};
+
+inline constexpr std::size_t vertexFloats = 6;
+
+/// Four vertices of each block: positions and normals, component by component, to where each block
+/// begins.
+HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
+  for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
+}
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to[2]) {
+  for (std::size_t k = 0; k < 6; k += 2) {
+    hn::StoreU(hn::ConcatLowerLower(d, chunks[k + 1], chunks[k]), d, to[0] + k * 4);
+    hn::StoreU(hn::ConcatUpperUpper(d, chunks[k + 1], chunks[k]), d, to[1] + k * 4);
+  }
+}
+#endif
+#if HWY_MAX_BYTES >= 64
+HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
+  const Eight half;
+  Vec<Eight> parts[6];
+  for (std::size_t k = 0; k < 6; ++k) parts[k] = hn::LowerHalf(half, chunks[k]);
+  storeBlocks(half, parts, to);
+  for (std::size_t k = 0; k < 6; ++k) parts[k] = hn::UpperHalf(half, chunks[k]);
+  storeBlocks(half, parts, to + 2);
+  static_cast<void>(d);
+}
+#endif
+
+template <class D>
+HWY_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* const* to) {
+  const hn::Repartition<double, D> dd;
+  const auto pair = [&](Vec<D> a, Vec<D> b, bool upper) HWY_ATTR {
+    return hn::BitCast(dd, upper ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
+  };
+  Vec<D> chunks[6];
+  for (int half = 0; half < 2; ++half) {
+    const auto xy = pair(p.x, p.y, half == 1);
+    const auto zx = pair(p.z, n.x, half == 1);
+    const auto yz = pair(n.y, n.z, half == 1);
+    chunks[half * 3] = hn::BitCast(d, hn::InterleaveLower(dd, xy, zx));
+    chunks[half * 3 + 1] = hn::BitCast(d, hn::OddEven(xy, yz));
+    chunks[half * 3 + 2] = hn::BitCast(d, hn::InterleaveUpper(dd, zx, yz));
+  }
+  storeBlocks(d, chunks, to);
+}
+
+template <class D>
+HWY_INLINE void turnAndStore(D d, const Vec<D> q[8], const Vec3<D>& position, const Vec3<D>& normal,
+                             float* const* to) {
+  const Vec4<D> real{q[0], q[1], q[2], q[3]}, dual{q[4], q[5], q[6], q[7]};
+  const Vec<D> factor = turningFactor(d, real);
+  storeVertices(d, movePoint(real, dual, factor, position), turnDirection(real, factor, normal),
+                to);
+}
+
+/// The three components of four vertices, in each block.
+template <class D>
+HWY_INLINE Vec3<D> everyBlock(D d, const Lanes* lanes, std::size_t first) {
+  return {hn::LoadDup128(d, lanes[0].v + first), hn::LoadDup128(d, lanes[1].v + first),
+          hn::LoadDup128(d, lanes[2].v + first)};
+}
+
+/// As many instances as D has blocks. `pairs`: of a pair, the real parts of all of them, and the
+/// dual parts. `influences` is 0 where `run` says how many.
+template <int influences, class D>
+HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
+                              float* const* outputs) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
+  const std::size_t count = influences != 0 ? influences : task.run.influences;
+  const std::uint64_t slot = task.run.slotOf(task.firstBlock);
+  const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
+  const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
+  float* to[blocks];
+  for (std::size_t i = 0; i < blocks; ++i)
+    to[i] = outputs[i] + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+  for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
+    const Lanes* const positions = task.mesh.positions.data() + std::size_t{block} * 3;
+    const Lanes* const normals = task.mesh.normals.data() + std::size_t{block} * 3;
+    for (std::size_t half = 0; half < blockVertices; half += 4) {
+      Vec<D> q[8];
+      for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+        const float* entry = pairs + std::size_t{number[0]} * blocks;
+        Vec<D> w = hn::Set(d, weight[0]);
+        Vec<D> real = hn::Mul(w, hn::Load(d, entry));
+        Vec<D> dual = hn::Mul(w, hn::Load(d, entry + lanes));
+        for (std::size_t i = 1; i < count; ++i) {
+          entry = pairs + std::size_t{number[i]} * blocks;
+          w = hn::Set(d, weight[i]);
+          real = hn::Add(real, hn::Mul(w, hn::Load(d, entry)));
+          dual = hn::Add(dual, hn::Mul(w, hn::Load(d, entry + lanes)));
+        }
+        q[vertex] = real;
+        q[vertex + 4] = dual;
+        number += count;
+        weight += count;
+      }
+      transpose4(d, q[0], q[1], q[2], q[3]);
+      transpose4(d, q[4], q[5], q[6], q[7]);
+      turnAndStore(d, q, everyBlock(d, positions, half), everyBlock(d, normals, half), to);
+      for (float*& place : to) place += 4 * vertexFloats;
+    }
+  }
+}
+
+#if HWY_MAX_BYTES >= 32
+/// One instance: a vector holds a dual quaternion, and then a component of eight vertices.
+template <int influences>
+HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RESTRICT pairs,
+                             float* output) {
+  const std::size_t count = influences != 0 ? influences : task.run.influences;
+  const std::uint64_t slot = task.run.slotOf(task.firstBlock);
+  const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
+  const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
+  float* to = output + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+  for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
+    Vec<Eight> rows[8];
+    for (Vec<Eight>& row : rows) {
+      row = hn::Mul(hn::Set(d, weight[0]), hn::Load(d, pairs + number[0]));
+      for (std::size_t i = 1; i < count; ++i)
+        row = hn::Add(row, hn::Mul(hn::Set(d, weight[i]), hn::Load(d, pairs + number[i])));
+      number += count;
+      weight += count;
+    }
+    Vec<Eight> q[8];
+    for (std::size_t k = 0; k < 4; ++k) {
+      q[k] = hn::ConcatLowerLower(d, rows[k + 4], rows[k]);
+      q[k + 4] = hn::ConcatUpperUpper(d, rows[k + 4], rows[k]);
+    }
+    transpose4(d, q[0], q[1], q[2], q[3]);
+    transpose4(d, q[4], q[5], q[6], q[7]);
+    float* const halves[2] = {to, to + 4 * vertexFloats};
+    turnAndStore(d, q, loadVector(d, task.mesh.positions.data() + std::size_t{block} * 3, 0),
+                 loadVector(d, task.mesh.normals.data() + std::size_t{block} * 3, 0), halves);
+    to += blockVertices * vertexFloats;
+  }
+}
+#else
+template <int influences>
+HWY_INLINE void turnInstance(Four d, const PlainTask& task, const float* pairs, float* output) {
+  turnInstances<influences>(d, task, pairs, &output);
+}
+#endif
+
+/// Calls what is made for the number of influences.
+template <class D>
+inline HWY_ATTR void turnByInfluences(D d, const PlainTask& task, const float* pairs,
+                                      float* const* outputs) {
+  switch (task.run.influences) {
+    case 1:
+      return turnInstances<1>(d, task, pairs, outputs);
+    case 2:
+      return turnInstances<2>(d, task, pairs, outputs);
+    case 3:
+      return turnInstances<3>(d, task, pairs, outputs);
+    case 4:
+      return turnInstances<4>(d, task, pairs, outputs);
+    default:
+      return turnInstances<0>(d, task, pairs, outputs);
+  }
+}
+inline HWY_ATTR void turnByInfluences(const PlainTask& task, const float* pairs, float* output) {
+  const Wide d;
+  switch (task.run.influences) {
+    case 1:
+      return turnInstance<1>(d, task, pairs, output);
+    case 2:
+      return turnInstance<2>(d, task, pairs, output);
+    case 3:
+      return turnInstance<3>(d, task, pairs, output);
+    case 4:
+      return turnInstance<4>(d, task, pairs, output);
+    default:
+      return turnInstance<0>(d, task, pairs, output);
+  }
+}
+
+}  // namespace dermis::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per target

@@ -1,0 +1,132 @@
+#include "cpu/polar.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dermis::cpu {
+namespace {
+
+// Double precision needs no residual with compensated sums, as the palette kernel does
+// (shaders/polar.glsl), and there is no driver that could take its operations for others.
+using Vector = std::array<double, 4>;
+using Matrix = std::array<std::array<double, 4>, 4>;
+
+/// Horn's symmetric matrix of C (1987, "Closed-form solution of absolute orientation using unit
+/// quaternions"): the eigenvector of its largest eigenvalue is the rotation nearest to C.
+Matrix hornMatrix(const double c[3][3]) {
+  Matrix m{};
+  m[0][0] = c[0][0] - c[1][1] - c[2][2];
+  m[1][1] = -c[0][0] + c[1][1] - c[2][2];
+  m[2][2] = -c[0][0] - c[1][1] + c[2][2];
+  m[3][3] = c[0][0] + c[1][1] + c[2][2];
+  m[0][1] = m[1][0] = c[0][1] + c[1][0];
+  m[0][2] = m[2][0] = c[0][2] + c[2][0];
+  m[1][2] = m[2][1] = c[1][2] + c[2][1];
+  m[0][3] = m[3][0] = c[2][1] - c[1][2];
+  m[1][3] = m[3][1] = c[0][2] - c[2][0];
+  m[2][3] = m[3][2] = c[1][0] - c[0][1];
+  return m;
+}
+
+/// One rotation of Jacobi's method: makes the entry of row p and column q zero. The columns of
+/// `vectors` become the eigenvectors.
+void turn(Matrix& m, Matrix& vectors, std::size_t p, std::size_t q) {
+  if (m[p][q] == 0) return;
+  const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+  const double tangent = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(1 + theta * theta));
+  const double cosine = 1 / std::sqrt(1 + tangent * tangent);
+  const double sine = tangent * cosine;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double ip = m[i][p], iq = m[i][q];
+    m[i][p] = cosine * ip - sine * iq;
+    m[i][q] = sine * ip + cosine * iq;
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double pi = m[p][i], qi = m[q][i];
+    m[p][i] = cosine * pi - sine * qi;
+    m[q][i] = sine * pi + cosine * qi;
+    const double vp = vectors[i][p], vq = vectors[i][q];
+    vectors[i][p] = cosine * vp - sine * vq;
+    vectors[i][q] = sine * vp + cosine * vq;
+  }
+}
+
+Vector nearestRotation(const double c[3][3]) {
+  Matrix m = hornMatrix(c);
+  Matrix vectors{};
+  for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
+  // It converges quadratically: five or six sweeps, and few matrices take more.
+  for (int sweep = 0; sweep < 12; ++sweep) {
+    double outside = 0, inside = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      inside += std::abs(m[i][i]);
+      for (std::size_t j = i + 1; j < 4; ++j) outside += std::abs(m[i][j]);
+    }
+    if (outside <= 1e-18 * inside) break;
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = i + 1; j < 4; ++j) turn(m, vectors, i, j);
+    }
+  }
+  std::size_t largest = 0;
+  for (std::size_t i = 1; i < 4; ++i) {
+    if (m[i][i] > m[largest][largest]) largest = i;
+  }
+  Vector q{};
+  double square = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    q[i] = vectors[i][largest];
+    square += q[i] * q[i];
+  }
+  for (double& component : q) component /= std::sqrt(square);
+  return q;
+}
+
+}  // namespace
+
+void polarParts(const float rows[3][4], float rotation[4], ScaleShear& scaleShear) {
+  double c[3][3], largest = 0;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      c[row][column] = double{rows[row][column]};
+      largest = std::max(largest, std::abs(c[row][column]));
+    }
+  }
+  if (largest == 0) {
+    rotation[0] = rotation[1] = rotation[2] = 0;
+    rotation[3] = 1;
+    scaleShear = {{0, 0, 0}, {0, 0, 0}};
+    return;
+  }
+  // The determinant, and how large it would be if no product in it cancelled. One that rounding of
+  // the matrix may have made negative (24 roundings of 2^-24) counts as 0: a flat matrix has one of
+  // either sign.
+  double determinant = 0, magnitude = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const double a = c[1][j] * c[2][k], b = c[1][k] * c[2][j];
+    determinant += c[0][i] / largest * (a - b) / largest / largest;
+    magnitude += std::abs(c[0][i]) / largest * (std::abs(a) + std::abs(b)) / largest / largest;
+  }
+  const double side = determinant < -1.43e-6 * magnitude ? -1 : 1;
+  double scaled[3][3];
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      scaled[row][column] = side * c[row][column] / largest;
+  }
+  const Vector q = nearestRotation(scaled);
+  const double x = q[0], y = q[1], z = q[2], w = q[3];
+  const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                          {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                          {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+  const auto part = [&](int i, int j) {  // of Rᵀ C
+    return r[0][i] * c[0][j] + r[1][i] * c[1][j] + r[2][i] * c[2][j];
+  };
+  for (int i = 0; i < 3; ++i) scaleShear.diagonal[i] = static_cast<float>(part(i, i));
+  scaleShear.mixed[0] = static_cast<float>((part(0, 1) + part(1, 0)) / 2);
+  scaleShear.mixed[1] = static_cast<float>((part(0, 2) + part(2, 0)) / 2);
+  scaleShear.mixed[2] = static_cast<float>((part(1, 2) + part(2, 1)) / 2);
+  for (int i = 0; i < 4; ++i) rotation[i] = static_cast<float>(q[static_cast<std::size_t>(i)]);
+}
+
+}  // namespace dermis::cpu

@@ -1,0 +1,209 @@
+// Poses to what vertices read: unit dual quaternions of joints and of pairs, scale/shear parts, and
+// matrices. The formulas are those of the palette kernel (shaders/palette.comp).
+
+// clang-format off
+#if defined(DERMIS_CPU_POSE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef DERMIS_CPU_POSE_INL_H
+#undef DERMIS_CPU_POSE_INL_H
+#else
+#define DERMIS_CPU_POSE_INL_H
+#endif
+// clang-format on
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+
+#include "cpu/mesh_data.h"
+#include "cpu/polar.h"
+#include "cpu/simd_inl.h"
+#include "dermis/types.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dermis::cpu::HWY_NAMESPACE {
+
+/// Joint matrices of as many joints as there are lanes.
+template <class D>
+struct Joints {
+  Vec3<D> r0, r1, r2;  ///< the 3×3 parts by their rows
+  Vec3<D> translation;
+};
+
+template <class D>
+struct DualQuaternions {
+  Vec4<D> real, dual;
+};
+
+/// det > 0, and no row of CᵀC − 1 sums, by absolute values, to more than 8e-6.
+template <class D>
+HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
+  const Vec3<D> c0{j.r0.x, j.r1.x, j.r2.x};
+  const Vec3<D> c1{j.r0.y, j.r1.y, j.r2.y};
+  const Vec3<D> c2{j.r0.z, j.r1.z, j.r2.z};
+  const Vec<D> one = hn::Set(d, 1.0f);
+  const Vec<D> xy = hn::Abs(dot3(c0, c1));
+  const Vec<D> xz = hn::Abs(dot3(c0, c2));
+  const Vec<D> yz = hn::Abs(dot3(c1, c2));
+  const Vec<D> x = hn::Add(hn::Abs(hn::Sub(dot3(c0, c0), one)), hn::Add(xy, xz));
+  const Vec<D> y = hn::Add(hn::Abs(hn::Sub(dot3(c1, c1), one)), hn::Add(xy, yz));
+  const Vec<D> z = hn::Add(hn::Abs(hn::Sub(dot3(c2, c2), one)), hn::Add(xz, yz));
+  const Vec<D> most = hn::Set(d, 8e-6f);
+  const auto near = hn::And(hn::Le(x, most), hn::And(hn::Le(y, most), hn::Le(z, most)));
+  return hn::And(hn::Gt(dot3(j.r0, cross3(j.r1, j.r2)), hn::Zero(d)), near);
+}
+
+/// The unit quaternion of a matrix that is all but a rotation: the first guess by the largest of
+/// the four squared components (Shepperd 1978), and a step of the power method.
+template <class D>
+HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
+  const Vec<D> one = hn::Set(d, 1.0f);
+  const Vec<D> more = hn::Add(one, j.r0.x), less = hn::Sub(one, j.r0.x);
+  const Vec<D> x = hn::Sub(hn::Sub(more, j.r1.y), j.r2.z);
+  const Vec<D> y = hn::Sub(hn::Add(less, j.r1.y), j.r2.z);
+  const Vec<D> z = hn::Add(hn::Sub(less, j.r1.y), j.r2.z);
+  const Vec<D> w = hn::Add(hn::Add(more, j.r1.y), j.r2.z);
+  const Vec3<D> sums{hn::Add(j.r1.z, j.r2.y), hn::Add(j.r0.z, j.r2.x), hn::Add(j.r0.y, j.r1.x)};
+  const Vec3<D> diff{hn::Sub(j.r2.y, j.r1.z), hn::Sub(j.r0.z, j.r2.x), hn::Sub(j.r1.x, j.r0.y)};
+  // Columns: of x (x, sz, sy, dx), of y (sz, y, sx, dy), of z (sy, sx, z, dz), of w (dx, dy, dz,
+  // w).
+  const auto yz = hn::Ge(y, z);
+  Vec4<D> guess{hn::IfThenElse(yz, sums.z, sums.y), hn::IfThenElse(yz, y, sums.x),
+                hn::IfThenElse(yz, sums.x, z), hn::IfThenElse(yz, diff.y, diff.z)};
+  const auto isX = hn::And(hn::Ge(x, y), hn::Ge(x, z));
+  guess = {hn::IfThenElse(isX, x, guess.x), hn::IfThenElse(isX, sums.z, guess.y),
+           hn::IfThenElse(isX, sums.y, guess.z), hn::IfThenElse(isX, diff.x, guess.w)};
+  const auto isW = hn::And(hn::Ge(w, x), hn::And(hn::Ge(w, y), hn::Ge(w, z)));
+  guess = {hn::IfThenElse(isW, diff.x, guess.x), hn::IfThenElse(isW, diff.y, guess.y),
+           hn::IfThenElse(isW, diff.z, guess.z), hn::IfThenElse(isW, w, guess.w)};
+  const auto column = [&](Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e) HWY_ATTR {
+    return hn::Add(hn::Add(hn::Add(hn::Mul(guess.x, a), hn::Mul(guess.y, b)), hn::Mul(guess.z, c)),
+                   hn::Mul(guess.w, e));
+  };
+  const Vec4<D> q{column(x, sums.z, sums.y, diff.x), column(sums.z, y, sums.x, diff.y),
+                  column(sums.y, sums.x, z, diff.z), column(diff.x, diff.y, diff.z, w)};
+  const Vec<D> square = hn::Add(dot3(q.x, q.y, q.z, q.x, q.y, q.z), hn::Mul(q.w, q.w));
+  const Vec<D> inverse = hn::Div(one, hn::Sqrt(square));
+  return {hn::Mul(q.x, inverse), hn::Mul(q.y, inverse), hn::Mul(q.z, inverse),
+          hn::Mul(q.w, inverse)};
+}
+
+/// The dual part of rigid transforms: ½ (0, t) q.
+template <class D>
+HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
+  const Vec3<D> axis{q.x, q.y, q.z};
+  const Vec<D> half = hn::Set(d, 0.5f);
+  const Vec3<D> vector = scale3(add3(scale3(t, q.w), cross3(t, axis)), half);
+  return {vector.x, vector.y, vector.z, hn::Mul(hn::Set(d, -0.5f), dot3(t, axis))};
+}
+
+/// The joints of a section, and where what is made of them goes.
+struct PoseTask {
+  std::span<const std::uint32_t> joints;
+  std::span<const JointMatrix> pose;
+  float* dualQuaternions;  ///< 8 a joint
+  float* scaleShears;      ///< 8 a joint, or null
+};
+
+/// The matrices of joints `first` and on, 12 floats each: where they stand, or copied.
+HWY_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, std::size_t count,
+                                   float* copies) {
+  const std::uint32_t begin = task.joints[first];
+  bool isRow = first + count <= task.joints.size();
+  for (std::size_t i = 1; isRow && i < count; ++i) isRow = task.joints[first + i] == begin + i;
+  if (isRow && begin != stillJoint && begin + count <= task.pose.size())
+    return &task.pose[begin].m[0][0];
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t joint =
+        first + i < task.joints.size() ? task.joints[first + i] : stillJoint;
+    const JointMatrix still;
+    std::memcpy(copies + i * 12, joint == stillJoint ? still.m : task.pose[joint].m,
+                sizeof(JointMatrix));
+  }
+  return copies;
+}
+
+/// A joint that is not rigid: its rotation, and the rest.
+inline void convertOther(const float* matrix, float rotation[4], ScaleShear& part) {
+  float rows[3][4];
+  std::memcpy(rows, matrix, sizeof(rows));
+  bool isFinite = true;
+  for (const auto& row : rows) {
+    for (const float value : row) isFinite = isFinite && std::isfinite(value);
+  }
+  if (isFinite) {
+    polarParts(rows, rotation, part);
+  } else {
+    std::fill(rotation, rotation + 4, std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+/// Returns whether a joint scales or shears.
+inline HWY_ATTR bool convertJoints(const PoseTask& task) {
+  const Wide d;
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  HWY_ALIGN float copies[lanes * 12], isRigid[lanes], rotations[lanes * 4];
+  bool scales = false;
+  for (std::size_t first = 0; first < task.joints.size(); first += lanes) {
+    const float* const matrices = matricesOf(task, first, lanes, copies);
+    const Vec4<Wide> row0 = loadRows(d, matrices, 12);
+    const Vec4<Wide> row1 = loadRows(d, matrices + 4, 12);
+    const Vec4<Wide> row2 = loadRows(d, matrices + 8, 12);
+    const Joints<Wide> joints{{row0.x, row0.y, row0.z},
+                              {row1.x, row1.y, row1.z},
+                              {row2.x, row2.y, row2.z},
+                              {row0.w, row1.w, row2.w}};
+    const auto rigid = areRigid(d, joints);
+    Vec4<Wide> real = quaternionOf(d, joints);
+    ScaleShear parts[lanes];
+    if (!hn::AllTrue(d, rigid)) {
+      storeRows(d, real, rotations, 4);
+      hn::Store(hn::IfThenElseZero(rigid, hn::Set(d, 1.0f)), d, isRigid);
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        if (isRigid[lane] == 0)
+          convertOther(matrices + lane * 12, rotations + lane * 4, parts[lane]);
+      }
+      real = loadRows(d, rotations, 4);
+      scales = true;
+    }
+    float* const to = task.dualQuaternions + first * 8;
+    storeRows(d, real, to, 8);
+    storeRows(d, dualPart(d, real, joints.translation), to + 4, 8);
+    if (task.scaleShears == nullptr) continue;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      float* const part = task.scaleShears + (first + lane) * 8;
+      std::memcpy(part, parts[lane].diagonal, sizeof(parts[lane].diagonal));
+      std::memcpy(part + 3, parts[lane].mixed, sizeof(parts[lane].mixed));
+      part[6] = part[7] = 0;
+    }
+  }
+  return scales;
+}
+
+/// A dual quaternion for each pair, in the hemisphere of its pivot: 8 floats, `stride` floats from
+/// one half of a pair to the next.
+inline HWY_ATTR void convertPairs(std::span<const Pair> pairs, const float* dualQuaternions,
+                                  float* to, std::size_t stride) {
+  const Four d;
+  const hn::Repartition<double, Four> dd;
+  const auto sign = hn::SignBit(d);
+  for (const Pair& pair : pairs) {
+    const float* const joint = dualQuaternions + std::size_t{pair.joint} * 8;
+    const Vec<Four> pivot = hn::Load(d, dualQuaternions + std::size_t{pair.pivot} * 8);
+    const Vec<Four> real = hn::Load(d, joint);
+    const Vec<Four> dual = hn::Load(d, joint + 4);
+    Vec<Four> sum = hn::Mul(pivot, real);
+    sum = hn::Add(sum, hn::Reverse2(d, sum));
+    sum = hn::Add(sum, hn::BitCast(d, hn::Reverse2(dd, hn::BitCast(dd, sum))));
+    const auto flip = hn::And(sum, sign);
+    hn::Store(hn::Xor(real, flip), d, to);
+    hn::Store(hn::Xor(dual, flip), d, to + stride);
+    to += 2 * stride;
+  }
+}
+
+}  // namespace dermis::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per target

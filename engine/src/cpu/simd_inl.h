@@ -1,0 +1,161 @@
+// Vectors of floats, and of three and four of them. Compiled once for each instruction set.
+
+// clang-format off
+#if defined(DERMIS_CPU_SIMD_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef DERMIS_CPU_SIMD_INL_H
+#undef DERMIS_CPU_SIMD_INL_H
+#else
+#define DERMIS_CPU_SIMD_INL_H
+#endif
+// clang-format on
+
+#include <cstdint>
+
+#include "hwy/highway.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dermis::cpu::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Four floats: one vertex of one instance, or one component of four vertices. Wider vectors
+/// consist of such blocks.
+using Four = hn::FixedTag<float, 4>;
+#if HWY_MAX_BYTES >= 32
+using Eight = hn::FixedTag<float, 8>;
+/// Vertices at a time where no more than one instance is looked at.
+using Wide = Eight;
+#else
+using Wide = Four;
+#endif
+#if HWY_MAX_BYTES >= 64
+using Sixteen = hn::FixedTag<float, 16>;
+#endif
+
+template <class D>
+using Vec = hn::Vec<D>;
+
+template <class D>
+struct Vec3 {
+  Vec<D> x, y, z;
+};
+template <class D>
+struct Vec4 {
+  Vec<D> x, y, z, w;
+};
+
+// One rounding an operation on every target: nothing here is fused, or an estimate.
+
+template <class V>
+HWY_INLINE V dot3(V ax, V ay, V az, V bx, V by, V bz) {
+  return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
+}
+template <class D>
+HWY_INLINE Vec<D> dot3(const Vec3<D>& a, const Vec3<D>& b) {
+  return dot3(a.x, a.y, a.z, b.x, b.y, b.z);
+}
+template <class D>
+HWY_INLINE Vec3<D> cross3(const Vec3<D>& a, const Vec3<D>& b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
+          hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+template <class D>
+HWY_INLINE Vec3<D> add3(const Vec3<D>& a, const Vec3<D>& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+template <class D>
+HWY_INLINE Vec3<D> sub3(const Vec3<D>& a, const Vec3<D>& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+template <class D>
+HWY_INLINE Vec3<D> scale3(const Vec3<D>& a, Vec<D> factor) {
+  return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
+}
+template <class M, class D>
+HWY_INLINE Vec3<D> choose3(M mask, const Vec3<D>& yes, const Vec3<D>& no) {
+  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y),
+          hn::IfThenElse(mask, yes.z, no.z)};
+}
+template <class D>
+HWY_INLINE Vec<D> largest3(const Vec3<D>& a) {
+  return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
+}
+
+/// The power of two that brings a normal number to between a half and 4, and a subnormal one to at
+/// least 2^-23, so that its square neither overflows nor vanishes.
+template <class D>
+HWY_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
+  const hn::RebindToUnsigned<D> du;
+  const auto exponent = hn::ShiftRight<23>(hn::BitCast(du, largest));
+  const auto scaled = hn::Sub(hn::Set(du, 253u), hn::Min(exponent, hn::Set(du, 252u)));
+  return hn::BitCast(d, hn::ShiftLeft<23>(scaled));
+}
+
+/// `v` with length 1, at any scale, or `fallback` where it vanished.
+template <class D>
+HWY_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
+  const Vec3<D> scaled = scale3(v, powerScale(d, largest3(v)));
+  const Vec<D> square = dot3(scaled, scaled);
+  const Vec<D> inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square));
+  return choose3(hn::Eq(square, hn::Zero(d)), fallback, scale3(scaled, inverse));
+}
+
+/// 1 or -1: that sign of `value`, in which -0 counts as 0.
+template <class D>
+HWY_INLINE Vec<D> sideOf(D d, Vec<D> value) {
+  return hn::IfThenElse(hn::Lt(value, hn::Zero(d)), hn::Set(d, -1.0f), hn::Set(d, 1.0f));
+}
+
+/// In each block, the rows of a 4×4 matrix become its columns.
+template <class D>
+HWY_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
+  const hn::Repartition<double, D> dd;
+  const auto lowAb = hn::BitCast(dd, hn::InterleaveLower(d, a, b));
+  const auto highAb = hn::BitCast(dd, hn::InterleaveUpper(d, a, b));
+  const auto lowCe = hn::BitCast(dd, hn::InterleaveLower(d, c, e));
+  const auto highCe = hn::BitCast(dd, hn::InterleaveUpper(d, c, e));
+  a = hn::BitCast(d, hn::InterleaveLower(dd, lowAb, lowCe));
+  b = hn::BitCast(d, hn::InterleaveUpper(dd, lowAb, lowCe));
+  c = hn::BitCast(d, hn::InterleaveLower(dd, highAb, highCe));
+  e = hn::BitCast(d, hn::InterleaveUpper(dd, highAb, highCe));
+}
+
+/// Four floats of each lane, `stride` floats apart, as four vectors. Any alignment.
+HWY_INLINE Vec4<Four> loadRows(Four d, const float* from, std::size_t stride) {
+  Vec4<Four> rows{hn::LoadU(d, from), hn::LoadU(d, from + stride), hn::LoadU(d, from + 2 * stride),
+                  hn::LoadU(d, from + 3 * stride)};
+  transpose4(d, rows.x, rows.y, rows.z, rows.w);
+  return rows;
+}
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE Vec4<Eight> loadRows(Eight d, const float* from, std::size_t stride) {
+  const Four four;
+  const float* const upper = from + 4 * stride;
+  Vec4<Eight> rows{
+      hn::Combine(d, hn::LoadU(four, upper), hn::LoadU(four, from)),
+      hn::Combine(d, hn::LoadU(four, upper + stride), hn::LoadU(four, from + stride)),
+      hn::Combine(d, hn::LoadU(four, upper + 2 * stride), hn::LoadU(four, from + 2 * stride)),
+      hn::Combine(d, hn::LoadU(four, upper + 3 * stride), hn::LoadU(four, from + 3 * stride))};
+  transpose4(d, rows.x, rows.y, rows.z, rows.w);
+  return rows;
+}
+#endif
+
+/// The inverse of `loadRows`.
+template <class D>
+HWY_INLINE void storeRows(D d, Vec4<D> rows, float* to, std::size_t stride) {
+  HWY_ALIGN float lanes[4][hn::MaxLanes(d)];
+  hn::Store(rows.x, d, lanes[0]);
+  hn::Store(rows.y, d, lanes[1]);
+  hn::Store(rows.z, d, lanes[2]);
+  hn::Store(rows.w, d, lanes[3]);
+  for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane) {
+    for (std::size_t row = 0; row < 4; ++row) to[lane * stride + row] = lanes[row][lane];
+  }
+}
+
+}  // namespace dermis::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per target

@@ -1,0 +1,108 @@
+// The checks of a job, and what does not depend on instruction sets.
+
+#include "dermis/cpu/skin.h"
+
+#include <algorithm>
+#include <string>
+
+#include "cpu/task.h"
+#include "plan/check.h"
+
+namespace dermis::cpu {
+namespace {
+
+Error wrong(const std::string& what) {
+  return {ErrorCode::invalidArgument, what};
+}
+
+/// What `checkJob` knows of a job in buffers: one that is alone, and has all it wants.
+Result<void> checkLayout(const Job& job) {
+  const MeshInfo& info = job.mesh->info();
+  dermis::Job checked;
+  checked.mesh = info;
+  checked.method = job.method;
+  checked.place(job.places);
+  if (checked.motion == Motion::reskinned) checked.motion = Motion::kept;  // checked by instances
+  checked.box = {{-1, -1, -1}, {1, 1, 1}};
+  const PoseDescription pose{info.requiredJoints, 0, true};
+  Batch batch;
+  batch.poses = {&pose, 1};
+  batch.meshesSize = info.byteSize;
+  batch.posesSize = info.requiredJoints * sizeof(JointMatrix);
+  batch.outputs = OutputSizes::oneBuffer(~std::uint64_t{0} / 4 * 4);
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.storage16Bit = limits.storage8Bit = true;
+  return checkJob(batch, checked, {"the job"}, limits);
+}
+
+Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,
+                       const Subject& subject, const char* name) {
+  if (pose.size() >= info.requiredJoints) return {};
+  return wrong(subject.name() + ": its " + name + " has " + std::to_string(pose.size()) +
+               " joints, its mesh requires " + std::to_string(info.requiredJoints));
+}
+
+Result<void> checkInstance(const Job& job, const Instance& instance, const Subject& subject) {
+  const MeshInfo& info = job.mesh->info();
+  if (instance.output == nullptr) return wrong(subject.name() + " has no output");
+  if (Result<void> good = checkPose(instance.pose, info, subject, "pose"); !good) return good;
+  if (Result<void> good = checkMorphs(instance.morphs, info.morphTargetCount, subject); !good)
+    return good;
+  if (!std::ranges::is_sorted(instance.morphs, {}, &MorphWeight::target))
+    return wrong(subject.name() + ": its morph targets do not rise");
+  if (isSnormPosition(job.places.positions.format) && !isBox(instance.box)) {
+    return wrong(subject.name() +
+                 ": the box of its snorm16 positions must be finite, each side longer than 0");
+  }
+  if (job.places.motion != Motion::reskinned || instance.restartsMotion) return {};
+  if (Result<void> good = checkPose(instance.previousPose, info, subject, "previous pose"); !good)
+    return good;
+  if (!std::ranges::is_sorted(instance.previousMorphs, {}, &MorphWeight::target))
+    return wrong(subject.name() + ": its previous morph targets do not rise");
+  return checkMorphs(instance.previousMorphs, info.morphTargetCount, subject);
+}
+
+Result<void> check(const Job& job) {
+  if (job.mesh == nullptr) return wrong("the job has no mesh");
+  if (isForComparison(job.method)) {
+    return wrong("the job: " + std::string(methodName(job.method)) +
+                 " is for comparison, the CPU path has the everyday methods only");
+  }
+  const std::uint32_t end = std::min(job.vertexEnd, job.mesh->info().vertexCount);
+  if (job.firstVertex > end) {
+    return wrong("the job's vertices begin at " + std::to_string(job.firstVertex) + " and end at " +
+                 std::to_string(end));
+  }
+  if (Result<void> good = checkLayout(job); !good) return good;
+  for (std::size_t index = 0; index < job.instances.size(); ++index) {
+    if (Result<void> good = checkInstance(job, job.instances[index], {"instance", index}); !good)
+      return good;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> skin(const Job& job) {
+  if (Result<void> good = check(job); !good) return good;
+  Job clipped = job;
+  clipped.vertexEnd = std::min(job.vertexEnd, job.mesh->info().vertexCount);
+  for (const Instance& instance : job.instances) {
+    if (instance.result != nullptr) *instance.result = {};
+  }
+  if (clipped.firstVertex == clipped.vertexEnd) return {};
+  static thread_local Scratch scratch[3];
+  skinTask({&clipped, &job.mesh->data(), scratch});
+  return {};
+}
+
+void addResult(InstanceResult& result, const InstanceResult& other) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.orderedMin[axis] = std::min(result.orderedMin[axis], other.orderedMin[axis]);
+    result.orderedMax[axis] = std::max(result.orderedMax[axis], other.orderedMax[axis]);
+  }
+  result.clampedVertices += other.clampedVertices;
+}
+
+}  // namespace dermis::cpu

@@ -1,0 +1,474 @@
+// The CPU path against the reference, and its bits: the same for every instruction set, range of
+// vertices and company of instances.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dermis/cpu/skin.h"
+#include "dermis/pack.h"
+#include "dermis/verify/accuracy.h"
+#include "dermis/verify/reference.h"
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+using samples::OwnedMesh;
+using samples::randomMesh;
+using samples::randomPose;
+using samples::Rigidity;
+
+constexpr std::uint32_t jointCount = 30, instanceCount = 7;
+constexpr Box box{{-8, -8, -8}, {8, 8, 8}};
+
+constexpr std::array everydayMethods{Method::linear, Method::dualQuaternion, Method::blended,
+                                     Method::centerOfRotation, Method::bulgeControlled};
+
+VertexLayout layoutOf(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
+                      Motion motion = Motion::none,
+                      Arrangement arrangement = Arrangement::interleaved) {
+  return {.positions = positions,
+          .normals = normals,
+          .tangents = tangents,
+          .motion = motion,
+          .arrangement = arrangement};
+}
+const VertexLayout plainLayout =
+    layoutOf(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::none);
+
+/// Instances of one mesh in poses of one kind, side by side in memory.
+struct Crowd {
+  Crowd(std::uint32_t vertexCount, std::uint32_t influences, Rigidity rigidity,
+        const VertexLayout& wanted)
+      : layout(wanted), source(randomMesh(influences, vertexCount, jointCount, influences)) {
+    samples::addTangents(source, 3);
+    samples::addMorphs(source, 5, 3);
+    mesh.emplace(cpu::Mesh::create(pack(source.view(), jointCount).value()).value());
+    places = placeVertices(layout, vertexCount).value();
+    output.assign(places.size * instanceCount, std::byte{0x5a});
+    for (std::uint32_t i = 0; i < instanceCount; ++i) {
+      poses.push_back(randomPose(40 + i, jointCount, rigidity));
+      cpu::Instance instance;
+      instance.pose = poses.back();
+      instance.box = box;
+      instances.push_back(instance);
+    }
+    place();
+  }
+
+  void place() {
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+      instances[i].pose = poses[i];
+      instances[i].output = output.data() + places.size * i;
+    }
+  }
+  cpu::Job job(Method method) const {
+    cpu::Job job;
+    job.mesh = &*mesh;
+    job.method = method;
+    job.places = places;
+    job.instances = instances;
+    return job;
+  }
+  void skin(Method method) {
+    std::ranges::fill(output, std::byte{0x5a});
+    const Result<void> done = cpu::skin(job(method));
+    ASSERT_TRUE(done.ok()) << done.error().message;
+  }
+  Comparison compared(Method method, std::size_t i) {
+    const auto viewOf = [&](const OutputAttribute& attribute) -> SkinnedAttribute {
+      if (attribute.format == VertexFormat::none) return {};
+      return {output.data() + places.size * i + attribute.offset, source.vertexCount(),
+              attribute.stride, attribute.format};
+    };
+    const reference::SkinnedMesh expected =
+        reference::skin(source.view(), poses[i], method, instances[i].morphs).value();
+    return compareWithReference(expected, {viewOf(places.positions), viewOf(places.normals),
+                                           viewOf(places.tangents), box})
+        .value();
+  }
+
+  VertexLayout layout;
+  OwnedMesh source;
+  std::optional<cpu::Mesh> mesh;
+  VertexPlaces places;
+  std::vector<std::byte> output;
+  std::vector<std::vector<JointMatrix>> poses;
+  std::vector<cpu::Instance> instances;
+};
+
+class CpuSkinTest : public ::testing::Test {
+ protected:
+  ~CpuSkinTest() override { EXPECT_TRUE(cpu::setTarget({}).ok()); }
+};
+
+class CpuMethodTest : public CpuSkinTest,
+                      public ::testing::WithParamInterface<std::tuple<Method, Rigidity>> {};
+
+// With every format, and as many influences as have a way of their own.
+TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
+  const auto [method, rigidity] = GetParam();
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
+  std::vector<VertexLayout> layouts{plainLayout};
+  for (const VertexFormat format : allVertexFormats) {
+    layouts.push_back(
+        layoutOf(isPositionFormat(format) ? format : VertexFormat::float32x3,
+                 isNormalFormat(format) ? format : VertexFormat::none,
+                 isTangentFormat(format) ? format : VertexFormat::none, Motion::none,
+                 layouts.size() % 2 == 0 ? Arrangement::planar : Arrangement::interleaved));
+  }
+  for (std::size_t number = 0; number < layouts.size(); ++number) {
+    const auto influences = static_cast<std::uint32_t>(number % 6 + 1);
+    SCOPED_TRACE(std::string(formatName(layouts[number].positions)) + ", " +
+                 std::string(formatName(layouts[number].normals)) + ", " +
+                 std::to_string(influences) + " influences");
+    Crowd crowd(203, influences, rigidity, layouts[number]);
+    for (const bool isMorphed : {false, true}) {
+      if (isMorphed) {
+        for (cpu::Instance& instance : crowd.instances) instance.morphs = morphs;
+      }
+      crowd.skin(method);
+      for (std::size_t i = 0; i < instanceCount; ++i) {
+        const Comparison comparison = crowd.compared(method, i);
+        EXPECT_TRUE(comparison.passed())
+            << "instance " << i << ", vertex " << comparison.firstFailure << ": "
+            << comparison.worstPosition << ", " << comparison.worstNormal << ", "
+            << comparison.worstTangent << " of the bounds";
+      }
+    }
+  }
+}
+
+TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
+  const auto [method, rigidity] = GetParam();
+  for (const VertexLayout& layout :
+       {plainLayout,
+        layoutOf(VertexFormat::snorm16x3, VertexFormat::octahedral16x2,
+                 VertexFormat::octahedral8x2),
+        layoutOf(VertexFormat::float16x4, VertexFormat::snorm8x4, VertexFormat::float32x4)}) {
+    Crowd crowd(333, 5, rigidity, layout);
+    crowd.poses[3] = randomPose(5, jointCount, Rigidity::shear);  // one that leaves the plain way
+    crowd.place();
+    crowd.skin(method);
+    const std::vector<std::byte> first = crowd.output;
+    for (const std::string_view target : cpu::targetNames()) {
+      ASSERT_TRUE(cpu::setTarget(target).ok());
+      crowd.skin(method);
+      EXPECT_TRUE(crowd.output == first) << target;
+      std::ranges::fill(crowd.output, std::byte{0x5a});
+      std::uint32_t begin = 0;
+      for (const std::uint32_t end : {13u, 100u, 104u, 250u, 0xffffffffu}) {
+        for (std::size_t i = 0; i < instanceCount; i += 3) {
+          cpu::Job job = crowd.job(method);
+          job.firstVertex = begin;
+          job.vertexEnd = end;
+          job.instances = job.instances.subspan(i, std::min<std::size_t>(3, instanceCount - i));
+          ASSERT_TRUE(cpu::skin(job).ok());
+        }
+        begin = end;
+      }
+      EXPECT_TRUE(crowd.output == first) << target << ", in ranges";
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cpu, CpuMethodTest,
+    ::testing::Combine(::testing::ValuesIn(everydayMethods),
+                       ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
+                                         Rigidity::mirrored, Rigidity::mirroredAlongOneAxis)));
+
+TEST_F(CpuSkinTest, TheInstructionSetsOfThisProcessorAreThere) {
+  const std::vector<std::string_view> names = cpu::targetNames();
+  ASSERT_FALSE(names.empty());
+#if defined(__x86_64__)
+  // Builds with sanitizers leave EMU128 out.
+  EXPECT_TRUE(names.back() == "EMU128" || names.back() == "SSE4") << names.back();
+  const auto has = [&](std::string_view name) { return std::ranges::count(names, name) == 1; };
+  EXPECT_EQ(has("SSE4"), __builtin_cpu_supports("sse4.2") != 0);
+  EXPECT_EQ(has("AVX2"), __builtin_cpu_supports("avx2") != 0);
+  EXPECT_EQ(has("AVX3"), __builtin_cpu_supports("avx512bw") != 0);
+#endif
+  const Result<void> none = cpu::setTarget("AVX9");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.error().message.find("'AVX9'"), std::string::npos);
+  EXPECT_NE(none.error().message.find(names.back()), std::string::npos) << none.error().message;
+}
+
+// Each thread works in memory of its own.
+TEST_F(CpuSkinTest, ThreadsShareTheVerticesOfOneInstance) {
+  Crowd crowd(5000, 4, Rigidity::shear, plainLayout);
+  crowd.skin(Method::bulgeControlled);
+  const std::vector<std::byte> first = crowd.output;
+  std::ranges::fill(crowd.output, std::byte{0});
+  std::vector<std::thread> threads;
+  for (std::uint32_t part = 0; part < 4; ++part) {
+    threads.emplace_back([&crowd, part] {
+      cpu::Job job = crowd.job(Method::bulgeControlled);
+      job.firstVertex = part * 1250;
+      job.vertexEnd = (part + 1) * 1250;
+      EXPECT_TRUE(cpu::skin(job).ok());
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_TRUE(crowd.output == first);
+}
+
+// Joints and pairs by the thousand: the mesh has several sections, and runs of few vertices.
+TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
+  constexpr std::uint32_t many = 3000;
+  OwnedMesh source = randomMesh(9, 4001, many, 6);
+  const cpu::Mesh mesh = cpu::Mesh::create(pack(source.view(), many).value()).value();
+  const std::vector<JointMatrix> pose = randomPose(1, many, Rigidity::rigid);
+  for (const Method method : everydayMethods) {
+    std::vector<float> output(4001 * 6);
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.output = output.data();
+    cpu::Job job;
+    job.mesh = &mesh;
+    job.method = method;
+    job.places = placeVertices(plainLayout, 4001).value();
+    job.instances = {&instance, 1};
+    ASSERT_TRUE(cpu::skin(job).ok());
+    const Comparison comparison =
+        compareWithReference(reference::skin(source.view(), pose, method).value(),
+                             {{output.data(), 4001, 24, VertexFormat::float32x3},
+                              {output.data() + 3, 4001, 24, VertexFormat::float32x3},
+                              {},
+                              {}})
+            .value();
+    EXPECT_TRUE(comparison.passed()) << methodName(method);
+  }
+}
+
+TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
+  Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
+  std::vector<InstanceResult> results(instanceCount), parts(instanceCount);
+  for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &results[i];
+  crowd.skin(Method::dualQuaternion);
+  for (std::size_t i = 0; i < instanceCount; ++i) {
+    float least[3], greatest[3];
+    for (std::uint32_t vertex = 0; vertex < 203; ++vertex) {
+      float p[3];
+      std::memcpy(p, crowd.output.data() + crowd.places.size * i + std::size_t{vertex} * 24, 12);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        least[axis] = vertex == 0 ? p[axis] : std::min(least[axis], p[axis]);
+        greatest[axis] = vertex == 0 ? p[axis] : std::max(greatest[axis], p[axis]);
+      }
+    }
+    const Box found = results[i].box().value();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(found.min[axis], least[axis]);
+      EXPECT_EQ(found.max[axis], greatest[axis]);
+    }
+  }
+  // By parts.
+  std::vector<InstanceResult> sums(instanceCount);
+  for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &parts[i];
+  for (const std::uint32_t begin : {0u, 77u}) {
+    cpu::Job job = crowd.job(Method::dualQuaternion);
+    job.firstVertex = begin;
+    job.vertexEnd = begin == 0 ? 77 : 203;
+    ASSERT_TRUE(cpu::skin(job).ok());
+    for (std::size_t i = 0; i < instanceCount; ++i) cpu::addResult(sums[i], parts[i]);
+  }
+  EXPECT_EQ(std::memcmp(sums.data(), results.data(), sizeof(InstanceResult) * instanceCount), 0);
+}
+
+TEST_F(CpuSkinTest, PositionsOutsideTheBoxAreClampedAndCounted) {
+  Crowd crowd(203, 4, Rigidity::rigid,
+              layoutOf(VertexFormat::snorm16x4, VertexFormat::none, VertexFormat::none));
+  InstanceResult result;
+  crowd.instances[0].box = {{-0.25f, -8, -8}, {0.25f, 8, 8}};
+  crowd.instances[0].result = &result;
+  crowd.skin(Method::dualQuaternion);
+  const reference::SkinnedMesh expected =
+      reference::skin(crowd.source.view(), crowd.poses[0], Method::dualQuaternion).value();
+  std::uint32_t outside = 0;
+  for (const reference::Double3& position : expected.positions)
+    outside += std::abs(position[0]) > 0.25 ? 1u : 0u;
+  EXPECT_EQ(result.clampedVertices, outside);
+  EXPECT_GT(outside, 10u);
+}
+
+TEST_F(CpuSkinTest, PreviousPositionsAreKeptReskinnedRestartedAndSettled) {
+  for (const Motion motion : {Motion::kept, Motion::reskinned}) {
+    Crowd crowd(203, 4, Rigidity::shear,
+                layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none, motion));
+    const std::vector<MorphWeight> before{{1, 0.5f}}, now{{0, 1}};
+    const std::vector<std::vector<JointMatrix>> oldPoses = crowd.poses;
+    const auto streamOf = [&](std::size_t i, const OutputAttribute& attribute) {
+      std::vector<std::byte> bytes;
+      for (std::uint32_t vertex = 0; vertex < 203; ++vertex) {
+        const std::byte* from = crowd.output.data() + crowd.places.size * i + attribute.offset +
+                                std::size_t{vertex} * attribute.stride;
+        bytes.insert(bytes.end(), from, from + 8);
+      }
+      return bytes;
+    };
+    const OutputAttribute& positions = crowd.places.positions;
+    OutputAttribute previous = crowd.places.previousPositions;
+    for (cpu::Instance& instance : crowd.instances) {
+      instance.restartsMotion = true;
+      instance.morphs = before;
+    }
+    crowd.skin(Method::dualQuaternion);
+    std::vector<std::vector<std::byte>> old;
+    for (std::size_t i = 0; i < instanceCount; ++i) {
+      old.push_back(streamOf(i, positions));
+      EXPECT_TRUE(streamOf(i, previous) == old.back()) << "restarted";
+    }
+    for (std::size_t i = 0; i < instanceCount; ++i) {
+      crowd.poses[i] = randomPose(70 + static_cast<std::uint32_t>(i), jointCount, Rigidity::rigid);
+      crowd.instances[i].restartsMotion = false;
+      crowd.instances[i].morphs = now;
+      crowd.instances[i].previousPose = oldPoses[i];
+      crowd.instances[i].previousMorphs = before;
+    }
+    crowd.place();
+    ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion)).ok());
+    for (std::size_t i = 0; i < instanceCount; ++i) {
+      EXPECT_TRUE(streamOf(i, previous) == old[i]);
+      EXPECT_FALSE(streamOf(i, positions) == old[i]);
+      crowd.instances[i].settles = true;
+    }
+    ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion)).ok());
+    for (std::size_t i = 0; i < instanceCount; ++i)
+      EXPECT_TRUE(streamOf(i, previous) == streamOf(i, positions)) << "settled";
+  }
+}
+
+// What the CPU path may not read or write is not there.
+TEST_F(CpuSkinTest, BytesBetweenAndBehindAttributesStay) {
+  VertexLayout layout =
+      layoutOf(VertexFormat::float16x3, VertexFormat::octahedral8x2, VertexFormat::none);
+  layout.stride = 20;
+  Crowd crowd(203, 4, Rigidity::rigid, layout);
+  crowd.skin(Method::dualQuaternion);
+  for (std::size_t byte = 0; byte < crowd.output.size(); ++byte) {
+    if (byte % 20 >= 8) {
+      ASSERT_EQ(crowd.output[byte], std::byte{0x5a}) << byte;
+    }
+  }
+  // The plain way, into memory that begins at odd addresses too.
+  Crowd plain(203, 4, Rigidity::rigid, plainLayout);
+  plain.skin(Method::dualQuaternion);
+  std::vector<std::byte> odd(plain.places.size + 2, std::byte{0x5a});
+  cpu::Instance instance = plain.instances[0];
+  instance.output = odd.data() + 1;
+  cpu::Job job = plain.job(Method::dualQuaternion);
+  job.instances = {&instance, 1};
+  ASSERT_TRUE(cpu::skin(job).ok());
+  EXPECT_TRUE(std::equal(odd.begin() + 1, odd.end() - 1, plain.output.begin()));
+  EXPECT_EQ(odd.front(), std::byte{0x5a});
+  EXPECT_EQ(odd.back(), std::byte{0x5a});
+}
+
+TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
+  for (const VertexLayout& layout :
+       {plainLayout, layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none)}) {
+    Crowd crowd(203, 4, Rigidity::rigid, layout);
+    const std::uint32_t stride = crowd.places.positions.stride;
+    for (const auto& [begin, end] : {std::pair{13u, 101u}, {16u, 19u}, {5u, 5u}, {200u, 203u}}) {
+      std::ranges::fill(crowd.output, std::byte{0x5a});
+      cpu::Job job = crowd.job(Method::dualQuaternion);
+      job.firstVertex = begin;
+      job.vertexEnd = end;
+      ASSERT_TRUE(cpu::skin(job).ok());
+      for (std::size_t byte = 0; byte < crowd.output.size(); byte += stride) {
+        const std::size_t vertex = byte % crowd.places.size / stride;
+        const auto all = std::span(crowd.output).subspan(byte, stride);
+        const bool isWritten =
+            !std::ranges::all_of(all, [](std::byte b) { return b == std::byte{0x5a}; });
+        ASSERT_EQ(isWritten, vertex >= begin && vertex < end) << vertex;
+      }
+    }
+  }
+}
+
+TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
+  Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
+  const auto expectRefused = [&](cpu::Job job, const std::string& text) {
+    const Result<void> done = cpu::skin(job);
+    ASSERT_FALSE(done.ok()) << text;
+    EXPECT_EQ(done.error().code, ErrorCode::invalidArgument) << done.error().message;
+    EXPECT_NE(done.error().message.find(text), std::string::npos) << done.error().message;
+    EXPECT_TRUE(
+        std::ranges::all_of(crowd.output, [](std::byte b) { return b == std::byte{0x5a}; }));
+  };
+  const cpu::Job good = crowd.job(Method::dualQuaternion);
+  cpu::Job bad = good;
+  bad.mesh = nullptr;
+  expectRefused(bad, "the job has no mesh");
+  for (const Method method : allMethods) {
+    if (!isForComparison(method)) continue;
+    bad = good;
+    bad.method = method;
+    expectRefused(bad, std::string(methodName(method)) + " is for comparison");
+  }
+  bad = good;
+  bad.firstVertex = 204;
+  expectRefused(bad, "begin at 204 and end at 203");
+  bad = good;
+  bad.places.normals.format = static_cast<VertexFormat>(99);
+  expectRefused(bad, "normals");
+  bad = good;
+  bad.places.positions.stride = 4;
+  expectRefused(bad, "positions");
+
+  const auto expectBadInstance = [&](const auto& change, const std::string& text) {
+    std::vector<cpu::Instance> instances = crowd.instances;
+    change(instances[2]);
+    cpu::Job job = good;
+    job.instances = instances;
+    expectRefused(job, "instance 2" + text);
+  };
+  const MorphWeight unknown{7, 1};
+  const std::array<MorphWeight, 2> falling{{{2, 1}, {1, 1}}};
+  expectBadInstance([](cpu::Instance& i) { i.output = nullptr; }, " has no output");
+  expectBadInstance([](cpu::Instance& i) { i.pose = i.pose.first(3); }, ": its pose has 3 joints");
+  expectBadInstance([&](cpu::Instance& i) { i.morphs = {&unknown, 1}; }, "");
+  expectBadInstance([&](cpu::Instance& i) { i.morphs = falling; },
+                    ": its morph targets do not rise");
+  EXPECT_TRUE(cpu::skin(good).ok());
+}
+
+TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
+  const std::uint32_t joints = 1200;
+  for (const std::uint32_t influences : {1000u, 1001u}) {
+    std::vector<std::uint32_t> numbers(influences);
+    std::vector<float> weights(influences, 1);
+    for (std::uint32_t i = 0; i < influences; ++i) numbers[i] = i;
+    const float position[3] = {1, 2, 3};
+    InfluenceSet set;
+    set.joints = {numbers.data(), 1, influences * 4, ComponentType::uint32, influences};
+    set.weights = floatAttribute(weights.data(), 1, influences);
+    MeshView view;
+    view.vertexCount = 1;
+    view.positions = floatAttribute(position, 1, 3);
+    view.influenceSets = {&set, 1};
+    const Result<cpu::Mesh> mesh = cpu::Mesh::create(pack(view, joints).value());
+    EXPECT_EQ(mesh.ok(), influences == 1000);
+    if (!mesh) continue;
+    const std::vector<JointMatrix> pose(joints);
+    float skinned[3] = {};
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.output = skinned;
+    cpu::Job job;
+    job.mesh = &*mesh;
+    job.places = placeVertices({}, 1).value();
+    job.instances = {&instance, 1};
+    ASSERT_TRUE(cpu::skin(job).ok());
+    EXPECT_NEAR(skinned[2], 3, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
