@@ -82,11 +82,15 @@ struct DirectionMap {
   Vec<D> side;
 };
 
+/// `isModerate`: nothing is so large or small that it must be scaled.
 template <class D>
 HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r1,
-                                        const Vec3<D>& r2) {
-  const Vec<D> scale = powerScale(d, hn::Max(largest3(r0), hn::Max(largest3(r1), largest3(r2))));
-  DirectionMap<D> map{scale3(r0, scale), scale3(r1, scale), scale3(r2, scale), scale};
+                                        const Vec3<D>& r2, bool isModerate) {
+  DirectionMap<D> map{r0, r1, r2, hn::Zero(d)};
+  if (!isModerate) {
+    const Vec<D> scale = powerScale(d, hn::Max(largest3(r0), hn::Max(largest3(r1), largest3(r2))));
+    map = {scale3(r0, scale), scale3(r1, scale), scale3(r2, scale), scale};
+  }
   map.side = sideOf(d, dot3(map.r0, cross3(map.r1, map.r2)));
   return map;
 }
@@ -102,15 +106,23 @@ HWY_INLINE Vec3<D> mapTangent(const DirectionMap<D>& map, const Vec3<D>& t) {
   return {dot3(map.r0, t), dot3(map.r1, t), dot3(map.r2, t)};
 }
 
+template <class D>
+HWY_INLINE DirectionMap<D> directionMap(D d, const Matrix<D>& m, bool isModerate) {
+  return directionMap(d, Vec3<D>{m.r0.x, m.r0.y, m.r0.z}, Vec3<D>{m.r1.x, m.r1.y, m.r1.z},
+                      Vec3<D>{m.r2.x, m.r2.y, m.r2.z}, isModerate);
+}
+template <class D>
+HWY_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal, bool isModerate) {
+  return unitOr(d, mapNormal(directionMap(d, m, isModerate), normal), normal);
+}
+
 /// A vertex through a blended matrix.
 template <class D>
-HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v) {
+HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, bool isModerate) {
   Vertex<D> skinned = v;
   skinned.position = throughMatrix(m, v.position);
-  const DirectionMap<D> map =
-      directionMap(d, Vec3<D>{m.r0.x, m.r0.y, m.r0.z}, Vec3<D>{m.r1.x, m.r1.y, m.r1.z},
-                   Vec3<D>{m.r2.x, m.r2.y, m.r2.z});
-  skinned.normal = unitOr(d, mapNormal(map, v.normal), v.normal);
+  skinned.normal = normalThrough(d, m, v.normal, isModerate);
+  const DirectionMap<D> map = directionMap(d, m, isModerate);
   skinned.tangent = unitOr(d, mapTangent(map, v.tangent), v.tangent);
   skinned.hand = hn::Mul(v.hand, map.side);
   return skinned;
@@ -181,6 +193,7 @@ struct Palette {
   const float* scalePairs = nullptr;   ///< the joint's part less the pivot's
   const float* rows = nullptr;         ///< of joints, 16 floats each
   bool scales = false;
+  bool isModerate = false;  ///< `areModerate`, of linear blending
 };
 
 inline float* floatsOf(std::vector<Lanes>& memory, std::size_t count) {
@@ -234,6 +247,7 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
   float* const rows = needsRows(method) ? floatsOf(scratch.rows, joints.size() * 16) : nullptr;
   palette.rows = rows;
   if (method == Method::linear) {
+    palette.isModerate = areModerate(joints, pose);
     for (std::size_t joint = 0; joint < joints.size(); ++joint)
       std::memcpy(rows + joint * 16, &matrixOf(joint), sizeof(JointMatrix));
     return palette;
@@ -313,7 +327,8 @@ HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>
 template <class D>
 HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const Slots& slots,
                                 const Palette& palette, const MethodInputs<D>& inputs) {
-  if (method == Method::linear) return throughMatrix(d, blendRows(d, palette, slots), bind);
+  if (method == Method::linear)
+    return throughMatrix(d, blendRows(d, palette, slots), bind, palette.isModerate);
   Vec4<D> blend[2];
   sumEntries<2>(d, palette.pairs, 1, slots.pairs, slots, blend);
   const Vec4<D>&real = blend[0], &dual = blend[1];
@@ -326,7 +341,7 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
   Part<D> part{};
   if (palette.scales) {
     part = blendParts(d, palette, slots);
-    const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2);
+    const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, false);
     scaled.normal = unitOr(d, mapNormal(map, bind.givenNormal), bind.normal);
     scaled.tangent = unitOr(d, mapTangent(map, bind.givenTangent), bind.tangent);
     scaled.hand = hn::Mul(bind.hand, map.side);
@@ -352,7 +367,7 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
     turned.position = add3(turned.position, scale3(pull, inputs.share));
   }
   if (method == Method::blended) {
-    const Vertex<D> straight = throughMatrix(d, blendRows(d, palette, slots), bind);
+    const Vertex<D> straight = throughMatrix(d, blendRows(d, palette, slots), bind, false);
     return mixVertices(d, straight, turned, inputs.share);
   }
   return turned;

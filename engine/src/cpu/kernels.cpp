@@ -96,8 +96,8 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const Instance& inst
 
 inline bool isPlainJob(const Job& job) {
   const VertexPlaces& places = job.places;
-  return job.method == Method::dualQuaternion && places.motion == Motion::none &&
-         places.positions.format == VertexFormat::float32x3 &&
+  return (job.method == Method::dualQuaternion || job.method == Method::linear) &&
+         places.motion == Motion::none && places.positions.format == VertexFormat::float32x3 &&
          places.normals.format == VertexFormat::float32x3 &&
          places.tangents.format == VertexFormat::none &&
          places.normals.offset == places.positions.offset + 12 && places.positions.stride == 24 &&
@@ -110,84 +110,135 @@ inline bool isPlainInstance(const Job& job, const Instance& instance) {
   return instance.morphs.empty() && instance.result == nullptr && place % alignof(float) == 0;
 }
 
-template <class D>
-inline HWY_ATTR void turnRuns(D d, const SectionTask& part, const float* pairs,
-                              float* const* outputs) {
+/// How many instances there are room for at a time.
+#if HWY_MAX_BYTES >= 64
+inline constexpr std::size_t mostInstances = 4;
+#elif HWY_MAX_BYTES >= 32
+inline constexpr std::size_t mostInstances = 2;
+#else
+inline constexpr std::size_t mostInstances = 1;
+#endif
+
+/// Instances that are skinned together, and what their poses became.
+struct PlainGroup {
+  std::size_t count = 0;
+  float* outputs[mostInstances] = {};
+  std::span<const JointMatrix> poses[mostInstances];
+  float* converted = nullptr;  ///< dual quaternions, `convertedFloats` for each
+  std::size_t convertedFloats = 0;
+  float* palettes = nullptr;  ///< of those that are skinned next
+};
+
+/// Calls `skin` for each run, with the blocks of it that the job has.
+template <class Skin>
+HWY_INLINE void forRuns(const SectionTask& part, const Skin& skin) {
   const MeshData& mesh = *part.task.mesh;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
     const Run& run = mesh.runs[number];
     std::uint32_t first, end;
     clipToRun(part, run, first, end);
-    if (first >= end) continue;
-    const PlainTask task{mesh, run, first / blockVertices, end / blockVertices};
-    if constexpr (hn::MaxLanes(d) == 4 || hn::MaxLanes(d) == 8) {
-      if (outputs[1] == nullptr) {
-        turnByInfluences(task, pairs, outputs[0]);
-        continue;
-      }
-    }
-    turnByInfluences(d, task, pairs, outputs);
+    if (first < end) skin(PlainTask{mesh, run, first / blockVertices, end / blockVertices});
   }
 }
 
-/// Whole blocks of instances that are plain. Those that scale are left to the general way.
-inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instance> instances) {
+/// By dual quaternions: as many instances as D has blocks.
+template <class D>
+inline HWY_ATTR void turnGroup(D d, const SectionTask& part, const PlainGroup& group,
+                               std::size_t first) {
+  constexpr std::size_t blocks = hn::MaxLanes(d) / 4;
+  const std::span<const Pair> pairs = pairsOf(*part.task.mesh, part.section);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    convertPairs(pairs, group.converted + (first + i) * group.convertedFloats,
+                 group.palettes + i * 4, blocks * 4);
+  }
+  forRuns(part, [&](const PlainTask& task)
+                    HWY_ATTR { turnByInfluences(d, task, group.palettes, group.outputs + first); });
+}
+inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
+  convertPairs(pairsOf(*part.task.mesh, part.section),
+               group.converted + first * group.convertedFloats, group.palettes, 4);
+  forRuns(part, [&](const PlainTask& task)
+                    HWY_ATTR { turnByInfluences(task, group.palettes, group.outputs[first]); });
+}
+
+/// By matrices.
+template <class D>
+inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& group,
+                               std::size_t first) {
+  constexpr std::size_t blocks = hn::MaxLanes(d) / 4;
+  const std::span<const std::uint32_t> joints = jointsOf(*part.task.mesh, part.section);
+  const std::size_t rowFloats = joints.size() * blocks * 4;
+  for (std::size_t i = 0; i < blocks; ++i) {
+    for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+      const JointMatrix& matrix =
+          joints[joint] == stillJoint ? stillMatrix : group.poses[first + i][joints[joint]];
+      float* const to = group.palettes + (joint * blocks + i) * 4;
+      for (std::size_t row = 0; row < 3; ++row)
+        std::memcpy(to + row * rowFloats, matrix.m[row], sizeof(matrix.m[row]));
+    }
+  }
+  forRuns(part, [&](const PlainTask& task) HWY_ATTR {
+    moveByInfluences(d, task, group.palettes, rowFloats, group.outputs + first);
+  });
+}
+
+inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group) {
+  const bool moves = part.task.job->method == Method::linear;
+  std::size_t first = 0;
 #if HWY_MAX_BYTES >= 64
-  constexpr std::size_t most = 4;
-#elif HWY_MAX_BYTES >= 32
-  constexpr std::size_t most = 2;
-#else
-  constexpr std::size_t most = 1;
+  if (group.count == 4) {
+    if (moves) return moveGroup(Sixteen(), part, group, 0);
+    return turnGroup(Sixteen(), part, group, 0);
+  }
 #endif
+#if HWY_MAX_BYTES >= 32
+  if (group.count >= 2) {
+    if (moves) {
+      moveGroup(Eight(), part, group, 0);
+    } else {
+      turnGroup(Eight(), part, group, 0);
+    }
+    first = 2;
+  }
+#endif
+  if (first == group.count) return;
+  if (moves) return moveGroup(Four(), part, group, first);
+  turnOne(part, group, first);
+}
+
+/// Whole blocks of instances that are plain. Those whose joints scale, or are very large or small,
+/// are left to the general way.
+inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instance> instances) {
   const Job& job = *part.task.job;
   const MeshData& mesh = *part.task.mesh;
   Scratch& scratch = part.task.scratch[2];
   const std::span<const std::uint32_t> joints = jointsOf(mesh, part.section);
-  const std::span<const Pair> pairs = pairsOf(mesh, part.section);
-  // Of each instance at a time; joints are converted as many at a time as there are lanes.
-  const std::size_t jointFloats = (joints.size() + 8) * 8;
-  float* const converted = floatsOf(scratch.dualQuaternions, jointFloats * most);
-  float* const signedPairs = floatsOf(scratch.pairs, pairs.size() * 8 * most);
-  std::size_t next = 0;
-  while (next < instances.size()) {
-    float* outputs[most + 1] = {};
-    std::size_t count = 0;
-    for (; count < most && next < instances.size(); ++next) {
-      const Instance& instance = instances[next];
-      float* const own = converted + count * jointFloats;
-      const bool scales = convertJoints({joints, instance.pose, own, nullptr});
-      if (scales && instance.mayScale) {
-        skinGenerally(part, instance);
-        continue;
-      }
-      outputs[count++] = reinterpret_cast<float*>(static_cast<std::byte*>(instance.output) +
-                                                  job.places.positions.offset);
+  const std::size_t pairs = pairsOf(mesh, part.section).size();
+  const bool moves = job.method == Method::linear;
+  PlainGroup group;
+  // Joints are converted as many at a time as there are lanes.
+  group.convertedFloats = (joints.size() + 8) * 8;
+  group.converted = floatsOf(scratch.dualQuaternions, group.convertedFloats * mostInstances);
+  group.palettes =
+      floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
+  for (const Instance& instance : instances) {
+    const bool isPlain =
+        moves ? areModerate(joints, instance.pose)
+              : !convertJoints({joints, instance.pose,
+                                group.converted + group.count * group.convertedFloats, nullptr}) ||
+                    !instance.mayScale;
+    if (!isPlain) {
+      skinGenerally(part, instance);
+      continue;
     }
-    const auto expand = [&](std::size_t first, std::size_t blocks) {
-      for (std::size_t i = 0; i < blocks; ++i)
-        convertPairs(pairs, converted + (first + i) * jointFloats, signedPairs + i * 4, blocks * 4);
-    };
-    std::size_t done = 0;
-#if HWY_MAX_BYTES >= 64
-    if (count == 4) {
-      expand(0, 4);
-      turnRuns(Sixteen(), part, signedPairs, outputs);
-      done = 4;
-    }
-#endif
-#if HWY_MAX_BYTES >= 32
-    if (count - done >= 2) {
-      expand(done, 2);
-      turnRuns(Eight(), part, signedPairs, outputs + done);
-      done += 2;
-    }
-#endif
-    if (done < count) {
-      expand(done, 1);
-      float* const one[2] = {outputs[done], nullptr};
-      turnRuns(Wide(), part, signedPairs, one);
-    }
+    group.outputs[group.count] = reinterpret_cast<float*>(static_cast<std::byte*>(instance.output) +
+                                                          job.places.positions.offset);
+    group.poses[group.count] = instance.pose;
+    if (++group.count < mostInstances) continue;
+    skinGroup(part, group);
+    group.count = 0;
   }
+  if (group.count != 0) skinGroup(part, group);
 }
 
 // -- A job.

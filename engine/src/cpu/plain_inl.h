@@ -127,6 +127,54 @@ HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTR
   }
 }
 
+/// The same by blended matrices. `rows`: of a joint, the first rows of all instances; the other
+/// rows stand `rowFloats` and twice as many floats behind.
+template <int influences, class D>
+HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTRICT rows,
+                              std::size_t rowFloats, float* const* outputs) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
+  const std::size_t count = influences != 0 ? influences : task.run.influences;
+  const std::uint64_t slot = task.run.slotOf(task.firstBlock);
+  const std::uint16_t* HWY_RESTRICT number = task.mesh.jointNumbers.data() + slot;
+  const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
+  float* to[blocks];
+  for (std::size_t i = 0; i < blocks; ++i)
+    to[i] = outputs[i] + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+  for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
+    const Lanes* const positions = task.mesh.positions.data() + std::size_t{block} * 3;
+    const Lanes* const normals = task.mesh.normals.data() + std::size_t{block} * 3;
+    for (std::size_t half = 0; half < blockVertices; half += 4) {
+      Vec<D> m[3][4];
+      for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+        const float* entry = rows + std::size_t{number[0]} * blocks / 2;
+        Vec<D> w = hn::Set(d, weight[0]);
+        Vec<D> row0 = hn::Mul(w, hn::Load(d, entry));
+        Vec<D> row1 = hn::Mul(w, hn::Load(d, entry + rowFloats));
+        Vec<D> row2 = hn::Mul(w, hn::Load(d, entry + 2 * rowFloats));
+        for (std::size_t i = 1; i < count; ++i) {
+          entry = rows + std::size_t{number[i]} * blocks / 2;
+          w = hn::Set(d, weight[i]);
+          row0 = hn::Add(row0, hn::Mul(w, hn::Load(d, entry)));
+          row1 = hn::Add(row1, hn::Mul(w, hn::Load(d, entry + rowFloats)));
+          row2 = hn::Add(row2, hn::Mul(w, hn::Load(d, entry + 2 * rowFloats)));
+        }
+        m[0][vertex] = row0;
+        m[1][vertex] = row1;
+        m[2][vertex] = row2;
+        number += count;
+        weight += count;
+      }
+      for (auto& row : m) transpose4(d, row[0], row[1], row[2], row[3]);
+      const Matrix<D> matrix{{m[0][0], m[0][1], m[0][2], m[0][3]},
+                             {m[1][0], m[1][1], m[1][2], m[1][3]},
+                             {m[2][0], m[2][1], m[2][2], m[2][3]}};
+      storeVertices(d, throughMatrix(matrix, everyBlock(d, positions, half)),
+                    normalThrough(d, matrix, everyBlock(d, normals, half), true), to);
+      for (float*& place : to) place += 4 * vertexFloats;
+    }
+  }
+}
+
 #if HWY_MAX_BYTES >= 32
 /// One instance: a vector holds a dual quaternion, and then a component of eight vertices.
 template <int influences>
@@ -167,6 +215,23 @@ HWY_INLINE void turnInstance(Four d, const PlainTask& task, const float* pairs, 
 #endif
 
 /// Calls what is made for the number of influences.
+template <class D>
+inline HWY_ATTR void moveByInfluences(D d, const PlainTask& task, const float* rows,
+                                      std::size_t rowFloats, float* const* outputs) {
+  switch (task.run.influences) {
+    case 1:
+      return moveInstances<1>(d, task, rows, rowFloats, outputs);
+    case 2:
+      return moveInstances<2>(d, task, rows, rowFloats, outputs);
+    case 3:
+      return moveInstances<3>(d, task, rows, rowFloats, outputs);
+    case 4:
+      return moveInstances<4>(d, task, rows, rowFloats, outputs);
+    default:
+      return moveInstances<0>(d, task, rows, rowFloats, outputs);
+  }
+}
+
 template <class D>
 inline HWY_ATTR void turnByInfluences(D d, const PlainTask& task, const float* pairs,
                                       float* const* outputs) {

@@ -139,6 +139,24 @@ inline void convertOther(const float* matrix, float rotation[4], ScaleShear& par
   }
 }
 
+/// Whether normals may go by the cofactors of blended matrices as they are: no entry is larger than
+/// 2^40, and no joint flattens all to less than 2^-40. What cancels in a blend leaves roundings
+/// that are larger than 2^-70, the products of which are not yet subnormal.
+inline bool areModerate(std::span<const std::uint32_t> joints, std::span<const JointMatrix> pose) {
+  constexpr float most = 1099511627776.0f;
+  bool are = true;
+  for (const std::uint32_t joint : joints) {
+    if (joint == stillJoint) continue;
+    float largest = 0;
+    for (const auto& row : pose[joint].m) {
+      for (std::size_t column = 0; column < 3; ++column)
+        largest = std::max(largest, std::abs(row[column]));
+    }
+    are = are && largest <= most && largest >= 1 / most;
+  }
+  return are;
+}
+
 /// Returns whether a joint scales or shears.
 inline HWY_ATTR bool convertJoints(const PoseTask& task) {
   const Wide d;
