@@ -196,9 +196,9 @@ struct Palette {
   bool isModerate = false;  ///< `areModerate`, of linear blending
 };
 
-inline float* floatsOf(std::vector<Lanes>& memory, std::size_t count) {
-  const std::size_t lanes = (count + blockVertices - 1) / blockVertices;
-  if (memory.size() < lanes) memory.resize(lanes);
+inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
+  const std::size_t lines = (count + std::size(CacheLine().v) - 1) / std::size(CacheLine().v);
+  if (memory.size() < lines) memory.resize(lines);
   return memory.data()->v;
 }
 
@@ -255,9 +255,9 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
   // Joints are converted as many at a time as there are lanes.
   float* const converted = floatsOf(scratch.dualQuaternions, (joints.size() + 8) * 8);
   float* const parts = floatsOf(scratch.scaleShears, (joints.size() + 8) * 8);
-  palette.scales = convertJoints({joints, pose, converted, parts}) && mayScale;
+  palette.scales = convertJoints({joints, pose, {converted}, parts}) && mayScale;
   float* const signedPairs = floatsOf(scratch.pairs, pairs.size() * 8);
-  convertPairs(pairs, converted, signedPairs, 4);
+  convertPairs(Four(), pairs, {converted}, {signedPairs});
   palette.pairs = signedPairs;
   if (palette.scales) {
     float* const differences = floatsOf(scratch.scalePairs, pairs.size() * 8);

@@ -124,9 +124,13 @@ struct PlainGroup {
   std::size_t count = 0;
   float* outputs[mostInstances] = {};
   std::span<const JointMatrix> poses[mostInstances];
-  float* converted = nullptr;  ///< dual quaternions, `convertedFloats` for each
-  std::size_t convertedFloats = 0;
+  /// Dual quaternions: of each joint the real parts of all instances, and the dual parts.
+  DualQuaternionArray<float> joints{nullptr, mostInstances * 4};
   float* palettes = nullptr;  ///< of those that are skinned next
+
+  DualQuaternionArray<const float> from(std::size_t instance) const {
+    return {joints.first + instance * 4, joints.stride, joints.dual};
+  }
 };
 
 /// Calls `skin` for each run, with the blocks of it that the job has.
@@ -147,19 +151,23 @@ inline HWY_ATTR void turnGroup(D d, const SectionTask& part, const PlainGroup& g
                                std::size_t first) {
   constexpr std::size_t blocks = hn::MaxLanes(d) / 4;
   const std::span<const Pair> pairs = pairsOf(*part.task.mesh, part.section);
-  for (std::size_t i = 0; i < blocks; ++i) {
-    convertPairs(pairs, group.converted + (first + i) * group.convertedFloats,
-                 group.palettes + i * 4, blocks * 4);
-  }
-  forRuns(part, [&](const PlainTask& task)
-                    HWY_ATTR { turnByInfluences(d, task, group.palettes, group.outputs + first); });
+  const std::size_t dual = pairs.size() * blocks * 4;
+  convertPairs(d, pairs, group.from(first), {group.palettes, blocks * 4, dual});
+  forRuns(part, [&](const PlainTask& task) HWY_ATTR {
+    turnByInfluences(d, task, group.palettes, dual, group.outputs + first);
+  });
 }
+#if HWY_MAX_BYTES >= 32
 inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
-  convertPairs(pairsOf(*part.task.mesh, part.section),
-               group.converted + first * group.convertedFloats, group.palettes, 4);
+  convertPairs(Four(), pairsOf(*part.task.mesh, part.section), group.from(first), {group.palettes});
   forRuns(part, [&](const PlainTask& task)
                     HWY_ATTR { turnByInfluences(task, group.palettes, group.outputs[first]); });
 }
+#else
+inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
+  turnGroup(Four(), part, group, first);
+}
+#endif
 
 /// By matrices.
 template <class D>
@@ -217,16 +225,16 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instan
   const bool moves = job.method == Method::linear;
   PlainGroup group;
   // Joints are converted as many at a time as there are lanes.
-  group.convertedFloats = (joints.size() + 8) * 8;
-  group.converted = floatsOf(scratch.dualQuaternions, group.convertedFloats * mostInstances);
+  group.joints.dual = (joints.size() + 8) * group.joints.stride;
+  group.joints.first = floatsOf(scratch.dualQuaternions, group.joints.dual * 2);
   group.palettes =
       floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
   for (const Instance& instance : instances) {
+    const DualQuaternionArray<float> own{group.joints.first + group.count * 4, group.joints.stride,
+                                         group.joints.dual};
     const bool isPlain =
         moves ? areModerate(joints, instance.pose)
-              : !convertJoints({joints, instance.pose,
-                                group.converted + group.count * group.convertedFloats, nullptr}) ||
-                    !instance.mayScale;
+              : !convertJoints({joints, instance.pose, own, nullptr}) || !instance.mayScale;
     if (!isPlain) {
       skinGenerally(part, instance);
       continue;

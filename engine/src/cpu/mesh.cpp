@@ -129,6 +129,7 @@ class Slots {
 
   void endSection() {
     if (joints_.empty()) return;
+    sortJoints();
     Section section;
     section.firstJoint = firstJoint_;
     section.firstPair = firstPair_;
@@ -137,12 +138,30 @@ class Slots {
     data_.mostJoints = std::max(data_.mostJoints, section.jointCount());
     data_.mostPairs = std::max(data_.mostPairs, section.pairCount());
     data_.sections.push_back(section);
+    firstSlot_ = data_.weights.size();
     joints_.clear();
     pairs_.clear();
     isNewSection_ = true;
   }
 
  private:
+  /// So that poses are mostly read from one end to the other.
+  void sortJoints() {
+    std::vector<std::uint16_t> numbers(joints_.size());
+    std::uint16_t next = 0;
+    for (const auto& [joint, number] : joints_) {  // rising
+      data_.joints[std::size_t{firstJoint_} + next] = joint;
+      numbers[number] = next++;
+    }
+    for (std::size_t pair = firstPair_; pair < data_.pairs.size(); ++pair) {
+      Pair& own = data_.pairs[pair];
+      own = {numbers[own.pivot], numbers[own.joint]};
+    }
+    for (std::size_t slot = firstSlot_; slot < data_.jointNumbers.size(); ++slot) {
+      std::uint16_t& own = data_.jointNumbers[slot];
+      own = static_cast<std::uint16_t>(numbers[own / indexScale] * indexScale);
+    }
+  }
   std::uint16_t jointNumber(std::uint32_t joint) {
     const auto [found, isNew] =
         joints_.try_emplace(joint, static_cast<std::uint16_t>(joints_.size()));
@@ -172,6 +191,7 @@ class Slots {
   std::map<std::uint32_t, std::uint16_t> joints_;
   std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> pairs_;
   std::uint32_t block_ = 0, firstJoint_ = 0, firstPair_ = 0;
+  std::size_t firstSlot_ = 0;
   bool isNewSection_ = true;
 };
 

@@ -42,11 +42,15 @@ HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to
 #if HWY_MAX_BYTES >= 64
 HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
   const Eight half;
-  Vec<Eight> parts[6];
-  for (std::size_t k = 0; k < 6; ++k) parts[k] = hn::LowerHalf(half, chunks[k]);
-  storeBlocks(half, parts, to);
-  for (std::size_t k = 0; k < 6; ++k) parts[k] = hn::UpperHalf(half, chunks[k]);
-  storeBlocks(half, parts, to + 2);
+  for (std::size_t k = 0; k < 6; k += 2) {
+    // The even blocks of both chunks, and the odd ones.
+    const auto even = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(chunks[k + 1]), chunks[k]);
+    const auto odd = hn::OddEvenBlocks(chunks[k + 1], hn::SwapAdjacentBlocks(chunks[k]));
+    hn::StoreU(hn::LowerHalf(half, even), half, to[0] + k * 4);
+    hn::StoreU(hn::LowerHalf(half, odd), half, to[1] + k * 4);
+    hn::StoreU(hn::UpperHalf(half, even), half, to[2] + k * 4);
+    hn::StoreU(hn::UpperHalf(half, odd), half, to[3] + k * 4);
+  }
   static_cast<void>(d);
 }
 #endif
@@ -69,32 +73,45 @@ HWY_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* co
   storeBlocks(d, chunks, to);
 }
 
-template <class D>
-HWY_INLINE void turnAndStore(D d, const Vec<D> q[8], const Vec3<D>& position, const Vec3<D>& normal,
-                             float* const* to) {
+/// The three components of four vertices, in each block.
+struct InEveryBlock {
+  std::size_t first;
+
+  template <class D>
+  HWY_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
+    return {hn::LoadDup128(d, lanes[0].v + first), hn::LoadDup128(d, lanes[1].v + first),
+            hn::LoadDup128(d, lanes[2].v + first)};
+  }
+};
+/// Of eight vertices.
+struct InAllLanes {
+  template <class D>
+  HWY_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
+    return loadVector(d, lanes, 0);
+  }
+};
+
+/// What is read of a block late stays out of registers until then.
+template <class D, class Place>
+HWY_INLINE void turnAndStore(D d, const Vec<D> q[8], const Lanes* positions, const Lanes* normals,
+                             const Place& place, float* const* to) {
   const Vec4<D> real{q[0], q[1], q[2], q[3]}, dual{q[4], q[5], q[6], q[7]};
   const Vec<D> factor = turningFactor(d, real);
-  storeVertices(d, movePoint(real, dual, factor, position), turnDirection(real, factor, normal),
-                to);
+  const Vec3<D> position = movePoint(real, dual, factor, place.load(d, positions));
+  storeVertices(d, position, turnDirection(real, factor, place.load(d, normals)), to);
 }
 
-/// The three components of four vertices, in each block.
-template <class D>
-HWY_INLINE Vec3<D> everyBlock(D d, const Lanes* lanes, std::size_t first) {
-  return {hn::LoadDup128(d, lanes[0].v + first), hn::LoadDup128(d, lanes[1].v + first),
-          hn::LoadDup128(d, lanes[2].v + first)};
-}
-
-/// As many instances as D has blocks. `pairs`: of a pair, the real parts of all of them, and the
-/// dual parts. `influences` is 0 where `run` says how many.
+/// As many instances as D has blocks. `pairs`: of each pair the real parts of all of them; the dual
+/// parts stand `dual` floats behind. `influences` is 0 where `run` says how many.
 template <int influences, class D>
 HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
-                              float* const* outputs) {
+                              std::size_t dual, float* const* outputs) {
   constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
   const std::size_t count = influences != 0 ? influences : task.run.influences;
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
   const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
   const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
+  const float* HWY_RESTRICT duals = pairs + dual;
   float* to[blocks];
   for (std::size_t i = 0; i < blocks; ++i)
     to[i] = outputs[i] + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
@@ -104,24 +121,24 @@ HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTR
     for (std::size_t half = 0; half < blockVertices; half += 4) {
       Vec<D> q[8];
       for (std::size_t vertex = 0; vertex < 4; ++vertex) {
-        const float* entry = pairs + std::size_t{number[0]} * blocks;
+        std::size_t entry = std::size_t{number[0]} * blocks / 2;
         Vec<D> w = hn::Set(d, weight[0]);
-        Vec<D> real = hn::Mul(w, hn::Load(d, entry));
-        Vec<D> dual = hn::Mul(w, hn::Load(d, entry + lanes));
+        Vec<D> realSum = hn::Mul(w, hn::Load(d, pairs + entry));
+        Vec<D> dualSum = hn::Mul(w, hn::Load(d, duals + entry));
         for (std::size_t i = 1; i < count; ++i) {
-          entry = pairs + std::size_t{number[i]} * blocks;
+          entry = std::size_t{number[i]} * blocks / 2;
           w = hn::Set(d, weight[i]);
-          real = hn::Add(real, hn::Mul(w, hn::Load(d, entry)));
-          dual = hn::Add(dual, hn::Mul(w, hn::Load(d, entry + lanes)));
+          realSum = hn::Add(realSum, hn::Mul(w, hn::Load(d, pairs + entry)));
+          dualSum = hn::Add(dualSum, hn::Mul(w, hn::Load(d, duals + entry)));
         }
-        q[vertex] = real;
-        q[vertex + 4] = dual;
+        q[vertex] = realSum;
+        q[vertex + 4] = dualSum;
         number += count;
         weight += count;
       }
       transpose4(d, q[0], q[1], q[2], q[3]);
       transpose4(d, q[4], q[5], q[6], q[7]);
-      turnAndStore(d, q, everyBlock(d, positions, half), everyBlock(d, normals, half), to);
+      turnAndStore(d, q, positions, normals, InEveryBlock{half}, to);
       for (float*& place : to) place += 4 * vertexFloats;
     }
   }
@@ -168,8 +185,9 @@ HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTR
       const Matrix<D> matrix{{m[0][0], m[0][1], m[0][2], m[0][3]},
                              {m[1][0], m[1][1], m[1][2], m[1][3]},
                              {m[2][0], m[2][1], m[2][2], m[2][3]}};
-      storeVertices(d, throughMatrix(matrix, everyBlock(d, positions, half)),
-                    normalThrough(d, matrix, everyBlock(d, normals, half), true), to);
+      const InEveryBlock from{half};
+      storeVertices(d, throughMatrix(matrix, from.load(d, positions)),
+                    normalThrough(d, matrix, from.load(d, normals), true), to);
       for (float*& place : to) place += 4 * vertexFloats;
     }
   }
@@ -202,15 +220,10 @@ HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RE
     transpose4(d, q[0], q[1], q[2], q[3]);
     transpose4(d, q[4], q[5], q[6], q[7]);
     float* const halves[2] = {to, to + 4 * vertexFloats};
-    turnAndStore(d, q, loadVector(d, task.mesh.positions.data() + std::size_t{block} * 3, 0),
-                 loadVector(d, task.mesh.normals.data() + std::size_t{block} * 3, 0), halves);
+    turnAndStore(d, q, task.mesh.positions.data() + std::size_t{block} * 3,
+                 task.mesh.normals.data() + std::size_t{block} * 3, InAllLanes(), halves);
     to += blockVertices * vertexFloats;
   }
-}
-#else
-template <int influences>
-HWY_INLINE void turnInstance(Four d, const PlainTask& task, const float* pairs, float* output) {
-  turnInstances<influences>(d, task, pairs, &output);
 }
 #endif
 
@@ -234,22 +247,23 @@ inline HWY_ATTR void moveByInfluences(D d, const PlainTask& task, const float* r
 
 template <class D>
 inline HWY_ATTR void turnByInfluences(D d, const PlainTask& task, const float* pairs,
-                                      float* const* outputs) {
+                                      std::size_t dual, float* const* outputs) {
   switch (task.run.influences) {
     case 1:
-      return turnInstances<1>(d, task, pairs, outputs);
+      return turnInstances<1>(d, task, pairs, dual, outputs);
     case 2:
-      return turnInstances<2>(d, task, pairs, outputs);
+      return turnInstances<2>(d, task, pairs, dual, outputs);
     case 3:
-      return turnInstances<3>(d, task, pairs, outputs);
+      return turnInstances<3>(d, task, pairs, dual, outputs);
     case 4:
-      return turnInstances<4>(d, task, pairs, outputs);
+      return turnInstances<4>(d, task, pairs, dual, outputs);
     default:
-      return turnInstances<0>(d, task, pairs, outputs);
+      return turnInstances<0>(d, task, pairs, dual, outputs);
   }
 }
+#if HWY_MAX_BYTES >= 32
 inline HWY_ATTR void turnByInfluences(const PlainTask& task, const float* pairs, float* output) {
-  const Wide d;
+  const Eight d;
   switch (task.run.influences) {
     case 1:
       return turnInstance<1>(d, task, pairs, output);
@@ -263,6 +277,7 @@ inline HWY_ATTR void turnByInfluences(const PlainTask& task, const float* pairs,
       return turnInstance<0>(d, task, pairs, output);
   }
 }
+#endif
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -98,12 +98,21 @@ HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
   return {vector.x, vector.y, vector.z, hn::Mul(hn::Set(d, -0.5f), dot3(t, axis))};
 }
 
+/// Dual quaternions of joints or pairs: the real parts `stride` floats from one to the next, the
+/// dual parts `dual` floats behind them.
+template <class T>
+struct DualQuaternionArray {
+  T* first;
+  std::size_t stride = 8;
+  std::size_t dual = 4;
+};
+
 /// The joints of a section, and where what is made of them goes.
 struct PoseTask {
   std::span<const std::uint32_t> joints;
   std::span<const JointMatrix> pose;
-  float* dualQuaternions;  ///< 8 a joint
-  float* scaleShears;      ///< 8 a joint, or null
+  DualQuaternionArray<float> dualQuaternions;
+  float* scaleShears;  ///< 8 a joint, or null
 };
 
 /// The matrices of joints `first` and on, 12 floats each: where they stand, or copied.
@@ -185,9 +194,10 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
       real = loadRows(d, rotations, 4);
       scales = true;
     }
-    float* const to = task.dualQuaternions + first * 8;
-    storeRows(d, real, to, 8);
-    storeRows(d, dualPart(d, real, joints.translation), to + 4, 8);
+    const DualQuaternionArray<float>& to = task.dualQuaternions;
+    storeRows(d, real, to.first + first * to.stride, to.stride);
+    storeRows(d, dualPart(d, real, joints.translation), to.first + first * to.stride + to.dual,
+              to.stride);
     if (task.scaleShears == nullptr) continue;
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       float* const part = task.scaleShears + (first + lane) * 8;
@@ -199,25 +209,27 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
   return scales;
 }
 
-/// A dual quaternion for each pair, in the hemisphere of its pivot: 8 floats, `stride` floats from
-/// one half of a pair to the next.
-inline HWY_ATTR void convertPairs(std::span<const Pair> pairs, const float* dualQuaternions,
-                                  float* to, std::size_t stride) {
-  const Four d;
-  const hn::Repartition<double, Four> dd;
+/// A dual quaternion for each pair, in the hemisphere of its pivot; of as many instances as D has
+/// blocks, which stand one behind the other.
+template <class D>
+HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
+                             const DualQuaternionArray<const float>& joints,
+                             const DualQuaternionArray<float>& to) {
+  const hn::Repartition<double, D> dd;
   const auto sign = hn::SignBit(d);
+  float* place = to.first;
   for (const Pair& pair : pairs) {
-    const float* const joint = dualQuaternions + std::size_t{pair.joint} * 8;
-    const Vec<Four> pivot = hn::Load(d, dualQuaternions + std::size_t{pair.pivot} * 8);
-    const Vec<Four> real = hn::Load(d, joint);
-    const Vec<Four> dual = hn::Load(d, joint + 4);
-    Vec<Four> sum = hn::Mul(pivot, real);
+    const float* const joint = joints.first + std::size_t{pair.joint} * joints.stride;
+    const Vec<D> pivot = hn::LoadU(d, joints.first + std::size_t{pair.pivot} * joints.stride);
+    const Vec<D> real = hn::LoadU(d, joint);
+    const Vec<D> dual = hn::LoadU(d, joint + joints.dual);
+    Vec<D> sum = hn::Mul(pivot, real);
     sum = hn::Add(sum, hn::Reverse2(d, sum));
     sum = hn::Add(sum, hn::BitCast(d, hn::Reverse2(dd, hn::BitCast(dd, sum))));
     const auto flip = hn::And(sum, sign);
-    hn::Store(hn::Xor(real, flip), d, to);
-    hn::Store(hn::Xor(dual, flip), d, to + stride);
-    to += 2 * stride;
+    hn::Store(hn::Xor(real, flip), d, place);
+    hn::Store(hn::Xor(dual, flip), d, place + to.dual);
+    place += to.stride;
   }
 }
 

@@ -143,17 +143,27 @@ HWY_INLINE Vec4<Eight> loadRows(Eight d, const float* from, std::size_t stride) 
 #endif
 
 /// The inverse of `loadRows`.
-template <class D>
-HWY_INLINE void storeRows(D d, Vec4<D> rows, float* to, std::size_t stride) {
-  HWY_ALIGN float lanes[4][hn::MaxLanes(d)];
-  hn::Store(rows.x, d, lanes[0]);
-  hn::Store(rows.y, d, lanes[1]);
-  hn::Store(rows.z, d, lanes[2]);
-  hn::Store(rows.w, d, lanes[3]);
-  for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane) {
-    for (std::size_t row = 0; row < 4; ++row) to[lane * stride + row] = lanes[row][lane];
-  }
+HWY_INLINE void storeRows(Four d, Vec4<Four> rows, float* to, std::size_t stride) {
+  transpose4(d, rows.x, rows.y, rows.z, rows.w);
+  hn::StoreU(rows.x, d, to);
+  hn::StoreU(rows.y, d, to + stride);
+  hn::StoreU(rows.z, d, to + 2 * stride);
+  hn::StoreU(rows.w, d, to + 3 * stride);
 }
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE void storeRows(Eight d, const Vec4<Eight>& rows, float* to, std::size_t stride) {
+  const Four four;
+  storeRows(four,
+            Vec4<Four>{hn::LowerHalf(four, rows.x), hn::LowerHalf(four, rows.y),
+                       hn::LowerHalf(four, rows.z), hn::LowerHalf(four, rows.w)},
+            to, stride);
+  storeRows(four,
+            Vec4<Four>{hn::UpperHalf(four, rows.x), hn::UpperHalf(four, rows.y),
+                       hn::UpperHalf(four, rows.z), hn::UpperHalf(four, rows.w)},
+            to + 4 * stride, stride);
+  static_cast<void>(d);
+}
+#endif
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -11,13 +11,18 @@
 
 namespace dermis::cpu {
 
+/// As wide as the widest vectors.
+struct alignas(64) CacheLine {
+  float v[16];
+};
+
 /// Memory of one thread, as large as the largest section that it has skinned needs.
 struct Scratch {
-  std::vector<Lanes> dualQuaternions;  ///< of joints: real and dual part
-  std::vector<Lanes> scaleShears;      ///< of joints: diagonal and mixed entries, and two zeros
-  std::vector<Lanes> rows;             ///< of joints: 3×4, and four zeros
-  std::vector<Lanes> pairs;            ///< dual quaternions, of up to four instances
-  std::vector<Lanes> scalePairs;       ///< the joint's scale/shear part less the pivot's
+  std::vector<CacheLine> dualQuaternions;  ///< of joints: real and dual part
+  std::vector<CacheLine> scaleShears;      ///< of joints: diagonal and mixed entries, and two zeros
+  std::vector<CacheLine> rows;             ///< of joints: 3×4, and four zeros
+  std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
+  std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part less the pivot's
 };
 
 struct Task {
