@@ -329,17 +329,18 @@ Result<void> setTarget(std::string_view name) {
     std::string all;
     bool isFound = false;
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      all += (all.empty() ? "" : ", ") + std::string(hwy::TargetName(target));
+      if (!all.empty()) all.append(", ");
+      all.append(hwy::TargetName(target));
       if (name != hwy::TargetName(target)) continue;
       hwy::SetSupportedTargetsForTest(target);
       isFound = true;
       break;
     }
     if (!isFound) {
-      return Error{ErrorCode::invalidArgument, "'" + std::string(name) +
-                                                   "' is no instruction set of this processor that "
-                                                   "Dermis was compiled for; those are " +
-                                                   all};
+      std::string message(1, '\'');
+      message.append(name).append(
+          "' is no instruction set of this processor that Dermis was compiled for; those are ");
+      return Error{ErrorCode::invalidArgument, message + all};
     }
   }
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

@@ -1,0 +1,306 @@
+// How fast the CPU path is, beside a plain loop and, where it was built with
+// -DDERMIS_BENCH_OZZ=FOLDER, ozz-animation's SkinningJob (linear blending, by SIMD; it leaves
+// normals unnormalised, and gets its palettes ready). All take turns in one process; the best round
+// counts.
+//
+//   dermis_cpu_benchmark [VERTICES [INSTANCES [ROUNDS]]]       10,000 vertices, 200 instances, 20
+//
+// 60 joints, four influences everywhere, positions and normals in float32. The conversion of poses
+// is part of what is measured.
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <random>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dermis/cpu/skin.h"
+#include "dermis/pack.h"
+#include "random_rig.h"
+
+#ifdef DERMIS_BENCH_OZZ
+#include "ozz/base/maths/simd_math.h"
+#include "ozz/geometry/runtime/skinning_job.h"
+#endif
+
+namespace {
+
+using namespace dermis;
+
+constexpr std::uint32_t jointCount = 60;
+
+template <typename T>
+T must(Result<T> result) {
+  if (result) return *std::move(result);
+  std::fprintf(stderr, "dermis_cpu_benchmark: error: %s\n", result.error().message.c_str());
+  std::exit(1);
+}
+
+struct Vertex {
+  float position[3], normal[3];
+};
+
+/// A long figure: the joints of a vertex are neighbours.
+struct Scene {
+  Scene(std::uint32_t vertices, std::uint32_t count)
+      : vertexCount(vertices),
+        instanceCount(count),
+        bind(vertices),
+        joints(vertices * 4u),
+        weights(vertices * 4u),
+        output(std::size_t{vertices} * count) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
+    for (std::uint32_t v = 0; v < vertexCount; ++v) {
+      const auto middle = static_cast<int>(std::uint64_t{v} * jointCount / vertexCount);
+      const int side = random() % 2 == 0 ? 1 : -1;
+      const std::array<int, 4> steps{0, side, -side, 2 * side};
+      std::array<float, 4> own{};
+      float sum = 0, length = 0;
+      for (float& w : own) sum += w = weight(random);
+      std::ranges::sort(own, std::greater<>());
+      for (std::size_t k = 0; k < 4; ++k) {
+        // Around at the ends: four different joints.
+        const int joint =
+            (middle + steps[k] + static_cast<int>(jointCount)) % static_cast<int>(jointCount);
+        joints[v * 4u + k] = static_cast<std::uint16_t>(joint);
+        weights[v * 4u + k] = own[k] / sum;
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        bind[v].position[axis] = coordinate(random);
+        bind[v].normal[axis] = coordinate(random);
+        length += bind[v].normal[axis] * bind[v].normal[axis];
+      }
+      for (float& component : bind[v].normal) component /= std::sqrt(length);
+    }
+    for (std::uint32_t i = 0; i < instanceCount; ++i)
+      poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
+    InfluenceSet set;
+    set.joints = {joints.data(), vertexCount, 8, ComponentType::uint16, 4};
+    set.weights = floatAttribute(weights.data(), vertexCount, 4);
+    MeshView view;
+    view.vertexCount = vertexCount;
+    view.positions = floatAttribute(bind[0].position, vertexCount, 3, sizeof(Vertex));
+    view.normals = floatAttribute(bind[0].normal, vertexCount, 3, sizeof(Vertex));
+    view.influenceSets = {&set, 1};
+    mesh.emplace(must(cpu::Mesh::create(must(pack(view, jointCount)))));
+    for (std::uint32_t i = 0; i < instanceCount; ++i) {
+      cpu::Instance instance;
+      instance.pose = poses[i];
+      instance.output = outputOf(i);
+      instances.push_back(instance);
+    }
+  }
+
+  Vertex* outputOf(std::uint32_t instance) {
+    return output.data() + std::size_t{instance} * vertexCount;
+  }
+
+  std::uint32_t vertexCount, instanceCount;
+  std::vector<Vertex> bind;
+  std::vector<std::uint16_t> joints;
+  std::vector<float> weights;
+  std::vector<std::vector<JointMatrix>> poses;
+  std::vector<Vertex> output;
+  std::optional<cpu::Mesh> mesh;
+  std::vector<cpu::Instance> instances;
+};
+
+// -- Who takes part.
+
+/// Skins instances `first` to `end`.
+struct Contender {
+  std::string name;
+  std::function<void(std::uint32_t first, std::uint32_t end)> skin;
+  std::function<void()> prepare = [] {};
+  std::array<double, 2> best{1e9, 1e9};  ///< seconds, on one thread and on two
+};
+
+Contender dermisContender(Scene& scene, Method method, std::string_view target) {
+  VertexLayout layout;
+  layout.normals = VertexFormat::float32x3;
+  const VertexPlaces places = must(placeVertices(layout, scene.vertexCount));
+  Contender contender;
+  contender.name = "dermis " + std::string(methodName(method)) + ", " + std::string(target);
+  contender.prepare = [target] {
+    if (!cpu::setTarget(target)) std::exit(1);
+  };
+  contender.skin = [&scene, method, places](std::uint32_t first, std::uint32_t end) {
+    constexpr std::uint32_t together = 16;
+    for (std::uint32_t i = first; i < end; i += together) {
+      cpu::Job job;
+      job.mesh = &*scene.mesh;
+      job.method = method;
+      job.places = places;
+      job.instances = std::span(scene.instances).subspan(i, std::min(together, end - i));
+      if (!cpu::skin(job)) std::exit(1);
+    }
+  };
+  return contender;
+}
+
+/// As one writes it down: Kavan et al. 2007, section 4, vertex by vertex.
+void skinPlainly(Scene& scene, std::uint32_t instance) {
+  std::array<std::array<float, 8>, jointCount> palette;
+  for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
+    const auto& m = scene.poses[instance][joint].m;
+    std::array<float, 8>& q = palette[joint];
+    // A column of the largest square (Shepperd 1978).
+    const float squares[4] = {1 + m[0][0] - m[1][1] - m[2][2], 1 - m[0][0] + m[1][1] - m[2][2],
+                              1 - m[0][0] - m[1][1] + m[2][2], 1 + m[0][0] + m[1][1] + m[2][2]};
+    const auto largest = std::max_element(squares, squares + 4) - squares;
+    const float a = m[2][1] - m[1][2], b = m[0][2] - m[2][0], c = m[1][0] - m[0][1];
+    const float d = m[0][1] + m[1][0], e = m[0][2] + m[2][0], f = m[1][2] + m[2][1];
+    const float columns[4][4] = {
+        {squares[0], d, e, a}, {d, squares[1], f, b}, {e, f, squares[2], c}, {a, b, c, squares[3]}};
+    const float scale = 0.5f / std::sqrt(squares[largest]);
+    for (std::size_t k = 0; k < 4; ++k) q[k] = columns[largest][k] * scale;
+    const float x = m[0][3], y = m[1][3], z = m[2][3];
+    q[4] = 0.5f * (q[3] * x + y * q[2] - z * q[1]);
+    q[5] = 0.5f * (q[3] * y + z * q[0] - x * q[2]);
+    q[6] = 0.5f * (q[3] * z + x * q[1] - y * q[0]);
+    q[7] = -0.5f * (x * q[0] + y * q[1] + z * q[2]);
+  }
+  Vertex* const output = scene.outputOf(instance);
+  for (std::uint32_t v = 0; v < scene.vertexCount; ++v) {
+    const std::uint16_t* const joints = &scene.joints[v * 4u];
+    const std::array<float, 8>& pivot = palette[joints[0]];
+    std::array<float, 8> q{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::array<float, 8>& joint = palette[joints[k]];
+      const float dot =
+          pivot[0] * joint[0] + pivot[1] * joint[1] + pivot[2] * joint[2] + pivot[3] * joint[3];
+      const float weight = std::copysign(scene.weights[v * 4u + k], dot);
+      for (std::size_t i = 0; i < 8; ++i) q[i] += weight * joint[i];
+    }
+    const float factor = 2 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const auto turned = [&](const float* p, const float* shift, float dual, float* to) {
+      const float x = q[1] * p[2] - q[2] * p[1] + q[3] * p[0] + shift[0];
+      const float y = q[2] * p[0] - q[0] * p[2] + q[3] * p[1] + shift[1];
+      const float z = q[0] * p[1] - q[1] * p[0] + q[3] * p[2] + shift[2];
+      to[0] = p[0] + factor * (q[1] * z - q[2] * y + q[3] * shift[0] - dual * q[0]);
+      to[1] = p[1] + factor * (q[2] * x - q[0] * z + q[3] * shift[1] - dual * q[1]);
+      to[2] = p[2] + factor * (q[0] * y - q[1] * x + q[3] * shift[2] - dual * q[2]);
+    };
+    constexpr float none[3] = {0, 0, 0};
+    turned(scene.bind[v].position, &q[4], q[7], output[v].position);
+    turned(scene.bind[v].normal, none, 0, output[v].normal);
+  }
+}
+
+Contender plainContender(Scene& scene) {
+  Contender contender;
+  contender.name = "a plain loop, dual quaternions";
+  contender.skin = [&scene](std::uint32_t first, std::uint32_t end) {
+    for (std::uint32_t i = first; i < end; ++i) skinPlainly(scene, i);
+  };
+  return contender;
+}
+
+#ifdef DERMIS_BENCH_OZZ
+Contender ozzContender(Scene& scene) {
+  struct alignas(16) Matrix {
+    float columns[4][4];
+  };
+  std::vector<Matrix> palettes;
+  for (const std::vector<JointMatrix>& pose : scene.poses) {
+    for (const JointMatrix& joint : pose) {
+      Matrix& to = palettes.emplace_back();
+      for (std::size_t column = 0; column < 4; ++column) {
+        for (std::size_t row = 0; row < 3; ++row) to.columns[column][row] = joint.m[row][column];
+        to.columns[column][3] = column == 3 ? 1.0f : 0.0f;
+      }
+    }
+  }
+  std::vector<float> weights;  // the last one is what is left of 1
+  for (std::size_t v = 0; v < scene.vertexCount; ++v)
+    weights.insert(weights.end(), &scene.weights[v * 4], &scene.weights[v * 4 + 3]);
+  Contender contender;
+  contender.name = "ozz-animation, linear";
+  contender.skin = [&scene, palettes, weights](std::uint32_t first, std::uint32_t end) {
+    using ozz::span;
+    const std::size_t vertices = scene.vertexCount;
+    for (std::uint32_t i = first; i < end; ++i) {
+      ozz::geometry::SkinningJob job;
+      job.vertex_count = static_cast<int>(vertices);
+      job.influences_count = 4;
+      job.joint_matrices = span(reinterpret_cast<const ozz::math::Float4x4*>(
+                                    palettes.data() + std::size_t{i} * jointCount),
+                                jointCount);
+      job.joint_indices = span(scene.joints.data(), vertices * 4);
+      job.joint_indices_stride = 8;
+      job.joint_weights = span(weights.data(), weights.size());
+      job.joint_weights_stride = 12;
+      job.in_positions = span<const float>(scene.bind[0].position, vertices * 6);
+      job.in_normals = span<const float>(scene.bind[0].normal, vertices * 6 - 3);
+      Vertex* const output = scene.outputOf(i);
+      job.out_positions = span<float>(output[0].position, vertices * 6);
+      job.out_normals = span<float>(output[0].normal, vertices * 6 - 3);
+      job.in_positions_stride = job.in_normals_stride = sizeof(Vertex);
+      job.out_positions_stride = job.out_normals_stride = sizeof(Vertex);
+      if (!job.Run()) std::exit(1);
+    }
+  };
+  return contender;
+}
+#endif
+
+double secondsOf(const Contender& contender, std::uint32_t instances, bool onTwoThreads) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  if (onTwoThreads) {
+    std::thread other([&] { contender.skin(instances / 2, instances); });
+    contender.skin(0, instances / 2);
+    other.join();
+  } else {
+    contender.skin(0, instances);
+  }
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto argument = [&](int index, int otherwise) {
+    return static_cast<std::uint32_t>(argc > index ? std::max(std::atoi(argv[index]), 1)
+                                                   : otherwise);
+  };
+  Scene scene(argument(1, 10'000), argument(2, 200));
+  std::vector<Contender> contenders;
+#ifdef DERMIS_BENCH_OZZ
+  contenders.push_back(ozzContender(scene));
+#endif
+  contenders.push_back(plainContender(scene));
+  for (const Method method : {Method::dualQuaternion, Method::linear}) {
+    for (const std::string_view target : cpu::targetNames())
+      contenders.push_back(dermisContender(scene, method, target));
+  }
+  const std::uint32_t rounds = argument(3, 20);
+  for (std::uint32_t round = 0; round < rounds; ++round) {
+    for (Contender& contender : contenders) {
+      contender.prepare();
+      for (const bool onTwoThreads : {false, true}) {
+        double& best = contender.best[onTwoThreads ? 1 : 0];
+        best = std::min(best, secondsOf(contender, scene.instanceCount, onTwoThreads));
+      }
+    }
+  }
+  std::printf("%u vertices, %u instances, %u joints; million vertices a second\n",
+              scene.vertexCount, scene.instanceCount, jointCount);
+  std::printf("%-34s %9s %6s %9s %6s\n", "", "1 thread", "", "2 threads", "");
+  const double vertices = 1e-6 * scene.vertexCount * scene.instanceCount;
+  for (const Contender& contender : contenders) {
+    std::printf("%-34s %9.0f %6.2f %9.0f %6.2f\n", contender.name.c_str(),
+                vertices / contender.best[0], contenders[0].best[0] / contender.best[0],
+                vertices / contender.best[1], contenders[0].best[1] / contender.best[1]);
+  }
+  return 0;
+}
