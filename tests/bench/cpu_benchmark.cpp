@@ -12,6 +12,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -48,6 +49,11 @@ struct Vertex {
   float position[3], normal[3];
 };
 
+/// Output begins where engines let buffers begin.
+struct alignas(64) CacheLine {
+  std::byte bytes[64];
+};
+
 /// A long figure: the joints of a vertex are neighbours.
 struct Scene {
   Scene(std::uint32_t vertices, std::uint32_t count)
@@ -56,7 +62,7 @@ struct Scene {
         bind(vertices),
         joints(vertices * 4u),
         weights(vertices * 4u),
-        output(std::size_t{vertices} * count) {
+        output(std::size_t{vertices} * count * sizeof(Vertex) / sizeof(CacheLine) + 1) {
     std::mt19937 random(7);
     std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
     for (std::uint32_t v = 0; v < vertexCount; ++v) {
@@ -101,7 +107,7 @@ struct Scene {
   }
 
   Vertex* outputOf(std::uint32_t instance) {
-    return output.data() + std::size_t{instance} * vertexCount;
+    return reinterpret_cast<Vertex*>(output.data()) + std::size_t{instance} * vertexCount;
   }
 
   std::uint32_t vertexCount, instanceCount;
@@ -109,7 +115,7 @@ struct Scene {
   std::vector<std::uint16_t> joints;
   std::vector<float> weights;
   std::vector<std::vector<JointMatrix>> poses;
-  std::vector<Vertex> output;
+  std::vector<CacheLine> output;
   std::optional<cpu::Mesh> mesh;
   std::vector<cpu::Instance> instances;
 };
