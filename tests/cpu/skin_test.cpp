@@ -392,6 +392,45 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
   }
 }
 
+// With every method, scaling joints and morph targets.
+TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
+  const std::vector<std::uint32_t> vertices{200, 3, 4, 4, 150, 77, 0, 9, 101, 202};
+  for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear}) {
+    Crowd crowd(203, 5, rigidity, plainLayout);
+    for (cpu::Instance& instance : crowd.instances) instance.morphs = morphs;
+    for (const Method method : everydayMethods) {
+      crowd.skin(method);
+      std::vector<float> positions(vertices.size() * 3);
+      const Result<void> done =
+          cpu::skinVertices(*crowd.mesh, method, crowd.instances[1], vertices, positions);
+      ASSERT_TRUE(done.ok()) << done.error().message;
+      for (std::size_t i = 0; i < vertices.size(); ++i) {
+        float expected[3];
+        std::memcpy(expected,
+                    crowd.output.data() + crowd.places.size + std::size_t{vertices[i]} * 24,
+                    sizeof(expected));
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          EXPECT_EQ(positions[i * 3 + axis], expected[axis])
+              << methodName(method) << ", vertex " << vertices[i];
+        }
+      }
+    }
+    std::vector<float> positions(3);
+    const std::uint32_t outside = 203;
+    EXPECT_FALSE(
+        cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], {&outside, 1}, positions)
+            .ok());
+    EXPECT_FALSE(
+        cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], vertices, positions)
+            .ok());
+    EXPECT_FALSE(cpu::skinVertices(*crowd.mesh, Method::logMatrix, crowd.instances[0],
+                                   std::span(vertices).first(1), positions)
+                     .ok());
+    EXPECT_TRUE(cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], {}, {}).ok());
+  }
+}
+
 TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
   const auto expectRefused = [&](cpu::Job job, const std::string& text) {

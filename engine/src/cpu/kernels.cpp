@@ -17,6 +17,8 @@
 // After foreach_target.h.
 #include "hwy/highway.h"
 
+#include <bit>
+
 #include "cpu/general_inl.h"
 #include "cpu/plain_inl.h"
 #include "cpu/task.h"

@@ -9,6 +9,7 @@
 
 #include "abi.h"
 #include "cpu/mesh_data.h"
+#include "cpu/morph.h"
 
 namespace dermis::cpu {
 namespace {
@@ -201,6 +202,59 @@ std::uint32_t MeshData::runOf(std::uint32_t block) const {
   const auto after =
       std::ranges::upper_bound(runs, block, {}, [](const Run& run) { return run.firstBlock; });
   return static_cast<std::uint32_t>(after - runs.begin()) - 1;
+}
+
+std::vector<abi::InfluenceRecord> MeshData::influencesOf(std::uint32_t vertex) const {
+  const Run& run = runs[runOf(vertex / blockVertices)];
+  const std::uint64_t first =
+      run.slotOf(vertex / blockVertices) + std::uint64_t{vertex % blockVertices} * run.influences;
+  std::vector<abi::InfluenceRecord> all;
+  for (std::uint64_t slot = first; slot < first + run.influences; ++slot) {
+    const std::uint32_t joint =
+        joints[sections[run.section].firstJoint + jointNumbers[slot] / indexScale];
+    if (weights[slot] != 0 && joint != stillJoint) all.push_back({weights[slot], joint});
+  }
+  return all;
+}
+
+MeshData MeshData::select(std::span<const std::uint32_t> vertices,
+                          std::span<const MorphWeight> morphs) const {
+  MeshData selected;
+  selected.blockCount =
+      static_cast<std::uint32_t>((vertices.size() + blockVertices - 1) / blockVertices);
+  selected.positions.resize(std::size_t{selected.blockCount} * 3);
+  const auto copy = [&](const std::vector<Lanes>& from, std::size_t components,
+                        std::vector<Lanes>& to) {
+    if (from.empty()) return;
+    to.resize(selected.blockCount * components);
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      for (std::size_t k = 0; k < components; ++k) {
+        to[i / blockVertices * components + k].v[i % blockVertices] =
+            from[vertices[i] / blockVertices * components + k].v[vertices[i] % blockVertices];
+      }
+    }
+  };
+  copy(centers, 3, selected.centers);
+  copy(dualQuaternionWeights, 1, selected.dualQuaternionWeights);
+  copy(bulgeStrengths, 1, selected.bulgeStrengths);
+  Slots slots(selected);
+  std::array<std::vector<abi::InfluenceRecord>, blockVertices> influences;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::uint32_t vertex = vertices[i], block = vertex / blockVertices;
+    Lanes displaced[3];
+    std::copy_n(positions.data() + std::size_t{block} * 3, 3, displaced);
+    morphBlock(*this, block, morphs, displaced, nullptr, nullptr);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      selected.positions[i / blockVertices * 3 + axis].v[i % blockVertices] =
+          displaced[axis].v[vertex % blockVertices];
+    }
+    influences[i % blockVertices] = influencesOf(vertex);
+    if ((i + 1) % blockVertices != 0 && i + 1 != vertices.size()) continue;
+    slots.add(influences);
+    for (auto& lane : influences) lane.clear();
+  }
+  slots.endSection();
+  return selected;
 }
 
 Mesh::Mesh(std::unique_ptr<const MeshData> data) : data_(std::move(data)) {}

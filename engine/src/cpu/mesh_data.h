@@ -4,8 +4,11 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "abi.h"
+#include "dermis/mesh.h"
 #include "dermis/pack.h"
 
 namespace dermis::cpu {
@@ -76,6 +79,11 @@ struct MeshData {
   std::vector<std::uint32_t> packed;            ///< with morph targets: the packed mesh
 
   std::uint32_t runOf(std::uint32_t block) const;
+  /// Those that count, the pivot first.
+  std::vector<abi::InfluenceRecord> influencesOf(std::uint32_t vertex) const;
+  /// Some of the vertices, displaced, and without directions: they come out where they do here.
+  MeshData select(std::span<const std::uint32_t> vertices,
+                  std::span<const MorphWeight> morphs) const;
 };
 
 }  // namespace dermis::cpu

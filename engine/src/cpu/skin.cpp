@@ -82,6 +82,11 @@ Result<void> check(const Job& job) {
   return {};
 }
 
+void run(const Job& job, const MeshData& mesh) {
+  static thread_local Scratch scratch[3];
+  skinTask({&job, &mesh, scratch});
+}
+
 }  // namespace
 
 Result<void> skin(const Job& job) {
@@ -91,9 +96,41 @@ Result<void> skin(const Job& job) {
   for (const Instance& instance : job.instances) {
     if (instance.result != nullptr) *instance.result = {};
   }
-  if (clipped.firstVertex == clipped.vertexEnd) return {};
-  static thread_local Scratch scratch[3];
-  skinTask({&clipped, &job.mesh->data(), scratch});
+  if (clipped.firstVertex != clipped.vertexEnd) run(clipped, job.mesh->data());
+  return {};
+}
+
+Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
+                          std::span<const std::uint32_t> vertices, std::span<float> positions) {
+  const std::uint32_t vertexCount = mesh.info().vertexCount;
+  for (const std::uint32_t vertex : vertices) {
+    if (vertex < vertexCount) continue;
+    return wrong("there is no vertex " + std::to_string(vertex) + " in a mesh of " +
+                 std::to_string(vertexCount));
+  }
+  if (positions.size() != vertices.size() * 3) {
+    return wrong(std::to_string(vertices.size()) + " vertices have three floats each, not " +
+                 std::to_string(positions.size()) + " in all");
+  }
+  if (vertices.empty()) return {};
+  Instance own;
+  own.pose = instance.pose;
+  own.mayScale = instance.mayScale;
+  own.morphs = instance.morphs;
+  own.output = positions.data();
+  Job job;
+  job.mesh = &mesh;
+  job.method = method;
+  job.instances = {&own, 1};
+  const Result<VertexPlaces> places =
+      placeVertices({}, static_cast<std::uint32_t>(vertices.size()));
+  if (!places) return places.error();
+  job.places = *places;
+  if (Result<void> good = check(job); !good) return good;
+  const MeshData selected = mesh.data().select(vertices, own.morphs);
+  own.morphs = {};
+  job.vertexEnd = static_cast<std::uint32_t>(vertices.size());
+  run(job, selected);
   return {};
 }
 

@@ -62,6 +62,14 @@ struct Job {
 /// then.
 Result<void> skin(const Job& job);
 
+/// Where some vertices of an instance are, without skinning the others: for picking, and for things
+/// that hang on a vertex. `positions` gets three floats for each of `vertices`, which may stand in
+/// any order: the same values that `skin` writes as float32x3. O(vertices × influences); it
+/// allocates. Of the instance, pose, `mayScale` and morph targets count. Fails as `skin`, and with
+/// `invalidArgument` for a vertex that the mesh does not have.
+Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
+                          std::span<const std::uint32_t> vertices, std::span<float> positions);
+
 /// Adds to the result of some vertices of an instance that of others.
 void addResult(InstanceResult& result, const InstanceResult& other);
 
