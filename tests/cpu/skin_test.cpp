@@ -200,7 +200,7 @@ TEST_F(CpuSkinTest, TheInstructionSetsOfThisProcessorAreThere) {
   EXPECT_NE(none.error().message.find(names.back()), std::string::npos) << none.error().message;
 }
 
-// Each thread works in memory of its own.
+// Four threads skin a quarter each, at the same time.
 TEST_F(CpuSkinTest, ThreadsShareTheVerticesOfOneInstance) {
   Crowd crowd(5000, 4, Rigidity::shear, plainLayout);
   crowd.skin(Method::bulgeControlled);

@@ -521,7 +521,7 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
     }
     return encodePosition(d, format, relative);
   };
-  addPositions(d, skinned.position, first, end, findings);
+  if (task.instance.result != nullptr) addPositions(d, skinned.position, first, end, findings);
   std::byte* const to = placeOf(places.positions);
   std::byte* const toPrevious = placeOf(places.previousPositions);
   const Encoded<D> encoded = encode(skinned.position, true);

@@ -12,7 +12,8 @@ namespace dermis::cpu {
 struct MeshData;
 
 /// Made once, at import, from a packed mesh. It is immutable: any number of threads may skin it. It
-/// owns its memory, about as much as the packed mesh takes.
+/// owns its memory, about as much as the packed mesh takes, and with morph targets a copy of that
+/// too.
 class Mesh {
  public:
   /// O(vertices × influences). Fails with `limitExceeded` if a vertex has more than 1,000

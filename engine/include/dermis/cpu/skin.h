@@ -1,5 +1,5 @@
-// Skinning on the CPU, by the everyday methods, with SIMD instructions of the processor that it
-// runs on. No Vulkan, no threads of its own: a Job is what one thread does.
+// Skinning on the CPU by the everyday methods, with the SIMD instructions of its processor. It
+// needs no Vulkan, and starts no threads: the thread that calls `skin` does the job.
 //
 //   const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
 //   cpu::Job job;
@@ -56,7 +56,8 @@ struct Job {
 
 /// Writes the vertices. Every vertex comes out the same, to the bit, whatever the range, the other
 /// instances, the thread and the processor. Any number of threads may call it at once, with output
-/// that does not overlap. It uses memory of the thread, some 100 KiB, which the thread keeps.
+/// that does not overlap. Each thread keeps the memory that it worked in: at most 0.7 MiB where no
+/// vertex has more than 128 influences.
 ///
 /// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
 /// then.
