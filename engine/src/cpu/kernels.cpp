@@ -135,15 +135,44 @@ struct PlainGroup {
   }
 };
 
-/// Calls `skin` for each run, with the blocks of it that the job has.
+/// Skins parts of blocks beside the output, as it skins whole ones, and copies them there.
 template <class Skin>
-HWY_INLINE void forRuns(const SectionTask& part, const Skin& skin) {
+HWY_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t first,
+                         std::uint32_t end, std::size_t instances, float* const* outputs,
+                         const Skin& skin) {
+  CacheLine blocks[mostInstances][blockFloats * sizeof(float) / sizeof(CacheLine)];
+  float* beside[mostInstances];
+  for (std::size_t i = 0; i < instances; ++i) beside[i] = blocks[i]->v;
+  const std::uint32_t block = first / blockVertices, within = first - block * blockVertices;
+  skin(PlainTask{*part.task.mesh, run, block, block + 1, block}, beside);
+  for (std::size_t i = 0; i < instances; ++i) {
+    std::memcpy(outputs[i] + std::size_t{first} * vertexFloats, beside[i] + within * vertexFloats,
+                (end - first) * vertexFloats * sizeof(float));
+  }
+}
+
+/// Calls `skin` for each run, with the blocks of it that the job has, and with where the vertices
+/// of its first block go.
+template <class Skin>
+HWY_INLINE void forRuns(const SectionTask& part, std::size_t instances, float* const* outputs,
+                        const Skin& skin) {
   const MeshData& mesh = *part.task.mesh;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
     const Run& run = mesh.runs[number];
     std::uint32_t first, end;
     clipToRun(part, run, first, end);
-    if (first < end) skin(PlainTask{mesh, run, first / blockVertices, end / blockVertices});
+    if (first >= end) continue;
+    std::uint32_t whole = (first + blockVertices - 1) / blockVertices;
+    if (first != whole * blockVertices) {
+      const std::uint32_t partEnd = std::min(end, whole * blockVertices);
+      skinPart(part, run, first, partEnd, instances, outputs, skin);
+      first = partEnd;
+    }
+    if (first >= end) continue;
+    const std::uint32_t wholeEnd = end / blockVertices;
+    if (whole < wholeEnd) skin(PlainTask{mesh, run, whole, wholeEnd, 0}, outputs);
+    if (end != wholeEnd * blockVertices)
+      skinPart(part, run, std::max(first, wholeEnd * blockVertices), end, instances, outputs, skin);
   }
 }
 
@@ -155,15 +184,21 @@ inline HWY_ATTR void turnGroup(D d, const SectionTask& part, const PlainGroup& g
   const std::span<const Pair> pairs = pairsOf(*part.task.mesh, part.section);
   const std::size_t dual = pairs.size() * blocks * 4;
   convertPairs(d, pairs, group.from(first), {group.palettes, blocks * 4, dual});
-  forRuns(part, [&](const PlainTask& task) HWY_ATTR {
-    turnByInfluences(d, task, group.palettes, dual, group.outputs + first);
-  });
+  forRuns(part, blocks, group.outputs + first,
+          [&](const PlainTask& task, float* const* to) HWY_ATTR {
+            byInfluences(task.run, [&](auto influences) HWY_ATTR {
+              turnInstances<influences()>(d, task, group.palettes, dual, to);
+            });
+          });
 }
 #if HWY_MAX_BYTES >= 32
 inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
   convertPairs(Four(), pairsOf(*part.task.mesh, part.section), group.from(first), {group.palettes});
-  forRuns(part, [&](const PlainTask& task)
-                    HWY_ATTR { turnByInfluences(task, group.palettes, group.outputs[first]); });
+  forRuns(part, 1, group.outputs + first, [&](const PlainTask& task, float* const* to) HWY_ATTR {
+    byInfluences(task.run, [&](auto influences) HWY_ATTR {
+      turnInstance<influences()>(Eight(), task, group.palettes, to[0]);
+    });
+  });
 }
 #else
 inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
@@ -187,9 +222,12 @@ inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& g
         std::memcpy(to + row * rowFloats, matrix.m[row], sizeof(matrix.m[row]));
     }
   }
-  forRuns(part, [&](const PlainTask& task) HWY_ATTR {
-    moveByInfluences(d, task, group.palettes, rowFloats, group.outputs + first);
-  });
+  forRuns(part, blocks, group.outputs + first,
+          [&](const PlainTask& task, float* const* to) HWY_ATTR {
+            byInfluences(task.run, [&](auto influences) HWY_ATTR {
+              moveInstances<influences()>(d, task, group.palettes, rowFloats, to);
+            });
+          });
 }
 
 inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group) {
@@ -216,9 +254,9 @@ inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group)
   turnOne(part, group, first);
 }
 
-/// Whole blocks of instances that are plain. Those whose joints scale, or are very large or small,
-/// are left to the general way.
-inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instance> instances) {
+/// Instances that are plain. Those whose joints scale, or are very large or small, go the general
+/// way.
+inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   const Job& job = *part.task.job;
   const MeshData& mesh = *part.task.mesh;
   Scratch& scratch = part.task.scratch[2];
@@ -231,12 +269,12 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instan
   group.joints.first = floatsOf(scratch.dualQuaternions, group.joints.dual * 2);
   group.palettes =
       floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
-  for (const Instance& instance : instances) {
+  for (const Instance& instance : job.instances) {
     const DualQuaternionArray<float> own{group.joints.first + group.count * 4, group.joints.stride,
                                          group.joints.dual};
     const bool isPlain =
         moves ? areModerate(joints, instance.pose)
-              : !convertJoints({joints, instance.pose, own, nullptr}) || !instance.mayScale;
+              : !convertJoints({joints, instance.pose, own, nullptr, instance.mayScale});
     if (!isPlain) {
       skinGenerally(part, instance);
       continue;
@@ -255,32 +293,12 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part, std::span<const Instan
 
 inline HWY_ATTR void skinSection(const SectionTask& part) {
   const Job& job = *part.task.job;
-  if (!isPlainJob(job)) {
-    for (const Instance& instance : job.instances) skinGenerally(part, instance);
+  const auto isPlain = [&](const Instance& instance) { return isPlainInstance(job, instance); };
+  if (isPlainJob(job) && std::ranges::all_of(job.instances, isPlain)) {
+    skinPlainly(part);
     return;
   }
-  const bool isPlain = std::ranges::all_of(
-      job.instances, [&](const Instance& instance) { return isPlainInstance(job, instance); });
-  // Parts of blocks go the general way.
-  const std::uint32_t firstWhole =
-      (part.firstVertex + blockVertices - 1) / blockVertices * blockVertices;
-  const std::uint32_t wholeEnd = part.vertexEnd / blockVertices * blockVertices;
-  if (!isPlain || firstWhole >= wholeEnd) {
-    for (const Instance& instance : job.instances) skinGenerally(part, instance);
-    return;
-  }
-  SectionTask whole = part;
-  whole.firstVertex = firstWhole;
-  whole.vertexEnd = wholeEnd;
-  skinPlainly(whole, job.instances);
-  for (const auto& [first, end] :
-       {std::pair{part.firstVertex, firstWhole}, {wholeEnd, part.vertexEnd}}) {
-    if (first == end) continue;
-    SectionTask rest = part;
-    rest.firstVertex = first;
-    rest.vertexEnd = end;
-    for (const Instance& instance : job.instances) skinGenerally(rest, instance);
-  }
+  for (const Instance& instance : job.instances) skinGenerally(part, instance);
 }
 
 HWY_ATTR void skinTask(const Task& task) {
@@ -310,43 +328,52 @@ namespace {
 
 HWY_EXPORT(skinTask);
 
+std::int64_t usable() {
+  return hwy::SupportedTargets() & HWY_TARGETS;
+}
+
+/// Of our own: Highway's is that of the whole process, which the engine may use too.
+hwy::ChosenTarget& chosenTarget() {
+  static hwy::ChosenTarget chosen;
+  static const bool isReady = (chosen.Update(usable()), true);
+  static_cast<void>(isReady);
+  return chosen;
+}
+
 }  // namespace
 
 void skinTask(const Task& task) {
-  HWY_DYNAMIC_DISPATCH(skinTask)(task);
+  // A build for one instruction set has a table of one.
+  const auto& table = HWY_DISPATCH_TABLE(skinTask);
+  table[std::size(table) == 1 ? 0 : chosenTarget().GetIndex()](task);
 }
 
 std::vector<std::string_view> targetNames() {
-  hwy::SetSupportedTargetsForTest(0);
   std::vector<std::string_view> names;
-  // The best ones have the lowest bits.
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets())
-    names.emplace_back(hwy::TargetName(target));
+  for (std::int64_t rest = usable(); rest != 0; rest &= rest - 1)  // the best have the lowest bits
+    names.emplace_back(hwy::TargetName(rest & -rest));
   return names;
 }
 
 Result<void> setTarget(std::string_view name) {
-  hwy::SetSupportedTargetsForTest(0);
-  if (!name.empty()) {
-    std::string all;
-    bool isFound = false;
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      if (!all.empty()) all.append(", ");
-      all.append(hwy::TargetName(target));
-      if (name != hwy::TargetName(target)) continue;
-      hwy::SetSupportedTargetsForTest(target);
-      isFound = true;
-      break;
-    }
-    if (!isFound) {
-      std::string message(1, '\'');
-      message.append(name).append(
-          "' is no instruction set of this processor that Dermis was compiled for; those are ");
-      return Error{ErrorCode::invalidArgument, message + all};
-    }
+  if (name.empty()) {
+    chosenTarget().Update(usable());
+    return {};
   }
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return {};
+  std::string all;
+  for (std::int64_t rest = usable(); rest != 0; rest &= rest - 1) {
+    const std::int64_t target = rest & -rest;
+    if (name == hwy::TargetName(target)) {
+      chosenTarget().Update(target);
+      return {};
+    }
+    if (!all.empty()) all.append(", ");
+    all.append(hwy::TargetName(target));
+  }
+  std::string message(1, '\'');
+  message.append(name).append(
+      "' is no instruction set of this processor that Dermis was compiled for; those are ");
+  return Error{ErrorCode::invalidArgument, message + all};
 }
 
 }  // namespace dermis::cpu

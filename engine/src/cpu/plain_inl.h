@@ -12,6 +12,8 @@
 #endif
 // clang-format on
 
+#include <type_traits>
+
 #include "cpu/general_inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,9 +24,29 @@ struct PlainTask {
   const MeshData& mesh;
   const Run& run;
   std::uint32_t firstBlock, blockEnd;
+  std::uint32_t outputBlock;  ///< the one that stands at the beginning of the output
 };
 
 inline constexpr std::size_t vertexFloats = 6;
+inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
+
+/// Calls `skin` with the number of influences of the run: as a constant, or 0 where it is too large
+/// to be one.
+template <class Skin>
+HWY_INLINE void byInfluences(const Run& run, const Skin& skin) {
+  switch (run.influences) {
+    case 1:
+      return skin(std::integral_constant<int, 1>());
+    case 2:
+      return skin(std::integral_constant<int, 2>());
+    case 3:
+      return skin(std::integral_constant<int, 3>());
+    case 4:
+      return skin(std::integral_constant<int, 4>());
+    default:
+      return skin(std::integral_constant<int, 0>());
+  }
+}
 
 /// Four vertices of each block: positions and normals, component by component, to where each block
 /// begins.
@@ -102,7 +124,7 @@ HWY_INLINE void turnAndStore(D d, const Vec<D> q[8], const Lanes* positions, con
 }
 
 /// As many instances as D has blocks. `pairs`: of each pair the real parts of all of them; the dual
-/// parts stand `dual` floats behind. `influences` is 0 where `run` says how many.
+/// parts stand `dual` floats behind.
 template <int influences, class D>
 HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
                               std::size_t dual, float* const* outputs) {
@@ -114,7 +136,7 @@ HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTR
   const float* HWY_RESTRICT duals = pairs + dual;
   float* to[blocks];
   for (std::size_t i = 0; i < blocks; ++i)
-    to[i] = outputs[i] + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+    to[i] = outputs[i] + std::size_t{task.firstBlock - task.outputBlock} * blockFloats;
   for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
     const Lanes* const positions = task.mesh.positions.data() + std::size_t{block} * 3;
     const Lanes* const normals = task.mesh.normals.data() + std::size_t{block} * 3;
@@ -156,7 +178,7 @@ HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTR
   const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
   float* to[blocks];
   for (std::size_t i = 0; i < blocks; ++i)
-    to[i] = outputs[i] + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+    to[i] = outputs[i] + std::size_t{task.firstBlock - task.outputBlock} * blockFloats;
   for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
     const Lanes* const positions = task.mesh.positions.data() + std::size_t{block} * 3;
     const Lanes* const normals = task.mesh.normals.data() + std::size_t{block} * 3;
@@ -202,7 +224,7 @@ HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RE
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
   const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
   const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
-  float* to = output + std::size_t{task.firstBlock} * blockVertices * vertexFloats;
+  float* to = output + std::size_t{task.firstBlock - task.outputBlock} * blockFloats;
   for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
     Vec<Eight> rows[8];
     for (Vec<Eight>& row : rows) {
@@ -222,59 +244,7 @@ HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RE
     float* const halves[2] = {to, to + 4 * vertexFloats};
     turnAndStore(d, q, task.mesh.positions.data() + std::size_t{block} * 3,
                  task.mesh.normals.data() + std::size_t{block} * 3, InAllLanes(), halves);
-    to += blockVertices * vertexFloats;
-  }
-}
-#endif
-
-/// Calls what is made for the number of influences.
-template <class D>
-inline HWY_ATTR void moveByInfluences(D d, const PlainTask& task, const float* rows,
-                                      std::size_t rowFloats, float* const* outputs) {
-  switch (task.run.influences) {
-    case 1:
-      return moveInstances<1>(d, task, rows, rowFloats, outputs);
-    case 2:
-      return moveInstances<2>(d, task, rows, rowFloats, outputs);
-    case 3:
-      return moveInstances<3>(d, task, rows, rowFloats, outputs);
-    case 4:
-      return moveInstances<4>(d, task, rows, rowFloats, outputs);
-    default:
-      return moveInstances<0>(d, task, rows, rowFloats, outputs);
-  }
-}
-
-template <class D>
-inline HWY_ATTR void turnByInfluences(D d, const PlainTask& task, const float* pairs,
-                                      std::size_t dual, float* const* outputs) {
-  switch (task.run.influences) {
-    case 1:
-      return turnInstances<1>(d, task, pairs, dual, outputs);
-    case 2:
-      return turnInstances<2>(d, task, pairs, dual, outputs);
-    case 3:
-      return turnInstances<3>(d, task, pairs, dual, outputs);
-    case 4:
-      return turnInstances<4>(d, task, pairs, dual, outputs);
-    default:
-      return turnInstances<0>(d, task, pairs, dual, outputs);
-  }
-}
-#if HWY_MAX_BYTES >= 32
-inline HWY_ATTR void turnByInfluences(const PlainTask& task, const float* pairs, float* output) {
-  const Eight d;
-  switch (task.run.influences) {
-    case 1:
-      return turnInstance<1>(d, task, pairs, output);
-    case 2:
-      return turnInstance<2>(d, task, pairs, output);
-    case 3:
-      return turnInstance<3>(d, task, pairs, output);
-    case 4:
-      return turnInstance<4>(d, task, pairs, output);
-    default:
-      return turnInstance<0>(d, task, pairs, output);
+    to += blockFloats;
   }
 }
 #endif

@@ -112,7 +112,8 @@ struct PoseTask {
   std::span<const std::uint32_t> joints;
   std::span<const JointMatrix> pose;
   DualQuaternionArray<float> dualQuaternions;
-  float* scaleShears;  ///< 8 a joint, or null
+  float* scaleShears;         ///< 8 a joint, or null
+  bool stopsAtScale = false;  ///< the rest is of no use if a joint scales
 };
 
 /// The matrices of joints `first` and on, 12 floats each: where they stand, or copied.
@@ -185,6 +186,7 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
     Vec4<Wide> real = quaternionOf(d, joints);
     ScaleShear parts[lanes];
     if (!hn::AllTrue(d, rigid)) {
+      if (task.stopsAtScale) return true;
       storeRows(d, real, rotations, 4);
       hn::Store(hn::IfThenElseZero(rigid, hn::Set(d, 1.0f)), d, isRigid);
       for (std::size_t lane = 0; lane < lanes; ++lane) {
