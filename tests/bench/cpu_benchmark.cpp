@@ -3,10 +3,12 @@
 // normals unnormalised, and gets its palettes ready). All take turns in one process; the best round
 // counts.
 //
-//   dermis_cpu_benchmark [VERTICES [INSTANCES [ROUNDS]]]       10,000 vertices, 200 instances, 20
+//   dermis_cpu_benchmark [VERTICES|MODEL [INSTANCES [ROUNDS]]]    10,000 vertices, 200 instances,
+//   20
 //
-// 60 joints, four influences everywhere, positions and normals in float32. The conversion of poses
-// is part of what is measured.
+// A figure of 60 joints, four influences everywhere; or the first skin of a glTF file, whose
+// instances are in different places of its first animation. Positions and normals in float32. The
+// conversion of poses is part of what is measured.
 
 #include <algorithm>
 #include <array>
@@ -23,8 +25,8 @@
 #include <thread>
 #include <vector>
 
+#include "crowd.h"
 #include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
 #include "random_rig.h"
 
 #ifdef DERMIS_BENCH_OZZ
@@ -35,8 +37,6 @@
 namespace {
 
 using namespace dermis;
-
-constexpr std::uint32_t jointCount = 60;
 
 template <typename T>
 T must(Result<T> result) {
@@ -55,52 +55,49 @@ struct alignas(64) CacheLine {
 };
 
 /// A long figure: the joints of a vertex are neighbours.
-struct Scene {
-  Scene(std::uint32_t vertices, std::uint32_t count)
-      : vertexCount(vertices),
-        instanceCount(count),
-        bind(vertices),
-        joints(vertices * 4u),
-        weights(vertices * 4u),
-        output(std::size_t{vertices} * count * sizeof(Vertex) / sizeof(CacheLine) + 1) {
-    std::mt19937 random(7);
-    std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
-    for (std::uint32_t v = 0; v < vertexCount; ++v) {
-      const auto middle = static_cast<int>(std::uint64_t{v} * jointCount / vertexCount);
-      const int side = random() % 2 == 0 ? 1 : -1;
-      const std::array<int, 4> steps{0, side, -side, 2 * side};
-      std::array<float, 4> own{};
-      float sum = 0, length = 0;
-      for (float& w : own) sum += w = weight(random);
-      std::ranges::sort(own, std::greater<>());
-      for (std::size_t k = 0; k < 4; ++k) {
-        // Around at the ends: four different joints.
-        const int joint =
-            (middle + steps[k] + static_cast<int>(jointCount)) % static_cast<int>(jointCount);
-        joints[v * 4u + k] = static_cast<std::uint16_t>(joint);
-        weights[v * 4u + k] = own[k] / sum;
-      }
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        bind[v].position[axis] = coordinate(random);
-        bind[v].normal[axis] = coordinate(random);
-        length += bind[v].normal[axis] * bind[v].normal[axis];
-      }
-      for (float& component : bind[v].normal) component /= std::sqrt(length);
+bench::Crowd longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount) {
+  constexpr int jointCount = 60;
+  bench::Crowd crowd;
+  crowd.name = "a long figure";
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
+  for (std::uint32_t v = 0; v < vertexCount; ++v) {
+    bench::PlainVertex& vertex = crowd.vertices.emplace_back();
+    const auto middle = static_cast<int>(std::uint64_t{v} * jointCount / vertexCount);
+    const int side = random() % 2 == 0 ? 1 : -1;
+    const std::array<int, 4> steps{0, side, -side, 2 * side};
+    float sum = 0, length = 0;
+    for (float& w : vertex.weights) sum += w = weight(random);
+    std::ranges::sort(vertex.weights, std::greater<>());
+    for (std::size_t k = 0; k < 4; ++k) {
+      // Around at the ends: four different joints.
+      vertex.joints[k] = static_cast<std::uint16_t>((middle + steps[k] + jointCount) % jointCount);
+      vertex.weights[k] /= sum;
     }
-    for (std::uint32_t i = 0; i < instanceCount; ++i)
-      poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
-    InfluenceSet set;
-    set.joints = {joints.data(), vertexCount, 8, ComponentType::uint16, 4};
-    set.weights = floatAttribute(weights.data(), vertexCount, 4);
-    MeshView view;
-    view.vertexCount = vertexCount;
-    view.positions = floatAttribute(bind[0].position, vertexCount, 3, sizeof(Vertex));
-    view.normals = floatAttribute(bind[0].normal, vertexCount, 3, sizeof(Vertex));
-    view.influenceSets = {&set, 1};
-    mesh.emplace(must(cpu::Mesh::create(must(pack(view, jointCount)))));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      vertex.position[axis] = coordinate(random);
+      vertex.normal[axis] = coordinate(random);
+      length += vertex.normal[axis] * vertex.normal[axis];
+    }
+    for (float& component : vertex.normal) component /= std::sqrt(length);
+  }
+  for (std::uint32_t i = 0; i < instanceCount; ++i)
+    crowd.poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
+  crowd.mesh = must(bench::packVertices(crowd.vertices, jointCount));
+  return crowd;
+}
+
+struct Scene {
+  explicit Scene(bench::Crowd own)
+      : crowd(std::move(own)),
+        vertexCount(static_cast<std::uint32_t>(crowd.vertices.size())),
+        instanceCount(static_cast<std::uint32_t>(crowd.poses.size())),
+        jointCount(static_cast<std::uint32_t>(crowd.poses[0].size())),
+        output(crowd.vertices.size() * crowd.poses.size() * sizeof(Vertex) / sizeof(CacheLine) + 1),
+        mesh(must(cpu::Mesh::create(*crowd.mesh))) {
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
       cpu::Instance instance;
-      instance.pose = poses[i];
+      instance.pose = crowd.poses[i];
       instance.output = outputOf(i);
       instances.push_back(instance);
     }
@@ -110,13 +107,10 @@ struct Scene {
     return reinterpret_cast<Vertex*>(output.data()) + std::size_t{instance} * vertexCount;
   }
 
-  std::uint32_t vertexCount, instanceCount;
-  std::vector<Vertex> bind;
-  std::vector<std::uint16_t> joints;
-  std::vector<float> weights;
-  std::vector<std::vector<JointMatrix>> poses;
+  bench::Crowd crowd;
+  std::uint32_t vertexCount, instanceCount, jointCount;
   std::vector<CacheLine> output;
-  std::optional<cpu::Mesh> mesh;
+  cpu::Mesh mesh;
   std::vector<cpu::Instance> instances;
 };
 
@@ -143,7 +137,7 @@ Contender dermisContender(Scene& scene, Method method, std::string_view target) 
     constexpr std::uint32_t together = 16;
     for (std::uint32_t i = first; i < end; i += together) {
       cpu::Job job;
-      job.mesh = &*scene.mesh;
+      job.mesh = &scene.mesh;
       job.method = method;
       job.places = places;
       job.instances = std::span(scene.instances).subspan(i, std::min(together, end - i));
@@ -155,9 +149,10 @@ Contender dermisContender(Scene& scene, Method method, std::string_view target) 
 
 /// As one writes it down: Kavan et al. 2007, section 4, vertex by vertex.
 void skinPlainly(Scene& scene, std::uint32_t instance) {
-  std::array<std::array<float, 8>, jointCount> palette;
-  for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
-    const auto& m = scene.poses[instance][joint].m;
+  static thread_local std::vector<std::array<float, 8>> palette;
+  palette.resize(scene.jointCount);
+  for (std::uint32_t joint = 0; joint < scene.jointCount; ++joint) {
+    const auto& m = scene.crowd.poses[instance][joint].m;
     std::array<float, 8>& q = palette[joint];
     // A column of the largest square (Shepperd 1978).
     const float squares[4] = {1 + m[0][0] - m[1][1] - m[2][2], 1 - m[0][0] + m[1][1] - m[2][2],
@@ -177,14 +172,15 @@ void skinPlainly(Scene& scene, std::uint32_t instance) {
   }
   Vertex* const output = scene.outputOf(instance);
   for (std::uint32_t v = 0; v < scene.vertexCount; ++v) {
-    const std::uint16_t* const joints = &scene.joints[v * 4u];
+    const bench::PlainVertex& vertex = scene.crowd.vertices[v];
+    const std::uint16_t* const joints = vertex.joints.data();
     const std::array<float, 8>& pivot = palette[joints[0]];
     std::array<float, 8> q{};
     for (std::size_t k = 0; k < 4; ++k) {
       const std::array<float, 8>& joint = palette[joints[k]];
       const float dot =
           pivot[0] * joint[0] + pivot[1] * joint[1] + pivot[2] * joint[2] + pivot[3] * joint[3];
-      const float weight = std::copysign(scene.weights[v * 4u + k], dot);
+      const float weight = std::copysign(vertex.weights[k], dot);
       for (std::size_t i = 0; i < 8; ++i) q[i] += weight * joint[i];
     }
     const float factor = 2 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -197,8 +193,8 @@ void skinPlainly(Scene& scene, std::uint32_t instance) {
       to[2] = p[2] + factor * (q[0] * y - q[1] * x + q[3] * shift[2] - dual * q[2]);
     };
     constexpr float none[3] = {0, 0, 0};
-    turned(scene.bind[v].position, &q[4], q[7], output[v].position);
-    turned(scene.bind[v].normal, none, 0, output[v].normal);
+    turned(vertex.position.data(), &q[4], q[7], output[v].position);
+    turned(vertex.normal.data(), none, 0, output[v].normal);
   }
 }
 
@@ -217,7 +213,7 @@ Contender ozzContender(Scene& scene) {
     float columns[4][4];
   };
   std::vector<Matrix> palettes;
-  for (const std::vector<JointMatrix>& pose : scene.poses) {
+  for (const std::vector<JointMatrix>& pose : scene.crowd.poses) {
     for (const JointMatrix& joint : pose) {
       Matrix& to = palettes.emplace_back();
       for (std::size_t column = 0; column < 4; ++column) {
@@ -226,12 +222,20 @@ Contender ozzContender(Scene& scene) {
       }
     }
   }
+  std::vector<Vertex> bind;
+  std::vector<std::uint16_t> joints;
   std::vector<float> weights;  // the last one is what is left of 1
-  for (std::size_t v = 0; v < scene.vertexCount; ++v)
-    weights.insert(weights.end(), &scene.weights[v * 4], &scene.weights[v * 4 + 3]);
+  for (const bench::PlainVertex& vertex : scene.crowd.vertices) {
+    Vertex& to = bind.emplace_back();
+    std::ranges::copy(vertex.position, to.position);
+    std::ranges::copy(vertex.normal, to.normal);
+    joints.insert(joints.end(), vertex.joints.begin(), vertex.joints.end());
+    weights.insert(weights.end(), vertex.weights.begin(), vertex.weights.end() - 1);
+  }
   Contender contender;
   contender.name = "ozz-animation, linear";
-  contender.skin = [&scene, palettes, weights](std::uint32_t first, std::uint32_t end) {
+  contender.skin = [&scene, palettes, bind, joints, weights](std::uint32_t first,
+                                                             std::uint32_t end) {
     using ozz::span;
     const std::size_t vertices = scene.vertexCount;
     for (std::uint32_t i = first; i < end; ++i) {
@@ -239,14 +243,14 @@ Contender ozzContender(Scene& scene) {
       job.vertex_count = static_cast<int>(vertices);
       job.influences_count = 4;
       job.joint_matrices = span(reinterpret_cast<const ozz::math::Float4x4*>(
-                                    palettes.data() + std::size_t{i} * jointCount),
-                                jointCount);
-      job.joint_indices = span(scene.joints.data(), vertices * 4);
+                                    palettes.data() + std::size_t{i} * scene.jointCount),
+                                scene.jointCount);
+      job.joint_indices = span(joints.data(), vertices * 4);
       job.joint_indices_stride = 8;
       job.joint_weights = span(weights.data(), weights.size());
       job.joint_weights_stride = 12;
-      job.in_positions = span<const float>(scene.bind[0].position, vertices * 6);
-      job.in_normals = span<const float>(scene.bind[0].normal, vertices * 6 - 3);
+      job.in_positions = span<const float>(bind[0].position, vertices * 6);
+      job.in_normals = span<const float>(bind[0].normal, vertices * 6 - 3);
       Vertex* const output = scene.outputOf(i);
       job.out_positions = span<float>(output[0].position, vertices * 6);
       job.out_normals = span<float>(output[0].normal, vertices * 6 - 3);
@@ -279,7 +283,10 @@ int main(int argc, char** argv) {
     return static_cast<std::uint32_t>(argc > index ? std::max(std::atoi(argv[index]), 1)
                                                    : otherwise);
   };
-  Scene scene(argument(1, 10'000), argument(2, 200));
+  const std::string subject = argc > 1 ? argv[1] : "10000";
+  const bool isNumber = std::ranges::all_of(subject, [](char c) { return c >= '0' && c <= '9'; });
+  Scene scene(isNumber ? longFigure(argument(1, 10'000), argument(2, 200))
+                       : must(bench::loadCrowd(subject, argument(2, 200))));
   std::vector<Contender> contenders;
 #ifdef DERMIS_BENCH_OZZ
   contenders.push_back(ozzContender(scene));
@@ -299,8 +306,8 @@ int main(int argc, char** argv) {
       }
     }
   }
-  std::printf("%u vertices, %u instances, %u joints; million vertices a second\n",
-              scene.vertexCount, scene.instanceCount, jointCount);
+  std::printf("%s: %u vertices, %u instances, %u joints; million vertices a second\n",
+              scene.crowd.name.c_str(), scene.vertexCount, scene.instanceCount, scene.jointCount);
   std::printf("%-34s %9s %6s %9s %6s\n", "", "1 thread", "", "2 threads", "");
   const double vertices = 1e-6 * scene.vertexCount * scene.instanceCount;
   for (const Contender& contender : contenders) {
