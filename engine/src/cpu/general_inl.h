@@ -405,10 +405,9 @@ HWY_INLINE void addPositions(D d, const Vec3<D>& position, std::size_t first, st
 
 /// Vertices of a run, of one instance.
 struct GeneralTask {
-  const Job& job;
-  const MeshData& mesh;
+  const Task& task;
   const Run& run;
-  const Instance& instance;
+  const TaskInstance& instance;
   const Palette& palette;
   const Palette* previous;  ///< Motion::reskinned
   std::uint32_t firstVertex, vertexEnd;
@@ -464,12 +463,10 @@ HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, 
 
 /// Relative to the box of the instance, where the format is.
 template <class D>
-HWY_INLINE Vec3<D> relativeTo(D d, const Box& box, const Vec3<D>& position) {
+HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& position) {
   const auto along = [&](Vec<D> v, std::size_t axis) HWY_ATTR {
-    const double least = double{box.min[axis]}, greatest = double{box.max[axis]};
-    const auto centre = static_cast<float>((least + greatest) / 2);
-    const auto inverse = static_cast<float>(2 / (greatest - least));
-    return hn::Mul(hn::Sub(v, hn::Set(d, centre)), hn::Set(d, inverse));
+    return hn::Mul(hn::Sub(v, hn::Set(d, instance.boxCentre[axis])),
+                   hn::Set(d, instance.boxInverse[axis]));
   };
   return {along(position.x, 0), along(position.y, 1), along(position.z, 2)};
 }
@@ -487,8 +484,8 @@ template <class D>
 HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
                           std::size_t first, std::size_t end, const BlockVertices* morphed,
                           const BlockVertices* morphedBefore, Findings& findings) {
-  const Job& job = task.job;
-  const MeshData& mesh = task.mesh;
+  const Task& job = task.task;
+  const MeshData& mesh = *job.mesh;
   const VertexPlaces& places = job.places;
   const std::size_t vertex = std::size_t{block} * blockVertices + lane;
   const auto placeOf = [&](const OutputAttribute& attribute) {
@@ -512,7 +509,7 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
   const std::uint32_t bytes = formatSize(format);
   const auto encode = [&](const Vec3<D>& position, bool mayCount) HWY_ATTR {
     if (!isSnormPosition(format)) return encodePosition(d, format, position);
-    const Vec3<D> relative = relativeTo(d, task.instance.box, position);
+    const Vec3<D> relative = relativeTo(d, task.instance, position);
     if (mayCount) {
       // A vertex of the engine's own box may stand a rounding outside.
       HWY_ALIGN float outside[hn::MaxLanes(d)];
@@ -560,8 +557,9 @@ inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
        block * blockVertices < task.vertexEnd; ++block) {
     const bool isMorphed = !task.instance.morphs.empty();
     const bool wasMorphed = reskins && !task.instance.previousMorphs.empty();
-    if (isMorphed) loadBlock(task.mesh, block, task.instance.morphs, true, morphed);
-    if (wasMorphed) loadBlock(task.mesh, block, task.instance.previousMorphs, false, morphedBefore);
+    if (isMorphed) loadBlock(*task.task.mesh, block, task.instance.morphs, true, morphed);
+    if (wasMorphed)
+      loadBlock(*task.task.mesh, block, task.instance.previousMorphs, false, morphedBefore);
     for (std::uint32_t lane = 0; lane < blockVertices; lane += lanes) {
       const std::uint32_t vertex = block * blockVertices + lane;
       const std::uint32_t first = std::max(vertex, task.firstVertex);

@@ -29,6 +29,7 @@ namespace dermis::cpu::HWY_NAMESPACE {
 /// The part of a job that lies in one section.
 struct SectionTask {
   const Task& task;
+  Scratch* scratch;
   const Section& section;
   std::size_t firstRun, runEnd;
   std::uint32_t firstVertex, vertexEnd;  ///< in these runs
@@ -42,15 +43,15 @@ inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& fi
 }
 
 /// Copies positions to the previous positions.
-inline void settle(const Job& job, const Instance& instance, std::uint32_t first,
+inline void settle(const Task& task, const TaskInstance& instance, std::uint32_t first,
                    std::uint32_t end) {
   auto* const output = static_cast<std::byte*>(instance.output);
-  const OutputAttribute &from = job.places.positions, &to = job.places.previousPositions;
+  const OutputAttribute &from = task.places.positions, &to = task.places.previousPositions;
   copyLanes(output + to.offset, to.stride, output + from.offset, from.stride,
             formatSize(from.format), first, end);
 }
 
-inline void write(const Findings& findings, const Instance& instance) {
+inline void write(const Findings& findings, const TaskInstance& instance) {
   if (instance.result == nullptr) return;
   InstanceResult found;
   found.clampedVertices = findings.clamped;
@@ -66,21 +67,21 @@ inline void write(const Findings& findings, const Instance& instance) {
   addResult(*instance.result, found);
 }
 
-inline HWY_ATTR void skinGenerally(const SectionTask& part, const Instance& instance) {
-  const Job& job = *part.task.job;
+inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& instance) {
+  const Task& task = part.task;
   const MeshData& mesh = *part.task.mesh;
-  if (instance.settles && job.places.motion != Motion::none) {
-    settle(job, instance, part.firstVertex, part.vertexEnd);
+  if (instance.settles && task.places.motion != Motion::none) {
+    settle(task, instance, part.firstVertex, part.vertexEnd);
     return;
   }
-  Scratch* const scratch = part.task.scratch;
+  Scratch* const scratch = part.scratch;
   const Palette palette =
-      makePalette(mesh, part.section, job.method, instance.pose, instance.mayScale, scratch[0]);
+      makePalette(mesh, part.section, task.method, instance.pose, instance.mayScale, scratch[0]);
   Palette previous;
-  const bool reskins = job.places.motion == Motion::reskinned && !instance.restartsMotion;
+  const bool reskins = task.places.motion == Motion::reskinned && !instance.restartsMotion;
   if (reskins) {
-    previous = makePalette(mesh, part.section, job.method, instance.previousPose, instance.mayScale,
-                           scratch[1]);
+    previous = makePalette(mesh, part.section, task.method, instance.previousPose,
+                           instance.mayScale, scratch[1]);
   }
   Findings findings;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
@@ -88,7 +89,7 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const Instance& inst
     std::uint32_t first, end;
     clipToRun(part, run, first, end);
     if (first >= end) continue;
-    skinGeneral({job, mesh, run, instance, palette, reskins ? &previous : nullptr, first, end},
+    skinGeneral({task, run, instance, palette, reskins ? &previous : nullptr, first, end},
                 findings);
   }
   write(findings, instance);
@@ -96,9 +97,9 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const Instance& inst
 
 // -- The plain way.
 
-inline bool isPlainJob(const Job& job) {
-  const VertexPlaces& places = job.places;
-  return (job.method == Method::dualQuaternion || job.method == Method::linear) &&
+inline bool isPlainTask(const Task& task) {
+  const VertexPlaces& places = task.places;
+  return (task.method == Method::dualQuaternion || task.method == Method::linear) &&
          places.motion == Motion::none && places.positions.format == VertexFormat::float32x3 &&
          places.normals.format == VertexFormat::float32x3 &&
          places.tangents.format == VertexFormat::none &&
@@ -106,9 +107,9 @@ inline bool isPlainJob(const Job& job) {
          places.normals.stride == 24;
 }
 
-inline bool isPlainInstance(const Job& job, const Instance& instance) {
+inline bool isPlainInstance(const Task& task, const TaskInstance& instance) {
   const auto place =
-      reinterpret_cast<std::uintptr_t>(instance.output) + job.places.positions.offset;
+      reinterpret_cast<std::uintptr_t>(instance.output) + task.places.positions.offset;
   return instance.morphs.empty() && instance.result == nullptr && place % alignof(float) == 0;
 }
 
@@ -231,7 +232,7 @@ inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& g
 }
 
 inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group) {
-  const bool moves = part.task.job->method == Method::linear;
+  const bool moves = part.task.method == Method::linear;
   std::size_t first = 0;
 #if HWY_MAX_BYTES >= 64
   if (group.count == 4) {
@@ -257,19 +258,23 @@ inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group)
 /// Instances that are plain. Those whose joints scale, or are very large or small, go the general
 /// way.
 inline HWY_ATTR void skinPlainly(const SectionTask& part) {
-  const Job& job = *part.task.job;
+  const Task& task = part.task;
   const MeshData& mesh = *part.task.mesh;
-  Scratch& scratch = part.task.scratch[2];
+  Scratch& scratch = part.scratch[2];
   const std::span<const std::uint32_t> joints = jointsOf(mesh, part.section);
   const std::size_t pairs = pairsOf(mesh, part.section).size();
-  const bool moves = job.method == Method::linear;
+  const bool moves = task.method == Method::linear;
   PlainGroup group;
   // Joints are converted as many at a time as there are lanes.
   group.joints.dual = (joints.size() + 8) * group.joints.stride;
   group.joints.first = floatsOf(scratch.dualQuaternions, group.joints.dual * 2);
   group.palettes =
       floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
-  for (const Instance& instance : job.instances) {
+  for (const TaskInstance& instance : task.instances) {
+    if (!isPlainInstance(task, instance)) {
+      skinGenerally(part, instance);
+      continue;
+    }
     const DualQuaternionArray<float> own{group.joints.first + group.count * 4, group.joints.stride,
                                          group.joints.dual};
     const bool isPlain =
@@ -280,7 +285,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
       continue;
     }
     group.outputs[group.count] = reinterpret_cast<float*>(static_cast<std::byte*>(instance.output) +
-                                                          job.places.positions.offset);
+                                                          task.places.positions.offset);
     group.poses[group.count] = instance.pose;
     if (++group.count < mostInstances) continue;
     skinGroup(part, group);
@@ -292,26 +297,24 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
 // -- A job.
 
 inline HWY_ATTR void skinSection(const SectionTask& part) {
-  const Job& job = *part.task.job;
-  const auto isPlain = [&](const Instance& instance) { return isPlainInstance(job, instance); };
-  if (isPlainJob(job) && std::ranges::all_of(job.instances, isPlain)) {
+  if (isPlainTask(part.task)) {
     skinPlainly(part);
     return;
   }
-  for (const Instance& instance : job.instances) skinGenerally(part, instance);
+  for (const TaskInstance& instance : part.task.instances) skinGenerally(part, instance);
 }
 
-HWY_ATTR void skinTask(const Task& task) {
+HWY_ATTR void skinTask(const Task& task, Scratch* scratch) {
   const MeshData& mesh = *task.mesh;
-  std::uint32_t first = task.job->firstVertex;
-  const std::uint32_t end = task.job->vertexEnd;
+  std::uint32_t first = task.firstVertex;
+  const std::uint32_t end = task.vertexEnd;
   std::size_t run = mesh.runOf(first / blockVertices);
   while (first < end) {
     const std::uint32_t section = mesh.runs[run].section;
     std::size_t runEnd = run;
     while (runEnd < mesh.runs.size() && mesh.runs[runEnd].section == section) ++runEnd;
     const std::uint32_t sectionEnd = std::min(end, mesh.runs[runEnd - 1].blockEnd * blockVertices);
-    skinSection({task, mesh.sections[section], run, runEnd, first, sectionEnd});
+    skinSection({task, scratch, mesh.sections[section], run, runEnd, first, sectionEnd});
     first = sectionEnd;
     run = runEnd;
   }
@@ -342,10 +345,10 @@ hwy::ChosenTarget& chosenTarget() {
 
 }  // namespace
 
-void skinTask(const Task& task) {
+void dispatchTask(const Task& task, Scratch* scratch) {
   // A build for one instruction set has a table of one.
   const auto& table = HWY_DISPATCH_TABLE(skinTask);
-  table[std::size(table) == 1 ? 0 : chosenTarget().GetIndex()](task);
+  table[std::size(table) == 1 ? 0 : chosenTarget().GetIndex()](task, scratch);
 }
 
 std::vector<std::string_view> targetNames() {

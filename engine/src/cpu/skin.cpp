@@ -82,12 +82,33 @@ Result<void> check(const Job& job) {
   return {};
 }
 
-void run(const Job& job, const MeshData& mesh) {
-  static thread_local Scratch scratch[3];
-  skinTask({&job, &mesh, scratch});
+TaskInstance taskInstance(const Instance& instance, bool hasBox) {
+  TaskInstance own{instance.pose,           instance.output,         instance.mayScale,
+                   instance.restartsMotion, instance.settles,        instance.morphs,
+                   instance.previousPose,   instance.previousMorphs, instance.result};
+  for (std::size_t axis = 0; hasBox && axis < 3; ++axis) {
+    const double least = double{instance.box.min[axis]}, greatest = double{instance.box.max[axis]};
+    own.boxCentre[axis] = static_cast<float>((least + greatest) / 2);
+    own.boxInverse[axis] = static_cast<float>(2 / (greatest - least));
+  }
+  return own;
+}
+
+void skinMesh(const Job& job, const MeshData& mesh) {
+  static thread_local std::vector<TaskInstance> instances;
+  instances.clear();
+  const bool hasBox = isSnormPosition(job.places.positions.format);
+  for (const Instance& instance : job.instances)
+    instances.push_back(taskInstance(instance, hasBox));
+  skinTask({&mesh, job.method, job.places, job.firstVertex, job.vertexEnd, instances});
 }
 
 }  // namespace
+
+void skinTask(const Task& task) {
+  static thread_local Scratch scratch[3];
+  dispatchTask(task, scratch);
+}
 
 Result<void> skin(const Job& job) {
   if (Result<void> good = check(job); !good) return good;
@@ -96,7 +117,7 @@ Result<void> skin(const Job& job) {
   for (const Instance& instance : job.instances) {
     if (instance.result != nullptr) *instance.result = {};
   }
-  if (clipped.firstVertex != clipped.vertexEnd) run(clipped, job.mesh->data());
+  if (clipped.firstVertex != clipped.vertexEnd) skinMesh(clipped, job.mesh->data());
   return {};
 }
 
@@ -130,7 +151,7 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
   const MeshData selected = mesh.data().select(vertices, own.morphs);
   own.morphs = {};
   job.vertexEnd = static_cast<std::uint32_t>(vertices.size());
-  run(job, selected);
+  skinMesh(job, selected);
   return {};
 }
 

@@ -1,4 +1,4 @@
-// One call of `skin`, as the SIMD code gets it: checked, and with memory to work in.
+// What the SIMD code gets: jobs that were checked, and memory to work in.
 #pragma once
 
 #include <cstddef>
@@ -25,13 +25,31 @@ struct Scratch {
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part less the pivot's
 };
 
-struct Task {
-  const Job* job;
-  const MeshData* mesh;
-  Scratch* scratch;  ///< three: of an instance, of its previous pose, and of several at a time
+/// As `Instance`.
+struct TaskInstance {
+  std::span<const JointMatrix> pose;
+  void* output = nullptr;
+  bool mayScale = true, restartsMotion = false, settles = false;
+  std::span<const MorphWeight> morphs;  ///< rising by target
+  std::span<const JointMatrix> previousPose;
+  std::span<const MorphWeight> previousMorphs;
+  InstanceResult* result = nullptr;
+  float boxCentre[3] = {}, boxInverse[3] = {};  ///< of snorm16 positions; 1 / half its size
 };
 
-/// By the best instructions that the processor has, or those that `setTarget` chose.
+struct Task {
+  const MeshData* mesh = nullptr;
+  Method method = Method::dualQuaternion;
+  VertexPlaces places;
+  std::uint32_t firstVertex = 0, vertexEnd = 0;
+  std::span<const TaskInstance> instances;
+};
+
+/// With memory that the thread keeps.
 void skinTask(const Task& task);
+
+/// `scratch`: three, of an instance, of its previous pose, and of several at a time.
+/// By the best instructions that the processor has, or those that `setTarget` chose.
+void dispatchTask(const Task& task, Scratch* scratch);
 
 }  // namespace dermis::cpu
