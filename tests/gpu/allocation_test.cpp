@@ -1,11 +1,13 @@
 // Frames of a scene that is warm allocate nothing on the CPU: every `operator new` of this thread
-// is counted while Dermis works. A program of its own, since it replaces that operator.
+// is counted while Dermis works, for the GPU or on the CPU. A program of its own, since it replaces
+// that operator.
 
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <new>
 
+#include "dermis/cpu/skinning_system.h"
 #include "open_device.h"
 #include "system_test.h"
 
@@ -24,6 +26,17 @@ void* allocate(std::size_t size) {
 
 void* operator new(std::size_t size) {
   return allocate(size);
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  const auto multiple = static_cast<std::size_t>(alignment);
+  if (isCounting) ++allocations;
+  return std::aligned_alloc(multiple, (size + multiple - 1) / multiple * multiple);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
 }
 void operator delete(void* memory) noexcept {
   std::free(memory);
@@ -138,6 +151,60 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
   }
   EXPECT_GT(counted, 0u) << "the first frames have to allocate, or nothing is counted";
   EXPECT_EQ(allocations, counted);
+}
+
+TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
+  constexpr std::uint32_t count = 200;
+  cpu::SkinningSystem system = must(cpu::SkinningSystem::create());
+  InstanceDescription instance;
+  instance.mesh = must(system.addMesh(systemMesh(1, 50)));
+  instance.layout = motionLayout();
+  std::vector<PoseHandle> poses(count);
+  must(system.addPoses(poses, 8));
+  std::vector<InstanceHandle> instances;
+  const std::array<MorphWeight, 2> morphs{{{0, 0.5f}, {1, 0.25f}}};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    instance.pose = poses[i];
+    instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;
+    instance.bounds = i % 5 == 0;
+    instance.updateInterval = 1 + i % 3;
+    instances.push_back(must(system.addInstance(instance)));
+    if (i % 2 == 0) must(system.change({.instance = instances.back(), .morphs = morphs}));
+  }
+  const Pose pose = systemPose(1);
+  std::vector<InstanceVisibility> views(count);
+  std::uint32_t counted = 0;
+  const auto expect = [](bool isRight) {
+    if (!isRight) std::abort();
+  };
+  for (std::uint32_t frame = 1; frame <= 60; ++frame) {
+    {
+      const Counting counting;
+      system.beginFrame();
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if ((i + frame) % 4 == 0) continue;
+        const Result<std::span<JointMatrix>> place = system.writePose(poses[i]);
+        expect(place.ok());
+        std::ranges::copy(pose, place->begin());
+      }
+      for (std::uint32_t i = 0; i < count; ++i) views[i] = {instances[i], (i + frame) % 6 != 0, 2};
+      expect(system.setVisibility(views).ok());
+      const auto jobs = system.jobs(1000);
+      expect(jobs.ok());
+      if (frame % 9 == 8) {
+        expect(system.abandonFrame().ok());
+      } else {
+        for (const cpu::PlannedJob& job : *jobs) cpu::skin(job);
+      }
+    }
+    if (frame == 40) {
+      EXPECT_GT(allocations, 0u) << "the first frames have to allocate, or nothing is counted";
+      allocations = 0;
+    }
+    if (frame > 40) counted += static_cast<std::uint32_t>(system.skinnedInstances().size());
+  }
+  EXPECT_GT(counted, 1000u);
+  EXPECT_EQ(allocations, 0u);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // A SkinningSystem as simple as can be: for each instance what its output must hold, whether a
-// frame had to skin it, and which places frames under way may still read.
+// frame had to skin it, and which places frames under way may still read. `Engine` is one of
+// SystemEngine (of vulkan::SkinningSystem) and CpuEngine (of cpu::SkinningSystem).
 #pragma once
 
 #include <compare>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "cpu_engine.h"
 #include "system_test.h"
 
 namespace dermis::test {
@@ -52,9 +54,10 @@ struct ModelInstance {
   bool isDisplayed() const { return isVisible && (!description.culledOnGpu || isShownByGpu); }
 };
 
+template <class Engine>
 class SystemModel {
  public:
-  explicit SystemModel(SystemEngine& engine) : engine_(engine) {}
+  explicit SystemModel(Engine& engine) : engine_(engine) {}
 
   std::map<std::uint32_t, ModelPose> poses;
   std::vector<ModelInstance> instances;
@@ -99,7 +102,7 @@ class SystemModel {
   bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists);
   void checkStatistics(const Lists& lists) const;
 
-  SystemEngine& engine_;
+  Engine& engine_;
   std::vector<Place> locked_;
   std::map<std::uint64_t, GpuCounts> gpuCounts_;  ///< by frame
 };

@@ -1,7 +1,8 @@
 // Thousands of random steps of a system beside a model of it: meshes, palettes and instances come
 // and go, move, hide, find no room and are moved about while frames are under way, buffers grow,
 // frames are abandoned, the GPU writes some poses, and every instance's output stays, bit for bit,
-// what it would be alone. Half of the tests record into secondary command buffers.
+// what it would be alone. Half of the tests record into secondary command buffers. The same steps
+// are gone on the CPU, without what is the GPU's.
 
 #include <gtest/gtest.h>
 
@@ -9,8 +10,10 @@
 #include <array>
 #include <cstring>
 #include <random>
+#include <type_traits>
 #include <utility>
 
+#include "dermis/cpu/skin.h"
 #include "system_model.h"
 
 namespace dermis::test {
@@ -21,6 +24,7 @@ constexpr std::uint32_t stepCount = 10'000;
 constexpr std::uint32_t systemSteps = 500;  // then another system begins to grow
 constexpr std::uint32_t poseCount = 12;
 constexpr std::uint32_t meshKinds = 8;
+constexpr Capacity outputCapacity{1024, 100 << 10};  // so small that it is full at times
 
 const std::array<std::vector<MorphWeight>, 3> morphSets{
     std::vector<MorphWeight>{}, {{0, 0.5f}}, {{1, 0.25f}, {2, 1.0f}}};
@@ -39,44 +43,38 @@ struct ModelMesh {
   std::uint32_t kind = 0;
 };
 
-class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<std::uint32_t> {
+/// The steps. What differs between the GPU and the CPU is left to the tests.
+template <class Engine>
+class ModelSteps {
+ public:
+  virtual ~ModelSteps() = default;
+
  protected:
-  void SetUp() override {
-    SystemTest::SetUp();
-    if (device_ == nullptr) return;
-    for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
-      kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
-    vulkan::SkinningSystemDescription small = description();
-    small.framesInFlight = framesInFlight;
-    small.meshCapacity = {2048, 512 << 10};
-    small.jointCapacity = {8, 8 * 40};
-    small.gpuJointCapacity = {0, 8 * 40};
-    small.instanceCapacity = {4, 200};
-    small.boundsCapacity = {1};
-    small.outputCapacity = {1024, 100 << 10};  // so small that it is full at times
-    description_ = small;
-    for (samples::MappedBuffer& words : words_)
-      words = must(
-          samples::MappedBuffer::create(device(), 4096 * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
-    makeSystem();
-  }
-  /// A system without anything, of which everything has to grow.
+  explicit ModelSteps(std::uint32_t seed) : random_(seed) {}
+
+  /// An engine without anything, of which everything has to grow.
+  virtual void makeEngine() = 0;
+  virtual void prepare(const PipelineNeeds& needs) = 0;
+  virtual void submit() = 0;
+  virtual void abandon() = 0;
+  /// Counts up when the output grows.
+  virtual std::uint64_t outputGeneration() = 0;
+  /// An instance skinned alone.
+  virtual Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
+                            const InstanceDescription& description,
+                            std::span<const MorphWeight> morphs) = 0;
+
+  void run();
   void makeSystem() {
     model_.reset();
     meshes_.clear();
     gone_.clear();
-    engine_.emplace(device(), description_);
-    engine_->recordsSecondary = GetParam() % 2 == 0;
+    makeEngine();
     model_.emplace(*engine_);
     engine_->begin();
   }
-  void TearDown() override {
-    engine_.reset();
-    for (samples::MappedBuffer& words : words_) words = {};
-    SystemTest::TearDown();
-  }
 
-  vulkan::SkinningSystem& system() { return engine_->system(); }
+  auto& system() { return engine_->system(); }
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   bool chance(std::uint32_t percent) { return below(100) < percent; }
   ModelInstance& anyInstance() { return model_->instances[below(model_->instances.size())]; }
@@ -100,35 +98,35 @@ class SystemModelTest : public SystemTest, public ::testing::WithParamInterface<
   void changeMeanwhile();
   void step();
 
-  void showSome(std::span<std::byte> words);
   void expectRoomIsMissing(const Error& error, std::uint64_t size);
   const Streams& expected(const ModelInstance& instance, const ShownPose& shown);
   void expectOutputs();
 
-  std::mt19937 random_{GetParam()};
-  vulkan::SkinningSystemDescription description_;
+  static constexpr bool hasGpu = std::is_same_v<Engine, SystemEngine>;
+  std::mt19937 random_;
   std::vector<PackedMesh> kinds_;
-  std::optional<SystemEngine> engine_;
-  std::optional<SystemModel> model_;
+  std::optional<Engine> engine_;
+  std::optional<SystemModel<Engine>> model_;
   std::map<std::uint32_t, ModelMesh> meshes_;
   std::uint32_t nextNumber_ = 0;
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
-  std::array<samples::MappedBuffer, framesInFlight> words_;
   std::map<std::pair<ShownPose, VertexFormat>, Streams> expected_;
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0;
   std::uint64_t growths_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };
 
-void SystemModelTest::addMesh() {
+template <class Engine>
+void ModelSteps<Engine>::addMesh() {
   if (meshes_.size() >= 12) return;
   const std::uint32_t kind = below(meshKinds);
   kindOf_[nextNumber_] = kind;
   meshes_[nextNumber_++] = {engine_->addMesh(kinds_[kind]), kind};
 }
 
-void SystemModelTest::removeMesh() {
+template <class Engine>
+void ModelSteps<Engine>::removeMesh() {
   if (meshes_.size() < 3) return;
   const auto mesh = anyMesh();
   const Result<void> removed = system().removeMesh(mesh->second.handle);
@@ -136,17 +134,19 @@ void SystemModelTest::removeMesh() {
   if (removed) meshes_.erase(mesh);
 }
 
-void SystemModelTest::addPose() {
+template <class Engine>
+void ModelSteps<Engine>::addPose() {
   if (model_->poses.size() >= 30) return;
   const std::uint32_t pose = below(poseCount);
-  const PoseWriter writer = chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
+  const PoseWriter writer = hasGpu && chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
   const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
   if (!added) return;  // places of palettes that went are not free yet
   model_->poses[nextNumber_++] = {*added, pose};
   engine_->writePose(*added, systemPose(pose));
 }
 
-void SystemModelTest::removePose() {
+template <class Engine>
+void ModelSteps<Engine>::removePose() {
   if (model_->poses.size() < 3) return;
   const auto palette = anyPalette();
   const Result<void> removed = system().removePose(palette->second.handle);
@@ -155,13 +155,15 @@ void SystemModelTest::removePose() {
 }
 
 /// Refused where there is no room, and only there.
-void SystemModelTest::expectRoomIsMissing(const Error& error, std::uint64_t size) {
+template <class Engine>
+void ModelSteps<Engine>::expectRoomIsMissing(const Error& error, std::uint64_t size) {
   EXPECT_EQ(error.code, ErrorCode::limitExceeded) << error.message;
   ++refusals_;
   EXPECT_LT(system().statistics().outputs.largestFree, size + 256) << error.message;
 }
 
-void SystemModelTest::addInstance() {
+template <class Engine>
+void ModelSteps<Engine>::addInstance() {
   if (meshes_.empty() || model_->poses.empty()) return;
   const auto mesh = anyMesh();
   const auto palette = anyPalette();
@@ -174,9 +176,9 @@ void SystemModelTest::addInstance() {
   description.pose = palette->second.handle;
   description.method = methods[below(methods.size())];
   description.layout = someLayouts()[below(3)];
-  description.culledOnGpu = chance(25);
+  description.culledOnGpu = hasGpu && chance(25);
   if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
-  must(system().prepare(pipelineNeeds(description)));
+  prepare(pipelineNeeds(description));
   const Result<InstanceHandle> added = system().addInstance(description);
   if (!added) {
     expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
@@ -186,7 +188,8 @@ void SystemModelTest::addInstance() {
   model_->instances.push_back(instance);
 }
 
-void SystemModelTest::removeInstance() {
+template <class Engine>
+void ModelSteps<Engine>::removeInstance() {
   if (model_->instances.empty()) return;
   const std::uint32_t index = below(model_->instances.size());
   gone_.push_back(model_->instances[index].handle);
@@ -194,7 +197,8 @@ void SystemModelTest::removeInstance() {
   model_->remove(index);
 }
 
-void SystemModelTest::setMesh(ModelInstance& instance) {
+template <class Engine>
+void ModelSteps<Engine>::setMesh(ModelInstance& instance) {
   // Twice between two frames would leave open whether its output has been another's.
   if (instance.changesMesh) return;
   const auto mesh = anyMesh();
@@ -212,7 +216,8 @@ void SystemModelTest::setMesh(ModelInstance& instance) {
   instance.isChanged = instance.changesMesh = true;
 }
 
-void SystemModelTest::changeInstance() {
+template <class Engine>
+void ModelSteps<Engine>::changeInstance() {
   if (model_->instances.empty()) return;
   ModelInstance& instance = anyInstance();
   switch (below(6)) {
@@ -240,7 +245,8 @@ void SystemModelTest::changeInstance() {
 }
 
 /// In one call: methods, poses, visibility, morph weights and jumps, of some instances twice.
-void SystemModelTest::changeSeveral() {
+template <class Engine>
+void ModelSteps<Engine>::changeSeveral() {
   if (model_->instances.empty()) return;
   std::vector<InstanceChange> changes;
   for (std::uint32_t count = 1 + below(12); count != 0; --count) {
@@ -257,7 +263,7 @@ void SystemModelTest::changeSeveral() {
     }
     if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
     if (change.pose || change.method) {
-      must(system().prepare(pipelineNeeds(instance.description)));
+      prepare(pipelineNeeds(instance.description));
       instance.isChanged = instance.isUrgent = true;
       instance.waitedFrames = 0;
     }
@@ -275,7 +281,8 @@ void SystemModelTest::changeSeveral() {
 }
 
 /// Of all instances, as culling decides.
-void SystemModelTest::setVisibility() {
+template <class Engine>
+void ModelSteps<Engine>::setVisibility() {
   std::vector<InstanceVisibility> wanted;
   for (ModelInstance& instance : model_->instances) {
     if (chance(20)) instance.isVisible = !instance.isVisible;
@@ -288,7 +295,8 @@ void SystemModelTest::setVisibility() {
   must(system().setVisibility(wanted));
 }
 
-void SystemModelTest::tryStaleHandle() {
+template <class Engine>
+void ModelSteps<Engine>::tryStaleHandle() {
   if (gone_.empty()) return;
   const InstanceHandle stale = gone_[below(gone_.size())];
   EXPECT_FALSE(system().removeInstance(stale).ok());
@@ -298,17 +306,8 @@ void SystemModelTest::tryStaleHandle() {
   EXPECT_FALSE(system().setVisibility({&shown, 1}).ok());
 }
 
-void SystemModelTest::showSome(std::span<std::byte> words) {
-  for (ModelInstance& instance : model_->instances) {
-    if (!instance.description.culledOnGpu) continue;
-    if (chance(20)) instance.isShownByGpu = !instance.isShownByGpu;
-    const std::uint32_t index = must(system().visibilityIndex(instance.handle));
-    const std::uint32_t word = instance.isShownByGpu ? 1u << below(32) : 0u;
-    std::memcpy(words.data() + index * 4, &word, sizeof(word));
-  }
-}
-
-void SystemModelTest::runFrame() {
+template <class Engine>
+void ModelSteps<Engine>::runFrame() {
   for (auto& [number, palette] : model_->poses) {
     if (!chance(60)) continue;
     const std::uint32_t pose = below(poseCount);
@@ -316,17 +315,12 @@ void SystemModelTest::runFrame() {
     model_->writePose(number, pose);
   }
   if (chance(15)) system().compact(below(40'000));
-  const auto nextWords = [this]() -> samples::MappedBuffer& {
-    return words_[submittedFrames_ % framesInFlight];
-  };
   if (chance(15)) {
-    showSome(nextWords().bytes());
-    engine_->abandon({nextWords().handle(), 0}, [this] { changeMeanwhile(); });
+    abandon();
     ++abandonedFrames_;
     if (chance(50)) return beginFrame();
   }
-  showSome(nextWords().bytes());
-  engine_->submit({nextWords().handle(), 0});
+  submit();
   ++submittedFrames_;
   model_->afterRecord();
   movedInstances_ += system().movedInstances().size();
@@ -334,13 +328,19 @@ void SystemModelTest::runFrame() {
   beginFrame();
 }
 
-void SystemModelTest::beginFrame() {
-  engine_->begin(below(framesInFlight));
+template <class Engine>
+void ModelSteps<Engine>::beginFrame() {
+  if constexpr (hasGpu) {
+    engine_->begin(below(framesInFlight));
+  } else {
+    engine_->begin();
+  }
   model_->beginFrame();
 }
 
 /// Between `record` and `abandonFrame`, when poses cannot be written.
-void SystemModelTest::changeMeanwhile() {
+template <class Engine>
+void ModelSteps<Engine>::changeMeanwhile() {
   for (std::uint32_t count = below(6); count != 0; --count) {
     switch (below(6)) {
       case 0:
@@ -365,7 +365,8 @@ void SystemModelTest::changeMeanwhile() {
   if (chance(15)) system().compact(below(40'000));
 }
 
-const Streams& SystemModelTest::expected(const ModelInstance& instance, const ShownPose& shown) {
+template <class Engine>
+const Streams& ModelSteps<Engine>::expected(const ModelInstance& instance, const ShownPose& shown) {
   // Meshes are told apart by what is in them, of which there are few.
   const std::uint32_t kind = kindOf_.at(shown.mesh);
   const ShownPose content{kind, shown.pose, shown.morphs, shown.method};
@@ -373,18 +374,21 @@ const Streams& SystemModelTest::expected(const ModelInstance& instance, const Sh
   description.method = shown.method;
   Streams& streams = expected_[{content, description.layout.tangents}];
   if (streams[positionStream].empty())
-    streams = alone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
+    streams = skinAlone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
   return streams;
 }
 
-void SystemModelTest::expectOutputs() {
+template <class Engine>
+void ModelSteps<Engine>::expectOutputs() {
   const std::vector<std::byte> bytes = engine_->readOutput();
   for (const ModelInstance& instance : model_->instances) {
     if (!instance.shown) continue;
     SCOPED_TRACE("frame " + std::to_string(engine_->frame()) + ", instance " +
                  std::to_string(instance.handle.index));
     const Streams streams = engine_->read(bytes, instance.handle);
-    expectSkinned(streams, expected(instance, *instance.shown));
+    const Streams& wanted = expected(instance, *instance.shown);
+    for (std::size_t stream = 0; stream < previousStream; ++stream)
+      EXPECT_TRUE(streams[stream] == wanted[stream]) << "stream " << stream;
     ++checkedInstances_;
     if (instance.description.layout.motion == Motion::none || !instance.before) continue;
     EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
@@ -392,7 +396,8 @@ void SystemModelTest::expectOutputs() {
   }
 }
 
-void SystemModelTest::step() {
+template <class Engine>
+void ModelSteps<Engine>::step() {
   const std::uint32_t kind = below(100);
   const bool isCrowded = model_->instances.size() > 60;
   if (kind < 4) return addMesh();
@@ -408,14 +413,18 @@ void SystemModelTest::step() {
   runFrame();
 }
 
-TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
-  for (std::uint32_t number = 0; number < stepCount && !HasFailure(); ++number) {
+template <class Engine>
+void ModelSteps<Engine>::run() {
+  for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
+    kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
+  makeSystem();
+  for (std::uint32_t number = 0; number < stepCount && !::testing::Test::HasFailure(); ++number) {
     SCOPED_TRACE("step " + std::to_string(number));
     step();
     if (number % systemSteps != systemSteps - 1) continue;
     runFrame();
     expectOutputs();
-    growths_ += system().outputGeneration();
+    growths_ += outputGeneration();
     makeSystem();
   }
   // Or else nothing was tested.
@@ -426,7 +435,131 @@ TEST_P(SystemModelTest, EveryStepGivesWhatTheModelSays) {
   EXPECT_GT(growths_, 100u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, SystemModelTest, ::testing::Values(1u, 2u, 3u));
+// -- On the GPU.
+
+class GpuModelTest : public SystemTest,
+                     public ModelSteps<SystemEngine>,
+                     public ::testing::WithParamInterface<std::uint32_t> {
+ protected:
+  GpuModelTest() : ModelSteps(GetParam()) {}
+  void TearDown() override {
+    engine_.reset();
+    for (samples::MappedBuffer& words : words_) words = {};
+    SystemTest::TearDown();
+  }
+
+  void makeEngine() override {
+    vulkan::SkinningSystemDescription small = description();
+    small.framesInFlight = framesInFlight;
+    small.meshCapacity = {2048, 512 << 10};
+    small.jointCapacity = {8, 8 * 40};
+    small.gpuJointCapacity = {0, 8 * 40};
+    small.instanceCapacity = {4, 200};
+    small.boundsCapacity = {1};
+    small.outputCapacity = outputCapacity;
+    for (samples::MappedBuffer& words : words_)
+      words = must(
+          samples::MappedBuffer::create(device(), 4096 * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+    engine_.emplace(device(), small);
+    engine_->recordsSecondary = GetParam() % 2 == 0;
+  }
+  void prepare(const PipelineNeeds& needs) override { must(system().prepare(needs)); }
+  samples::MappedBuffer& nextWords() { return words_[submittedFrames_ % framesInFlight]; }
+  void showSome() {
+    const std::span<std::byte> words = nextWords().bytes();
+    for (ModelInstance& instance : model_->instances) {
+      if (!instance.description.culledOnGpu) continue;
+      if (chance(20)) instance.isShownByGpu = !instance.isShownByGpu;
+      const std::uint32_t index = must(system().visibilityIndex(instance.handle));
+      const std::uint32_t word = instance.isShownByGpu ? 1u << below(32) : 0u;
+      std::memcpy(words.data() + index * 4, &word, sizeof(word));
+    }
+  }
+  void submit() override {
+    showSome();
+    engine_->submit({nextWords().handle(), 0});
+  }
+  void abandon() override {
+    showSome();
+    engine_->abandon({nextWords().handle(), 0}, [this] { changeMeanwhile(); });
+  }
+  std::uint64_t outputGeneration() override { return system().outputGeneration(); }
+  Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
+                    const InstanceDescription& description,
+                    std::span<const MorphWeight> morphs) override {
+    return alone(mesh, pose, description, morphs);
+  }
+
+  std::array<samples::MappedBuffer, framesInFlight> words_;
+};
+
+TEST_P(GpuModelTest, EveryStepGivesWhatTheModelSays) {
+  run();
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, GpuModelTest, ::testing::Values(1u, 2u, 3u));
+
+// -- On the CPU.
+
+class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public ModelSteps<CpuEngine> {
+ protected:
+  CpuModelTest() : ModelSteps(GetParam()) {}
+
+  void makeEngine() override {
+    cpu::SkinningSystemDescription small;
+    small.jointCapacity = {8, 8 * 40};
+    small.instanceCapacity = {4, 200};
+    small.boundsCapacity = {1};
+    small.outputCapacity = outputCapacity;
+    engine_.emplace(small);
+    engine_->verticesPerJob = GetParam() % 2 == 0 ? 1 << 16 : 24;
+    output_ = engine_->system().outputBytes().data();
+    generation_ = 0;
+  }
+  void prepare(const PipelineNeeds&) override {}
+  void submit() override {
+    engine_->submit();
+    const std::byte* const now = system().outputBytes().data();
+    generation_ += std::exchange(output_, now) != now;
+  }
+  void abandon() override {
+    engine_->abandon([this] { changeMeanwhile(); });
+  }
+  std::uint64_t outputGeneration() override { return generation_; }
+  Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
+                    const InstanceDescription& description,
+                    std::span<const MorphWeight> morphs) override {
+    VertexLayout layout = description.layout;
+    const bool hasPrevious = std::exchange(layout.motion, Motion::none) != Motion::none;
+    const cpu::Mesh own = must(cpu::Mesh::create(mesh));
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.morphs = morphs;
+    cpu::Job job;
+    job.mesh = &own;
+    job.method = description.method;
+    job.places = must(placeVertices(layout, mesh.vertexCount()));
+    std::vector<std::byte> bytes(job.places.size);
+    instance.output = bytes.data();
+    job.instances = {&instance, 1};
+    must(cpu::skin(job));
+    const std::array<OutputAttribute, streamCount> attributes{
+        job.places.positions, job.places.normals, job.places.tangents, {}};
+    Streams streams;
+    for (std::size_t stream = 0; stream < previousStream; ++stream)
+      streams[stream] = readAttribute(bytes, attributes[stream], mesh.vertexCount());
+    if (hasPrevious) streams[previousStream] = streams[positionStream];
+    return streams;
+  }
+
+ private:
+  const std::byte* output_ = nullptr;
+  std::uint64_t generation_ = 0;
+};
+
+TEST_P(CpuModelTest, EveryStepGivesWhatTheModelSays) {
+  run();
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, CpuModelTest, ::testing::Values(1u, 2u, 3u));
 
 }  // namespace
 }  // namespace dermis::test

@@ -77,6 +77,8 @@ class SystemEngine {
   void finish() { waitUntilUnderWay(0); }
   std::uint64_t frame() const { return frame_; }
   std::uint64_t completedFrame() const { return completedFrame_; }
+  /// The last `record` had nothing to do but copies.
+  bool isIdle() const { return lastFrame().dispatches == 0 || lastFrame().copies != 0; }
   /// Of the last `record`.
   vulkan::FrameStatistics lastFrame() const { return system_.statistics().lastFrame; }
 

@@ -5,12 +5,14 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <string_view>
 #include <vector>
 
 #include "abi.h"
 #include "dermis/cpu/skin.h"
+#include "dermis/cpu/skinning_system.h"
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
@@ -74,12 +76,33 @@ Result<bool> skinTriangle() {
   job.places = *places;
   job.instances = {&instance, 1};
   if (const Result<void> done = cpu::skin(job); !done) return done.error();
-  for (std::size_t vertex = 0; vertex < 3; ++vertex) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (static_cast<double>(skinnedFloats[vertex][axis]) != expected[vertex][axis]) return false;
+  const auto isExpected = [&] {
+    for (std::size_t vertex = 0; vertex < 9; ++vertex) {
+      if (static_cast<double>(skinnedFloats[vertex / 3][vertex % 3]) !=
+          expected[vertex / 3][vertex % 3])
+        return false;
     }
-  }
-  return true;
+    return true;
+  };
+  if (!isExpected()) return false;
+
+  // The same in a scene.
+  cpu::SkinningSystemDescription description;
+  description.output = std::as_writable_bytes(std::span(skinnedFloats));
+  Result<cpu::SkinningSystem> scene = cpu::SkinningSystem::create(description);
+  if (!scene) return scene.error();
+  InstanceDescription inScene;
+  inScene.mesh = *scene->addMesh(*packed);
+  inScene.pose = *scene->addPose(1);
+  const Result<InstanceHandle> added = scene->addInstance(inScene);
+  if (!added) return added.error();
+  const Result<void> morphed = scene->change({.instance = *added, .morphs = {{&morph, 1}}});
+  if (!morphed) return morphed.error();
+  scene->beginFrame();
+  scene->writePose(inScene.pose)->front() = palette.front();
+  std::memset(skinnedFloats, 0, sizeof(skinnedFloats));
+  for (const cpu::PlannedJob& planned : *scene->jobs()) cpu::skin(planned);
+  return isExpected();
 }
 
 }  // namespace

@@ -1,0 +1,530 @@
+// A Scene whose commands become jobs. The tables of its plan say which vertices of which instances
+// are skinned, from which poses; palettes are only names of poses here.
+
+#include "dermis/cpu/skinning_system.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "abi.h"
+#include "cpu/task.h"
+#include "dermis/cpu/skin.h"
+#include "plan/builder.h"
+
+namespace dermis::cpu {
+
+struct PlannedTask : Task {};
+
+void skin(const PlannedJob& job) {
+  skinTask(*job.task_);
+}
+
+namespace {
+
+constexpr std::uint32_t noResult = 0xffffffff;
+/// Skinned at a time by the widest vectors.
+constexpr std::uint64_t instancesTogether = 4;
+
+/// As large as offsets in the tables allow.
+DeviceLimits limitsOfMemory() {
+  DeviceLimits limits;
+  limits.maxStorageBufferRange = 0xfffffffc;
+  limits.minStorageBufferOffsetAlignment = 64;
+  limits.maxWorkgroupCountX = limits.maxWorkgroupCountY = 0xffffffff;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.storage16Bit = limits.storage8Bit = true;
+  limits.comparisonMethods = false;
+  return limits;
+}
+
+Error wrong(const std::string& what) {
+  return {ErrorCode::invalidArgument, what};
+}
+
+Result<void> checkMethod(Method method) {
+  if (!isForComparison(method)) return {};
+  return wrong(std::string(methodName(method)) +
+               " is for comparison, the CPU path has the everyday methods only");
+}
+
+/// The joint matrices that a palette is made of.
+struct PaletteSource {
+  std::span<const JointMatrix> pose;
+  bool mayScale = true;
+  std::uint64_t end = 0;  ///< the unit behind the palette
+};
+
+/// Where the attributes of one instance stand, by `Stream`.
+using Offsets = std::array<std::uint64_t, streamCount>;
+
+}  // namespace
+
+struct SkinningSystem::State {
+  explicit State(Scene&& own) : scene(std::move(own)) {}
+
+  Result<void> grow(const BufferGrowth& growth);
+  void addPoseBuffer(std::uint64_t bytes);
+  Result<MeshHandle> addMesh(Mesh&& mesh);
+  std::span<JointMatrix> poseAt(const PosePlace& place) {
+    return std::span(poseBuffers[place.poseBuffer])
+        .subspan(place.offset / sizeof(JointMatrix), place.jointCount);
+  }
+
+  void readBackResults();
+  void namePalettes(const DispatchCommand& dispatch);
+  void addDispatch(const DispatchCommand& dispatch, std::uint64_t verticesPerJob);
+  void addInstances(const Task& task, std::size_t first, std::uint64_t verticesPerJob);
+  void addTask(const Task& task, std::size_t first, std::size_t count);
+  TaskInstance taskInstance(const abi::InstanceRecord& record, std::uint32_t& result) const;
+  void finishTasks();
+  const PaletteSource& paletteAt(std::uint32_t unit) const;
+
+  Scene scene;
+  std::unique_ptr<State*> self;  ///< what the scene's growth callback is given
+  Plan plan;
+  std::span<const std::uint32_t> tables;  ///< of the plan
+  std::uint64_t frame = 0;
+  bool isPlanned = false;  ///< the frame has its jobs
+
+  struct OwnMesh {
+    MeshHandle handle;
+    Mesh mesh;
+  };
+  /// By the word at which the scene would place it.
+  std::unordered_map<std::uint32_t, OwnMesh> meshes;
+  std::vector<std::vector<JointMatrix>> poseBuffers;
+  std::vector<CacheLine> ownOutput;
+  std::span<std::byte> output;
+  std::map<std::uint32_t, PaletteSource> palettes;  ///< by their first unit; they do not overlap
+  mutable std::map<std::uint32_t, PaletteSource>::const_iterator lastPalette;
+
+  std::vector<TaskInstance> instances;
+  std::vector<std::uint32_t> resultOf;  ///< of each: the number of its result, or `noResult`
+  /// What a task finds out about an instance. Others may find out about its other vertices.
+  struct Part {
+    std::uint32_t result;
+    InstanceResult found;
+  };
+  std::vector<Part> parts;
+  std::vector<InstanceResult> results;  ///< by their numbers
+  std::vector<std::byte> readBack;
+  struct Extent {
+    std::size_t first, count;
+  };
+  std::vector<PlannedTask> tasks;
+  std::vector<Extent> extents;  ///< of each task, among the instances
+  std::vector<PlannedJob> jobs;
+};
+
+// -- Memory.
+
+void SkinningSystem::State::addPoseBuffer(std::uint64_t bytes) {
+  poseBuffers.emplace_back(bytes / sizeof(JointMatrix));
+}
+
+Result<void> SkinningSystem::State::grow(const BufferGrowth& growth) {
+  if (growth.role == BufferRole::poses) addPoseBuffer(growth.requirement.size);
+  if (growth.role != BufferRole::positions) return {};
+  std::vector<CacheLine> larger(growth.requirement.size / sizeof(CacheLine) + 1);
+  std::memcpy(larger.data(), output.data(), output.size());
+  ownOutput = std::move(larger);
+  output = std::as_writable_bytes(std::span(ownOutput)).first(growth.requirement.size);
+  return {};
+}
+
+SkinningSystem::SkinningSystem() = default;
+SkinningSystem::~SkinningSystem() = default;
+SkinningSystem::SkinningSystem(SkinningSystem&&) noexcept = default;
+SkinningSystem& SkinningSystem::operator=(SkinningSystem&&) noexcept = default;
+
+Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
+  const bool ownsOutput = description.output.data() == nullptr;
+  if (!ownsOutput && description.output.size() < 4)
+    return wrong("SkinningSystemDescription::output has fewer than 4 bytes");
+  auto self = std::make_unique<State*>(nullptr);
+  SceneDescription ofScene;
+  ofScene.framesInFlight = 1;
+  ofScene.jointCapacity = description.jointCapacity;
+  ofScene.outputCapacity =
+      ownsOutput ? description.outputCapacity : Capacity::fixed(description.output.size() / 4 * 4);
+  ofScene.instanceCapacity = description.instanceCapacity;
+  ofScene.boundsCapacity = description.boundsCapacity;
+  ofScene.limits = limitsOfMemory();
+  ofScene.tuning = {128, 32};
+  ofScene.growth = {self.get(), [](void* user, const BufferGrowth& growth) {
+                      return (*static_cast<State**>(user))->grow(growth);
+                    }};
+  Result<Scene> scene = Scene::create(ofScene);
+  if (!scene) return scene.error();
+  SkinningSystem system;
+  system.state_ = std::make_unique<State>(std::move(*scene));
+  State& state = *system.state_;
+  *self = &state;
+  state.self = std::move(self);
+  state.lastPalette = state.palettes.end();
+  for (std::uint32_t number = 0; number < state.scene.poseBufferCount(); ++number)
+    state.addPoseBuffer(state.scene.poseBuffer(number).requirement.size);
+  if (ownsOutput) {
+    const std::uint64_t size = state.scene.buffer(BufferRole::positions).size;
+    state.ownOutput.resize(size / sizeof(CacheLine) + 1);
+    state.output = std::as_writable_bytes(std::span(state.ownOutput)).first(size);
+  } else {
+    state.output = description.output;
+  }
+  return system;
+}
+
+// -- Meshes, poses, instances.
+
+Result<MeshHandle> SkinningSystem::addMesh(Mesh mesh) {
+  Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
+  if (!handle) return handle;
+  const auto word = static_cast<std::uint32_t>(*state_->scene.meshOffset(*handle) / 4);
+  // One that was removed may have stood there.
+  state_->meshes.insert_or_assign(word, State::OwnMesh{*handle, std::move(mesh)});
+  return handle;
+}
+Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
+  Result<Mesh> made = Mesh::create(mesh);
+  if (!made) return made.error();
+  return addMesh(std::move(*made));
+}
+Result<void> SkinningSystem::removeMesh(MeshHandle mesh) {
+  if (Result<void> removed = state_->scene.removeMesh(mesh); !removed) return removed;
+  std::erase_if(state_->meshes, [&](const auto& entry) { return entry.second.handle == mesh; });
+  return {};
+}
+
+Result<PoseHandle> SkinningSystem::addPose(std::uint32_t jointCount, const PoseOptions& options) {
+  PoseHandle pose;
+  if (Result<void> added = addPoses({&pose, 1}, jointCount, options); !added) return added.error();
+  return pose;
+}
+Result<void> SkinningSystem::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                                      const PoseOptions& options) {
+  if (options.writer == PoseWriter::gpu)
+    return wrong("a pose that the GPU writes cannot be skinned on the CPU");
+  if (Result<void> added = state_->scene.addPoses(poses, jointCount, options); !added) return added;
+  for (const PoseHandle pose : poses)
+    std::ranges::fill(state_->poseAt(*state_->scene.posePlace(pose)), JointMatrix{});
+  return {};
+}
+Result<void> SkinningSystem::removePose(PoseHandle pose) {
+  return state_->scene.removePose(pose);
+}
+Result<InstanceHandle> SkinningSystem::addInstance(const InstanceDescription& description) {
+  if (Result<void> good = checkMethod(description.method); !good) return good.error();
+  if (description.culledOnGpu)
+    return wrong("an instance that is culled on the GPU cannot be skinned on the CPU");
+  return state_->scene.addInstance(description);
+}
+Result<void> SkinningSystem::removeInstance(InstanceHandle instance) {
+  return state_->scene.removeInstance(instance);
+}
+
+// -- What changes.
+
+void SkinningSystem::beginFrame() {
+  State& state = *state_;
+  const bool hasResults = std::exchange(state.isPlanned, false);
+  ++state.frame;
+  // Numbers that rise one by one cannot be wrong.
+  static_cast<void>(state.scene.beginFrame(state.frame, state.frame - 1).ok());
+  if (hasResults) state.readBackResults();
+  state.jobs.clear();
+}
+std::uint64_t SkinningSystem::frame() const {
+  return state_->frame;
+}
+
+Result<std::span<JointMatrix>> SkinningSystem::writePose(PoseHandle pose) {
+  const Result<PosePlace> place = state_->scene.writePose(pose);
+  if (!place) return place.error();
+  return state_->poseAt(*place);
+}
+Result<void> SkinningSystem::change(const InstanceChange& change) {
+  if (change.method) {
+    if (Result<void> good = checkMethod(*change.method); !good) return good;
+  }
+  return state_->scene.change(change);
+}
+Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
+  const auto isWrong = [](const InstanceChange& change) {
+    return change.method && isForComparison(*change.method);
+  };
+  const auto bad = std::ranges::find_if(changes, isWrong);
+  const auto number = static_cast<std::size_t>(bad - changes.begin());
+  if (Result<void> done = state_->scene.change(changes.first(number)); !done) return done;
+  if (bad == changes.end()) return {};
+  return wrong("change " + std::to_string(number) + ": " +
+               checkMethod(*bad->method).error().message);
+}
+Result<void> SkinningSystem::setVisibility(std::span<const InstanceVisibility> instances) {
+  return state_->scene.setVisibility(instances);
+}
+Result<bool> SkinningSystem::isDue(InstanceHandle instance) const {
+  return state_->scene.isDue(instance);
+}
+std::uint64_t SkinningSystem::compact(std::uint64_t maxBytes) {
+  return state_->scene.compact(maxBytes);
+}
+
+// -- Frames.
+
+Result<std::span<const PlannedJob>> SkinningSystem::jobs(std::uint32_t verticesPerJob) {
+  State& state = *state_;
+  if (Result<void> planned = state.scene.plan(state.plan); !planned) return planned.error();
+  state.tables = PlanData::of(state.plan).tables;
+  state.instances.clear();
+  state.resultOf.clear();
+  state.lastPalette = state.palettes.end();
+  state.tasks.clear();
+  state.extents.clear();
+  for (const Command& command : state.plan.commands()) {
+    if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
+      if (dispatch->variant.kernel == Kernel::palette) {
+        state.namePalettes(*dispatch);
+      } else {
+        state.addDispatch(*dispatch, std::max(verticesPerJob, 1u));
+      }
+    } else if (const auto* copy = std::get_if<CopyCommand>(&command);
+               copy != nullptr && copy->to == BufferRole::positions) {
+      std::memcpy(state.output.data() + copy->toOffset, state.output.data() + copy->fromOffset,
+                  copy->size);
+    }
+  }
+  state.finishTasks();
+  if (Result<void> committed = state.scene.commit(); !committed) return committed.error();
+  state.isPlanned = true;
+  return std::span<const PlannedJob>(state.jobs);
+}
+
+Result<void> SkinningSystem::abandonFrame() {
+  if (Result<void> abandoned = state_->scene.abandonFrame(state_->frame); !abandoned)
+    return abandoned;
+  state_->isPlanned = false;
+  state_->jobs.clear();
+  return {};
+}
+
+/// A palette that is written ends those that it overwrites.
+void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
+  const auto push = abi::load<abi::PalettePush>(dispatch.constants, 0);
+  for (std::uint32_t number = 0; number < push.paletteCount; ++number) {
+    const auto record =
+        abi::load<abi::PaletteRecord>(tables, push.palettes + number * abi::PALETTE_WORDS);
+    PaletteSource source;
+    source.mayScale = (record.flags & abi::PALETTE_MAY_SCALE) != 0;
+    source.pose =
+        std::span<const JointMatrix>(poseBuffers[dispatch.poseBuffer])
+            .subspan(record.matrices * unitBytes / sizeof(JointMatrix), record.jointCount);
+    const PaletteForm form = (record.flags & abi::PALETTE_MATRICES) != 0
+                                 ? PaletteForm::matrices
+                                 : PaletteForm::dualQuaternions;
+    source.end = record.place + paletteSize(form, record.jointCount, source.mayScale);
+    auto first = palettes.lower_bound(record.place);
+    if (first != palettes.begin() && std::prev(first)->second.end > record.place) --first;
+    auto end = first;
+    while (end != palettes.end() && end->first < source.end) ++end;
+    // Mostly it is the same again: the memory is kept.
+    if (first != end && first->first == record.place) {
+      first->second = source;
+      ++first;
+      palettes.erase(first, end);
+    } else {
+      palettes.erase(first, end);
+      palettes.emplace(record.place, source);
+    }
+  }
+}
+
+/// Instances mostly come in the order of their poses.
+const PaletteSource& SkinningSystem::State::paletteAt(std::uint32_t unit) const {
+  if (lastPalette != palettes.end() && lastPalette->first != unit) ++lastPalette;
+  if (lastPalette == palettes.end() || lastPalette->first != unit)
+    lastPalette = palettes.find(unit);
+  return lastPalette->second;
+}
+
+TaskInstance SkinningSystem::State::taskInstance(const abi::InstanceRecord& record,
+                                                 std::uint32_t& result) const {
+  TaskInstance instance;
+  const PaletteSource& palette = paletteAt(record.palette);
+  instance.pose = palette.pose;
+  instance.mayScale = palette.mayScale;
+  instance.restartsMotion = (record.flags & abi::INSTANCE_RESTARTS) != 0;
+  instance.settles = (record.flags & abi::INSTANCE_SETTLES) != 0;
+  if (record.extension == 0) return instance;
+  const auto extension = abi::load<abi::ExtensionRecord>(tables, record.extension);
+  static_assert(sizeof(MorphWeight) == sizeof(abi::ActiveMorph));
+  instance.morphs = {reinterpret_cast<const MorphWeight*>(tables.data() + extension.morphs),
+                     extension.morphCount};
+  result = extension.result;
+  const float centre[3] = {extension.centreX, extension.centreY, extension.centreZ};
+  const float inverse[3] = {extension.inverseX, extension.inverseY, extension.inverseZ};
+  std::ranges::copy(centre, instance.boxCentre);
+  std::ranges::copy(inverse, instance.boxInverse);
+  return instance;
+}
+
+void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
+                                        std::uint64_t verticesPerJob) {
+  const auto push = abi::load<abi::SkinPush>(dispatch.constants, 0);
+  const Variant& variant = dispatch.variant;
+  const bool findsOut = hasResults(variant);
+  Task task;
+  task.method = variant.method;
+  task.places.motion = variant.motion;
+  const std::array<OutputAttribute*, streamCount> attributes{
+      &task.places.positions, &task.places.normals, &task.places.tangents,
+      &task.places.previousPositions};
+  const std::array<VertexFormat, streamCount> formats{
+      variant.positions, variant.normals, variant.tangents,
+      variant.motion == Motion::none ? VertexFormat::none : variant.positions};
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    attributes[stream]->format = formats[stream];
+  for (std::uint32_t number = 0; number < push.groupCount; ++number) {
+    const auto group = abi::load<abi::GroupRecord>(tables, push.groups + number * abi::GROUP_WORDS);
+    task.mesh = &meshes.find(group.mesh)->second.mesh.data();
+    task.firstVertex = group.firstVertex;
+    task.vertexEnd = group.vertexEnd;
+    const std::array<std::uint32_t, streamCount> strides{group.positionStride, group.normalStride,
+                                                         group.tangentStride, group.previousStride};
+    for (std::size_t stream = 0; stream < streamCount; ++stream)
+      attributes[stream]->stride = strides[stream];
+
+    const std::size_t first = instances.size();
+    for (std::uint32_t index = 0; index < group.instanceCount; ++index) {
+      const auto record = abi::load<abi::InstanceRecord>(
+          tables, push.instances + (group.firstInstance + index) * abi::INSTANCE_WORDS);
+      Offsets offsets{record.positions, record.normals, record.tangents, record.previousPositions};
+      std::uint64_t least = ~std::uint64_t{0};
+      for (std::size_t stream = 0; stream < streamCount; ++stream) {
+        // Records say where the group's first vertex stands.
+        offsets[stream] +=
+            dispatch.windows[stream].offset - std::uint64_t{group.firstVertex} * strides[stream];
+        if (formats[stream] != VertexFormat::none) least = std::min(least, offsets[stream]);
+      }
+      // One mesh, one set of formats and strides: one layout, so these are the same for all.
+      for (std::size_t stream = 0; stream < streamCount; ++stream)
+        attributes[stream]->offset =
+            formats[stream] == VertexFormat::none ? 0 : offsets[stream] - least;
+      std::uint32_t result = 0;
+      TaskInstance& instance = instances.emplace_back(taskInstance(record, result));
+      instance.output = output.data() + least;
+      resultOf.push_back(findsOut && !instance.settles ? result : noResult);
+    }
+    addInstances(task, first, verticesPerJob);
+  }
+}
+
+/// Instances from `first` on, as tasks of some of them or of some of their vertices.
+void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
+                                         std::uint64_t verticesPerJob) {
+  const std::size_t count = instances.size() - first;
+  if (count == 0) return;
+  const std::uint64_t vertices = task.vertexEnd - task.firstVertex;
+  std::uint64_t each = std::min<std::uint64_t>(count, instancesTogether);
+  std::uint64_t step = vertices;
+  if (vertices * each <= verticesPerJob) {
+    each = std::max(verticesPerJob / vertices / instancesTogether * instancesTogether, each);
+  } else {
+    const std::uint64_t ranges = (vertices * each + verticesPerJob - 1) / verticesPerJob;
+    const std::uint64_t blocks = (vertices + ranges * blockVertices - 1) / (ranges * blockVertices);
+    step = blocks * blockVertices;
+  }
+  const bool findOut =
+      std::any_of(resultOf.end() - static_cast<std::ptrdiff_t>(count), resultOf.end(),
+                  [](std::uint32_t result) { return result != noResult; });
+  Task part = task;
+  for (std::uint64_t begin = task.firstVertex; begin < task.vertexEnd; begin += step) {
+    part.firstVertex = static_cast<std::uint32_t>(begin);
+    part.vertexEnd =
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(begin + step, task.vertexEnd));
+    const bool isAgain = begin != task.firstVertex && findOut;
+    for (std::size_t instance = 0; isAgain && instance < count; ++instance) {
+      // Each range finds out something of its own.
+      instances.push_back(TaskInstance(instances[first + instance]));
+      resultOf.push_back(std::uint32_t{resultOf[first + instance]});
+    }
+    const std::size_t from = isAgain ? instances.size() - count : first;
+    for (std::size_t instance = 0; instance < count; instance += each)
+      addTask(part, from + instance, std::min<std::size_t>(each, count - instance));
+  }
+}
+
+void SkinningSystem::State::addTask(const Task& task, std::size_t first, std::size_t count) {
+  tasks.push_back({task});
+  extents.push_back({first, count});
+}
+
+/// When nothing moves any more.
+void SkinningSystem::State::finishTasks() {
+  parts.clear();
+  for (const std::uint32_t result : resultOf) {
+    if (result != noResult) parts.push_back({result, {}});
+  }
+  std::size_t part = 0;
+  for (std::size_t index = 0; index < instances.size(); ++index) {
+    if (resultOf[index] != noResult) instances[index].result = &parts[part++].found;
+  }
+  jobs.clear();
+  for (std::size_t index = 0; index < tasks.size(); ++index) {
+    PlannedTask& task = tasks[index];
+    task.instances = std::span(instances).subspan(extents[index].first, extents[index].count);
+    PlannedJob& job = jobs.emplace_back();
+    job.task_ = &task;
+    job.vertexCount_ = std::uint64_t{task.vertexEnd - task.firstVertex} * task.instances.size();
+  }
+}
+
+/// As the GPU's commands do.
+void SkinningSystem::State::readBackResults() {
+  for (const Part& part : parts) {
+    if (results.size() <= part.result) results.resize(part.result + 1);
+    results[part.result] = {};
+  }
+  for (const Part& part : parts) addResult(results[part.result], part.found);
+  readBack.resize(plan.buffer(BufferRole::readBack).size);
+  for (const Command& command : plan.commands()) {
+    const auto* copy = std::get_if<CopyCommand>(&command);
+    if (copy == nullptr || copy->to != BufferRole::readBack) continue;
+    const std::uint64_t needed = (copy->fromOffset + copy->size) / sizeof(InstanceResult);
+    if (results.size() < needed) results.resize(needed);
+    std::memcpy(readBack.data() + copy->toOffset,
+                reinterpret_cast<const std::byte*>(results.data()) + copy->fromOffset, copy->size);
+  }
+  static_cast<void>(scene.readBack(frame - 1, readBack).ok());  // it was committed last
+}
+
+// -- Results.
+
+std::span<const std::byte> SkinningSystem::outputBytes() const {
+  return state_->output;
+}
+Result<InstanceOutput> SkinningSystem::output(InstanceHandle instance) const {
+  return state_->scene.output(instance);
+}
+std::span<const InstanceHandle> SkinningSystem::skinnedInstances() const {
+  return state_->scene.skinnedInstances();
+}
+std::span<const InstanceHandle> SkinningSystem::settledInstances() const {
+  return state_->scene.settledInstances();
+}
+std::span<const InstanceHandle> SkinningSystem::movedInstances() const {
+  return state_->scene.movedInstances();
+}
+Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle instance) const {
+  return state_->scene.bounds(instance);
+}
+SceneStatistics SkinningSystem::statistics() const {
+  return state_->scene.statistics();
+}
+
+}  // namespace dermis::cpu

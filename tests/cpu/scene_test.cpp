@@ -1,0 +1,269 @@
+// cpu::SkinningSystem: what the model-based test (gpu/system_model_test.cpp) does not do.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "cpu_engine.h"
+#include "dermis/cpu/skin.h"
+#include "dermis/pack.h"
+#include "random_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint32_t jointCount = 8, vertexCount = 1001;
+
+PackedMesh meshOf(std::uint32_t vertices) {
+  OwnedMesh mesh = randomMesh(1, vertices, jointCount, 4);
+  addTangents(mesh, 2);
+  addMorphs(mesh, 3, 3);
+  return must(pack(mesh.view(), jointCount));
+}
+
+/// Instances of one mesh in a pose each.
+class CpuSceneTest : public ::testing::Test {
+ protected:
+  void add(std::uint32_t count, const VertexLayout& layout, bool bounds = false) {
+    if (!mesh_) mesh_ = engine_.addMesh(packed_);
+    InstanceDescription description;
+    description.mesh = mesh_;
+    description.layout = layout;
+    description.bounds = bounds;
+    description.box = {{-2, -2, -2}, {2, 2, 2}};
+    for (std::uint32_t i = 0; i < count; ++i) {
+      description.pose = must(engine_->addPose(jointCount));
+      poses_.push_back(description.pose);
+      descriptions_.push_back(description);
+      instances_.push_back(must(engine_->addInstance(description)));
+    }
+  }
+  void writePoses(std::uint32_t seed) {
+    for (std::size_t i = 0; i < poses_.size(); ++i) engine_.writePose(poses_[i], poseOf(seed, i));
+  }
+  static std::vector<JointMatrix> poseOf(std::uint32_t seed, std::size_t index) {
+    return randomPose(seed * 100 + static_cast<std::uint32_t>(index), jointCount, Rigidity::rigid);
+  }
+  /// What a job of the instance alone writes, and finds out.
+  std::vector<std::byte> alone(std::size_t index, std::uint32_t seed, InstanceResult& found) const {
+    const cpu::Mesh mesh = must(cpu::Mesh::create(packed_));
+    VertexLayout layout = descriptions_[index].layout;
+    const std::vector<JointMatrix> pose = poseOf(seed, index);
+    cpu::Job job;
+    job.mesh = &mesh;
+    job.method = descriptions_[index].method;
+    job.places = must(placeVertices(layout, vertexCount));
+    std::vector<std::byte> bytes(job.places.size);
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.output = bytes.data();
+    instance.box = descriptions_[index].box;
+    instance.result = &found;
+    job.instances = {&instance, 1};
+    must(cpu::skin(job));
+    return bytes;
+  }
+
+  PackedMesh packed_ = meshOf(vertexCount);
+  CpuEngine engine_{{}};
+  MeshHandle mesh_;
+  std::vector<PoseHandle> poses_;
+  std::vector<InstanceHandle> instances_;
+  std::vector<InstanceDescription> descriptions_;
+};
+
+VertexLayout normalsToo() {
+  VertexLayout layout;
+  layout.normals = VertexFormat::float32x3;
+  return layout;
+}
+
+TEST_F(CpuSceneTest, BoundsAndClampedVerticesAreThoseOfAllJobsTogether) {
+  engine_.verticesPerJob = 100;  // several jobs for each instance
+  VertexLayout snorm = normalsToo();
+  snorm.positions = VertexFormat::snorm16x4;
+  add(5, normalsToo(), true);
+  add(6, snorm, true);
+  for (std::uint32_t frame = 1; frame <= 3; ++frame) {
+    engine_.begin();
+    for (std::size_t i = 0; frame > 1 && i < instances_.size(); ++i) {
+      InstanceResult found;
+      alone(i, frame - 1, found);
+      const std::optional<Box> box = must(engine_->bounds(instances_[i]));
+      ASSERT_TRUE(box && found.box());
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(box->min[axis], found.box()->min[axis]);
+        EXPECT_EQ(box->max[axis], found.box()->max[axis]);
+      }
+    }
+    writePoses(frame);
+    engine_.submit();
+  }
+  const std::vector<std::byte> bytes = engine_.readOutput();
+  for (std::size_t i = 0; i < instances_.size(); ++i) {
+    InstanceResult found;
+    const std::vector<std::byte> expected = alone(i, 3, found);
+    const InstanceOutput output = must(engine_->output(instances_[i]));
+    EXPECT_EQ(std::memcmp(bytes.data() + output.offset, expected.data(), expected.size()), 0) << i;
+  }
+}
+
+TEST_F(CpuSceneTest, NoBitDependsOnHowLongJobsAre) {
+  add(9, normalsToo());
+  std::vector<std::byte> first;
+  std::uint64_t frame = 0;
+  for (const std::uint32_t vertices : {1u, 7u, 64u, 1000u, 5000u, 1u << 20}) {
+    engine_.verticesPerJob = vertices;
+    engine_.begin();
+    writePoses(1);
+    std::uint64_t planned = 0;
+    const std::span<const cpu::PlannedJob> jobs = must(engine_->jobs(vertices));
+    for (const cpu::PlannedJob& job : jobs) {
+      planned += job.vertexCount();
+      // A job of several instances has at least a block of each.
+      EXPECT_LE(job.vertexCount(), std::max(vertices, 32u));
+      cpu::skin(job);
+    }
+    EXPECT_EQ(planned, 9u * vertexCount);
+    EXPECT_EQ(engine_->statistics().lastFrame.skinnedVertices, planned);
+    EXPECT_EQ(engine_->statistics().lastFrame.frame, ++frame);
+    if (first.empty()) first = engine_.readOutput();
+    EXPECT_TRUE(engine_.readOutput() == first) << vertices;
+  }
+}
+
+TEST_F(CpuSceneTest, TheOutputMayBeTheEngines) {
+  const std::uint64_t size = std::uint64_t{vertexCount} * 24;
+  std::vector<std::byte> memory(size * 2 + 64, std::byte{0xa5});
+  cpu::SkinningSystemDescription description;
+  description.output = std::span(memory).subspan(32, size * 2);
+  CpuEngine engine(description);
+  engine.begin();
+  InstanceDescription instance;
+  instance.mesh = engine.addMesh(packed_);
+  instance.pose = must(engine->addPose(jointCount));
+  instance.layout = normalsToo();
+  static_cast<void>(must(engine->addInstance(instance)));
+  static_cast<void>(must(engine->addInstance(instance)));
+  const Result<InstanceHandle> third = engine->addInstance(instance);
+  ASSERT_FALSE(third.ok());
+  EXPECT_EQ(third.error().code, ErrorCode::limitExceeded);
+  engine.submit();
+  EXPECT_EQ(engine->outputBytes().data(), memory.data() + 32);
+  const auto isUntouched = [](std::byte byte) { return byte == std::byte{0xa5}; };
+  EXPECT_TRUE(std::all_of(memory.begin(), memory.begin() + 32, isUntouched));
+  EXPECT_TRUE(std::all_of(memory.end() - 32, memory.end(), isUntouched));
+  EXPECT_FALSE(std::all_of(memory.begin() + 32, memory.end() - 32, isUntouched));
+}
+
+TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
+  add(2, normalsToo());
+  const auto expectRefused = [](const auto& result, const char* words) {
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
+    EXPECT_NE(result.error().message.find(words), std::string::npos) << result.error().message;
+  };
+  expectRefused(engine_->addPose(jointCount, {.writer = PoseWriter::gpu}), "GPU");
+  InstanceDescription description = descriptions_[0];
+  description.culledOnGpu = true;
+  expectRefused(engine_->addInstance(description), "culled on the GPU");
+  description = descriptions_[0];
+  description.method = Method::logMatrix;
+  expectRefused(engine_->addInstance(description), "log_matrix");
+  const InstanceChange wrong{.instance = instances_[0], .method = Method::sphericalBlend};
+  expectRefused(engine_->change(wrong), "spherical_blend");
+  // The one before it is made.
+  const std::array<InstanceChange, 3> changes{{{.instance = instances_[0], .visible = false},
+                                               wrong,
+                                               {.instance = instances_[1], .visible = false}}};
+  expectRefused(engine_->change(changes), "1");
+  engine_.begin();
+  static_cast<void>(must(engine_->jobs()));
+  EXPECT_EQ(engine_->skinnedInstances().size(), 1u);
+  EXPECT_EQ(engine_->skinnedInstances()[0], instances_[1]);
+  expectRefused(engine_->jobs(), "beginFrame");
+  std::byte little[3];
+  cpu::SkinningSystemDescription tiny;
+  tiny.output = little;
+  expectRefused(cpu::SkinningSystem::create(tiny), "output");
+}
+
+// What a neighbour finds out later does not take it away either.
+TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
+  VertexLayout layout = normalsToo();
+  layout.motion = Motion::kept;
+  add(3, layout, true);
+  engine_.begin();
+  writePoses(1);
+  engine_.submit();
+  engine_.begin();
+  const Box first = must(engine_->bounds(instances_[1])).value();
+  for (std::uint32_t frame = 2; frame < 5; ++frame) {
+    engine_.writePose(poses_[0], poseOf(frame, 0));
+    engine_.writePose(poses_[2], poseOf(frame, 2));
+    if (frame == 3) {
+      engine_.abandon([] {});
+    } else {
+      engine_.submit();
+    }
+    engine_.begin();
+    const Box now = must(engine_->bounds(instances_[1])).value();
+    EXPECT_EQ(std::memcmp(&first, &now, sizeof(now)), 0);
+  }
+}
+
+// As in a job of its own.
+TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
+  engine_.begin();
+  mesh_ = engine_.addMesh(packed_);
+  const std::vector<JointMatrix> pose = randomPose(1, jointCount, Rigidity::shear);
+  std::vector<std::vector<std::byte>> outputs;
+  for (const bool mayScale : {true, false}) {
+    InstanceDescription description;
+    description.mesh = mesh_;
+    description.pose = must(engine_->addPose(jointCount, {.mayScale = mayScale}));
+    engine_.writePose(description.pose, pose);
+    instances_.push_back(must(engine_->addInstance(description)));
+    const cpu::Mesh mesh = must(cpu::Mesh::create(packed_));
+    cpu::Job job;
+    job.mesh = &mesh;
+    job.places = must(placeVertices(description.layout, vertexCount));
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.mayScale = mayScale;
+    instance.output = outputs.emplace_back(job.places.size).data();
+    job.instances = {&instance, 1};
+    must(cpu::skin(job));
+  }
+  engine_.submit();
+  EXPECT_NE(outputs[0], outputs[1]);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const InstanceOutput output = must(engine_->output(instances_[i]));
+    EXPECT_EQ(readAttribute(engine_.readOutput(), output.positions, vertexCount), outputs[i]) << i;
+  }
+}
+
+TEST_F(CpuSceneTest, PosesAreTheIdentityUntilTheyAreWritten) {
+  engine_.begin();
+  const PoseHandle other = must(engine_->addPose(jointCount));  // whose place is used again
+  engine_.writePose(other, poseOf(1, 0));
+  must(engine_->removePose(other));
+  engine_.submit();
+  engine_.begin();
+  add(1, normalsToo());
+  engine_.submit();
+  const InstanceOutput output = must(engine_->output(instances_[0]));
+  const OwnedMesh source = randomMesh(1, vertexCount, jointCount, 4);
+  const std::vector<std::byte> positions =
+      readAttribute(engine_.readOutput(), output.positions, vertexCount);
+  for (std::size_t i = 0; i < vertexCount * 3u; ++i) {
+    float value;
+    std::memcpy(&value, positions.data() + i * 4, 4);
+    ASSERT_NEAR(value, source.positions[i], 1e-6f * (1 + std::abs(value))) << i;
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

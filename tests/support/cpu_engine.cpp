@@ -1,0 +1,60 @@
+#include "cpu_engine.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+namespace dermis::test {
+
+CpuEngine::CpuEngine(const cpu::SkinningSystemDescription& description)
+    : system_(must(cpu::SkinningSystem::create(description))) {}
+
+MeshHandle CpuEngine::addMesh(const PackedMesh& mesh) {
+  const MeshHandle handle = must(system_.addMesh(mesh));
+  vertexCounts_[{handle.index, handle.generation}] = mesh.vertexCount();
+  return handle;
+}
+
+void CpuEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matrices) {
+  const std::span<JointMatrix> to = must(system_.writePose(pose));
+  if (to.size() != matrices.size()) throw std::runtime_error("the pose has another size");
+  std::ranges::copy(matrices, to.begin());
+}
+
+void CpuEngine::submit() {
+  const std::span<const cpu::PlannedJob> planned = must(system_.jobs(verticesPerJob));
+  std::vector<cpu::PlannedJob> jobs(planned.begin(), planned.end());
+  std::ranges::shuffle(jobs, random_);
+  jobCount_ = jobs.size();
+  const auto half = jobs.begin() + static_cast<std::ptrdiff_t>(jobs.size() / 2);
+  const auto run = [](auto begin, auto end) {
+    std::for_each(begin, end, [](const cpu::PlannedJob& job) { cpu::skin(job); });
+  };
+  std::thread other(run, jobs.begin(), half);
+  run(half, jobs.end());
+  other.join();
+}
+
+void CpuEngine::abandon(const std::function<void()>& meanwhile) {
+  static_cast<void>(must(system_.jobs(verticesPerJob)));
+  meanwhile();
+  must(system_.abandonFrame());
+}
+
+std::vector<std::byte> CpuEngine::readOutput() const {
+  const std::span<const std::byte> bytes = system_.outputBytes();
+  return {bytes.begin(), bytes.end()};
+}
+
+Streams CpuEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
+  const InstanceOutput output = must(system_.output(instance));
+  const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
+  Streams streams;
+  if (output.size == 0) return streams;
+  const std::uint32_t vertices = vertexCounts_.at({output.mesh.index, output.mesh.generation});
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    streams[stream] = readAttribute(bytes, attributes[stream], vertices);
+  return streams;
+}
+
+}  // namespace dermis::test

@@ -1,0 +1,48 @@
+// A small engine around a cpu::SkinningSystem, with the calls of SystemEngine.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "dermis/cpu/skinning_system.h"
+#include "system_engine.h"
+
+namespace dermis::test {
+
+class CpuEngine {
+ public:
+  explicit CpuEngine(const cpu::SkinningSystemDescription& description);
+
+  cpu::SkinningSystem& system() { return system_; }
+  cpu::SkinningSystem* operator->() { return &system_; }
+
+  MeshHandle addMesh(const PackedMesh& mesh);
+  void writePose(PoseHandle pose, std::span<const JointMatrix> matrices);
+
+  void begin() { system_.beginFrame(); }
+  /// Does the jobs of the frame on two threads, in a random order.
+  void submit();
+  /// Lists the jobs, calls `meanwhile`, and says that none was done.
+  void abandon(const std::function<void()>& meanwhile);
+  std::uint64_t frame() const { return system_.frame(); }
+  std::uint64_t completedFrame() const { return system_.frame() - 1; }
+  /// The last frame had nothing to do.
+  bool isIdle() const { return jobCount_ == 0; }
+
+  std::vector<std::byte> readOutput() const;
+  Streams read(std::span<const std::byte> bytes, InstanceHandle instance) const;
+
+  std::uint32_t verticesPerJob = 1 << 16;
+
+ private:
+  cpu::SkinningSystem system_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
+  std::size_t jobCount_ = 0;
+  std::mt19937 random_{1};
+};
+
+}  // namespace dermis::test
