@@ -370,6 +370,51 @@ TEST_F(CpuSkinTest, BytesBetweenAndBehindAttributesStay) {
   EXPECT_EQ(odd.back(), std::byte{0x5a});
 }
 
+// An array for each attribute, as programs without a GPU like it.
+TEST_F(CpuSkinTest, AttributesMayGoToArraysOfTheirOwn) {
+  const VertexLayout layout = layoutOf(VertexFormat::float32x3, VertexFormat::float32x3,
+                                       VertexFormat::float32x4, Motion::kept);
+  Crowd together(100, 4, Rigidity::rigid, layout);
+  for (cpu::Instance& instance : together.instances) instance.restartsMotion = true;
+  together.skin(Method::dualQuaternion);
+  Crowd apart(100, 4, Rigidity::rigid, layout);
+  cpu::Job job = apart.job(Method::dualQuaternion);
+  job.places.positions = job.places.previousPositions = {0, 12, VertexFormat::float32x3};
+  job.places.normals = {0, 12, VertexFormat::float32x3};
+  job.places.tangents = {4, 20, VertexFormat::float32x4};
+  for (std::size_t i = 0; i < instanceCount; ++i) {
+    std::vector<float> positions(300), normals(300), tangents(501), previous(300);
+    apart.instances[i].output = {positions.data(), normals.data(), tangents.data(),
+                                 previous.data()};
+    apart.instances[i].restartsMotion = true;
+    job.instances = std::span(apart.instances).subspan(i, 1);
+    const Result<void> done = cpu::skin(job);
+    ASSERT_TRUE(done.ok()) << done.error().message;
+    const auto expectSame = [&](const float* floats, std::size_t stride, std::size_t count,
+                                const OutputAttribute& attribute) {
+      for (std::size_t vertex = 0; vertex < 100; ++vertex) {
+        EXPECT_EQ(std::memcmp(floats + vertex * stride,
+                              together.output.data() + together.places.size * i + attribute.offset +
+                                  vertex * attribute.stride,
+                              count * 4),
+                  0);
+      }
+    };
+    expectSame(positions.data(), 3, 3, together.places.positions);
+    expectSame(normals.data(), 3, 3, together.places.normals);
+    expectSame(tangents.data() + 1, 5, 4, together.places.tangents);
+    expectSame(previous.data(), 3, 3, together.places.previousPositions);
+    EXPECT_EQ(tangents[0], 0.0f);
+    EXPECT_EQ(tangents[5], 0.0f);
+  }
+  apart.instances[0].output = {apart.output.data(), nullptr, apart.output.data(),
+                               apart.output.data()};
+  job.instances = {&apart.instances[0], 1};
+  const Result<void> refused = cpu::skin(job);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("no output for its normals"), std::string::npos);
+}
+
 TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
   for (const VertexLayout& layout :
        {plainLayout, layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none)}) {
@@ -470,7 +515,8 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   };
   const MorphWeight unknown{7, 1};
   const std::array<MorphWeight, 2> falling{{{2, 1}, {1, 1}}};
-  expectBadInstance([](cpu::Instance& i) { i.output = nullptr; }, " has no output");
+  expectBadInstance([](cpu::Instance& i) { i.output = nullptr; },
+                    " has no output for its positions");
   expectBadInstance([](cpu::Instance& i) { i.pose = i.pose.first(3); }, ": its pose has 3 joints");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = {&unknown, 1}; }, "");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = falling; },

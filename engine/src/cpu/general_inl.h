@@ -488,9 +488,8 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
   const MeshData& mesh = *job.mesh;
   const VertexPlaces& places = job.places;
   const std::size_t vertex = std::size_t{block} * blockVertices + lane;
-  const auto placeOf = [&](const OutputAttribute& attribute) {
-    return static_cast<std::byte*>(task.instance.output) + attribute.offset +
-           vertex * attribute.stride;
+  const auto placeOf = [&](Stream stream, const OutputAttribute& attribute) {
+    return task.instance.output(stream) + vertex * attribute.stride;
   };
   const std::uint64_t slot = task.run.slotOf(block) + lane * task.run.influences;
   const Slots slots{mesh.jointNumbers.data() + slot, mesh.pairNumbers.data() + slot,
@@ -519,8 +518,8 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
     return encodePosition(d, format, relative);
   };
   if (task.instance.result != nullptr) addPositions(d, skinned.position, first, end, findings);
-  std::byte* const to = placeOf(places.positions);
-  std::byte* const toPrevious = placeOf(places.previousPositions);
+  std::byte* const to = placeOf(Stream::positions, places.positions);
+  std::byte* const toPrevious = placeOf(Stream::previousPositions, places.previousPositions);
   const Encoded<D> encoded = encode(skinned.position, true);
   if (places.motion == Motion::kept && !task.instance.restartsMotion) {
     copyLanes(toPrevious, places.previousPositions.stride, to, places.positions.stride, bytes,
@@ -538,13 +537,13 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
   storeLanes(d, encoded, bytes, to, places.positions.stride, first, end);
   if (places.normals.format != VertexFormat::none) {
     storeLanes(d, encodeNormal(d, places.normals.format, skinned.normal),
-               formatSize(places.normals.format), placeOf(places.normals), places.normals.stride,
-               first, end);
+               formatSize(places.normals.format), placeOf(Stream::normals, places.normals),
+               places.normals.stride, first, end);
   }
   if (places.tangents.format != VertexFormat::none) {
     storeLanes(d, encodeTangent(d, places.tangents.format, skinned.tangent, skinned.hand),
-               formatSize(places.tangents.format), placeOf(places.tangents), places.tangents.stride,
-               first, end);
+               formatSize(places.tangents.format), placeOf(Stream::tangents, places.tangents),
+               places.tangents.stride, first, end);
   }
 }
 

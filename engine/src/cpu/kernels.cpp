@@ -45,10 +45,9 @@ inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& fi
 /// Copies positions to the previous positions.
 inline void settle(const Task& task, const TaskInstance& instance, std::uint32_t first,
                    std::uint32_t end) {
-  auto* const output = static_cast<std::byte*>(instance.output);
   const OutputAttribute &from = task.places.positions, &to = task.places.previousPositions;
-  copyLanes(output + to.offset, to.stride, output + from.offset, from.stride,
-            formatSize(from.format), first, end);
+  copyLanes(instance.output(Stream::previousPositions), to.stride,
+            instance.output(Stream::positions), from.stride, formatSize(from.format), first, end);
 }
 
 inline void write(const Findings& findings, const TaskInstance& instance) {
@@ -103,14 +102,15 @@ inline bool isPlainTask(const Task& task) {
          places.motion == Motion::none && places.positions.format == VertexFormat::float32x3 &&
          places.normals.format == VertexFormat::float32x3 &&
          places.tangents.format == VertexFormat::none &&
-         places.normals.offset == places.positions.offset + 12 && places.positions.stride == 24 &&
-         places.normals.stride == 24;
+         places.positions.stride == vertexFloats * sizeof(float) &&
+         places.normals.stride == places.positions.stride;
 }
 
-inline bool isPlainInstance(const Task& task, const TaskInstance& instance) {
-  const auto place =
-      reinterpret_cast<std::uintptr_t>(instance.output) + task.places.positions.offset;
-  return instance.morphs.empty() && instance.result == nullptr && place % alignof(float) == 0;
+inline bool isPlainInstance(const TaskInstance& instance) {
+  const std::byte* const positions = instance.output(Stream::positions);
+  return instance.morphs.empty() && instance.result == nullptr &&
+         instance.output(Stream::normals) == positions + 3 * sizeof(float) &&
+         reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
 }
 
 /// How many instances there are room for at a time.
@@ -271,7 +271,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   group.palettes =
       floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
   for (const TaskInstance& instance : task.instances) {
-    if (!isPlainInstance(task, instance)) {
+    if (!isPlainInstance(instance)) {
       skinGenerally(part, instance);
       continue;
     }
@@ -284,8 +284,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
       skinGenerally(part, instance);
       continue;
     }
-    group.outputs[group.count] = reinterpret_cast<float*>(static_cast<std::byte*>(instance.output) +
-                                                          task.places.positions.offset);
+    group.outputs[group.count] = reinterpret_cast<float*>(instance.output(Stream::positions));
     group.poses[group.count] = instance.pose;
     if (++group.count < mostInstances) continue;
     skinGroup(part, group);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 
 #include "cpu/task.h"
 #include "plan/check.h"
@@ -45,7 +46,17 @@ Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,
 
 Result<void> checkInstance(const Job& job, const Instance& instance, const Subject& subject) {
   const MeshInfo& info = job.mesh->info();
-  if (instance.output == nullptr) return wrong(subject.name() + " has no output");
+  for (const auto& [attribute, memory, name] :
+       {std::tuple{&job.places.positions, instance.output.positions, "positions"},
+        {&job.places.normals, instance.output.normals, "normals"},
+        {&job.places.tangents, instance.output.tangents, "tangents"},
+        {&job.places.previousPositions, instance.output.previousPositions, "previous positions"}}) {
+    const bool isWanted = attribute == &job.places.previousPositions
+                              ? job.places.motion != Motion::none
+                              : attribute->format != VertexFormat::none;
+    if (isWanted && memory == nullptr)
+      return wrong(subject.name() + " has no output for its " + name);
+  }
   if (Result<void> good = checkPose(instance.pose, info, subject, "pose"); !good) return good;
   if (Result<void> good = checkMorphs(instance.morphs, info.morphTargetCount, subject); !good)
     return good;
@@ -82,10 +93,24 @@ Result<void> check(const Job& job) {
   return {};
 }
 
-TaskInstance taskInstance(const Instance& instance, bool hasBox) {
-  TaskInstance own{instance.pose,           instance.output,         instance.mayScale,
-                   instance.restartsMotion, instance.settles,        instance.morphs,
-                   instance.previousPose,   instance.previousMorphs, instance.result};
+TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) {
+  TaskInstance own;
+  own.pose = instance.pose;
+  own.mayScale = instance.mayScale;
+  own.restartsMotion = instance.restartsMotion;
+  own.settles = instance.settles;
+  own.morphs = instance.morphs;
+  own.previousPose = instance.previousPose;
+  own.previousMorphs = instance.previousMorphs;
+  own.result = instance.result;
+  const auto at = [](void* memory, const OutputAttribute& attribute) {
+    return memory == nullptr ? nullptr : static_cast<std::byte*>(memory) + attribute.offset;
+  };
+  own.outputs = {at(instance.output.positions, places.positions),
+                 at(instance.output.normals, places.normals),
+                 at(instance.output.tangents, places.tangents),
+                 at(instance.output.previousPositions, places.previousPositions)};
+  const bool hasBox = isSnormPosition(places.positions.format);
   for (std::size_t axis = 0; hasBox && axis < 3; ++axis) {
     const double least = double{instance.box.min[axis]}, greatest = double{instance.box.max[axis]};
     own.boxCentre[axis] = static_cast<float>((least + greatest) / 2);
@@ -97,9 +122,8 @@ TaskInstance taskInstance(const Instance& instance, bool hasBox) {
 void skinMesh(const Job& job, const MeshData& mesh) {
   static thread_local std::vector<TaskInstance> instances;
   instances.clear();
-  const bool hasBox = isSnormPosition(job.places.positions.format);
   for (const Instance& instance : job.instances)
-    instances.push_back(taskInstance(instance, hasBox));
+    instances.push_back(taskInstance(instance, job.places));
   skinTask({&mesh, job.method, job.places, job.firstVertex, job.vertexEnd, instances});
 }
 

@@ -60,9 +60,6 @@ struct PaletteSource {
   std::uint64_t end = 0;  ///< the unit behind the palette
 };
 
-/// Where the attributes of one instance stand, by `Stream`.
-using Offsets = std::array<std::uint64_t, streamCount>;
-
 }  // namespace
 
 struct SkinningSystem::State {
@@ -403,21 +400,17 @@ void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
     for (std::uint32_t index = 0; index < group.instanceCount; ++index) {
       const auto record = abi::load<abi::InstanceRecord>(
           tables, push.instances + (group.firstInstance + index) * abi::INSTANCE_WORDS);
-      Offsets offsets{record.positions, record.normals, record.tangents, record.previousPositions};
-      std::uint64_t least = ~std::uint64_t{0};
-      for (std::size_t stream = 0; stream < streamCount; ++stream) {
-        // Records say where the group's first vertex stands.
-        offsets[stream] +=
-            dispatch.windows[stream].offset - std::uint64_t{group.firstVertex} * strides[stream];
-        if (formats[stream] != VertexFormat::none) least = std::min(least, offsets[stream]);
-      }
-      // One mesh, one set of formats and strides: one layout, so these are the same for all.
-      for (std::size_t stream = 0; stream < streamCount; ++stream)
-        attributes[stream]->offset =
-            formats[stream] == VertexFormat::none ? 0 : offsets[stream] - least;
       std::uint32_t result = 0;
       TaskInstance& instance = instances.emplace_back(taskInstance(record, result));
-      instance.output = output.data() + least;
+      const std::array<std::uint32_t, streamCount> offsets{
+          record.positions, record.normals, record.tangents, record.previousPositions};
+      for (std::size_t stream = 0; stream < streamCount; ++stream) {
+        if (attributes[stream]->format == VertexFormat::none) continue;
+        // Records say where the group's first vertex stands.
+        instance.outputs[stream] = output.data() + dispatch.windows[stream].offset +
+                                   offsets[stream] -
+                                   std::size_t{group.firstVertex} * attributes[stream]->stride;
+      }
       resultOf.push_back(findsOut && !instance.settles ? result : noResult);
     }
     addInstances(task, first, verticesPerJob);

@@ -1,6 +1,7 @@
 // What the SIMD code gets: jobs that were checked, and memory to work in.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -28,19 +29,22 @@ struct Scratch {
 /// As `Instance`.
 struct TaskInstance {
   std::span<const JointMatrix> pose;
-  void* output = nullptr;
+  /// Where each attribute of the mesh's first vertex stands, by `Stream`.
+  std::array<std::byte*, streamCount> outputs{};
   bool mayScale = true, restartsMotion = false, settles = false;
   std::span<const MorphWeight> morphs;  ///< rising by target
   std::span<const JointMatrix> previousPose;
   std::span<const MorphWeight> previousMorphs;
   InstanceResult* result = nullptr;
   float boxCentre[3] = {}, boxInverse[3] = {};  ///< of snorm16 positions; 1 / half its size
+
+  std::byte* output(Stream stream) const { return outputs[static_cast<std::size_t>(stream)]; }
 };
 
 struct Task {
   const MeshData* mesh = nullptr;
   Method method = Method::dualQuaternion;
-  VertexPlaces places;
+  VertexPlaces places;  ///< formats, strides and motion
   std::uint32_t firstVertex = 0, vertexEnd = 0;
   std::span<const TaskInstance> instances;
 };

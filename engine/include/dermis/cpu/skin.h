@@ -25,12 +25,31 @@
 
 namespace dermis::cpu {
 
+/// Where the vertices of an instance are written: what the offsets of `Job::places` count from.
+struct OutputMemory {
+  void* positions = nullptr;
+  void* normals = nullptr;
+  void* tangents = nullptr;
+  void* previousPositions = nullptr;
+
+  constexpr OutputMemory() = default;
+  /// The same for all attributes: the usual case.
+  constexpr OutputMemory(void* all)
+      : positions(all), normals(all), tangents(all), previousPositions(all) {}
+  /// An array for each attribute; null for those that the job does not write.
+  constexpr OutputMemory(void* positionArray, void* normalArray, void* tangentArray,
+                         void* previousArray)
+      : positions(positionArray),
+        normals(normalArray),
+        tangents(tangentArray),
+        previousPositions(previousArray) {}
+};
+
 /// One instance of a job.
 struct Instance {
-  std::span<const JointMatrix> pose;  ///< at least `MeshInfo::requiredJoints`
-  bool mayScale = true;               ///< as `PoseDescription::mayScale`
-  /// Where its vertices are written: `Job::places` counts from here. Any alignment.
-  void* output = nullptr;
+  std::span<const JointMatrix> pose;    ///< at least `MeshInfo::requiredJoints`
+  bool mayScale = true;                 ///< as `PoseDescription::mayScale`
+  OutputMemory output;                  ///< any alignment
   Box box;                              ///< as `dermis::Job::box`
   std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, rising by target
   bool restartsMotion = false;          ///< as `dermis::Job::restartsMotion`
