@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "batch_runner.h"
 #include "commands.h"
 #include "comparison_subject.h"
 #include "dermis/text.h"
@@ -53,9 +54,10 @@ ExitStatus checkPicture(const CompareOptions& options) {
     return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return reportWrongUsage("-o OUT has a place for a number; there is one picture only");
-  if (options.device == "cpu")
-    return reportWrongUsage(
-        "--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+  if (samples::needsNoVulkan(options.device)) {
+    return reportWrongUsage(fmt::format(
+        "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
+  }
   if (options.width < leastWidth || options.width > largestWidth)
     return reportWrongUsage(
         fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
@@ -197,7 +199,7 @@ ExitStatus compare(const CompareOptions& options) {
 
   ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
   std::optional<samples::OpenDevice> open;
-  if (options.device != "cpu") {
+  if (!samples::needsNoVulkan(options.device)) {
     samples::DeviceOptions deviceOptions;
     deviceOptions.device = options.device;
     deviceOptions.graphics = !options.output.empty();
@@ -209,9 +211,11 @@ ExitStatus compare(const CompareOptions& options) {
   }
 
   const ComparisonOptions comparisonOptions{options.instances, options.repetitions, options.shares};
+  const ComparisonTimer timer{open ? &*open : nullptr, options.device == "cpu"};
+  if (timer.isCpu) title.device = samples::CpuTarget().name();
   const Result<MethodComparison> comparison = [&] {
-    samples::Progress progress("comparing", comparisonSteps(comparisonOptions, open.has_value()));
-    return compareMethods(subject.scene(), subject.pose, open ? &*open : nullptr, comparisonOptions,
+    samples::Progress progress("comparing", comparisonSteps(comparisonOptions, timer));
+    return compareMethods(subject.scene(), subject.pose, timer, comparisonOptions,
                           [&progress] { progress.step(); });
   }();
   if (!comparison) {
@@ -254,8 +258,8 @@ Run addCompare(CLI::App& app) {
                       "A clip's number or name, or none for the rest pose [the first]");
   command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");
   command->add_option("--device", options->device,
-                      "auto, cpu (nothing is timed), a number of 'dermis devices', or part of a "
-                      "name");
+                      "auto, cpu (SIMD on one thread), reference (nothing is timed), a number of "
+                      "'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write the same numbers to a file");
   command->add_option("--repetitions", options->repetitions,
                       fmt::format("Runs of each method [{}]", options->repetitions));

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "batch_runner.h"
 #include "commands.h"
 #include "crowd.h"
 #include "drawn_scene.h"
@@ -77,9 +78,10 @@ ExitStatus checkUsage(const RenderOptions& options) {
     return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
                                         options.method, methodNames("and")));
   }
-  if (options.device == "cpu")
-    return reportWrongUsage(
-        "--device cpu cannot draw; software Vulkan can: 'dermis devices' lists it");
+  if (samples::needsNoVulkan(options.device)) {
+    return reportWrongUsage(fmt::format(
+        "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
+  }
   if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
   if (*kind != PictureKind::png)
     return options.frames ? ExitStatus::done

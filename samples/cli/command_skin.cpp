@@ -63,6 +63,12 @@ ExitStatus checkUsage(const SkinOptions& options) {
     return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
                                         options.method, methodNames("and")));
   }
+  if (options.device == "cpu" && isForComparison(*methodFromName(options.method))) {
+    return reportWrongUsage(fmt::format(
+        "--method {} is for comparison: --device cpu has the everyday methods, --device reference "
+        "and Vulkan devices have all",
+        options.method));
+  }
   if (const ExitStatus shares = checkShares(options.shares); shares != ExitStatus::done)
     return shares;
   if (!std::isfinite(options.time)) return reportWrongUsage("--time must be a number of seconds");
@@ -145,15 +151,19 @@ ExitStatus skin(const SkinOptions& options) {
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
 
-  if (options.device == "cpu")
+  if (options.device == "reference")
     return writePoses(options, *scene, *clip, referenceSkinner(*scene, method));
+  const bool tangents = holdsTangents(*outputFormat(options.output));
+  if (options.device == "cpu") {
+    samples::CpuTarget target;
+    return writePoses(options, *scene, *clip, targetSkinner(*scene, method, tangents, target));
+  }
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
   Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
   if (!open) return reportDeviceError(open.error());
-  const bool tangents = holdsTangents(*outputFormat(options.output));
-  return writePoses(options, *scene, *clip,
-                    deviceSkinner(*scene, method, tangents, *open->device, open->context));
+  samples::VulkanTarget target(*open->device, open->context);
+  return writePoses(options, *scene, *clip, targetSkinner(*scene, method, tangents, target));
 }
 
 }  // namespace
@@ -174,8 +184,10 @@ Run addSkin(CLI::App& app) {
   command->add_option("--fps", options->framesPerSecond, "Poses a second [30]")->needs(frames);
   command->add_option("--method", options->method, methodNames("or") + " [dual_quaternion]");
   addShares(*command, options->shares);
-  command->add_option("--device", options->device,
-                      "auto, cpu (the reference), a number of 'dermis devices', or part of a name");
+  command->add_option(
+      "--device", options->device,
+      "auto, cpu (SIMD on the CPU), reference (slow, in double precision), a number "
+      "of 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return skin(*options); };
 }

@@ -37,18 +37,17 @@ bool isSkinned(const Scene& scene) {
 class Verifier {
  public:
   /// `reports` are refused for a model that they would damage.
-  Verifier(samples::OpenDevice& open, bool strict,
+  Verifier(samples::BatchTarget& target, bool strict,
            std::span<const samples::RequestedOutput> reports)
-      : open_(open), outputs_(outputsToVerify(open.context.limits())), reports_(reports) {
+      : target_(target), outputs_(outputsToVerify(target)), reports_(reports) {
     preparation_.strict = strict;
     preparation_.centersOfRotation = true;
   }
 
   void verifyRandom() {
-    const std::vector<samples::RandomCase> cases = samples::randomCases(open_.context.limits());
+    const std::vector<samples::RandomCase> cases = samples::randomCases(target_);
     samples::Progress progress("random meshes", cases.size());
-    add("random meshes",
-        verifyRandomMeshes(*open_.device, open_.context, cases, [&progress] { progress.step(); }));
+    add("random meshes", verifyRandomMeshes(target_, cases, [&progress] { progress.step(); }));
   }
 
   void verify(const std::string& model) {
@@ -82,8 +81,7 @@ class Verifier {
     }
     const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
     samples::Progress progress(model, poses.size());
-    add(model, verifyScene(*open_.device, open_.context, *scene, poses, outputs_,
-                           [&progress] { progress.step(); }));
+    add(model, verifyScene(target_, *scene, poses, outputs_, [&progress] { progress.step(); }));
   }
 
   void add(const std::string& model, Cases cases) {
@@ -110,7 +108,7 @@ class Verifier {
 
   void worsen(ExitStatus status) { status_ = std::max(status_, status); }
 
-  samples::OpenDevice& open_;
+  samples::BatchTarget& target_;
   std::vector<OutputToVerify> outputs_;
   std::span<const samples::RequestedOutput> reports_;
   std::string overwrites_;
@@ -131,33 +129,54 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
   return status;
 }
 
-ExitStatus verify(const VerifyOptions& options) {
-  if (options.device == "cpu") {
-    return reportWrongUsage(
-        "--device cpu is the reference itself, and would be compared with itself; "
-        "name a Vulkan device");
+/// What a report of the CPU path does not speak of.
+std::string notCovered(const samples::BatchTarget& target) {
+  std::string methods;
+  for (const Method method : allMethods) {
+    if (std::ranges::count(target.methods(), method) != 0) continue;
+    methods += (methods.empty() ? "" : ", ") + std::string(methodName(method));
   }
-  const std::array<samples::RequestedOutput, 2> outputFiles{
-      {{"--json", options.json}, {"--junit", options.junit}}};
-  const std::vector<std::filesystem::path> inputs(options.models.begin(), options.models.end());
-  if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
-    return reportWrongUsage(kept.error().message);
-  samples::DeviceOptions deviceOptions;
-  deviceOptions.device = options.device;
-  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
-  if (!open) return reportDeviceError(open.error());
+  return methods;
+}
 
-  Verifier verifier(*open, options.strict, outputFiles);
+ExitStatus verifyOn(samples::BatchTarget& target, const VerifyOptions& options,
+                    std::span<const samples::RequestedOutput> outputFiles) {
+  Verifier verifier(target, options.strict, outputFiles);
   if (options.random || options.models.empty()) verifier.verifyRandom();
   for (const std::string& model : options.models) {
     verifier.verify(model);
     if (!verifier.overwrites().empty()) return reportWrongUsage(verifier.overwrites());
   }
   // Files first: standard output may be closed.
-  const ExitStatus written = writeReports(options, open->device->info().name, verifier.models());
-  fmt::print("device  {}\n", open->device->info().name);
+  const ExitStatus written = writeReports(options, target.name(), verifier.models());
+  fmt::print("device  {}\n", target.name());
   printReport(verifier.models());
+  if (const std::string methods = notCovered(target); !methods.empty())
+    fmt::print("not covered, since they are for comparison and only on Vulkan devices: {}\n",
+               methods);
   return written == ExitStatus::done ? verifier.status() : written;
+}
+
+ExitStatus verify(const VerifyOptions& options) {
+  if (options.device == "reference") {
+    return reportWrongUsage(
+        "--device reference would be compared with itself; name cpu or a Vulkan device");
+  }
+  const std::array<samples::RequestedOutput, 2> outputFiles{
+      {{"--json", options.json}, {"--junit", options.junit}}};
+  const std::vector<std::filesystem::path> inputs(options.models.begin(), options.models.end());
+  if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
+    return reportWrongUsage(kept.error().message);
+  if (options.device == "cpu") {
+    samples::CpuTarget target;
+    return verifyOn(target, options, outputFiles);
+  }
+  samples::DeviceOptions deviceOptions;
+  deviceOptions.device = options.device;
+  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
+  if (!open) return reportDeviceError(open.error());
+  samples::VulkanTarget target(*open->device, open->context);
+  return verifyOn(target, options, outputFiles);
 }
 
 }  // namespace
@@ -171,8 +190,9 @@ Run addVerify(CLI::App& app) {
                       "A .gltf or .glb file, or several; none: random meshes");
   command->add_flag("--random", options->random,
                     "Verify random meshes too: methods x inputs x outputs, by pairs");
-  command->add_option("--device", options->device,
-                      "auto, a number of 'dermis devices', or part of a name");
+  command->add_option(
+      "--device", options->device,
+      "auto, cpu (SIMD on the CPU), a number of 'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write every case with its errors");
   command->add_option("--junit", options->junit, "Write the same as JUnit XML, for CI");
   command->add_flag("--strict", options->strict, strictHelp);

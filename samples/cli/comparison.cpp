@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
 
 #include "comparison_instructions.h"
+#include "dermis/cpu/skin.h"
 #include "dermis/verify/reference.h"
 #include "pipeline_statistics.h"
 #include "scene_skinner.h"
@@ -58,8 +60,7 @@ std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose
 
 Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
                                       std::span<const samples::SkinRequest> instance,
-                                      const ComparisonOptions& options,
-                                      const samples::OpenDevice& open) {
+                                      const ComparisonOptions& options, bool isCpu) {
   if (options.instances) {
     if (comparison.vertices > mostVertices / *options.instances) {
       return Error{ErrorCode::invalidArgument,
@@ -69,8 +70,7 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
     }
     return *options.instances;
   }
-  const std::uint64_t wanted =
-      (open.device->info().type == "CPU" ? verticesOnCpu : verticesOnGpu) / comparison.vertices;
+  const std::uint64_t wanted = (isCpu ? verticesOnCpu : verticesOnGpu) / comparison.vertices;
   // Joint matrices, and the largest palettes of all the methods.
   std::uint64_t bytes = 0;
   for (const samples::SkinRequest& part : instance)
@@ -136,10 +136,14 @@ class MethodComparer {
       compared.bytesPerJoint = bytesPerJoint(compared.method, comparison_.scales);
   }
 
-  Result<MethodComparison> compare(samples::OpenDevice* open) {
+  Result<MethodComparison> compare(const ComparisonTimer& timer) {
     if (Result<void> done = compareShapes(); !done) return done.error();
     if (Result<void> done = compareOnModel(); !done) return done.error();
-    if (Result<void> done = open != nullptr ? time(*open) : planOnly(); !done) return done.error();
+    if (timer.isCpu) {
+      if (Result<void> done = timeOnCpu(); !done) return done.error();
+    }
+    if (Result<void> done = timer.device != nullptr ? time(*timer.device) : planOnly(); !done)
+      return done.error();
     return std::move(comparison_);
   }
 
@@ -215,7 +219,8 @@ class MethodComparer {
   }
 
   Result<void> time(samples::OpenDevice& open) {
-    const Result<std::uint32_t> instances = chooseInstances(comparison_, instance_, options_, open);
+    const Result<std::uint32_t> instances =
+        chooseInstances(comparison_, instance_, options_, open.device->info().type == "CPU");
     if (!instances) return instances.error();
     comparison_.instances = *instances;
     comparison_.repetitions = options_.repetitions;
@@ -230,25 +235,82 @@ class MethodComparer {
       variants.push_back(mainVariant(batches->plan(variants.size())));
       step_();
     }
+    if (Result<void> timed = repeat([&](std::size_t method) { return batches->skin(method); });
+        !timed)
+      return timed;
+    countInstructions(variants, open.context.limits(),
+                      samples::PipelineStatistics::create(*open.device).get());
+    return {};
+  }
+
+  /// `run` returns what a method takes; less than 0 if it is not timed.
+  template <typename Run>
+  Result<void> repeat(const Run& run) {
     // In turn, so that what else the machine does hits all alike.
     std::vector<std::vector<double>> seconds(comparison_.methods.size());
     for (std::uint32_t repetition = 0; repetition < options_.repetitions; ++repetition) {
       for (std::size_t method = 0; method < seconds.size(); ++method) {
-        const Result<double> run = batches->skin(method);
-        if (!run) return run.error();
-        seconds[method].push_back(*run);
+        const Result<double> taken = run(method);
+        if (!taken) return taken.error();
+        if (*taken >= 0) seconds[method].push_back(*taken);
       }
       step_();
     }
-    for (std::size_t method = 0; method < seconds.size(); ++method)
-      comparison_.methods[method].seconds = medianOf(seconds[method]);
+    for (std::size_t method = 0; method < seconds.size(); ++method) {
+      if (!seconds[method].empty()) comparison_.methods[method].seconds = medianOf(seconds[method]);
+    }
     const double linear = *comparison_.methods.front().seconds;
     for (ComparedMethod& compared : comparison_.methods) {
-      if (linear > 0) compared.time = *compared.seconds / linear;
+      if (linear > 0 && compared.seconds) compared.time = *compared.seconds / linear;
     }
-    countInstructions(variants, open.context.limits(),
-                      samples::PipelineStatistics::create(*open.device).get());
     return {};
+  }
+
+  Result<void> timeOnCpu() {
+    const Result<std::uint32_t> count = chooseInstances(comparison_, instance_, options_, true);
+    if (!count) return count.error();
+    comparison_.instances = *count;
+    comparison_.repetitions = options_.repetitions;
+    comparison_.clock = Clock::oneThread;
+    VertexLayout layout;
+    layout.normals = VertexFormat::float32x3;
+    std::vector<cpu::Mesh> meshes;
+    meshes.reserve(instance_.size());
+    std::vector<cpu::Job> jobs;
+    std::vector<std::vector<cpu::Instance>> instances;
+    std::vector<std::vector<std::byte>> outputs;
+    for (const samples::SkinRequest& part : instance_) {
+      Result<cpu::Mesh> mesh = cpu::Mesh::create(*part.mesh);
+      if (!mesh) return mesh.error();
+      meshes.push_back(std::move(*mesh));
+      VertexLayout own = layout;
+      if (!part.mesh->info().hasNormals) own.normals = VertexFormat::none;
+      const Result<VertexPlaces> places = placeVertices(own, part.mesh->vertexCount());
+      if (!places) return places.error();
+      std::vector<std::byte>& output = outputs.emplace_back(places->size * *count);
+      std::vector<cpu::Instance>& all = instances.emplace_back(*count);
+      for (std::uint32_t i = 0; i < *count; ++i) {
+        all[i].pose = part.pose;
+        all[i].mayScale = part.mayScale;
+        all[i].morphs = part.morphs;
+        all[i].output = output.data() + places->size * i;
+      }
+      cpu::Job& job = jobs.emplace_back();
+      job.mesh = &meshes.back();
+      job.places = *places;
+      job.instances = all;
+    }
+    return repeat([&](std::size_t number) -> Result<double> {
+      const Method method = comparison_.methods[number].method;
+      if (isForComparison(method)) return -1.0;
+      using Timer = std::chrono::steady_clock;
+      const auto begin = Timer::now();
+      for (cpu::Job& job : jobs) {
+        job.method = method;
+        if (Result<void> done = cpu::skin(job); !done) return done.error();
+      }
+      return std::chrono::duration<double>(Timer::now() - begin).count();
+    });
   }
 
   /// The kernels of a device with all that Dermis makes use of.
@@ -297,14 +359,17 @@ class MethodComparer {
 
 }  // namespace
 
-std::size_t comparisonSteps(const ComparisonOptions& options, bool withDevice) {
-  return allMethods.size() * (withDevice ? 3 : 2) + (withDevice ? options.repetitions : 0);
+std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTimer& timer) {
+  const bool isTimed = timer.device != nullptr || timer.isCpu;
+  return allMethods.size() * (timer.device != nullptr ? 3 : 2) +
+         (isTimed ? options.repetitions : 0);
 }
 
 Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
-                                        samples::OpenDevice* open, const ComparisonOptions& options,
+                                        const ComparisonTimer& timer,
+                                        const ComparisonOptions& options,
                                         const std::function<void()>& step) {
-  return MethodComparer(scene, pose, options, step).compare(open);
+  return MethodComparer(scene, pose, options, step).compare(timer);
 }
 
 }  // namespace dermis::cli

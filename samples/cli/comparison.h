@@ -17,7 +17,7 @@ namespace dermis::cli {
 
 struct ComparedMethod {
   Method method = Method::linear;
-  std::optional<double> seconds;  ///< the median; nothing without a device
+  std::optional<double> seconds;  ///< the median; nothing if it was not timed
   std::optional<double> time;     ///< of linear's
   std::optional<std::uint64_t> instructions;
   std::uint32_t bytesPerJoint = 0;  ///< of the palette, as the skin kernel reads it
@@ -28,7 +28,7 @@ struct ComparedMethod {
   std::optional<double> meanSquareDifference;  ///< its root
 };
 
-enum class Clock : std::uint8_t { none, timestamps, submission };
+enum class Clock : std::uint8_t { none, timestamps, submission, oneThread };
 enum class InstructionSource : std::uint8_t { driver, spirv };
 
 struct MethodComparison {
@@ -48,15 +48,23 @@ struct ComparisonOptions {
   MethodShares shares;
 };
 
+/// What times the methods.
+struct ComparisonTimer {
+  samples::OpenDevice* device = nullptr;
+  /// Without a device: dermis::cpu, on one thread. It has the everyday methods only.
+  bool isCpu = false;
+};
+
 /// Steps that `compareMethods` tells of.
-std::size_t comparisonSteps(const ComparisonOptions& options, bool withDevice);
+std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTimer& timer);
 
 /// Compares all methods on a scene that has a part with a mesh, each prepared with centres of
-/// rotation, in one pose. Without a device nothing is timed. `step` is called after each step.
+/// rotation, in one pose. Without a timer nothing is timed. `step` is called after each step.
 /// Fails where the device does, with `invalidArgument` where so many instances have too many
 /// vertices.
 Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
-                                        samples::OpenDevice* open, const ComparisonOptions& options,
+                                        const ComparisonTimer& timer,
+                                        const ComparisonOptions& options,
                                         const std::function<void()>& step);
 
 }  // namespace dermis::cli

@@ -29,6 +29,8 @@ std::string_view clockName(Clock clock) {
       return "the device's timestamps";
     case Clock::submission:
       return "from submission to the end of waiting: the device has no timestamps";
+    case Clock::oneThread:
+      return "one thread of the CPU";
     case Clock::none:
       break;
   }
@@ -139,6 +141,7 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
   json["repetitions"] = comparison.repetitions;
   json["clock"] = comparison.clock == Clock::timestamps   ? Json("timestamps")
                   : comparison.clock == Clock::submission ? Json("submission")
+                  : comparison.clock == Clock::oneThread  ? Json("oneThread")
                                                           : Json();
   json["instructionsOf"] = sourceName(comparison.instructionSource);
   json["methods"] = Json::array();

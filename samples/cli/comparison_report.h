@@ -10,7 +10,7 @@ namespace dermis::cli {
 
 /// What was compared where.
 struct ComparisonTitle {
-  std::string device;  ///< its name; "cpu" for the reference
+  std::string device;  ///< its name, or "reference"
   std::string driver;  ///< empty for the reference
   std::string model;
   std::string pose;  ///< "rest pose", "clip 0 'walk' at 0.341 s"

@@ -21,7 +21,7 @@ std::vector<float> toFloats(const std::vector<Vector>& vectors) {
   return floats;
 }
 
-SkinnedPart fromDevice(samples::SkinnedVertices&& vertices) {
+SkinnedPart fromTarget(samples::SkinnedVertices&& vertices) {
   SkinnedPart part{std::move(vertices.positions), std::move(vertices.normals), {}};
   const std::vector<std::byte>& tangents =
       vertices.streams[static_cast<std::size_t>(Stream::tangents)];
@@ -64,22 +64,23 @@ SkinParts referenceSkinner(const Scene& scene, Method method) {
   };
 }
 
-SkinParts deviceSkinner(const Scene& scene, Method method, bool tangents, samples::Device& device,
-                        vulkan::Context& context) {
+SkinParts targetSkinner(const Scene& scene, Method method, bool tangents,
+                        samples::BatchTarget& target) {
   samples::RunOptions options;
   options.countUntouched = false;
   if (tangents) options.output.tangents = VertexFormat::float32x4;
-  return [&scene, method, options, &device,
-          &context](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
+  options.tuning = target.divisions().front().tuning;
+  return [&scene, method, options,
+          &target](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
     std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
     for (samples::SkinRequest& request : requests) request.method = method;
-    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
+    Result<samples::BatchResult> result = target.run(requests, options);
     if (!result) return result.error();
     std::vector<SkinnedPart> all;
     std::size_t next = 0;
     for (std::size_t index = 0; index < scene.parts.size(); ++index) {
       const ScenePart& part = scene.parts[index];
-      all.push_back(part.mesh != nullptr ? fromDevice(std::move(result->instances[next++]))
+      all.push_back(part.mesh != nullptr ? fromTarget(std::move(result->instances[next++]))
                                          : bindPose(part, pose.morphs[index]));
     }
     return all;

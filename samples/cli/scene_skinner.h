@@ -1,14 +1,12 @@
-// Skins a scene, part by part, with the reference or on a device: what `skin` writes.
+// Skins a scene, part by part, with the reference, on the CPU or on a device: what `skin` writes.
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "batch_layout.h"
+#include "batch_runner.h"
 #include "bind_pose.h"
 #include "dermis/method.h"
-#include "dermis/vulkan/context.h"
-#include "device.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -20,9 +18,9 @@ using SkinParts = std::function<Result<std::vector<SkinnedPart>>(const ScenePose
 /// scene and the pose.
 std::vector<samples::SkinRequest> skinRequests(const Scene& scene, const ScenePose& pose);
 
-/// Both refer to the scene, and the second to the device and its context.
+/// Both refer to the scene, and the second to the target.
 SkinParts referenceSkinner(const Scene& scene, Method method);
-SkinParts deviceSkinner(const Scene& scene, Method method, bool tangents, samples::Device& device,
-                        vulkan::Context& context);
+SkinParts targetSkinner(const Scene& scene, Method method, bool tangents,
+                        samples::BatchTarget& target);
 
 }  // namespace dermis::cli

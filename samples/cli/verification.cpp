@@ -13,26 +13,18 @@
 namespace dermis::cli {
 namespace {
 
-/// The first is the one that others must equal to the bit.
-constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
-
-std::string name(const Tuning& tuning) {
-  return fmt::format("{} invocations, {} instances each", tuning.workgroupSize,
-                     tuning.instancesPerInvocation);
-}
-
 /// A part with one of the methods that it allows.
 struct Figure {
   std::size_t part;
   Method method;
 };
 
-std::vector<Figure> figuresOf(const Scene& scene) {
+std::vector<Figure> figuresOf(const Scene& scene, std::span<const Method> methods) {
   std::vector<Figure> figures;
   for (std::size_t part = 0; part < scene.parts.size(); ++part) {
     const PreparedMesh* mesh = scene.parts[part].mesh.get();
     if (mesh == nullptr) continue;
-    for (const Method method : allMethods) {
+    for (const Method method : methods) {
       if (mesh->allows(method)) figures.push_back({part, method});
     }
   }
@@ -126,9 +118,9 @@ struct PoseBatch {
   }
 };
 
-/// Positions, normals and tangents as float32, with every tuning: not a bit may change.
-Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
-                           const PoseBatch& batch, std::vector<VerifiedCase>& cases) {
+/// Positions, normals and tangents as float32, however the work is cut up: not a bit may change.
+Result<void> verifyDivisions(samples::BatchTarget& target, const PoseBatch& batch,
+                             std::vector<VerifiedCase>& cases) {
   std::vector<samples::SkinRequest> requests;
   for (const samples::InstanceToVerify& instance : batch.instances) {
     samples::SkinRequest& request = requests.emplace_back();
@@ -139,16 +131,18 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
   }
   std::vector<samples::SkinnedVertices> first;
   std::vector<Comparison> firstComparisons;
-  for (const Tuning& tuning : tunings) {
+  const std::vector<samples::Division> divisions = target.divisions();
+  for (const samples::Division& division : divisions) {
     samples::RunOptions options;
-    options.tuning = tuning;
+    options.tuning = division.tuning;
+    options.instructions = division.instructions;
     options.output.tangents = VertexFormat::float32x4;
     options.countUntouched = false;
-    Result<samples::BatchResult> result = samples::runBatch(device, context, requests, options);
+    Result<samples::BatchResult> result = target.run(requests, options);
     if (!result) return result.error();
     for (std::size_t index = 0; index < requests.size(); ++index) {
       const samples::SkinnedVertices& skinned = result->instances[index];
-      VerifiedCase verified = batch.newCase(index, name(tuning));
+      VerifiedCase verified = batch.newCase(index, division.name);
       verified.status = skinned.status;
       if (!first.empty() && skinned.streams == first[index].streams) {
         verified.comparison = firstComparisons[index];
@@ -158,7 +152,7 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
         if (!comparison) return comparison.error();
         verified.comparison = *comparison;
         if (!first.empty())
-          verified.wrong = "the result is not to the bit that of " + name(tunings[0]);
+          verified.wrong = "the result is not to the bit that of " + divisions[0].name;
       }
       if (first.empty()) firstComparisons.push_back(verified.comparison);
       cases.push_back(std::move(verified));
@@ -169,7 +163,7 @@ Result<void> verifyTunings(samples::Device& device, vulkan::Context& context,
 }
 
 /// One way to store the result.
-Result<void> verifyOutput(samples::Device& device, vulkan::Context& context, const PoseBatch& batch,
+Result<void> verifyOutput(samples::BatchTarget& target, const PoseBatch& batch,
                           const OutputToVerify& output, std::vector<VerifiedCase>& cases) {
   std::vector<samples::InstanceToVerify> instances;
   std::vector<std::size_t> indices;
@@ -183,7 +177,7 @@ Result<void> verifyOutput(samples::Device& device, vulkan::Context& context, con
     }
   }
   Result<std::vector<samples::VerifiedInstance>> verified =
-      samples::verifyBatch(device, context, instances, output.output);
+      samples::verifyBatch(target, instances, output.output);
   if (!verified) return verified.error();
   for (std::size_t place = 0; place < verified->size(); ++place) {
     const bool clamps = isSnormPosition(output.output.layout.positions) && place % 2 == 1;
@@ -234,21 +228,21 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
   return poses;
 }
 
-std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits) {
-  const std::vector<samples::OutputCase> cases = samples::outputCases(limits);
-  const std::vector<std::vector<Method>> methods = samples::shareOutMethods(cases);
+std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target) {
+  const std::vector<samples::OutputCase> cases = samples::outputCases(target.limits());
+  const std::vector<std::vector<Method>> methods =
+      samples::shareOutMethods(cases, target.methods());
   std::vector<OutputToVerify> outputs;
   for (std::size_t index = 0; index < cases.size(); ++index)
     outputs.push_back({cases[index], methods[index]});
   return outputs;
 }
 
-Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::Context& context,
-                                              const Scene& scene,
+Result<std::vector<VerifiedCase>> verifyScene(samples::BatchTarget& target, const Scene& scene,
                                               std::span<const PoseToVerify> poses,
                                               std::span<const OutputToVerify> outputs,
                                               const std::function<void()>& done) {
-  const std::vector<Figure> figures = figuresOf(scene);
+  const std::vector<Figure> figures = figuresOf(scene, target.methods());
   std::vector<VerifiedCase> cases;
   Result<ReferencePose> before = skinReference(scene, figures, poses.back());
   for (std::size_t index = 0; index < poses.size(); ++index) {
@@ -256,12 +250,12 @@ Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::C
     Result<ReferencePose> now = skinReference(scene, figures, poses[index]);
     if (!now) return now.error();
     const PoseBatch batch(scene, figures, poses[index], *now, *before);
-    if (Result<void> verified = verifyTunings(device, context, batch, cases); !verified)
+    if (Result<void> verified = verifyDivisions(target, batch, cases); !verified)
       return verified.error();
     const std::size_t first = outputs.size() * index / poses.size();
     const std::size_t end = outputs.size() * (index + 1) / poses.size();
     for (const OutputToVerify& output : outputs.subspan(first, end - first)) {
-      if (Result<void> verified = verifyOutput(device, context, batch, output, cases); !verified)
+      if (Result<void> verified = verifyOutput(target, batch, output, cases); !verified)
         return verified.error();
     }
     before = std::move(now);
@@ -270,14 +264,13 @@ Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::C
   return cases;
 }
 
-Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::Device& device,
-                                                     vulkan::Context& context,
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::BatchTarget& target,
                                                      std::span<const samples::RandomCase> cases,
                                                      const std::function<void()>& done) {
   std::vector<VerifiedCase> all;
   for (const samples::RandomCase& random : cases) {
     Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyRandomCase(device, context, random);
+        samples::verifyRandomCase(target, random);
     if (!verified) return verified.error();
     for (std::size_t index = 0; index < verified->size(); ++index) {
       VerifiedCase& added = all.emplace_back();

@@ -1,7 +1,8 @@
-// Every method and variant on the device, against the reference.
+// Every method and variant of a device, or of the CPU path, against the reference.
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ struct VerifiedCase {
   std::string pose;     ///< "rest pose", "clip 0 'walk' at 0.341 s"
   std::string variant;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
   Comparison comparison;
-  PoseStatus status;
+  std::optional<PoseStatus> status;
   std::string wrong;  ///< what else is wrong; empty where nothing is
 
   bool passed() const {
@@ -45,23 +46,21 @@ struct OutputToVerify {
   std::vector<Method> methods;
 };
 
-/// The ways that a device with these limits has. Over all of them every method meets every format.
-std::vector<OutputToVerify> outputsToVerify(const DeviceLimits& limits);
+/// The ways that a target has. Over all of them each of its methods meets every format.
+std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target);
 
 /// In each pose all parts with all methods, once for each way to cut up the work (which must not
 /// change a bit), and once for each of these ways to store the result, which are shared out among
 /// the poses. Motion goes from the pose before, in the first from the last. `done` is called after
 /// each pose. Fails with `invalidMesh` where a pose has positions that float32 cannot hold.
-Result<std::vector<VerifiedCase>> verifyScene(samples::Device& device, vulkan::Context& context,
-                                              const Scene& scene,
+Result<std::vector<VerifiedCase>> verifyScene(samples::BatchTarget& target, const Scene& scene,
                                               std::span<const PoseToVerify> poses,
                                               std::span<const OutputToVerify> outputs,
                                               const std::function<void()>& done);
 
 /// The product of methods, inputs and outputs over random meshes, by pairs. `done` is called after
 /// each combination.
-Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::Device& device,
-                                                     vulkan::Context& context,
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::BatchTarget& target,
                                                      std::span<const samples::RandomCase> cases,
                                                      const std::function<void()>& done);
 

@@ -81,7 +81,7 @@ Json describe(const VerifiedCase& verified) {
   json["worstNormalOfBound"] = comparison.worstNormal;
   json["largestPositionError"] = comparison.largestPositionError;
   json["worstTangentOfBound"] = comparison.worstTangent;
-  json["nonRigidJoints"] = verified.status.nonRigidJoints;
+  if (verified.status) json["nonRigidJoints"] = verified.status->nonRigidJoints;
   return json;
 }
 

@@ -1,11 +1,14 @@
-// Skins batches on a device and waits for them: for commands and tests, where an engine would keep
-// its buffers and go on.
+// Skins batches on a device, or on the CPU, and waits for them: for commands and tests, where an
+// engine would keep its buffers and go on.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "batch_layout.h"
@@ -20,10 +23,10 @@ namespace dermis::samples {
 
 /// What became of one request.
 struct SkinnedVertices {
-  std::vector<float> positions;  ///< 3 a vertex; empty where they are not stored as float32
-  std::vector<float> normals;    ///< likewise, or where the mesh has none
-  PoseStatus status;             ///< all 0 for linear
-  InstanceResult result;         ///< where it was asked for
+  std::vector<float> positions;      ///< 3 a vertex; empty where they are not stored as float32
+  std::vector<float> normals;        ///< likewise, or where the mesh has none
+  std::optional<PoseStatus> status;  ///< of a device; all 0 for linear
+  InstanceResult result;             ///< where it was asked for
   /// The attributes as they are stored, tightly packed, by `Stream`.
   std::array<std::vector<std::byte>, streamCount> streams;
   std::array<VertexFormat, streamCount> formats{};
@@ -35,7 +38,9 @@ struct SkinnedVertices {
 };
 
 struct RunOptions {
+  /// Of the device. On the CPU a job has so many vertices, of so many instances.
   Tuning tuning;
+  std::string instructions;  ///< of the CPU, one of `cpu::targetNames`; empty: the target's
   OutputLayout output;
   std::byte poison{0xa5};  ///< what stands in the outputs before
   bool countUntouched = true;
@@ -52,27 +57,87 @@ struct BatchResult {
 /// Skins one batch after another into the same outputs, as an engine does frame by frame.
 class BatchRunner {
  public:
-  BatchRunner(Device& device, vulkan::Context& context, const RunOptions& options)
-      : device_(device), context_(context), options_(options) {}
+  virtual ~BatchRunner() = default;
+  BatchRunner(const BatchRunner&) = delete;
+  BatchRunner& operator=(const BatchRunner&) = delete;
 
   /// Outputs are as the last run left them where they are as large as they were; else poisoned.
   Result<BatchResult> run(std::span<const SkinRequest> requests);
 
- private:
-  Result<void> makeOutputs(const Plan& plan);
-  vulkan::OutputBuffers outputRanges() const;
-  BatchResult readBack(const Plan& plan, const MappedBuffer& palettes,
-                       const MappedBuffer& results) const;
-  void countChangedBytes(BatchResult& result) const;
+ protected:
+  explicit BatchRunner(const RunOptions& options) : options_(options) {}
+  /// Skins `layout_`. Of each instance it says what the outputs do not: status and result.
+  virtual Result<BatchResult> skin() = 0;
+  virtual std::span<const std::byte> outputBytes(std::size_t stream) const = 0;
+  std::size_t outputOf(std::size_t stream) const { return layout_.oneOutput ? 0 : stream; }
 
-  Device& device_;
-  vulkan::Context& context_;
   RunOptions options_;
   BatchLayout layout_;
-  std::array<MappedBuffer, streamCount> outputs_;
+
+ private:
+  void readOutputs(BatchResult& result) const;
+  void countChangedBytes(BatchResult& result) const;
 };
 
-/// One batch on its own.
+/// A way to cut up the work, which must not change a bit.
+struct Division {
+  std::string name;
+  Tuning tuning;
+  std::string instructions;
+};
+
+/// What skins batches.
+class BatchTarget {
+ public:
+  virtual ~BatchTarget() = default;
+  virtual std::string name() const = 0;
+  virtual DeviceLimits limits() const = 0;
+  virtual std::span<const Method> methods() const = 0;
+  /// The first is the usual one.
+  virtual std::vector<Division> divisions() const = 0;
+  virtual std::unique_ptr<BatchRunner> runner(const RunOptions& options) = 0;
+
+  /// One batch on its own.
+  Result<BatchResult> run(std::span<const SkinRequest> requests, const RunOptions& options = {}) {
+    return runner(options)->run(requests);
+  }
+};
+
+/// Both must outlive it.
+class VulkanTarget : public BatchTarget {
+ public:
+  VulkanTarget(Device& device, vulkan::Context& context) : device_(device), context_(context) {}
+  std::string name() const override;
+  DeviceLimits limits() const override;
+  std::span<const Method> methods() const override;
+  std::vector<Division> divisions() const override;
+  std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
+
+ private:
+  Device& device_;
+  vulkan::Context& context_;
+};
+
+/// Whether `--device NAME` is cpu or reference.
+inline bool needsNoVulkan(std::string_view device) {
+  return device == "cpu" || device == "reference";
+}
+
+/// By dermis::cpu, with one of `cpu::targetNames`; empty: the best.
+class CpuTarget : public BatchTarget {
+ public:
+  explicit CpuTarget(std::string instructions = {}) : instructions_(std::move(instructions)) {}
+  std::string name() const override;
+  DeviceLimits limits() const override;
+  std::span<const Method> methods() const override;
+  std::vector<Division> divisions() const override;
+  std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
+
+ private:
+  std::string instructions_;
+};
+
+/// One batch on its own, on a device.
 Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
                              std::span<const SkinRequest> requests, const RunOptions& options = {});
 

@@ -14,7 +14,8 @@ using Meeting = std::tuple<Method, std::size_t, std::uint32_t>;
 
 class MethodRotation {
  public:
-  explicit MethodRotation(std::span<const OutputCase> outputs) : methods_(outputs.size()) {
+  MethodRotation(std::span<const OutputCase> outputs, std::span<const Method> methods)
+      : all_(methods), methods_(outputs.size()) {
     for (const OutputCase& output : outputs) values_.push_back(parameterValues(output));
   }
 
@@ -40,7 +41,7 @@ class MethodRotation {
       return std::tuple(newMeetings(output, method),
                         -static_cast<std::ptrdiff_t>(uses_[static_cast<std::size_t>(method)]));
     };
-    return *std::ranges::max_element(allMethods, {}, worth);
+    return *std::ranges::max_element(all_, {}, worth);
   }
 
   /// Whether there was a method left that does not meet all yet.
@@ -48,7 +49,7 @@ class MethodRotation {
     std::size_t most = 0, best = 0;
     Method bestMethod = Method::linear;
     for (std::size_t output = 0; output < values_.size(); ++output) {
-      for (const Method method : allMethods) {
+      for (const Method method : all_) {
         if (const std::size_t count = newMeetings(output, method); count > most) {
           most = count;
           best = output;
@@ -67,6 +68,7 @@ class MethodRotation {
       met_.insert({method, parameter, values_[output][parameter]});
   }
 
+  std::span<const Method> all_;
   std::vector<std::vector<std::uint32_t>> values_;  ///< by output
   std::vector<std::vector<Method>> methods_;        ///< by output
   std::array<std::size_t, allMethods.size()> uses_{};
@@ -87,8 +89,9 @@ std::vector<std::uint32_t> parameterValues(const OutputCase& output) {
           output.tuning.workgroupSize * 16 + output.tuning.instancesPerInvocation};
 }
 
-std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs) {
-  return MethodRotation(outputs).shareOut();
+std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs,
+                                                 std::span<const Method> methods) {
+  return MethodRotation(outputs, methods).shareOut();
 }
 
 }  // namespace dermis::samples

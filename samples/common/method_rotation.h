@@ -11,9 +11,10 @@
 namespace dermis::samples {
 
 /// For each of these ways the methods to verify in it: one, or as many as it takes. Over all of
-/// them every method meets every value of every parameter: the format of each attribute,
-/// arrangement, gap, motion, bounds and tuning. The same for the same ways.
-std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs);
+/// them every one of the methods meets every value of every parameter: the format of each
+/// attribute, arrangement, gap, motion, bounds and tuning. The same for the same ways.
+std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs,
+                                                 std::span<const Method> methods = allMethods);
 
 /// The values of an output case's parameters, each a number that no other value of that parameter
 /// has.

@@ -16,7 +16,6 @@ constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
 constexpr std::array motions{Motion::none, Motion::kept, Motion::reskinned};
 constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3}, {128, 16}}};
 
-constexpr std::array methods = allMethods;
 constexpr std::array rigidities{Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                 Rigidity::mirrored, Rigidity::mirroredAlongOneAxis};
 constexpr std::array<std::uint32_t, 6> vertexCounts{1, 7, 64, 65, 257, 1234};
@@ -153,7 +152,8 @@ std::vector<OutputCase> outputCases(const DeviceLimits& limits) {
   return cases;
 }
 
-std::vector<RandomCase> randomCases(const DeviceLimits& limits) {
+std::vector<RandomCase> randomCases(const BatchTarget& target) {
+  const std::span<const Method> methods = target.methods();
   std::vector<std::uint32_t> counts =
       countsOf(methods, rigidities, vertexCounts, jointCounts, influenceCounts, morphCounts,
                positionTypes, directionTypes, jointTypes, weightTypes, setSizes, inputGaps);
@@ -177,13 +177,13 @@ std::vector<RandomCase> randomCases(const DeviceLimits& limits) {
     random.input.gap = choice.of(inputGaps);
     if (random.input.joints == ComponentType::uint8)
       random.joints = std::min(random.joints, std::uint32_t{256});
-    random.output = storable(chooseOutput(choice), limits);
+    random.output = storable(chooseOutput(choice), target.limits());
     cases.push_back(random);
   }
   return cases;
 }
 
-Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::Context& context,
+Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
                                                        const RandomCase& random) {
   OwnedMesh mesh = randomMesh(1, random.vertices, random.joints, random.influences);
   addTangents(mesh, 2);
@@ -232,7 +232,7 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::C
     verified.exemptions = {exemptionsOf(expected[instance]).onlyFinite, 0};
     verified.exemptionsBefore = {exemptionsOf(expected[instance + 3]).onlyFinite, 0};
   }
-  return verifyBatch(device, context, instances, random.output, true);
+  return verifyBatch(target, instances, random.output, true);
 }
 
 }  // namespace dermis::samples

@@ -55,7 +55,7 @@ struct InstanceToVerify {
 /// What came out for one instance.
 struct VerifiedInstance {
   Comparison comparison;  ///< of the skinned vertices
-  PoseStatus status;
+  std::optional<PoseStatus> status;
   std::string wrong;  ///< what is wrong besides; empty where nothing is
 
   bool passed() const { return comparison.passed() && wrong.empty(); }
@@ -66,7 +66,7 @@ struct VerifiedInstance {
 /// attributes was touched. Where it is to be thorough, also that every byte of them was written,
 /// and that each instance comes out to the bit when it is skinned without the others. Fails where
 /// the batch cannot be skinned.
-Result<std::vector<VerifiedInstance>> verifyBatch(Device& device, vulkan::Context& context,
+Result<std::vector<VerifiedInstance>> verifyBatch(BatchTarget& target,
                                                   std::span<const InstanceToVerify> instances,
                                                   const OutputCase& output, bool thorough = false);
 
@@ -80,10 +80,11 @@ struct RandomCase {
   std::string inputName() const;
 };
 
-std::vector<RandomCase> randomCases(const DeviceLimits& limits);
+/// With the methods of the target, and outputs that it can store.
+std::vector<RandomCase> randomCases(const BatchTarget& target);
 
 /// Three instances of the case's mesh, each in a pose of its own.
-Result<std::vector<VerifiedInstance>> verifyRandomCase(Device& device, vulkan::Context& context,
+Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
                                                        const RandomCase& randomCase);
 
 }  // namespace dermis::samples

@@ -50,9 +50,9 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
 
 class BatchVerifier {
  public:
-  BatchVerifier(Device& device, vulkan::Context& context,
-                std::span<const InstanceToVerify> instances, const OutputCase& output)
-      : device_(device), context_(context), instances_(instances), output_(output) {}
+  BatchVerifier(BatchTarget& target, std::span<const InstanceToVerify> instances,
+                const OutputCase& output)
+      : target_(target), instances_(instances), output_(output) {}
 
   Result<std::vector<VerifiedInstance>> verify(bool thorough) {
     for (std::size_t index = 0; index < instances_.size(); ++index)
@@ -125,7 +125,7 @@ class BatchVerifier {
     options.tuning = output_.tuning;
     options.output = output_.layout;
     options.poison = poison;
-    BatchRunner runner(device_, context_, options);
+    const std::unique_ptr<BatchRunner> runner = target_.runner(options);
     const bool moves = output_.layout.motion != Motion::none;
     std::vector<SkinRequest> now, before, settled;
     for (const std::size_t index : indices) {
@@ -139,15 +139,15 @@ class BatchVerifier {
     }
     Frames frames;
     if (moves) {
-      Result<BatchResult> result = runner.run(before);
+      Result<BatchResult> result = runner->run(before);
       if (!result) return result.error();
       frames.before = std::move(*result);
     }
-    Result<BatchResult> result = runner.run(now);
+    Result<BatchResult> result = runner->run(now);
     if (!result) return result.error();
     frames.now = std::move(*result);
     if (moves) {
-      Result<BatchResult> last = runner.run(settled);
+      Result<BatchResult> last = runner->run(settled);
       if (!last) return last.error();
       frames.settled = std::move(*last);
     }
@@ -266,8 +266,7 @@ class BatchVerifier {
     wrong += wrong.empty() ? what : "; " + what;
   }
 
-  Device& device_;
-  vulkan::Context& context_;
+  BatchTarget& target_;
   std::span<const InstanceToVerify> instances_;
   const OutputCase& output_;
   std::vector<Box> boxes_;
@@ -276,10 +275,10 @@ class BatchVerifier {
 
 }  // namespace
 
-Result<std::vector<VerifiedInstance>> verifyBatch(Device& device, vulkan::Context& context,
+Result<std::vector<VerifiedInstance>> verifyBatch(BatchTarget& target,
                                                   std::span<const InstanceToVerify> instances,
                                                   const OutputCase& output, bool thorough) {
-  return BatchVerifier(device, context, instances, output).verify(thorough);
+  return BatchVerifier(target, instances, output).verify(thorough);
 }
 
 }  // namespace dermis::samples

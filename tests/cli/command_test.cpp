@@ -70,7 +70,8 @@ TEST(CommandTest, WrongUsageEndsWithTwo) {
       {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "0", "--device", "cpu"},
       {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "2", "--fps", "0", "--device",
        "cpu"},
-      {"verify", bar, "--device", "cpu"},
+      {"verify", bar, "--device", "reference"},
+      {"skin", bar, "-o", out, "--method", "log_matrix", "--device", "cpu"},
       {"info", bar, "--yaml"},
   };
   for (const std::vector<std::string>& arguments : wrong) {

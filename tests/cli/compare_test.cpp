@@ -150,14 +150,31 @@ TEST(CompareTest, EveryMethodHasARowAndLinearTakesAsLongAsLinear) {
 TEST(CompareTest, TheReferenceIsNotTimed) {
   // It needs no driver.
   const CommandResult result =
-      dermis({"compare", bar, "--device", "cpu"},
+      dermis({"compare", bar, "--device", "reference"},
              {"VK_DRIVER_FILES=/nonexistent.json", "VK_ICD_FILENAMES=/nonexistent.json"});
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_NE(result.output.find("nothing"), std::string::npos) << result.output;
-  const Compared compared = compare({bar, "--device", "cpu"});
+  const Compared compared = compare({bar, "--device", "reference"});
   for (const auto& [name, method] : compared.methods) {
     EXPECT_TRUE(method["time"].is_null()) << name;
     EXPECT_GT(method["instructions"].get<int>(), 20) << name;
+  }
+}
+
+TEST(CompareTest, TheCpuTimesTheEverydayMethods) {
+  const std::vector<std::string> noDriver{"VK_DRIVER_FILES=/nonexistent.json",
+                                          "VK_ICD_FILENAMES=/nonexistent.json"};
+  const CommandResult result = dermis(
+      {"compare", bar, "--device", "cpu", "--instances", "10", "--repetitions", "2"}, noDriver);
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(result.output.find("one thread"), std::string::npos) << result.output;
+  const Compared compared = compare({bar, "--device", "cpu", "--instances", "10"});
+  EXPECT_EQ(compared.json["clock"], "oneThread");
+  EXPECT_EQ(compared.json["instances"], 10);
+  for (const Method method : allMethods) {
+    const nlohmann::json& own = compared.methods.at(std::string(methodName(method)));
+    EXPECT_EQ(own["time"].is_null(), isForComparison(method)) << methodName(method);
+    EXPECT_GT(own["instructions"].get<int>(), 20) << methodName(method);
   }
 }
 
@@ -217,8 +234,9 @@ TEST(CompareTest, SkinTakesEveryMethodAndNamesThemAll) {
     const std::string name(methodName(method));
     EXPECT_NE(unknown.errors.find(name), std::string::npos) << unknown.errors;
     EXPECT_NE(help.output.find(name), std::string::npos) << help.output;
-    const CommandResult result = dermis({"skin", bar, "-o", outFile(name + ".ply"), "--time", "1",
-                                         "--device", "cpu", "--method", name});
+    const CommandResult result =
+        dermis({"skin", bar, "-o", outFile(name + ".ply"), "--time", "1", "--device",
+                isForComparison(method) ? "reference" : "cpu", "--method", name});
     EXPECT_EQ(result.status, 0) << name << ": " << result.errors;
     EXPECT_TRUE(readPly(outFile(name + ".ply")).has_value()) << name;
   }

@@ -17,8 +17,7 @@
 #include <vector>
 
 #include "dermis_command.h"
-#include "scene_skinner.h"
-#include "test_device.h"
+#include "every_skinner.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -95,32 +94,8 @@ double farthest(const std::vector<ForeignVertex>& vertices, std::size_t column,
 
 constexpr std::array foreignMethods{Method::linear, Method::dualQuaternion};
 
-class ForeignPosesTest : public ::testing::TestWithParam<const char*> {
+class ForeignPosesTest : public SkinnerTest {
  protected:
-  void SetUp() override {
-    if (!onDevice()) return;
-    std::string reason;
-    device_ = testDevice(true, reason);
-    if (device_ != nullptr) return;
-    ASSERT_FALSE(isContinuousIntegration()) << reason;
-    GTEST_SKIP() << reason;
-  }
-
-  bool onDevice() const { return std::string(GetParam()) != "reference"; }
-
-  std::vector<float> skin(const cli::Scene& scene, const cli::ScenePose& pose,
-                          Method method) const {
-    const cli::SkinParts skinner =
-        onDevice() ? cli::deviceSkinner(scene, method, false, *device_->device, device_->context)
-                   : cli::referenceSkinner(scene, method);
-    const Result<std::vector<cli::SkinnedPart>> parts = skinner(pose);
-    EXPECT_TRUE(parts.ok()) << (parts ? "" : parts.error().message);
-    std::vector<float> positions;
-    for (const cli::SkinnedPart& part : parts ? *parts : std::vector<cli::SkinnedPart>{})
-      positions.insert(positions.end(), part.positions.begin(), part.positions.end());
-    return positions;
-  }
-
   /// The models are built from code, which may change; then it is not the skinning that is wrong.
   static void expectSameModel(const std::vector<ForeignVertex>& vertices, const cli::Scene& scene) {
     std::vector<float> bind;
@@ -153,7 +128,7 @@ class ForeignPosesTest : public ::testing::TestWithParam<const char*> {
       ASSERT_TRUE(clip.ok()) << clip.error().message;
       for (std::size_t column = 0; column < columns; ++column) {
         const auto skinned = [&](double seconds, Method method) {
-          return skin(*scene, cli::scenePose(*scene, *clip, seconds), method);
+          return skinScene(*scene, cli::scenePose(*scene, *clip, seconds), method);
         };
         const Method method = foreignMethods[column];
         const double seconds = std::stod(time);
@@ -175,7 +150,7 @@ class ForeignPosesTest : public ::testing::TestWithParam<const char*> {
 // By three.mjs, in double precision; joint matrices are float32 here. Worst when this was written:
 // 6e-8 and, on lavapipe, 1.1e-7. The tolerances are fitted to that.
 TEST_P(ForeignPosesTest, ThreeJsAgrees) {
-  expectAgreement("three.tsv", 1, 7, onDevice() ? 4e-7 : 2.5e-7);
+  expectAgreement("three.tsv", 1, 7, isReference() ? 2.5e-7 : 4e-7);
 }
 
 // By blender.py, in float: its bones and its modifier round, each a few times. Worst: 5e-7.
@@ -183,10 +158,8 @@ TEST_P(ForeignPosesTest, BlenderAgreesWithAndWithoutPreserveVolume) {
   expectAgreement("blender.tsv", 2, 6, 1.5e-6);
 }
 
-INSTANTIATE_TEST_SUITE_P(Skinners, ForeignPosesTest, ::testing::Values("reference", "device"),
-                         [](const ::testing::TestParamInfo<const char*>& skinner) {
-                           return std::string(skinner.param);
-                         });
+INSTANTIATE_TEST_SUITE_P(Skinners, ForeignPosesTest, ::testing::ValuesIn(skinnerNames()),
+                         [](const auto& skinner) { return skinner.param; });
 
 }  // namespace
 }  // namespace dermis::test

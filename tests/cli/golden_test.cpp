@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "dermis_command.h"
+#include "every_skinner.h"
 #include "ply.h"
-#include "scene_skinner.h"
 #include "test_data.h"
-#include "test_device.h"
 
 namespace dermis::test {
 namespace {
@@ -86,38 +85,22 @@ struct GoldenPose {
   bool dualQuaternion = false;
 };
 
-class GoldenTest : public ::testing::TestWithParam<const char*> {
+class GoldenTest : public SkinnerTest {
  protected:
   void SetUp() override {
     const std::optional<std::filesystem::path> data = testDataFolder();
     if (!data) GTEST_SKIP() << noTestData;
     data_ = *data;
-    std::string reason;
-    if (onDevice()) device_ = testDevice(true, reason);
-    if (onDevice() && device_ == nullptr) {
-      ASSERT_FALSE(isContinuousIntegration()) << reason;
-      GTEST_SKIP() << reason;
-    }
+    SkinnerTest::SetUp();
   }
-
-  bool onDevice() const { return std::string(GetParam()) != "cpu"; }
 
   /// All positions of the scene, 3 a vertex.
   std::vector<float> skin(const cli::Scene& scene, const GoldenPose& pose) const {
     const Result<std::uint32_t> clip = cli::chooseClip(*scene.model, pose.animation);
     EXPECT_TRUE(clip.ok()) << (clip ? "" : clip.error().message);
     if (!clip) return {};
-    const Method method = pose.dualQuaternion ? Method::dualQuaternion : Method::linear;
-    const cli::SkinParts skinner =
-        onDevice() ? cli::deviceSkinner(scene, method, false, *device_->device, device_->context)
-                   : cli::referenceSkinner(scene, method);
-    const Result<std::vector<cli::SkinnedPart>> parts =
-        skinner(cli::scenePose(scene, *clip, pose.time));
-    EXPECT_TRUE(parts.ok()) << (parts ? "" : parts.error().message);
-    std::vector<float> positions;
-    for (const cli::SkinnedPart& part : parts ? *parts : std::vector<cli::SkinnedPart>{})
-      positions.insert(positions.end(), part.positions.begin(), part.positions.end());
-    return positions;
+    return skinScene(scene, cli::scenePose(scene, *clip, pose.time),
+                     pose.dualQuaternion ? Method::dualQuaternion : Method::linear);
   }
 
   double skinAndCompare(const cli::Scene& scene, GoldenPose pose, const Golden& golden) const {
@@ -179,7 +162,10 @@ TEST_P(GoldenTest, TheCommandWritesWhatAgrees) {
                  '/', '_');
     const CommandResult result =
         dermis({"skin", model.string(), "-o", out, "--animation", "0", "--time", "0.37", "--method",
-                dualQuaternion ? "dual_quaternion" : "linear", "--device", GetParam()});
+                dualQuaternion ? "dual_quaternion" : "linear", "--device",
+                isReference() ? "reference"
+                : onDevice()  ? "auto"
+                              : "cpu"});
     ASSERT_EQ(result.status, 0) << result.errors;
     const std::optional<Ply> ply = readPly(out);
     ASSERT_TRUE(ply.has_value()) << "the PLY file is not as it should be";
@@ -190,10 +176,8 @@ TEST_P(GoldenTest, TheCommandWritesWhatAgrees) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, GoldenTest, ::testing::Values("cpu", "auto"),
-                         [](const ::testing::TestParamInfo<const char*>& device) {
-                           return std::string(device.param);
-                         });
+INSTANTIATE_TEST_SUITE_P(Skinners, GoldenTest, ::testing::ValuesIn(skinnerNames()),
+                         [](const auto& skinner) { return skinner.param; });
 
 }  // namespace
 }  // namespace dermis::test

@@ -169,7 +169,7 @@ TEST_F(JointsTest, OnEitherSideOfTheThresholdOfRigidJoints) {
     }
     for (const Method method : allMethods) {
       const samples::BatchResult result = skin(mesh, pose, method);
-      const std::uint32_t nonRigid = result.instances[0].status.nonRigidJoints;
+      const std::uint32_t nonRigid = result.instances[0].status->nonRigidJoints;
       if (method != Method::linear) {
         EXPECT_LE(nonRigid, rigid ? 0u : count);
         EXPECT_GE(nonRigid, least > 8.5e-6 ? count : 0u);
@@ -190,7 +190,7 @@ TEST_F(JointsTest, RotationsThatWereRoundedAreRigid) {
   OwnedMesh mesh = randomMesh(3, 100, count, 1);
   std::vector<JointMatrix> pose;
   for (std::uint32_t i = 0; i < count; ++i) pose.push_back(joint(rotation(), 1));
-  EXPECT_EQ(skin(mesh, pose, Method::dualQuaternion).instances[0].status.nonRigidJoints, 0u);
+  EXPECT_EQ(skin(mesh, pose, Method::dualQuaternion).instances[0].status->nonRigidJoints, 0u);
 }
 
 // Joints as far from a rotation, from each other and from 1 as float32 allows.

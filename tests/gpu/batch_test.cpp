@@ -152,7 +152,7 @@ TEST_F(BatchTest, NanInAPoseAffectsThatInstanceAlone) {
       expectSameBits(before.instances[instance], after.instances[instance]);
     }
     const bool isDualQuaternion = crowd.requests[instance].method == Method::dualQuaternion;
-    EXPECT_EQ(after.instances[instance].status.nonFiniteJoints,
+    EXPECT_EQ(after.instances[instance].status->nonFiniteJoints,
               isDualQuaternion && (instance == 4 || instance == 6) ? 1u : 0u);
   }
 }
@@ -207,7 +207,7 @@ TEST_F(BatchTest, TheStatusTellsWhatAPoseHolds) {
   const samples::BatchResult result = run(requests);
   const auto expectStatus = [&](std::size_t index, std::uint32_t twoPhase, std::uint32_t nonRigid,
                                 std::uint32_t undeclared) {
-    const PoseStatus& status = result.instances[index].status;
+    const PoseStatus& status = *result.instances[index].status;
     EXPECT_EQ(status.twoPhase, twoPhase) << index;
     EXPECT_EQ(status.nonRigidJoints, nonRigid) << index;
     EXPECT_EQ(status.undeclaredScale, undeclared) << index;

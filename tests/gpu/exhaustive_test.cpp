@@ -36,8 +36,9 @@ class ExhaustiveTest : public DeviceTest {
     random.output.layout.tangents = tangents;
     random.output.layout.gap = static_cast<std::uint32_t>(number % 4);
     random.output.layout.bounds = number % 2 == 0;
+    samples::VulkanTarget target(device(), context());
     const Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyRandomCase(device(), context(), random);
+        samples::verifyRandomCase(target, random);
     ASSERT_TRUE(verified.ok()) << verified.error().message;
     ASSERT_EQ(verified->size(), 3u);
     for (const samples::VerifiedInstance& instance : *verified) {

@@ -440,9 +440,9 @@ TEST_P(MethodTest, APoseInTwoFormsIsTheSamePose) {
   for (std::size_t i = 0; i < crowd.requests.size(); ++i) {
     expectSameBytes(alone.instances[i], both.instances[2 * i], std::to_string(i));
     if (GetParam() == Method::linear) continue;
-    EXPECT_EQ(both.instances[2 * i].status.nonRigidJoints,
-              both.instances[2 * i + 1].status.nonRigidJoints);
-    EXPECT_EQ(both.instances[2 * i].status.twoPhase, both.instances[2 * i + 1].status.twoPhase);
+    EXPECT_EQ(both.instances[2 * i].status->nonRigidJoints,
+              both.instances[2 * i + 1].status->nonRigidJoints);
+    EXPECT_EQ(both.instances[2 * i].status->twoPhase, both.instances[2 * i + 1].status->twoPhase);
   }
 }
 

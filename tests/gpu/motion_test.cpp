@@ -24,7 +24,7 @@ class MotionTest : public DeviceTest, public ::testing::WithParamInterface<Motio
     if (device_ == nullptr) return;
     samples::RunOptions options;
     options.output.motion = GetParam();
-    runner_.emplace(device(), context(), options);
+    runner_ = samples::VulkanTarget(device(), context()).runner(options);
     for (std::uint32_t pose = 0; pose < 40; ++pose)
       poses_.push_back(randomPose(pose, jointCount, Rigidity::rigid));
   }
@@ -47,7 +47,7 @@ class MotionTest : public DeviceTest, public ::testing::WithParamInterface<Motio
   OwnedMesh mesh_ = randomMesh(1, 200, jointCount, 4);
   PackedMesh packed_ = *pack(mesh_.view(), jointCount);
   std::vector<std::vector<JointMatrix>> poses_;
-  std::optional<samples::BatchRunner> runner_;
+  std::unique_ptr<samples::BatchRunner> runner_;
 };
 
 TEST_P(MotionTest, EveryFrameSeesThePositionsOfTheFrameBefore) {

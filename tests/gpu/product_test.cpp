@@ -5,7 +5,7 @@
 
 #include "intercepted_device.h"
 #include "test_device.h"
-#include "verification_product.h"
+#include "verify_product.h"
 
 namespace dermis::test {
 namespace {
@@ -14,33 +14,8 @@ class ProductTest : public DeviceTest {
  protected:
   /// One case in every `step`.
   void verify(vulkan::Context& context, std::size_t step) {
-    const std::vector<samples::RandomCase> cases = samples::randomCases(context.limits());
-    EXPECT_GE(cases.size(), 77u) << "every two formats of positions, normals and tangents meet";
-    std::uint64_t compared = 0, exempt = 0, onlyUnit = 0;
-    for (std::size_t index = 0; index < cases.size(); index += step) {
-      const samples::RandomCase& random = cases[index];
-      SCOPED_TRACE(random.inputName() + " -> " + random.output.name() + ", " +
-                   std::string(methodName(random.method)));
-      const Result<std::vector<samples::VerifiedInstance>> verified =
-          samples::verifyRandomCase(device(), context, random);
-      ASSERT_TRUE(verified.ok()) << verified.error().message;
-      for (const samples::VerifiedInstance& instance : *verified) {
-        EXPECT_EQ(instance.wrong, "");
-        EXPECT_TRUE(instance.passed())
-            << "the first is vertex " << instance.comparison.firstFailure;
-        const Comparison& comparison = instance.comparison;
-        EXPECT_EQ(comparison.compared + comparison.exempt.onlyFinite, random.vertices);
-        compared += comparison.compared;
-        exempt += comparison.exempt.onlyFinite;
-        onlyUnit += comparison.onlyUnitNormals + comparison.onlyUnitTangents;
-      }
-    }
-    // Hardly any may escape the comparison, whatever the reference says of itself.
-    EXPECT_LE(exempt, compared / 1000);
-    EXPECT_LE(onlyUnit, compared / 500);
-    RecordProperty("compared", std::to_string(compared));
-    RecordProperty("exempt", std::to_string(exempt));
-    RecordProperty("onlyUnit", std::to_string(onlyUnit));
+    samples::VulkanTarget target(device(), context);
+    verifyProduct(target, step);
   }
 };
 

@@ -110,8 +110,9 @@ class WrongBytesTest : public ::testing::Test {
       instances[index].exemptions = exemptionsOf(*instances[index].expected);
       instances[index].exemptionsBefore = exemptionsOf(*instances[index].expectedBefore);
     }
+    samples::VulkanTarget target(*open_->device, open_->context);
     Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyBatch(*open_->device, open_->context, instances, output_, thorough);
+        samples::verifyBatch(target, instances, output_, thorough);
     setAfterWait_(nullptr);
     EXPECT_TRUE(verified.ok()) << (verified ? "" : verified.error().message);
     EXPECT_EQ(changed, wait != 0);
