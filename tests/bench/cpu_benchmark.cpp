@@ -27,6 +27,7 @@
 
 #include "crowd.h"
 #include "dermis/cpu/skin.h"
+#include "dermis/pack.h"
 #include "random_rig.h"
 
 #ifdef DERMIS_BENCH_OZZ
@@ -83,25 +84,39 @@ bench::Crowd longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount) 
   }
   for (std::uint32_t i = 0; i < instanceCount; ++i)
     crowd.poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
-  crowd.mesh = must(bench::packVertices(crowd.vertices, jointCount));
   return crowd;
+}
+
+/// With everything that a method or a layout may want.
+PackedMesh packWhole(const bench::Crowd& crowd) {
+  const bench::PlainVertex& first = crowd.vertices.front();
+  const std::uint32_t count = crowd.vertexCount();
+  std::vector<float> tangents, centers;
+  for (const bench::PlainVertex& vertex : crowd.vertices) {
+    const auto& n = vertex.normal;
+    tangents.insert(tangents.end(), {n[1], n[2], n[0], 1});
+    for (const float coordinate : vertex.position) centers.push_back(coordinate / 2);
+  }
+  const AttributeView joints{first.joints.data(), count, sizeof(first), ComponentType::uint16, 4};
+  const InfluenceSet set{joints, floatAttribute(first.weights.data(), count, 4, sizeof(first))};
+  MeshView view;
+  view.vertexCount = count;
+  view.positions = floatAttribute(first.position.data(), count, 3, sizeof(first));
+  view.normals = floatAttribute(first.normal.data(), count, 3, sizeof(first));
+  view.tangents = floatAttribute(tangents.data(), count, 4);
+  view.centersOfRotation = floatAttribute(centers.data(), count, 3);
+  view.influenceSets = {&set, 1};
+  return must(pack(view, crowd.jointCount()));
 }
 
 struct Scene {
   explicit Scene(bench::Crowd own)
       : crowd(std::move(own)),
-        vertexCount(static_cast<std::uint32_t>(crowd.vertices.size())),
-        instanceCount(static_cast<std::uint32_t>(crowd.poses.size())),
-        jointCount(static_cast<std::uint32_t>(crowd.poses[0].size())),
+        vertexCount(crowd.vertexCount()),
+        instanceCount(crowd.instanceCount()),
+        jointCount(crowd.jointCount()),
         output(crowd.vertices.size() * crowd.poses.size() * sizeof(Vertex) / sizeof(CacheLine) + 1),
-        mesh(must(cpu::Mesh::create(*crowd.mesh))) {
-    for (std::uint32_t i = 0; i < instanceCount; ++i) {
-      cpu::Instance instance;
-      instance.pose = crowd.poses[i];
-      instance.output = outputOf(i);
-      instances.push_back(instance);
-    }
-  }
+        mesh(must(cpu::Mesh::create(packWhole(crowd)))) {}
 
   Vertex* outputOf(std::uint32_t instance) {
     return reinterpret_cast<Vertex*>(output.data()) + std::size_t{instance} * vertexCount;
@@ -111,7 +126,6 @@ struct Scene {
   std::uint32_t vertexCount, instanceCount, jointCount;
   std::vector<CacheLine> output;
   cpu::Mesh mesh;
-  std::vector<cpu::Instance> instances;
 };
 
 // -- Who takes part.
@@ -124,27 +138,67 @@ struct Contender {
   std::array<double, 2> best{1e9, 1e9};  ///< seconds, on one thread and on two
 };
 
-Contender dermisContender(Scene& scene, Method method, std::string_view target) {
-  VertexLayout layout;
-  layout.normals = VertexFormat::float32x3;
-  const VertexPlaces places = must(placeVertices(layout, scene.vertexCount));
+/// What Dermis is asked for. The quickest case is the default.
+struct Case {
+  Method method = Method::dualQuaternion;
+  VertexLayout layout = {.normals = VertexFormat::float32x3};
+  bool bounds = false;
+  std::string name;  ///< of what is not the default
+};
+
+Contender dermisContender(Scene& scene, const Case& one, std::string_view target) {
+  const VertexPlaces places = must(placeVertices(one.layout, scene.vertexCount));
+  if (places.size * scene.instanceCount > scene.output.size() * sizeof(CacheLine))
+    scene.output.resize(places.size * scene.instanceCount / sizeof(CacheLine) + 1);
   Contender contender;
-  contender.name = "dermis " + std::string(methodName(method)) + ", " + std::string(target);
+  contender.name = "dermis " + std::string(methodName(one.method)) +
+                   (one.name.empty() ? "" : ", " + one.name) + ", " + std::string(target);
   contender.prepare = [target] {
     if (!cpu::setTarget(target)) std::exit(1);
   };
-  contender.skin = [&scene, method, places](std::uint32_t first, std::uint32_t end) {
+  contender.skin = [&scene, one, places](std::uint32_t first, std::uint32_t end) {
     constexpr std::uint32_t together = 16;
+    std::array<cpu::Instance, together> instances;
+    std::array<InstanceResult, together> results;
     for (std::uint32_t i = first; i < end; i += together) {
+      const std::uint32_t count = std::min(together, end - i);
+      for (std::uint32_t k = 0; k < count; ++k) {
+        instances[k].pose = scene.crowd.poses[i + k];
+        instances[k].output =
+            reinterpret_cast<std::byte*>(scene.output.data()) + places.size * (i + k);
+        instances[k].box = {{-9, -9, -9}, {9, 9, 9}};
+        if (one.bounds) instances[k].result = &results[k];
+      }
       cpu::Job job;
       job.mesh = &scene.mesh;
-      job.method = method;
+      job.method = one.method;
       job.places = places;
-      job.instances = std::span(scene.instances).subspan(i, std::min(together, end - i));
+      job.instances = std::span(instances).first(count);
       if (!cpu::skin(job)) std::exit(1);
     }
   };
   return contender;
+}
+
+/// What else engines ask for.
+std::vector<Case> furtherCases() {
+  using enum VertexFormat;
+  const VertexLayout usual{.normals = float32x3};
+  std::vector<Case> cases;
+  for (const Method method : {Method::blended, Method::bulgeControlled, Method::centerOfRotation})
+    cases.push_back({method, usual, false, {}});
+  const auto add = [&](const VertexLayout& layout, bool bounds, const char* name) {
+    cases.push_back({Method::dualQuaternion, layout, bounds, name});
+  };
+  add({}, false, "positions alone");
+  add({.normals = float32x3, .tangents = float32x4}, false, "tangents");
+  add({.normals = float32x3, .motion = Motion::kept}, false, "previous positions");
+  add({.normals = float32x3, .arrangement = Arrangement::planar}, false, "planar");
+  add(usual, true, "bounds");
+  add({.positions = float32x4, .normals = octahedral16x2}, false, "float32x4 octahedral16x2");
+  add({.positions = float16x4, .normals = octahedral8x2}, false, "float16x4 octahedral8x2");
+  add({.positions = snorm16x4, .normals = snorm8x4}, false, "snorm16x4 snorm8x4");
+  return cases;
 }
 
 /// As one writes it down: Kavan et al. 2007, section 4, vertex by vertex.
@@ -293,8 +347,17 @@ int main(int argc, char** argv) {
 #endif
   contenders.push_back(plainContender(scene));
   for (const Method method : {Method::dualQuaternion, Method::linear}) {
-    for (const std::string_view target : cpu::targetNames())
-      contenders.push_back(dermisContender(scene, method, target));
+    for (const std::string_view target : cpu::targetNames()) {
+      Case own;
+      own.method = method;
+      contenders.push_back(dermisContender(scene, own, target));
+    }
+  }
+  const bool hasAll = argc > 4 && std::string(argv[4]) == "all";
+  for (const Case& further : furtherCases()) {
+    const std::size_t targets = hasAll ? cpu::targetNames().size() : 0;
+    for (std::size_t target = 0; target < std::min<std::size_t>(targets, 2); ++target)
+      contenders.push_back(dermisContender(scene, further, cpu::targetNames()[target]));
   }
   const std::uint32_t rounds = argument(3, 20);
   for (std::uint32_t round = 0; round < rounds; ++round) {
@@ -308,10 +371,10 @@ int main(int argc, char** argv) {
   }
   std::printf("%s: %u vertices, %u instances, %u joints; million vertices a second\n",
               scene.crowd.name.c_str(), scene.vertexCount, scene.instanceCount, scene.jointCount);
-  std::printf("%-34s %9s %6s %9s %6s\n", "", "1 thread", "", "2 threads", "");
+  std::printf("%-58s %9s %6s %9s %6s\n", "", "1 thread", "", "2 threads", "");
   const double vertices = 1e-6 * scene.vertexCount * scene.instanceCount;
   for (const Contender& contender : contenders) {
-    std::printf("%-34s %9.0f %6.2f %9.0f %6.2f\n", contender.name.c_str(),
+    std::printf("%-58s %9.0f %6.2f %9.0f %6.2f\n", contender.name.c_str(),
                 vertices / contender.best[0], contenders[0].best[0] / contender.best[0],
                 vertices / contender.best[1], contenders[0].best[1] / contender.best[1]);
   }

@@ -48,8 +48,6 @@ PlainVertex plainVertex(const gltf::Primitive& primitive, std::size_t vertex) {
   return plain;
 }
 
-}  // namespace
-
 Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
                                 std::uint32_t jointCount) {
   const auto view = [&](const void* first, ComponentType type, std::uint32_t components) {
@@ -67,6 +65,8 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);
 }
+
+}  // namespace
 
 std::vector<samples::SkinRequest> Crowd::requests(Method method) const {
   std::vector<samples::SkinRequest> requests;

@@ -35,8 +35,6 @@ struct Crowd {
   std::vector<samples::SkinRequest> requests(Method method) const;
 };
 
-Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices, std::uint32_t jointCount);
-
 /// All primitives of a file that the first one's skin moves, as one mesh, so many times, each
 /// instance at another time of the file's first clip. Fails where the file has no skinned
 /// primitive, or one without normals or four influences a vertex.

@@ -11,8 +11,10 @@
 
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "cpu/simd_inl.h"
+#include "cpu/task.h"
 #include "dermis/vertex_format.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -167,22 +169,147 @@ HWY_INLINE Encoded<D> encodeTangent(D d, VertexFormat format, const Vec3<D>& v, 
   return encodeComponents(d, format, Vec4<D>{v.x, v.y, v.z, hand});
 }
 
+/// Calls `copy` with the size of a format as a constant.
+template <class Copy>
+HWY_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
+  switch (bytes) {
+    case 2:
+      return copy(std::integral_constant<std::size_t, 2>());
+    case 3:
+      return copy(std::integral_constant<std::size_t, 3>());
+    case 4:
+      return copy(std::integral_constant<std::size_t, 4>());
+    case 6:
+      return copy(std::integral_constant<std::size_t, 6>());
+    case 8:
+      return copy(std::integral_constant<std::size_t, 8>());
+    case 12:
+      return copy(std::integral_constant<std::size_t, 12>());
+    default:
+      return copy(std::integral_constant<std::size_t, 16>());
+  }
+}
+
+/// Copies an attribute of some vertices: quicker if they are `most`.
+template <std::size_t most = 0>
+HWY_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
+                          std::size_t fromStride, std::uint32_t bytes, std::size_t first,
+                          std::size_t end) {
+  bySize(bytes, [&](auto size) {
+    if constexpr (most != 0) {
+      if (end - first == most) {
+        for (std::size_t lane = 0; lane < most; ++lane)
+          std::memcpy(to + lane * toStride, from + lane * fromStride, size());
+        return;
+      }
+    }
+    for (std::size_t lane = first; lane < end; ++lane)
+      std::memcpy(to + lane * toStride, from + lane * fromStride, size());
+  });
+}
+
 /// Lanes of an attribute, `stride` bytes apart. `first` and `end` are lanes; `to` is where lane 0
 /// would go.
 template <class D>
 HWY_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, std::byte* to,
                            std::size_t stride, std::size_t first, std::size_t end) {
-  const hn::RebindToUnsigned<D> du;
   constexpr std::size_t lanes = hn::MaxLanes(d);
-  HWY_ALIGN std::uint32_t words[4][lanes];
-  const std::size_t count = (bytes + 3) / 4;
-  for (std::size_t word = 0; word < count; ++word) hn::Store(value.words[word], du, words[word]);
-  for (std::size_t lane = first; lane < end; ++lane) {
-    std::uint32_t own[4];
-    for (std::size_t word = 0; word < count; ++word) own[word] = words[word][lane];
-    std::memcpy(to + lane * stride, own, bytes);
+  const auto word = [&](std::size_t k) HWY_ATTR { return hn::BitCast(d, value.words[k]); };
+  const bool isWhole = end - first == lanes && stride % sizeof(float) == 0 &&
+                       reinterpret_cast<std::uintptr_t>(to) % alignof(float) == 0;
+  if (isWhole && bytes == 16) {
+    storeRows(d, Vec4<D>{word(0), word(1), word(2), word(3)}, reinterpret_cast<float*>(to),
+              stride / sizeof(float));
+    return;
+  }
+  if (isWhole && bytes == 12 && stride == 12) {
+    hn::StoreInterleaved3(word(0), word(1), word(2), d, reinterpret_cast<float*>(to));
+    return;
+  }
+  HWY_ALIGN float words[lanes * 4];
+  if (bytes > 4) {
+    storeRows(d, Vec4<D>{word(0), word(1), word(2), word(3)}, words, 4);
+    copyLanes<lanes>(to, stride, reinterpret_cast<const std::byte*>(words), 16, bytes, first, end);
+  } else {
+    hn::Store(hn::BitCast(d, value.words[0]), d, words);
+    copyLanes<lanes>(to, stride, reinterpret_cast<const std::byte*>(words), 4, bytes, first, end);
   }
 }
+
+// -- Positions and normals in float32, side by side: what most engines ask for.
+
+inline constexpr std::size_t vertexFloats = 6;
+inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
+
+/// Four vertices of each block: positions and normals, component by component, to where each block
+/// begins.
+HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
+  for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
+}
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to[2]) {
+  for (std::size_t k = 0; k < 6; k += 2) {
+    hn::StoreU(hn::ConcatLowerLower(d, chunks[k + 1], chunks[k]), d, to[0] + k * 4);
+    hn::StoreU(hn::ConcatUpperUpper(d, chunks[k + 1], chunks[k]), d, to[1] + k * 4);
+  }
+}
+#endif
+#if HWY_MAX_BYTES >= 64
+HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
+  const Eight half;
+  for (std::size_t k = 0; k < 6; k += 2) {
+    // The even blocks of both chunks, and the odd ones.
+    const auto even = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(chunks[k + 1]), chunks[k]);
+    const auto odd = hn::OddEvenBlocks(chunks[k + 1], hn::SwapAdjacentBlocks(chunks[k]));
+    hn::StoreU(hn::LowerHalf(half, even), half, to[0] + k * 4);
+    hn::StoreU(hn::LowerHalf(half, odd), half, to[1] + k * 4);
+    hn::StoreU(hn::UpperHalf(half, even), half, to[2] + k * 4);
+    hn::StoreU(hn::UpperHalf(half, odd), half, to[3] + k * 4);
+  }
+  static_cast<void>(d);
+}
+#endif
+
+template <class D>
+HWY_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* const* to) {
+  const hn::Repartition<double, D> dd;
+  const auto pair = [&](Vec<D> a, Vec<D> b, bool upper) HWY_ATTR {
+    return hn::BitCast(dd, upper ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
+  };
+  Vec<D> chunks[6];
+  for (int half = 0; half < 2; ++half) {
+    const auto xy = pair(p.x, p.y, half == 1);
+    const auto zx = pair(p.z, n.x, half == 1);
+    const auto yz = pair(n.y, n.z, half == 1);
+    chunks[half * 3] = hn::BitCast(d, hn::InterleaveLower(dd, xy, zx));
+    chunks[half * 3 + 1] = hn::BitCast(d, hn::OddEven(xy, yz));
+    chunks[half * 3 + 2] = hn::BitCast(d, hn::InterleaveUpper(dd, zx, yz));
+  }
+  storeBlocks(d, chunks, to);
+}
+
+inline bool areSideBySide(const VertexPlaces& places) {
+  return places.positions.format == VertexFormat::float32x3 &&
+         places.normals.format == VertexFormat::float32x3 &&
+         places.positions.stride == vertexFloats * sizeof(float) &&
+         places.normals.stride == places.positions.stride;
+}
+inline bool areSideBySide(const TaskInstance& instance) {
+  const std::byte* const positions = instance.output(Stream::positions);
+  return instance.output(Stream::normals) == positions + 3 * sizeof(float) &&
+         reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
+}
+
+/// As many vertices as there are lanes.
+HWY_INLINE void storeWhole(Four d, const Vec3<Four>& p, const Vec3<Four>& n, float* to) {
+  storeVertices(d, p, n, &to);
+}
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE void storeWhole(Eight d, const Vec3<Eight>& p, const Vec3<Eight>& n, float* to) {
+  float* const halves[2] = {to, to + 4 * vertexFloats};
+  storeVertices(d, p, n, halves);
+}
+#endif
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -10,7 +10,9 @@
 #endif
 // clang-format on
 
+#include <array>
 #include <cstring>
+#include <type_traits>
 
 #include "cpu/encode_inl.h"
 #include "cpu/morph.h"
@@ -115,15 +117,35 @@ HWY_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal,
   return unitOr(d, mapNormal(directionMap(d, m, isModerate), normal), normal);
 }
 
+/// Which of a vertex' directions are stored; the others are not computed.
+template <bool withTangents>
+struct Wanted {
+  static constexpr bool tangents = withTangents;
+  bool normals = false;
+
+  bool any() const { return normals || tangents; }
+};
+
+/// Directions of `v` through a map, `normal` and `tangent` being what they are at first.
+template <class D, class Wanted>
+HWY_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& normal,
+                              const Vec3<D>& tangent, Wanted wanted, Vertex<D>& v) {
+  if (wanted.normals) v.normal = unitOr(d, mapNormal(map, normal), v.normal);
+  if constexpr (Wanted::tangents) {
+    v.tangent = unitOr(d, mapTangent(map, tangent), v.tangent);
+    v.hand = hn::Mul(v.hand, map.side);
+  }
+}
+
 /// A vertex through a blended matrix.
-template <class D>
-HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, bool isModerate) {
+template <class D, class Wanted>
+HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, Wanted wanted,
+                                   bool isModerate) {
   Vertex<D> skinned = v;
   skinned.position = throughMatrix(m, v.position);
-  skinned.normal = normalThrough(d, m, v.normal, isModerate);
-  const DirectionMap<D> map = directionMap(d, m, isModerate);
-  skinned.tangent = unitOr(d, mapTangent(map, v.tangent), v.tangent);
-  skinned.hand = hn::Mul(v.hand, map.side);
+  if (wanted.any()) {
+    mapDirections(d, directionMap(d, m, isModerate), v.normal, v.tangent, wanted, skinned);
+  }
   return skinned;
 }
 
@@ -132,6 +154,11 @@ template <class D>
 struct Part {
   Vec3<D> r0, r1, r2;
 };
+
+template <class D>
+HWY_INLINE Part<D> partOf(Vec<D> xx, Vec<D> yy, Vec<D> zz, Vec<D> xy, Vec<D> xz, Vec<D> yz) {
+  return {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
+}
 
 template <class D>
 HWY_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
@@ -148,31 +175,92 @@ struct Slots {
   std::uint32_t influences;
 };
 
-/// Σ w e of each lane's entries. An entry has 4 K floats in `units` times 8 floats.
-template <std::size_t K, class D>
-HWY_INLINE void sumEntries(D d, const float* entries, std::size_t units,
-                           const std::uint16_t* numbers, const Slots& slots, Vec4<D>* sums) {
-  const Four four;
-  constexpr std::size_t lanes = hn::MaxLanes(d);
-  HWY_ALIGN float all[lanes * 4 * K];
-  const float* weights = slots.weights;
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    Vec<Four> sum[K];
-    for (std::size_t k = 0; k < K; ++k)
-      sum[k] =
-          hn::Mul(hn::Set(four, weights[0]), hn::Load(four, entries + numbers[0] * units + k * 4));
-    for (std::uint32_t slot = 1; slot < slots.influences; ++slot) {
-      const Vec<Four> weight = hn::Set(four, weights[slot]);
-      const float* const entry = entries + numbers[slot] * units;
-      for (std::size_t k = 0; k < K; ++k)
-        sum[k] = hn::Add(sum[k], hn::Mul(weight, hn::Load(four, entry + k * 4)));
-    }
-    for (std::size_t k = 0; k < K; ++k) hn::Store(sum[k], four, all + lane * 4 * K + k * 4);
-    numbers += slots.influences;
-    weights += slots.influences;
+/// Calls `sum` with the number of influences: as a constant, or 0 where it is too large to be one.
+template <class Sum>
+HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
+  switch (influences) {
+    case 1:
+      return sum(std::integral_constant<int, 1>());
+    case 2:
+      return sum(std::integral_constant<int, 2>());
+    case 3:
+      return sum(std::integral_constant<int, 3>());
+    case 4:
+      return sum(std::integral_constant<int, 4>());
+    default:
+      return sum(std::integral_constant<int, 0>());
   }
-  for (std::size_t k = 0; k < K; ++k) sums[k] = loadRows(d, all + k * 4, 4 * K);
 }
+
+/// Σ w e of one vertex, of as many floats of an entry as there are lanes. An entry has `units`
+/// times 8 floats. `influences` is 0 where `slots` say how many.
+template <int influences, class D>
+HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
+                            const std::uint16_t* HWY_RESTRICT numbers,
+                            const float* HWY_RESTRICT weights, std::size_t count) {
+  if (influences != 0) count = influences;
+  Vec<D> sum = hn::Mul(hn::Set(d, weights[0]), hn::Load(d, entries + numbers[0] * units));
+  for (std::size_t i = 1; i < count; ++i)
+    sum = hn::Add(sum, hn::Mul(hn::Set(d, weights[i]), hn::Load(d, entries + numbers[i] * units)));
+  return sum;
+}
+
+#if HWY_MAX_BYTES >= 32
+/// Eight rows of eight floats: the columns of their halves.
+HWY_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec4<Eight>& low, Vec4<Eight>& high) {
+  low = {hn::ConcatLowerLower(d, rows[4], rows[0]), hn::ConcatLowerLower(d, rows[5], rows[1]),
+         hn::ConcatLowerLower(d, rows[6], rows[2]), hn::ConcatLowerLower(d, rows[7], rows[3])};
+  high = {hn::ConcatUpperUpper(d, rows[4], rows[0]), hn::ConcatUpperUpper(d, rows[5], rows[1]),
+          hn::ConcatUpperUpper(d, rows[6], rows[2]), hn::ConcatUpperUpper(d, rows[7], rows[3])};
+  transpose4(d, low.x, low.y, low.z, low.w);
+  transpose4(d, high.x, high.y, high.z, high.w);
+}
+
+/// Σ w e of eight vertices. An entry has 4 K floats that count.
+template <std::size_t K>
+HWY_NOINLINE HWY_ATTR void sumEntries(Eight d, const float* entries, std::size_t units,
+                                      const std::uint16_t* numbers, const Slots& slots,
+                                      Vec4<Eight>* sums) {
+  const std::size_t count = slots.influences;
+  byInfluences(slots.influences, [&](auto influences) HWY_ATTR {
+    Vec<Eight> rows[8];
+    for (std::size_t vertex = 0; vertex < 8; ++vertex) {
+      rows[vertex] = sumVertex<influences()>(d, entries, units, numbers + vertex * count,
+                                             slots.weights + vertex * count, count);
+    }
+    columnsOf(d, rows, sums[0], sums[1]);
+    if (K < 3) return;
+    const Four four;
+    Vec<Four> thirds[8];
+    for (std::size_t vertex = 0; vertex < 8; ++vertex) {
+      thirds[vertex] = sumVertex<influences()>(four, entries + 8, units, numbers + vertex * count,
+                                               slots.weights + vertex * count, count);
+    }
+    Vec4<Eight>& third = sums[K - 1];
+    third = {hn::Combine(d, thirds[4], thirds[0]), hn::Combine(d, thirds[5], thirds[1]),
+             hn::Combine(d, thirds[6], thirds[2]), hn::Combine(d, thirds[7], thirds[3])};
+    transpose4(d, third.x, third.y, third.z, third.w);
+  });
+}
+#else
+template <std::size_t K>
+HWY_NOINLINE HWY_ATTR void sumEntries(Four d, const float* entries, std::size_t units,
+                                      const std::uint16_t* numbers, const Slots& slots,
+                                      Vec4<Four>* sums) {
+  const std::size_t count = slots.influences;
+  byInfluences(slots.influences, [&](auto influences) HWY_ATTR {
+    for (std::size_t k = 0; k < K; ++k) {
+      Vec<Four> rows[4];
+      for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+        rows[vertex] = sumVertex<influences()>(d, entries + k * 4, units, numbers + vertex * count,
+                                               slots.weights + vertex * count, count);
+      }
+      transpose4(d, rows[0], rows[1], rows[2], rows[3]);
+      sums[k] = {rows[0], rows[1], rows[2], rows[3]};
+    }
+  });
+}
+#endif
 
 /// The pivot's entry of each lane.
 template <std::size_t K, class D>
@@ -254,18 +342,13 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
   // Joints are converted as many at a time as there are lanes.
   float* const converted = floatsOf(scratch.dualQuaternions, (joints.size() + 8) * 8);
   float* const parts = floatsOf(scratch.scaleShears, (joints.size() + 8) * 8);
-  palette.scales = convertJoints({joints, pose, {converted}, parts}) && mayScale;
+  palette.scales = convertJoints({joints, pose, {converted}, {parts}}) && mayScale;
   float* const signedPairs = floatsOf(scratch.pairs, pairs.size() * 8);
   convertPairs(Four(), pairs, {converted}, {signedPairs});
   palette.pairs = signedPairs;
   if (palette.scales) {
     float* const differences = floatsOf(scratch.scalePairs, pairs.size() * 8);
-    for (std::size_t pair = 0; pair < pairs.size(); ++pair) {
-      for (std::size_t k = 0; k < 8; ++k) {
-        differences[pair * 8 + k] = parts[std::size_t{pairs[pair].joint} * 8 + k] -
-                                    parts[std::size_t{pairs[pair].pivot} * 8 + k];
-      }
-    }
+    subtractPivots(Four(), pairs, {parts}, {differences});
     palette.scaleShears = parts;
     palette.scalePairs = differences;
   }
@@ -292,10 +375,9 @@ HWY_INLINE Part<D> blendParts(D d, const Palette& palette, const Slots& slots) {
   Vec4<D> pivot[2], sum[2];
   pivotEntries<2>(d, palette.scaleShears, slots, pivot);
   sumEntries<2>(d, palette.scalePairs, 1, slots.pairs, slots, sum);
-  const Vec<D> xx = hn::Add(pivot[0].x, sum[0].x), yy = hn::Add(pivot[0].y, sum[0].y),
-               zz = hn::Add(pivot[0].z, sum[0].z), xy = hn::Add(pivot[0].w, sum[0].w),
-               xz = hn::Add(pivot[1].x, sum[1].x), yz = hn::Add(pivot[1].y, sum[1].y);
-  return {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
+  return partOf<D>(hn::Add(pivot[0].x, sum[0].x), hn::Add(pivot[0].y, sum[0].y),
+                   hn::Add(pivot[0].z, sum[0].z), hn::Add(pivot[0].w, sum[0].w),
+                   hn::Add(pivot[1].x, sum[1].x), hn::Add(pivot[1].y, sum[1].y));
 }
 
 template <class D>
@@ -306,28 +388,29 @@ HWY_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) 
 }
 
 /// Between a vertex that went straight and one that was turned. A mirror shows in the latter's.
-template <class D>
+template <class D, class Wanted>
 HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
-                                 Vec<D> share) {
+                                 Vec<D> share, Wanted wanted) {
   const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
   const auto mix = [&](const Vec3<D>& a, const Vec3<D>& b)
                        HWY_ATTR { return add3(scale3(a, rest), scale3(b, share)); };
-  Vertex<D> mixed = turned;
-  mixed.position = mix(straight.position, turned.position);
-  mixed.normal = unitOr(d, mix(straight.normal, turned.normal), turned.normal);
-  mixed.tangent = unitOr(d, mix(straight.tangent, turned.tangent), turned.tangent);
   const auto isTurned = hn::Ge(share, one);
-  mixed.position = choose3(isTurned, turned.position, mixed.position);
-  mixed.normal = choose3(isTurned, turned.normal, mixed.normal);
-  mixed.tangent = choose3(isTurned, turned.tangent, mixed.tangent);
+  Vertex<D> mixed = turned;
+  mixed.position = choose3(isTurned, turned.position, mix(straight.position, turned.position));
+  const auto mixDirection = [&](const Vec3<D>& a, const Vec3<D>& b)
+                                HWY_ATTR { return choose3(isTurned, b, unitOr(d, mix(a, b), b)); };
+  if (wanted.normals) mixed.normal = mixDirection(straight.normal, turned.normal);
+  if constexpr (Wanted::tangents) mixed.tangent = mixDirection(straight.tangent, turned.tangent);
   return mixed;
 }
 
-template <class D>
+/// `scales`: the palette has scale/shear parts.
+template <bool scales, class D, class Wanted>
 HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const Slots& slots,
-                                const Palette& palette, const MethodInputs<D>& inputs) {
+                                const Palette& palette, const MethodInputs<D>& inputs,
+                                Wanted wanted) {
   if (method == Method::linear)
-    return throughMatrix(d, blendRows(d, palette, slots), bind, palette.isModerate);
+    return throughMatrix(d, blendRows(d, palette, slots), bind, wanted, palette.isModerate);
   Vec4<D> blend[2];
   sumEntries<2>(d, palette.pairs, 1, slots.pairs, slots, blend);
   const Vec4<D>&real = blend[0], &dual = blend[1];
@@ -338,20 +421,20 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
   Vec3<D> center = inputs.center;
   const bool isAboutCenter = method == Method::centerOfRotation;
   Part<D> part{};
-  if (palette.scales) {
+  if constexpr (scales) {
     part = blendParts(d, palette, slots);
-    const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, false);
-    scaled.normal = unitOr(d, mapNormal(map, bind.givenNormal), bind.normal);
-    scaled.tangent = unitOr(d, mapTangent(map, bind.givenTangent), bind.tangent);
-    scaled.hand = hn::Mul(bind.hand, map.side);
+    if (wanted.any()) {
+      mapDirections(d, directionMap(d, part.r0, part.r1, part.r2, false), bind.givenNormal,
+                    bind.givenTangent, wanted, scaled);
+    }
   }
   const Vec3<D> point = isAboutCenter ? sub3(bind.position, center) : bind.position;
-  const Vec3<D> scaledPoint = palette.scales ? throughPart(part, point) : point;
+  const Vec3<D> scaledPoint = scales ? throughPart(part, point) : point;
 
   // Second phase: turned and moved.
   Vertex<D> turned = scaled;
-  turned.normal = turnDirection(real, factor, scaled.normal);
-  turned.tangent = turnDirection(real, factor, scaled.tangent);
+  if (wanted.normals) turned.normal = turnDirection(real, factor, scaled.normal);
+  if constexpr (Wanted::tangents) turned.tangent = turnDirection(real, factor, scaled.tangent);
   if (isAboutCenter) {
     const Matrix<D> rows = blendRows(d, palette, slots);
     turned.position = add3(turnDirection(real, factor, scaledPoint), throughMatrix(rows, center));
@@ -360,46 +443,50 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
   turned.position = movePoint(real, dual, factor, scaledPoint);
   if (method == Method::bulgeControlled) {
     const Matrix<D> rows = blendRows(d, palette, slots);
-    if (palette.scales) center = throughPart(part, center);
+    if constexpr (scales) center = throughPart(part, center);
     const Vec3<D> bulged = movePoint(real, dual, factor, center);
     const Vec3<D> pull = sub3(throughMatrix(rows, inputs.center), bulged);
     turned.position = add3(turned.position, scale3(pull, inputs.share));
   }
   if (method == Method::blended) {
-    const Vertex<D> straight = throughMatrix(d, blendRows(d, palette, slots), bind, false);
-    return mixVertices(d, straight, turned, inputs.share);
+    const Vertex<D> straight = throughMatrix(d, blendRows(d, palette, slots), bind, wanted, false);
+    return mixVertices(d, straight, turned, inputs.share, wanted);
   }
   return turned;
 }
 
 // -- Instances.
 
-/// What is found out about the vertices of one instance.
+/// What is found out about the vertices of one instance, lane by lane.
 struct Findings {
-  float least[3], greatest[3];
+  HWY_ALIGN float least[3][blockVertices];
+  HWY_ALIGN float greatest[3][blockVertices];
   std::uint32_t clamped = 0;
 
   Findings() {
-    std::fill(least, least + 3, std::numeric_limits<float>::infinity());
-    std::fill(greatest, greatest + 3, -std::numeric_limits<float>::infinity());
+    for (auto& lanes : least) std::ranges::fill(lanes, std::numeric_limits<float>::infinity());
+    for (auto& lanes : greatest) std::ranges::fill(lanes, -std::numeric_limits<float>::infinity());
   }
 };
 
+/// Lanes `first` to `end`.
 template <class D>
-HWY_INLINE void addPositions(D d, const Vec3<D>& position, std::size_t first, std::size_t end,
-                             Findings& findings) {
-  constexpr std::size_t lanes = hn::MaxLanes(d);
-  HWY_ALIGN float all[3][lanes];
-  hn::Store(position.x, d, all[0]);
-  hn::Store(position.y, d, all[1]);
-  hn::Store(position.z, d, all[2]);
+HWY_INLINE hn::Mask<D> lanesFrom(D d, std::size_t first, std::size_t end) {
+  return hn::AndNot(hn::FirstN(d, first), hn::FirstN(d, end));
+}
+
+template <class D>
+HWY_INLINE void addPositions(D d, const Vec3<D>& position, hn::Mask<D> counts, Findings& findings) {
+  const Vec<D> all[3] = {position.x, position.y, position.z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (std::size_t lane = first; lane < end; ++lane) {
-      // NaN is in no box.
-      const float value = all[axis][lane];
-      if (value < findings.least[axis]) findings.least[axis] = value;
-      if (value > findings.greatest[axis]) findings.greatest[axis] = value;
-    }
+    // NaN is in no box: it is neither less nor greater.
+    const Vec<D> value = all[axis];
+    const Vec<D> least = hn::Load(d, findings.least[axis]);
+    const Vec<D> greatest = hn::Load(d, findings.greatest[axis]);
+    const auto isLess = hn::And(counts, hn::Lt(value, least));
+    const auto isGreater = hn::And(counts, hn::Gt(value, greatest));
+    hn::Store(hn::IfThenElse(isLess, value, least), d, findings.least[axis]);
+    hn::Store(hn::IfThenElse(isGreater, value, greatest), d, findings.greatest[axis]);
   }
 }
 
@@ -411,6 +498,8 @@ struct GeneralTask {
   const Palette& palette;
   const Palette* previous;  ///< Motion::reskinned
   std::uint32_t firstVertex, vertexEnd;
+  std::array<std::uint32_t, 3> sizes;  ///< bytes of positions, normals, tangents
+  bool areSideBySide = false;          ///< positions and normals, in float32
 };
 
 /// One block's vertices in bind pose, displaced.
@@ -432,32 +521,25 @@ inline void loadBlock(const MeshData& mesh, std::uint32_t block,
              withDirections ? to.tangents : nullptr);
 }
 
-template <class D>
+template <class D, class Wanted>
 HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, std::size_t lane,
-                                const BlockVertices* morphed) {
+                                const BlockVertices* morphed, Wanted wanted) {
   const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   Vertex<D> v{none, none, none, none, none, hn::Set(d, 1.0f)};
   const auto at = [&](const std::vector<Lanes>& lanes, std::size_t components)
                       HWY_ATTR { return loadVector(d, lanes.data() + block * components, lane); };
-  if (morphed != nullptr) {
-    v.position = loadVector(d, morphed->positions, lane);
-    v.givenNormal = loadVector(d, morphed->normals, lane);
-    v.givenTangent = loadVector(d, morphed->tangents, lane);
-    v.normal = unitOr(d, v.givenNormal, none);
-    v.tangent = unitOr(d, v.givenTangent, none);
-  } else {
-    v.position = at(mesh.positions, 3);
-    if (!mesh.normals.empty()) {
-      v.normal = at(mesh.normals, 3);
-      v.givenNormal = at(mesh.givenNormals, 3);
-    }
-    if (!mesh.tangents.empty()) {
-      v.tangent = at(mesh.tangents, 4);
-      v.givenTangent = at(mesh.givenTangents, 4);
-    }
+  v.position = morphed != nullptr ? loadVector(d, morphed->positions, lane) : at(mesh.positions, 3);
+  if (wanted.normals) {
+    v.givenNormal =
+        morphed != nullptr ? loadVector(d, morphed->normals, lane) : at(mesh.givenNormals, 3);
+    v.normal = morphed != nullptr ? unitOr(d, v.givenNormal, none) : at(mesh.normals, 3);
   }
-  if (!mesh.tangents.empty())
+  if constexpr (Wanted::tangents) {
+    v.givenTangent =
+        morphed != nullptr ? loadVector(d, morphed->tangents, lane) : at(mesh.givenTangents, 4);
+    v.tangent = morphed != nullptr ? unitOr(d, v.givenTangent, none) : at(mesh.tangents, 4);
     v.hand = hn::Load(d, mesh.tangents[std::size_t{block} * 4 + 3].v + lane);
+  }
   return v;
 }
 
@@ -471,16 +553,8 @@ HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& 
   return {along(position.x, 0), along(position.y, 1), along(position.z, 2)};
 }
 
-/// Copies an attribute of some vertices.
-inline void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
-                      std::size_t fromStride, std::size_t bytes, std::size_t first,
-                      std::size_t end) {
-  for (std::size_t lane = first; lane < end; ++lane)
-    std::memcpy(to + lane * toStride, from + lane * fromStride, bytes);
-}
-
 /// Lanes `first` to `end` of those from `lane` of a block on.
-template <class D>
+template <bool scales, bool tangents, class D>
 HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
                           std::size_t first, std::size_t end, const BlockVertices* morphed,
                           const BlockVertices* morphedBefore, Findings& findings) {
@@ -502,22 +576,25 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
   if (job.method == Method::bulgeControlled)
     inputs.share = hn::Load(d, mesh.bulgeStrengths[block].v + lane);
 
-  const Vertex<D> skinned = skinVertex(d, job.method, bindVertex(d, mesh, block, lane, morphed),
-                                       slots, task.palette, inputs);
+  const Wanted<tangents> wanted{places.normals.format != VertexFormat::none};
+  const Vertex<D> skinned =
+      skinVertex<scales>(d, job.method, bindVertex(d, mesh, block, lane, morphed, wanted), slots,
+                         task.palette, inputs, wanted);
   const VertexFormat format = places.positions.format;
-  const std::uint32_t bytes = formatSize(format);
+  const std::uint32_t bytes = task.sizes[0];
   const auto encode = [&](const Vec3<D>& position, bool mayCount) HWY_ATTR {
     if (!isSnormPosition(format)) return encodePosition(d, format, position);
     const Vec3<D> relative = relativeTo(d, task.instance, position);
     if (mayCount) {
       // A vertex of the engine's own box may stand a rounding outside.
-      HWY_ALIGN float outside[hn::MaxLanes(d)];
-      hn::Store(largest3(relative), d, outside);
-      for (std::size_t i = first; i < end; ++i) findings.clamped += outside[i] > 1.00001f ? 1 : 0;
+      const auto isOutside = hn::Gt(largest3(relative), hn::Set(d, 1.00001f));
+      findings.clamped += static_cast<std::uint32_t>(
+          hn::CountTrue(d, hn::And(isOutside, lanesFrom(d, first, end))));
     }
     return encodePosition(d, format, relative);
   };
-  if (task.instance.result != nullptr) addPositions(d, skinned.position, first, end, findings);
+  if (task.instance.result != nullptr)
+    addPositions(d, skinned.position, lanesFrom(d, first, end), findings);
   std::byte* const to = placeOf(Stream::positions, places.positions);
   std::byte* const toPrevious = placeOf(Stream::previousPositions, places.previousPositions);
   const Encoded<D> encoded = encode(skinned.position, true);
@@ -527,27 +604,34 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
   } else if (places.motion != Motion::none) {
     Encoded<D> before = encoded;
     if (places.motion == Motion::reskinned && !task.instance.restartsMotion) {
+      const Wanted<false> positions;
+      const Vertex<D> bind = bindVertex(d, mesh, block, lane, morphedBefore, positions);
       const Vertex<D> old =
-          skinVertex(d, job.method, bindVertex(d, mesh, block, lane, morphedBefore), slots,
-                     *task.previous, inputs);
+          task.previous->scales
+              ? skinVertex<true>(d, job.method, bind, slots, *task.previous, inputs, positions)
+              : skinVertex<false>(d, job.method, bind, slots, *task.previous, inputs, positions);
       before = encode(old.position, false);
     }
     storeLanes(d, before, bytes, toPrevious, places.previousPositions.stride, first, end);
   }
-  storeLanes(d, encoded, bytes, to, places.positions.stride, first, end);
-  if (places.normals.format != VertexFormat::none) {
-    storeLanes(d, encodeNormal(d, places.normals.format, skinned.normal),
-               formatSize(places.normals.format), placeOf(Stream::normals, places.normals),
-               places.normals.stride, first, end);
+  if (task.areSideBySide && end - first == hn::MaxLanes(d)) {
+    storeWhole(d, skinned.position, skinned.normal, reinterpret_cast<float*>(to));
+  } else {
+    storeLanes(d, encoded, bytes, to, places.positions.stride, first, end);
+    if (wanted.normals) {
+      storeLanes(d, encodeNormal(d, places.normals.format, skinned.normal), task.sizes[1],
+                 placeOf(Stream::normals, places.normals), places.normals.stride, first, end);
+    }
   }
-  if (places.tangents.format != VertexFormat::none) {
+  if constexpr (tangents) {
     storeLanes(d, encodeTangent(d, places.tangents.format, skinned.tangent, skinned.hand),
-               formatSize(places.tangents.format), placeOf(Stream::tangents, places.tangents),
-               places.tangents.stride, first, end);
+               task.sizes[2], placeOf(Stream::tangents, places.tangents), places.tangents.stride,
+               first, end);
   }
 }
 
-inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
+template <bool scales, bool tangents>
+inline HWY_ATTR void skinRun(const GeneralTask& task, Findings& findings) {
   const Wide d;
   constexpr std::uint32_t lanes = hn::MaxLanes(d);
   const bool reskins = task.previous != nullptr;
@@ -564,9 +648,19 @@ inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
       const std::uint32_t first = std::max(vertex, task.firstVertex);
       const std::uint32_t end = std::min(vertex + lanes, task.vertexEnd);
       if (first >= end) continue;
-      skinLanes(d, task, block, lane, first - vertex, end - vertex, isMorphed ? &morphed : nullptr,
-                wasMorphed ? &morphedBefore : nullptr, findings);
+      skinLanes<scales, tangents>(d, task, block, lane, first - vertex, end - vertex,
+                                  isMorphed ? &morphed : nullptr,
+                                  wasMorphed ? &morphedBefore : nullptr, findings);
     }
+  }
+}
+
+inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
+  const bool tangents = task.task.places.tangents.format != VertexFormat::none;
+  if (task.palette.scales) {
+    tangents ? skinRun<true, true>(task, findings) : skinRun<true, false>(task, findings);
+  } else {
+    tangents ? skinRun<false, true>(task, findings) : skinRun<false, false>(task, findings);
   }
 }
 

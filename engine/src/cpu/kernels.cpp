@@ -55,13 +55,15 @@ inline void write(const Findings& findings, const TaskInstance& instance) {
   InstanceResult found;
   found.clampedVertices = findings.clamped;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!(findings.least[axis] <= findings.greatest[axis])) continue;
+    const float least = *std::ranges::min_element(findings.least[axis]);
+    const float greatest = *std::ranges::max_element(findings.greatest[axis]);
+    if (!(least <= greatest)) continue;
     const auto ordered = [](float value) {
       const auto bits = std::bit_cast<std::uint32_t>(value == 0 ? 0.0f : value);
       return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
     };
-    found.orderedMin[axis] = ordered(findings.least[axis]);
-    found.orderedMax[axis] = ordered(findings.greatest[axis]);
+    found.orderedMin[axis] = ordered(least);
+    found.orderedMax[axis] = ordered(greatest);
   }
   addResult(*instance.result, found);
 }
@@ -88,7 +90,16 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
     std::uint32_t first, end;
     clipToRun(part, run, first, end);
     if (first >= end) continue;
-    skinGeneral({task, run, instance, palette, reskins ? &previous : nullptr, first, end},
+    skinGeneral({task,
+                 run,
+                 instance,
+                 palette,
+                 reskins ? &previous : nullptr,
+                 first,
+                 end,
+                 {formatSize(task.places.positions.format), formatSize(task.places.normals.format),
+                  formatSize(task.places.tangents.format)},
+                 areSideBySide(task.places) && areSideBySide(instance)},
                 findings);
   }
   write(findings, instance);
@@ -97,20 +108,13 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
 // -- The plain way.
 
 inline bool isPlainTask(const Task& task) {
-  const VertexPlaces& places = task.places;
   return (task.method == Method::dualQuaternion || task.method == Method::linear) &&
-         places.motion == Motion::none && places.positions.format == VertexFormat::float32x3 &&
-         places.normals.format == VertexFormat::float32x3 &&
-         places.tangents.format == VertexFormat::none &&
-         places.positions.stride == vertexFloats * sizeof(float) &&
-         places.normals.stride == places.positions.stride;
+         task.places.motion == Motion::none && task.places.tangents.format == VertexFormat::none &&
+         areSideBySide(task.places);
 }
 
 inline bool isPlainInstance(const TaskInstance& instance) {
-  const std::byte* const positions = instance.output(Stream::positions);
-  return instance.morphs.empty() && instance.result == nullptr &&
-         instance.output(Stream::normals) == positions + 3 * sizeof(float) &&
-         reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
+  return instance.morphs.empty() && instance.result == nullptr && areSideBySide(instance);
 }
 
 /// How many instances there are room for at a time.
@@ -127,14 +131,32 @@ struct PlainGroup {
   std::size_t count = 0;
   float* outputs[mostInstances] = {};
   std::span<const JointMatrix> poses[mostInstances];
-  /// Dual quaternions: of each joint the real parts of all instances, and the dual parts.
+  /// Of each joint the real parts of all instances, and the dual parts; and likewise its
+  /// scale/shear parts.
   DualQuaternionArray<float> joints{nullptr, mostInstances * 4};
+  DualQuaternionArray<float> parts = joints;
   float* palettes = nullptr;  ///< of those that are skinned next
 
-  DualQuaternionArray<const float> from(std::size_t instance) const {
+  /// The memory of so many joints and pairs.
+  void assign(Scratch& scratch, std::size_t jointCount, std::size_t paletteFloats) {
+    // Joints are converted as many at a time as there are lanes.
+    joints.dual = parts.dual = (jointCount + blockVertices) * joints.stride;
+    joints.first = floatsOf(scratch.dualQuaternions, joints.dual * 2);
+    parts.first = floatsOf(scratch.scaleShears, joints.dual * 2);
+    palettes = floatsOf(scratch.pairs, paletteFloats * mostInstances);
+  }
+  DualQuaternionArray<float> jointsOf(std::size_t instance) const {
     return {joints.first + instance * 4, joints.stride, joints.dual};
   }
+  DualQuaternionArray<float> partsOf(std::size_t instance) const {
+    return {parts.first + instance * 4, parts.stride, parts.dual};
+  }
 };
+
+template <class T>
+inline DualQuaternionArray<const T> readOnly(const DualQuaternionArray<T>& array) {
+  return {array.first, array.stride, array.dual};
+}
 
 /// Skins parts of blocks beside the output, as it skins whole ones, and copies them there.
 template <class Skin>
@@ -184,19 +206,20 @@ inline HWY_ATTR void turnGroup(D d, const SectionTask& part, const PlainGroup& g
   constexpr std::size_t blocks = hn::MaxLanes(d) / 4;
   const std::span<const Pair> pairs = pairsOf(*part.task.mesh, part.section);
   const std::size_t dual = pairs.size() * blocks * 4;
-  convertPairs(d, pairs, group.from(first), {group.palettes, blocks * 4, dual});
+  convertPairs(d, pairs, readOnly(group.jointsOf(first)), {group.palettes, blocks * 4, dual});
   forRuns(part, blocks, group.outputs + first,
           [&](const PlainTask& task, float* const* to) HWY_ATTR {
-            byInfluences(task.run, [&](auto influences) HWY_ATTR {
+            byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
               turnInstances<influences()>(d, task, group.palettes, dual, to);
             });
           });
 }
 #if HWY_MAX_BYTES >= 32
 inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, std::size_t first) {
-  convertPairs(Four(), pairsOf(*part.task.mesh, part.section), group.from(first), {group.palettes});
+  convertPairs(Four(), pairsOf(*part.task.mesh, part.section), readOnly(group.jointsOf(first)),
+               {group.palettes});
   forRuns(part, 1, group.outputs + first, [&](const PlainTask& task, float* const* to) HWY_ATTR {
-    byInfluences(task.run, [&](auto influences) HWY_ATTR {
+    byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
       turnInstance<influences()>(Eight(), task, group.palettes, to[0]);
     });
   });
@@ -225,72 +248,121 @@ inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& g
   }
   forRuns(part, blocks, group.outputs + first,
           [&](const PlainTask& task, float* const* to) HWY_ATTR {
-            byInfluences(task.run, [&](auto influences) HWY_ATTR {
+            byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
               moveInstances<influences()>(d, task, group.palettes, rowFloats, to);
             });
           });
 }
 
-inline HWY_ATTR void skinGroup(const SectionTask& part, const PlainGroup& group) {
-  const bool moves = part.task.method == Method::linear;
+/// By dual quaternions, with two-phase scale.
+template <class D>
+inline HWY_ATTR void turnScaledGroup(D d, const SectionTask& part, const PlainGroup& group,
+                                     std::size_t first) {
+  constexpr std::size_t blocks = hn::MaxLanes(d) / 4;
+  const std::span<const Pair> pairs = pairsOf(*part.task.mesh, part.section);
+  const std::span<const std::uint32_t> joints = jointsOf(*part.task.mesh, part.section);
+  const std::size_t stride = blocks * 4, dual = pairs.size() * stride;
+  float* const scalePairs = group.palettes + dual * 2;
+  float* const parts = scalePairs + dual * 2;
+  const std::size_t second = joints.size() * stride;
+  convertPairs(d, pairs, readOnly(group.jointsOf(first)), {group.palettes, stride, dual});
+  subtractPivots(d, pairs, readOnly(group.partsOf(first)), {scalePairs, stride, dual});
+  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+    const float* const from = group.partsOf(first).first + joint * group.parts.stride;
+    hn::Store(hn::LoadU(d, from), d, parts + joint * stride);
+    hn::Store(hn::LoadU(d, from + group.parts.dual), d, parts + second + joint * stride);
+  }
+  const ScaledPalette palette{group.palettes, scalePairs, parts, dual, second};
+  forRuns(part, blocks, group.outputs + first,
+          [&](const PlainTask& task, float* const* to) HWY_ATTR {
+            byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
+              turnScaledInstances<influences()>(d, task, palette, to);
+            });
+          });
+}
+
+enum class PlainKind : std::uint8_t { turned, scaled, moved };
+
+template <class D>
+inline HWY_ATTR void skinBlocks(D d, PlainKind kind, const SectionTask& part,
+                                const PlainGroup& group, std::size_t first) {
+  if (kind == PlainKind::moved) return moveGroup(d, part, group, first);
+  if (kind == PlainKind::scaled) return turnScaledGroup(d, part, group, first);
+  turnGroup(d, part, group, first);
+}
+
+/// All of them, and then there are none.
+inline HWY_ATTR void skinGroup(PlainKind kind, const SectionTask& part, PlainGroup& group) {
   std::size_t first = 0;
 #if HWY_MAX_BYTES >= 64
   if (group.count == 4) {
-    if (moves) return moveGroup(Sixteen(), part, group, 0);
-    return turnGroup(Sixteen(), part, group, 0);
+    skinBlocks(Sixteen(), kind, part, group, 0);
+    first = 4;
   }
 #endif
 #if HWY_MAX_BYTES >= 32
-  if (group.count >= 2) {
-    if (moves) {
-      moveGroup(Eight(), part, group, 0);
-    } else {
-      turnGroup(Eight(), part, group, 0);
-    }
-    first = 2;
+  if (group.count - first >= 2) {
+    skinBlocks(Eight(), kind, part, group, first);
+    first += 2;
   }
 #endif
-  if (first == group.count) return;
-  if (moves) return moveGroup(Four(), part, group, first);
-  turnOne(part, group, first);
+  if (first != group.count) {
+    if (kind == PlainKind::turned) {
+      turnOne(part, group, first);
+    } else {
+      skinBlocks(Four(), kind, part, group, first);
+    }
+  }
+  group.count = 0;
 }
 
-/// Instances that are plain. Those whose joints scale, or are very large or small, go the general
-/// way.
+inline void copyJoints(std::size_t count, const DualQuaternionArray<float>& from,
+                       const DualQuaternionArray<float>& to) {
+  for (std::size_t joint = 0; joint < count; ++joint) {
+    std::memcpy(to.first + joint * to.stride, from.first + joint * from.stride, 16);
+    std::memcpy(to.first + to.dual + joint * to.stride,
+                from.first + from.dual + joint * from.stride, 16);
+  }
+}
+
+/// Instances that are plain. Those by matrices that are very large or small go the general way.
 inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   const Task& task = part.task;
-  const MeshData& mesh = *part.task.mesh;
-  Scratch& scratch = part.scratch[2];
+  const MeshData& mesh = *task.mesh;
   const std::span<const std::uint32_t> joints = jointsOf(mesh, part.section);
   const std::size_t pairs = pairsOf(mesh, part.section).size();
   const bool moves = task.method == Method::linear;
-  PlainGroup group;
-  // Joints are converted as many at a time as there are lanes.
-  group.joints.dual = (joints.size() + 8) * group.joints.stride;
-  group.joints.first = floatsOf(scratch.dualQuaternions, group.joints.dual * 2);
-  group.palettes =
-      floatsOf(scratch.pairs, (moves ? joints.size() * 12 : pairs * 8) * mostInstances);
+  const PlainKind kind = moves ? PlainKind::moved : PlainKind::turned;
+  PlainGroup group, scaled;
+  group.assign(part.scratch[2], joints.size(), moves ? joints.size() * 12 : pairs * 8);
+  const auto add = [&](PlainGroup& to, const TaskInstance& instance) {
+    to.outputs[to.count] = reinterpret_cast<float*>(instance.output(Stream::positions));
+    to.poses[to.count++] = instance.pose;
+  };
   for (const TaskInstance& instance : task.instances) {
-    if (!isPlainInstance(instance)) {
+    if (!isPlainInstance(instance) || (moves && !areModerate(joints, instance.pose))) {
       skinGenerally(part, instance);
       continue;
     }
-    const DualQuaternionArray<float> own{group.joints.first + group.count * 4, group.joints.stride,
-                                         group.joints.dual};
-    const bool isPlain =
-        moves ? areModerate(joints, instance.pose)
-              : !convertJoints({joints, instance.pose, own, nullptr, instance.mayScale});
-    if (!isPlain) {
-      skinGenerally(part, instance);
-      continue;
+    const std::size_t place = group.count;
+    const bool scales =
+        !moves &&
+        convertJoints({joints, instance.pose, group.jointsOf(place), group.partsOf(place)}) &&
+        instance.mayScale;
+    if (scales) {
+      if (scaled.palettes == nullptr)
+        scaled.assign(part.scratch[3], joints.size(), pairs * 16 + joints.size() * 8);
+      copyJoints(joints.size(), group.jointsOf(place), scaled.jointsOf(scaled.count));
+      copyJoints(joints.size(), group.partsOf(place), scaled.partsOf(scaled.count));
+      add(scaled, instance);
+      if (scaled.count == mostInstances) skinGroup(PlainKind::scaled, part, scaled);
+    } else {
+      add(group, instance);
+      if (group.count == mostInstances) skinGroup(kind, part, group);
     }
-    group.outputs[group.count] = reinterpret_cast<float*>(instance.output(Stream::positions));
-    group.poses[group.count] = instance.pose;
-    if (++group.count < mostInstances) continue;
-    skinGroup(part, group);
-    group.count = 0;
   }
-  if (group.count != 0) skinGroup(part, group);
+  skinGroup(kind, part, group);
+  skinGroup(PlainKind::scaled, part, scaled);
 }
 
 // -- A job.

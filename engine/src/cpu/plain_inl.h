@@ -12,8 +12,6 @@
 #endif
 // clang-format on
 
-#include <type_traits>
-
 #include "cpu/general_inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -26,74 +24,6 @@ struct PlainTask {
   std::uint32_t firstBlock, blockEnd;
   std::uint32_t outputBlock;  ///< the one that stands at the beginning of the output
 };
-
-inline constexpr std::size_t vertexFloats = 6;
-inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
-
-/// Calls `skin` with the number of influences of the run: as a constant, or 0 where it is too large
-/// to be one.
-template <class Skin>
-HWY_INLINE void byInfluences(const Run& run, const Skin& skin) {
-  switch (run.influences) {
-    case 1:
-      return skin(std::integral_constant<int, 1>());
-    case 2:
-      return skin(std::integral_constant<int, 2>());
-    case 3:
-      return skin(std::integral_constant<int, 3>());
-    case 4:
-      return skin(std::integral_constant<int, 4>());
-    default:
-      return skin(std::integral_constant<int, 0>());
-  }
-}
-
-/// Four vertices of each block: positions and normals, component by component, to where each block
-/// begins.
-HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
-  for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
-}
-#if HWY_MAX_BYTES >= 32
-HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to[2]) {
-  for (std::size_t k = 0; k < 6; k += 2) {
-    hn::StoreU(hn::ConcatLowerLower(d, chunks[k + 1], chunks[k]), d, to[0] + k * 4);
-    hn::StoreU(hn::ConcatUpperUpper(d, chunks[k + 1], chunks[k]), d, to[1] + k * 4);
-  }
-}
-#endif
-#if HWY_MAX_BYTES >= 64
-HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
-  const Eight half;
-  for (std::size_t k = 0; k < 6; k += 2) {
-    // The even blocks of both chunks, and the odd ones.
-    const auto even = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(chunks[k + 1]), chunks[k]);
-    const auto odd = hn::OddEvenBlocks(chunks[k + 1], hn::SwapAdjacentBlocks(chunks[k]));
-    hn::StoreU(hn::LowerHalf(half, even), half, to[0] + k * 4);
-    hn::StoreU(hn::LowerHalf(half, odd), half, to[1] + k * 4);
-    hn::StoreU(hn::UpperHalf(half, even), half, to[2] + k * 4);
-    hn::StoreU(hn::UpperHalf(half, odd), half, to[3] + k * 4);
-  }
-  static_cast<void>(d);
-}
-#endif
-
-template <class D>
-HWY_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* const* to) {
-  const hn::Repartition<double, D> dd;
-  const auto pair = [&](Vec<D> a, Vec<D> b, bool upper) HWY_ATTR {
-    return hn::BitCast(dd, upper ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
-  };
-  Vec<D> chunks[6];
-  for (int half = 0; half < 2; ++half) {
-    const auto xy = pair(p.x, p.y, half == 1);
-    const auto zx = pair(p.z, n.x, half == 1);
-    const auto yz = pair(n.y, n.z, half == 1);
-    chunks[half * 3] = hn::BitCast(d, hn::InterleaveLower(dd, xy, zx));
-    chunks[half * 3 + 1] = hn::BitCast(d, hn::OddEven(xy, yz));
-    chunks[half * 3 + 2] = hn::BitCast(d, hn::InterleaveUpper(dd, zx, yz));
-  }
-  storeBlocks(d, chunks, to);
-}
 
 /// The three components of four vertices, in each block.
 struct InEveryBlock {
@@ -115,9 +45,8 @@ struct InAllLanes {
 
 /// What is read of a block late stays out of registers until then.
 template <class D, class Place>
-HWY_INLINE void turnAndStore(D d, const Vec<D> q[8], const Lanes* positions, const Lanes* normals,
-                             const Place& place, float* const* to) {
-  const Vec4<D> real{q[0], q[1], q[2], q[3]}, dual{q[4], q[5], q[6], q[7]};
+HWY_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual, const Lanes* positions,
+                             const Lanes* normals, const Place& place, float* const* to) {
   const Vec<D> factor = turningFactor(d, real);
   const Vec3<D> position = movePoint(real, dual, factor, place.load(d, positions));
   storeVertices(d, position, turnDirection(real, factor, place.load(d, normals)), to);
@@ -160,7 +89,85 @@ HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTR
       }
       transpose4(d, q[0], q[1], q[2], q[3]);
       transpose4(d, q[4], q[5], q[6], q[7]);
-      turnAndStore(d, q, positions, normals, InEveryBlock{half}, to);
+      turnAndStore(d, Vec4<D>{q[0], q[1], q[2], q[3]}, Vec4<D>{q[4], q[5], q[6], q[7]}, positions,
+                   normals, InEveryBlock{half}, to);
+      for (float*& place : to) place += 4 * vertexFloats;
+    }
+  }
+}
+
+/// What the vertices of instances that scale read. Entries of all instances stand side by side,
+/// their second halves in arrays behind.
+struct ScaledPalette {
+  const float* pairs;       ///< dual quaternions of pairs
+  const float* scalePairs;  ///< scale/shear parts of pairs: the joint's less the pivot's
+  const float* parts;       ///< of joints
+  std::size_t dual;         ///< from a half of a pair to the other one
+  std::size_t second;       ///< the same, of a joint
+};
+
+/// As `turnInstances`, with two-phase scale.
+template <int influences, class D>
+HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPalette& palette,
+                                    float* const* outputs) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
+  const std::size_t count = influences != 0 ? influences : task.run.influences;
+  const std::uint64_t slot = task.run.slotOf(task.firstBlock);
+  const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
+  const std::uint16_t* HWY_RESTRICT joint = task.mesh.jointNumbers.data() + slot;
+  const float* HWY_RESTRICT weight = task.mesh.weights.data() + slot;
+  float* to[blocks];
+  for (std::size_t i = 0; i < blocks; ++i)
+    to[i] = outputs[i] + std::size_t{task.firstBlock - task.outputBlock} * blockFloats;
+  /// Both halves of an entry, blended, of four vertices.
+  const auto blend = [&](const float* HWY_RESTRICT entries, Vec<D> sums[8]) HWY_ATTR {
+    for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+      const std::uint16_t* const own = number + vertex * count;
+      const float* const ownWeights = weight + vertex * count;
+      Vec<D> low = hn::Zero(d), high = hn::Zero(d);
+      for (std::size_t i = 0; i < count; ++i) {
+        const float* const entry = entries + std::size_t{own[i]} * blocks / 2;
+        const Vec<D> w = hn::Set(d, ownWeights[i]);
+        const Vec<D> lowPart = hn::Mul(w, hn::Load(d, entry));
+        const Vec<D> highPart = hn::Mul(w, hn::Load(d, entry + palette.dual));
+        low = i == 0 ? lowPart : hn::Add(low, lowPart);
+        high = i == 0 ? highPart : hn::Add(high, highPart);
+      }
+      sums[vertex] = low;
+      sums[vertex + 4] = high;
+    }
+  };
+  for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
+    const Lanes* const positions = task.mesh.positions.data() + std::size_t{block} * 3;
+    const Lanes* const normals = task.mesh.normals.data() + std::size_t{block} * 3;
+    const Lanes* const given = task.mesh.givenNormals.data() + std::size_t{block} * 3;
+    for (std::size_t half = 0; half < blockVertices; half += 4) {
+      const InEveryBlock from{half};
+      Vec<D> s[8];
+      blend(palette.scalePairs, s);
+      for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+        const float* const pivot = palette.parts + std::size_t{joint[vertex * count]} * blocks / 2;
+        s[vertex] = hn::Add(hn::Load(d, pivot), s[vertex]);
+        s[vertex + 4] = hn::Add(hn::Load(d, pivot + palette.second), s[vertex + 4]);
+      }
+      transpose4(d, s[0], s[1], s[2], s[3]);
+      transpose4(d, s[4], s[5], s[6], s[7]);
+      const Part<D> part = partOf<D>(s[0], s[1], s[2], s[3], s[4], s[5]);
+      const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, false);
+      const Vec3<D> normal = unitOr(d, mapNormal(map, from.load(d, given)), from.load(d, normals));
+      const Vec3<D> position = throughPart(part, from.load(d, positions));
+
+      Vec<D> q[8];
+      blend(palette.pairs, q);
+      transpose4(d, q[0], q[1], q[2], q[3]);
+      transpose4(d, q[4], q[5], q[6], q[7]);
+      const Vec4<D> real{q[0], q[1], q[2], q[3]}, dual{q[4], q[5], q[6], q[7]};
+      const Vec<D> factor = turningFactor(d, real);
+      storeVertices(d, movePoint(real, dual, factor, position), turnDirection(real, factor, normal),
+                    to);
+      number += 4 * count;
+      joint += 4 * count;
+      weight += 4 * count;
       for (float*& place : to) place += 4 * vertexFloats;
     }
   }
@@ -228,21 +235,14 @@ HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RE
   for (std::uint32_t block = task.firstBlock; block < task.blockEnd; ++block) {
     Vec<Eight> rows[8];
     for (Vec<Eight>& row : rows) {
-      row = hn::Mul(hn::Set(d, weight[0]), hn::Load(d, pairs + number[0]));
-      for (std::size_t i = 1; i < count; ++i)
-        row = hn::Add(row, hn::Mul(hn::Set(d, weight[i]), hn::Load(d, pairs + number[i])));
+      row = sumVertex<influences>(d, pairs, 1, number, weight, count);
       number += count;
       weight += count;
     }
-    Vec<Eight> q[8];
-    for (std::size_t k = 0; k < 4; ++k) {
-      q[k] = hn::ConcatLowerLower(d, rows[k + 4], rows[k]);
-      q[k + 4] = hn::ConcatUpperUpper(d, rows[k + 4], rows[k]);
-    }
-    transpose4(d, q[0], q[1], q[2], q[3]);
-    transpose4(d, q[4], q[5], q[6], q[7]);
+    Vec4<Eight> real, dual;
+    columnsOf(d, rows, real, dual);
     float* const halves[2] = {to, to + 4 * vertexFloats};
-    turnAndStore(d, q, task.mesh.positions.data() + std::size_t{block} * 3,
+    turnAndStore(d, real, dual, task.mesh.positions.data() + std::size_t{block} * 3,
                  task.mesh.normals.data() + std::size_t{block} * 3, InAllLanes(), halves);
     to += blockFloats;
   }

@@ -52,7 +52,7 @@ void turn(Matrix& m, Matrix& vectors, std::size_t p, std::size_t q) {
   }
 }
 
-Vector nearestRotation(const double c[3][3]) {
+Vector byJacobi(const double c[3][3]) {
   Matrix m = hornMatrix(c);
   Matrix vectors{};
   for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
@@ -78,6 +78,69 @@ Vector nearestRotation(const double c[3][3]) {
     q[i] = vectors[i][largest];
     square += q[i] * q[i];
   }
+  for (double& component : q) component /= std::sqrt(square);
+  return q;
+}
+
+using Matrix3 = std::array<std::array<double, 3>, 3>;
+
+Matrix3 cofactorsOf(const Matrix3& m) {
+  Matrix3 cofactors;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto &a = m[(i + 1) % 3], &b = m[(i + 2) % 3];
+    cofactors[i] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                    a[0] * b[1] - a[1] * b[0]};
+  }
+  return cofactors;
+}
+
+double determinantOf(const Matrix3& m, const Matrix3& cofactors) {
+  return m[0][0] * cofactors[0][0] + m[0][1] * cofactors[0][1] + m[0][2] * cofactors[0][2];
+}
+
+/// Newton's method for the orthogonal factor (Higham 1986, "Computing the polar decomposition"):
+/// X ← (X + X⁻ᵀ) / 2, from C / det(C)^⅓ on. It converges quadratically, to a rotation if
+/// det(C) > 0. Returns whether it did within a few steps, as it does where C is far from flat.
+bool nearestRotation(const double c[3][3], Matrix3& x) {
+  for (std::size_t i = 0; i < 3; ++i) x[i] = {c[i][0], c[i][1], c[i][2]};
+  Matrix3 cofactors = cofactorsOf(x);
+  const double determinant = determinantOf(x, cofactors);
+  // The largest entry is 1. What is flatter is left to Jacobi's method.
+  if (!(determinant > 1e-4)) return false;
+  const double scale = 1 / std::cbrt(determinant);
+  for (auto& row : x) {
+    for (double& entry : row) entry *= scale;
+  }
+  for (int step = 0; step < 12; ++step) {
+    cofactors = cofactorsOf(x);
+    const double half = 0.5 / determinantOf(x, cofactors);
+    double change = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        const double next = 0.5 * x[i][j] + half * cofactors[i][j];
+        change = std::max(change, std::abs(next - x[i][j]));
+        x[i][j] = next;
+      }
+    }
+    // The error is about the square of the last change.
+    if (change < 1e-8) return true;
+  }
+  return false;
+}
+
+/// Of a rotation, by its largest component (Shepperd 1978).
+Vector quaternionOf(const Matrix3& r) {
+  const Vector squares{1 + r[0][0] - r[1][1] - r[2][2], 1 - r[0][0] + r[1][1] - r[2][2],
+                       1 - r[0][0] - r[1][1] + r[2][2], 1 + r[0][0] + r[1][1] + r[2][2]};
+  const auto largest =
+      static_cast<std::size_t>(std::ranges::max_element(squares) - squares.begin());
+  const double a = r[2][1] - r[1][2], b = r[0][2] - r[2][0], c = r[1][0] - r[0][1];
+  const double d = r[0][1] + r[1][0], e = r[0][2] + r[2][0], f = r[1][2] + r[2][1];
+  const Matrix columns{
+      {{squares[0], d, e, a}, {d, squares[1], f, b}, {e, f, squares[2], c}, {a, b, c, squares[3]}}};
+  Vector q = columns[largest];
+  double square = 0;
+  for (const double component : q) square += component * component;
   for (double& component : q) component /= std::sqrt(square);
   return q;
 }
@@ -114,7 +177,8 @@ void polarParts(const float rows[3][4], float rotation[4], ScaleShear& scaleShea
     for (int column = 0; column < 3; ++column)
       scaled[row][column] = side * c[row][column] / largest;
   }
-  const Vector q = nearestRotation(scaled);
+  Matrix3 nearest;
+  const Vector q = nearestRotation(scaled, nearest) ? quaternionOf(nearest) : byJacobi(scaled);
   const double x = q[0], y = q[1], z = q[2], w = q[3];
   const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
                           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},

@@ -99,7 +99,8 @@ HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
 }
 
 /// Dual quaternions of joints or pairs: the real parts `stride` floats from one to the next, the
-/// dual parts `dual` floats behind them.
+/// dual parts `dual` floats behind them. Scale/shear parts stand like that, too: the diagonal and
+/// an entry, and the two other entries.
 template <class T>
 struct DualQuaternionArray {
   T* first;
@@ -112,8 +113,7 @@ struct PoseTask {
   std::span<const std::uint32_t> joints;
   std::span<const JointMatrix> pose;
   DualQuaternionArray<float> dualQuaternions;
-  float* scaleShears;         ///< 8 a joint, or null
-  bool stopsAtScale = false;  ///< the rest is of no use if a joint scales
+  DualQuaternionArray<float> scaleShears;  ///< two times four floats a joint, in the same way
 };
 
 /// The matrices of joints `first` and on, 12 floats each: where they stand, or copied.
@@ -186,7 +186,6 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
     Vec4<Wide> real = quaternionOf(d, joints);
     ScaleShear parts[lanes];
     if (!hn::AllTrue(d, rigid)) {
-      if (task.stopsAtScale) return true;
       storeRows(d, real, rotations, 4);
       hn::Store(hn::IfThenElseZero(rigid, hn::Set(d, 1.0f)), d, isRigid);
       for (std::size_t lane = 0; lane < lanes; ++lane) {
@@ -200,12 +199,14 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
     storeRows(d, real, to.first + first * to.stride, to.stride);
     storeRows(d, dualPart(d, real, joints.translation), to.first + first * to.stride + to.dual,
               to.stride);
-    if (task.scaleShears == nullptr) continue;
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      float* const part = task.scaleShears + (first + lane) * 8;
-      std::memcpy(part, parts[lane].diagonal, sizeof(parts[lane].diagonal));
-      std::memcpy(part + 3, parts[lane].mixed, sizeof(parts[lane].mixed));
-      part[6] = part[7] = 0;
+      const DualQuaternionArray<float>& shears = task.scaleShears;
+      float* const part = shears.first + (first + lane) * shears.stride;
+      const ScaleShear& own = parts[lane];
+      const float low[4] = {own.diagonal[0], own.diagonal[1], own.diagonal[2], own.mixed[0]};
+      const float high[4] = {own.mixed[1], own.mixed[2], 0, 0};
+      std::memcpy(part, low, sizeof(low));
+      std::memcpy(part + shears.dual, high, sizeof(high));
     }
   }
   return scales;
@@ -231,6 +232,22 @@ HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
     const auto flip = hn::And(sum, sign);
     hn::Store(hn::Xor(real, flip), d, place);
     hn::Store(hn::Xor(dual, flip), d, place + to.dual);
+    place += to.stride;
+  }
+}
+
+/// The joint's scale/shear part less the pivot's, of each pair.
+template <class D>
+HWY_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
+                               const DualQuaternionArray<const float>& parts,
+                               const DualQuaternionArray<float>& to) {
+  float* place = to.first;
+  for (const Pair& pair : pairs) {
+    const float* const joint = parts.first + std::size_t{pair.joint} * parts.stride;
+    const float* const pivot = parts.first + std::size_t{pair.pivot} * parts.stride;
+    hn::Store(hn::Sub(hn::LoadU(d, joint), hn::LoadU(d, pivot)), d, place);
+    hn::Store(hn::Sub(hn::LoadU(d, joint + parts.dual), hn::LoadU(d, pivot + parts.dual)), d,
+              place + to.dual);
     place += to.stride;
   }
 }

@@ -130,7 +130,7 @@ void skinMesh(const Job& job, const MeshData& mesh) {
 }  // namespace
 
 void skinTask(const Task& task) {
-  static thread_local Scratch scratch[3];
+  static thread_local Scratch scratch[4];
   dispatchTask(task, scratch);
 }
 

@@ -52,7 +52,8 @@ struct Task {
 /// With memory that the thread keeps.
 void skinTask(const Task& task);
 
-/// `scratch`: three, of an instance, of its previous pose, and of several at a time.
+/// `scratch`: four, of an instance, of its previous pose, of several at a time, and of several that
+/// scale.
 /// By the best instructions that the processor has, or those that `setTarget` chose.
 void dispatchTask(const Task& task, Scratch* scratch);
 
