@@ -1,11 +1,13 @@
 #include "crowd.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
 #include "barrier.h"
 #include "frames.h"
+#include "in_parallel.h"
 
 using namespace dermis;
 
@@ -64,13 +66,13 @@ Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
   Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
   if (!system) return system.error();
 
-  Crowd crowd(device, character, script, options, std::move(*system));
+  Crowd crowd(&device, character, script, options, CrowdSystem(std::move(*system)));
   for (const Part& part : character.parts()) {
     Result<MeshHandle> mesh = crowd.system_.addMesh(part.packed);
     if (!mesh) return mesh.error();
     crowd.meshes_.push_back(*mesh);
-    if (Result<void> built = crowd.system_.prepare(pipelineNeeds(crowd.describe(part))); !built)
-      return built.error();
+    const PipelineNeeds needs = pipelineNeeds(crowd.describe(part));
+    if (Result<void> built = crowd.system_.onDevice()->prepare(needs); !built) return built.error();
   }
   return crowd;
 }
@@ -141,12 +143,9 @@ Result<void> Crowd::comeAndGo(std::uint64_t frame) {
 // [crowd-frame]
 Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
                               VkCommandBuffer commandBuffer) {
-  if (Result<void> begun = system_.beginFrame(frame, completedFrame); !begun) return begun;
-  if (Result<void> done = comeAndGo(frame); !done) return done;
-  for (const CrowdFigure& figure : figures_) {
-    if (!figure.isThere()) continue;
-    if (Result<void> done = move(figure); !done) return done;
-  }
+  vulkan::SkinningSystem& system = *system_.onDevice();
+  if (Result<void> begun = system.beginFrame(frame, completedFrame); !begun) return begun;
+  if (Result<void> done = moveAll(frame); !done) return done;
   vulkan::FrameDescription description;
   if (options_.culledOnGpu) {
     Result<VkBuffer> visibility = writeVisibility(frame);
@@ -156,8 +155,17 @@ Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
 
   // This program copies the vertices, to look at them; one that draws says vertexInput, twice.
   recordBarrier(*device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
-  if (Result<void> done = system_.record(commandBuffer, description); !done) return done;
+  if (Result<void> done = system.record(commandBuffer, description); !done) return done;
   recordBarrier(*device_, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+  return {};
+}
+
+Result<void> Crowd::moveAll(std::uint64_t frame) {
+  if (Result<void> done = comeAndGo(frame); !done) return done;
+  for (const CrowdFigure& figure : figures_) {
+    if (!figure.isThere()) continue;
+    if (Result<void> done = move(figure); !done) return done;
+  }
   return {};
 }
 
@@ -182,22 +190,69 @@ Result<void> Crowd::move(const CrowdFigure& figure) {
 }
 // [/crowd-frame]
 
+Result<Crowd> Crowd::createOnCpu(const Character& character, const Figures& script,
+                                 const CrowdOptions& options) {
+  const vulkan::SkinningSystemDescription most = capacities(character, script.count(), options);
+  cpu::SkinningSystemDescription description;
+  description.jointCapacity = most.jointCapacity;
+  description.instanceCapacity = most.instanceCapacity;
+  description.outputCapacity = most.outputCapacity;
+  Result<cpu::SkinningSystem> system = cpu::SkinningSystem::create(description);
+  if (!system) return system.error();
+  Crowd crowd(nullptr, character, script, options, CrowdSystem(std::move(*system)));
+  for (const Part& part : character.parts()) {
+    Result<MeshHandle> mesh = crowd.system_.addMesh(part.packed);
+    if (!mesh) return mesh.error();
+    crowd.meshes_.push_back(*mesh);
+  }
+  return crowd;
+}
+
+Result<void> Crowd::skinOnCpu(std::uint64_t frame) {
+  using Clock = std::chrono::steady_clock;
+  cpu::SkinningSystem& system = *system_.onCpu();
+  system.beginFrame();
+  if (Result<void> done = moveAll(frame); !done) return done;
+  const auto begin = Clock::now();
+  const Result<std::span<const cpu::PlannedJob>> jobs = system.jobs();
+  if (!jobs) return jobs.error();
+  const auto planned = Clock::now();
+  inParallel(jobs->size(), [&](std::size_t index) { cpu::skin((*jobs)[index]); });
+  planSeconds_ = std::chrono::duration<double>(planned - begin).count();
+  jobSeconds_ = std::chrono::duration<double>(Clock::now() - planned).count();
+  return {};
+}
+
+vulkan::SystemStatistics Crowd::statistics() const {
+  if (system_.onDevice() != nullptr) return system_.onDevice()->statistics();
+  const SceneStatistics scene = system_.onCpu()->statistics();
+  vulkan::SystemStatistics all;
+  static_cast<FrameWorkStatistics&>(all.lastFrame) = scene.lastFrame;
+  all.lastFrame.planSeconds = planSeconds_;
+  all.lastCompletedFrame.frame = scene.lastFrame.frame;
+  all.lastCompletedFrame.seconds = jobSeconds_;
+  all.meshes = scene.meshes;
+  all.palettes = scene.palettes;
+  all.outputs = scene.outputs;
+  return all;
+}
+
 /// A word for each instance. Here the CPU writes them to mapped memory before the submission, which
 /// needs no barrier.
 Result<VkBuffer> Crowd::writeVisibility(std::uint64_t frame) {
   visibility_.resize(options_.framesInFlight);
   samples::MappedBuffer& buffer = visibility_[frame % options_.framesInFlight];
   if (buffer.handle() == VK_NULL_HANDLE) {
-    Result<samples::MappedBuffer> made =
-        samples::MappedBuffer::create(*device_, std::uint64_t{system_.instanceCapacity()} * 4,
-                                      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    Result<samples::MappedBuffer> made = samples::MappedBuffer::create(
+        *device_, std::uint64_t{system_.onDevice()->instanceCapacity()} * 4,
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
     if (!made) return made.error();
     buffer = std::move(*made);
   }
   for (const CrowdFigure& figure : figures_) {
     const std::uint32_t word = figure.now.isInView ? 1 : 0;
     for (const InstanceHandle instance : figure.instances) {
-      const Result<std::uint32_t> index = system_.visibilityIndex(instance);
+      const Result<std::uint32_t> index = system_.onDevice()->visibilityIndex(instance);
       if (!index) return index.error();
       std::memcpy(buffer.bytes().data() + std::size_t{*index} * 4, &word, 4);
     }

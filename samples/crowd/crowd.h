@@ -14,6 +14,7 @@
 
 #include "buffer.h"
 #include "character.h"
+#include "crowd_system.h"
 #include "dermis/dermis.h"
 #include "dermis/vulkan/vulkan.h"
 #include "device.h"
@@ -46,25 +47,33 @@ class Crowd {
                                       dermis::vulkan::Context& context, const Character& character,
                                       const Figures& script, const CrowdOptions& options);
 
+  /// The same on the CPU, without Vulkan.
+  static dermis::Result<Crowd> createOnCpu(const Character& character, const Figures& script,
+                                           const CrowdOptions& options);
+
   /// Each frame, outside a render pass.
   dermis::Result<void> skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
                                  VkCommandBuffer commandBuffer);
+  /// Each frame, on all cores.
+  dermis::Result<void> skinOnCpu(std::uint64_t frame);
 
   /// After the last frame, for each that the GPU is then done with: its statistics are complete.
   dermis::Result<void> complete(std::uint64_t frame, std::uint64_t completedFrame) {
-    return system_.beginFrame(frame, completedFrame);
+    return system_.onDevice()->beginFrame(frame, completedFrame);
   }
 
-  const dermis::vulkan::SkinningSystem& system() const { return system_; }
+  const CrowdSystem& system() const { return system_; }
+  /// On the CPU, the time of the jobs stands for the GPU's.
+  dermis::vulkan::SystemStatistics statistics() const;
   std::span<const CrowdFigure> figures() const { return figures_; }
   bool isCulledOnGpu() const { return options_.culledOnGpu; }
   /// How often a figure found no room; it comes when there is some.
   std::uint64_t refusals() const { return refusals_; }
 
  private:
-  Crowd(dermis::samples::Device& device, const Character& character, const Figures& script,
-        const CrowdOptions& options, dermis::vulkan::SkinningSystem system)
-      : device_(&device),
+  Crowd(dermis::samples::Device* device, const Character& character, const Figures& script,
+        const CrowdOptions& options, CrowdSystem system)
+      : device_(device),
         character_(&character),
         script_(&script),
         options_(options),
@@ -75,15 +84,17 @@ class Crowd {
   dermis::Result<void> add(CrowdFigure& figure);
   dermis::Result<void> remove(CrowdFigure& figure);
   dermis::Result<void> comeAndGo(std::uint64_t frame);
+  dermis::Result<void> moveAll(std::uint64_t frame);
   dermis::Result<void> move(const CrowdFigure& figure);
   dermis::Result<VkBuffer> writeVisibility(std::uint64_t frame);
 
-  dermis::samples::Device* device_;
+  dermis::samples::Device* device_;  ///< null on the CPU
   const Character* character_;
   const Figures* script_;
   CrowdOptions options_;
-  dermis::vulkan::SkinningSystem system_;
-  std::vector<dermis::MeshHandle> meshes_;  ///< by part
+  CrowdSystem system_;
+  double planSeconds_ = 0, jobSeconds_ = 0;  ///< of the last frame on the CPU
+  std::vector<dermis::MeshHandle> meshes_;   ///< by part
   std::vector<CrowdFigure> figures_;
   /// For culling on the GPU: what a culling kernel would write, one for each frame in flight.
   std::vector<dermis::samples::MappedBuffer> visibility_;

@@ -56,12 +56,21 @@ Result<void> CrowdCheck::capture(const Crowd& crowd, const ShownPoses& shown, st
   Result<samples::MappedBuffer> buffer = readBackBuffer(size);
   if (!buffer) return buffer.error();
   const VkBufferCopy region{0, 0, size};
-  device_->functions().CmdCopyBuffer(commandBuffer, crowd.system().outputBuffer(), buffer->handle(),
-                                     1, &region);
+  device_->functions().CmdCopyBuffer(commandBuffer, crowd.system().onDevice()->outputBuffer(),
+                                     buffer->handle(), 1, &region);
   const vulkan::Dependency toHost{{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
                                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}};
   recordBarrier(*device_, commandBuffer, toHost);
-  captures_.push_back({frame, std::move(*instances), std::move(*buffer)});
+  captures_.push_back({frame, std::move(*instances), std::move(*buffer), {}});
+  return {};
+}
+
+Result<void> CrowdCheck::captureOnCpu(const Crowd& crowd, const ShownPoses& shown,
+                                      std::uint64_t frame) {
+  Result<std::vector<Instance>> instances = displayedBy(crowd, shown);
+  if (!instances) return instances.error();
+  const std::span<const std::byte> bytes = crowd.system().onCpu()->outputBytes();
+  captures_.push_back({frame, std::move(*instances), {}, {bytes.begin(), bytes.end()}});
   return {};
 }
 
@@ -79,7 +88,7 @@ Result<void> CrowdCheck::compareUpTo(std::uint64_t completedFrame) {
       count(capture, capture.instances[index], findings[index]);
     }
     ++totals_.frames;
-    unused_.push_back(std::move(capture.output));
+    if (capture.onCpu.empty()) unused_.push_back(std::move(capture.output));
   }
   return {};
 }
@@ -100,7 +109,7 @@ double CrowdCheck::distanceFrom(PoseKey pose, std::uint32_t part, const Capture&
                                 const OutputAttribute& attribute) const {
   constexpr std::size_t samples = 16;
   const std::vector<reference::Double3>& expected = references_.of({part, pose}).positions;
-  const std::byte* first = capture.output.bytes().data() + attribute.offset;
+  const std::byte* first = capture.bytes().data() + attribute.offset;
   double sum = 0;
   for (std::size_t sample = 0; sample < samples; ++sample) {
     const std::size_t vertex = sample * expected.size() / samples;
@@ -148,7 +157,7 @@ CrowdCheck::MeshFinding CrowdCheck::checkPose(const Capture& capture, const Inst
                                               const ShownPose& pose) const {
   const InstanceOutput& output = instance.output;
   const std::uint32_t vertexCount = character_->parts()[instance.shown.part].packed.vertexCount();
-  const std::span<const std::byte> bytes = capture.output.bytes();
+  const std::span<const std::byte> bytes = capture.bytes();
   SkinnedView current, previous;
   current.positions = attributeAt(bytes, output.positions, vertexCount);
   if (output.normals.format != VertexFormat::none)

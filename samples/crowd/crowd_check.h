@@ -27,12 +27,16 @@ struct CheckTotals {
 
 class CrowdCheck {
  public:
-  CrowdCheck(dermis::samples::Device& device, const Character& character)
-      : device_(&device), character_(&character), references_(character) {}
+  /// `device` is null on the CPU.
+  CrowdCheck(dermis::samples::Device* device, const Character& character)
+      : device_(device), character_(&character), references_(character) {}
 
   /// Records a copy of the output, behind `Crowd::skinFrame`, and keeps what it must be.
   dermis::Result<void> capture(const Crowd& crowd, const ShownPoses& shown, std::uint64_t frame,
                                VkCommandBuffer commandBuffer);
+  /// Copies the output of the frame, on the CPU.
+  dermis::Result<void> captureOnCpu(const Crowd& crowd, const ShownPoses& shown,
+                                    std::uint64_t frame);
   /// Compares what was captured in frames that the GPU is done with.
   dermis::Result<void> compareUpTo(std::uint64_t completedFrame);
 
@@ -47,6 +51,11 @@ class CrowdCheck {
     std::uint64_t frame = 0;
     std::vector<Instance> instances;
     dermis::samples::MappedBuffer output;
+    std::vector<std::byte> onCpu;  ///< the output, if it was skinned there
+
+    std::span<const std::byte> bytes() const {
+      return onCpu.empty() ? output.bytes() : std::span<const std::byte>(onCpu);
+    }
   };
   /// Of one instance.
   struct MeshFinding {

@@ -80,15 +80,20 @@ Json jsonOf(const CheckTotals& check) {
 }  // namespace
 
 void CrowdReport::printTitle() const {
-  fmt::print("device  {}, driver {}\n", title_.device, title_.driver);
+  fmt::print("device  {}{}\n", title_.device, title_.isOnCpu ? "" : ", driver " + title_.driver);
   fmt::print("model   {}: {} vertices in {} meshes of one pose\n", title_.model,
              title_.verticesOfFigure, title_.meshes);
-  fmt::print("frames  {} in flight; means of {} each\n\n", title_.framesInFlight, rowFrames);
+  if (title_.isOnCpu) {
+    fmt::print("frames  means of {} each\n\n", rowFrames);
+  } else {
+    fmt::print("frames  {} in flight; means of {} each\n\n", title_.framesInFlight, rowFrames);
+  }
   fmt::print(
       "                                                                    upload   plan+record  "
-      "    GPU\n"
+      "{:>7}\n"
       " frame  figures  instances   skinned   settled    vertices  dispatches     KiB   ns/instance"
-      "     ms\n");
+      "     ms\n",
+      title_.isOnCpu ? "jobs" : "GPU");
 }
 
 /// The CPU is not told how many the GPU chose until the frame is complete.
@@ -103,7 +108,7 @@ std::optional<std::uint32_t> CrowdReport::settledBy(const Frame& frame) const {
 }
 
 void CrowdReport::add(const Crowd& crowd, const ShownCounts& counts) {
-  const vulkan::SystemStatistics statistics = crowd.system().statistics();
+  const vulkan::SystemStatistics statistics = crowd.statistics();
   Frame frame;
   frame.cpu = statistics.lastFrame;
   frame.figures =
@@ -121,7 +126,7 @@ void CrowdReport::add(const Crowd& crowd, const ShownCounts& counts) {
 }
 
 void CrowdReport::addCompleted(const Crowd& crowd) {
-  const vulkan::GpuStatistics statistics = crowd.system().statistics().lastCompletedFrame;
+  const vulkan::GpuStatistics statistics = crowd.statistics().lastCompletedFrame;
   // Frames count from 1.
   if (statistics.frame != 0) frames_[statistics.frame - 1].gpu = statistics;
 }
@@ -176,7 +181,7 @@ void CrowdReport::finish(const Crowd& crowd) {
     printTitle();
     for (const Row& row : rows_) printRow(row);
   }
-  memory_ = crowd.system().statistics();
+  memory_ = crowd.statistics();
   totals_.refusals = crowd.refusals();
   sumUp();
   printTotals();
@@ -209,7 +214,8 @@ void CrowdReport::printTotals() const {
   if (!title_.culledOnGpu) {
     fmt::print("\nskinned   {} vertices in {} frames", sums.vertices, frames_.size());
     if (sums.verticesPerSecond)
-      fmt::print(", {:.1f} million a second of GPU time", *sums.verticesPerSecond * 1e-6);
+      fmt::print(", {:.1f} million a second of {}", *sums.verticesPerSecond * 1e-6,
+                 title_.isOnCpu ? "the jobs' time" : "GPU time");
     fmt::print("\n");
   } else {
     fmt::print("\n");
@@ -220,6 +226,10 @@ void CrowdReport::printTotals() const {
       share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
       share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
   if (sums.refusals != 0) fmt::print("refused   a figure {} times\n", sums.refusals);
+  if (title_.isOnCpu) {
+    fmt::print("memory    MiB: outputs {}\n", mebibytes(memory_.outputs));
+    return;
+  }
   fmt::print("memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of the device in all\n",
              mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
              static_cast<double>(memory_.deviceMemory) / mebibyte);

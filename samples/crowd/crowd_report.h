@@ -20,6 +20,7 @@ struct ReportTitle {
   std::uint64_t verticesOfFigure = 0;
   std::uint32_t framesInFlight = 0;
   bool culledOnGpu = false;
+  bool isOnCpu = false;  ///< without Vulkan
 };
 
 class CrowdReport {

@@ -190,7 +190,7 @@ Result<Film::Draws> Film::drawsOf(const Crowd& crowd, std::uint64_t frame) const
       if (!output) return output.error();
       if (output->size == 0) continue;
       const auto stream = [&](const OutputAttribute& attribute) -> render::VertexStream {
-        return {crowd.system().outputBuffer(), attribute.offset, attribute.stride,
+        return {crowd.system().onDevice()->outputBuffer(), attribute.offset, attribute.stride,
                 attribute.format};
       };
       render::Draw draw;

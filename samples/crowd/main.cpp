@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "batch_runner.h"
 #include "crowd.h"
 #include "crowd_check.h"
 #include "crowd_report.h"
@@ -99,6 +100,16 @@ Result<void> play(Show& show, const Options& options) {
   return {};
 }
 
+ReportTitle titleOf(const Character& character, const Options& options) {
+  ReportTitle title;
+  title.model = std::filesystem::path(options.model).filename().string();
+  title.meshes = character.parts().size();
+  title.verticesOfFigure = character.vertexCount();
+  title.framesInFlight = options.crowd.framesInFlight;
+  title.culledOnGpu = options.crowd.culledOnGpu;
+  return title;
+}
+
 Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Character& character,
                                        const Figures& script, const Options& options) {
   CrowdOptions crowdOptions = options.crowd;
@@ -109,31 +120,23 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
   if (!crowd) return crowd.error();
   Result<FrameLoop> loop = FrameLoop::create(*open.device, options.crowd.framesInFlight);
   if (!loop) return loop.error();
-  ReportTitle title;
+  ReportTitle title = titleOf(character, options);
   title.device = open.device->info().name;
   title.driver = samples::driverVersion(*open.device);
-  title.model = std::filesystem::path(options.model).filename().string();
-  title.meshes = character.parts().size();
-  title.verticesOfFigure = character.vertexCount();
-  title.framesInFlight = options.crowd.framesInFlight;
-  title.culledOnGpu = options.crowd.culledOnGpu;
   return std::make_unique<Show>(Show{std::move(*crowd), ShownPoses(character),
-                                     CrowdCheck(*open.device, character),
+                                     CrowdCheck(open.device.get(), character),
                                      CrowdReport(std::move(title)), nullptr, std::move(*loop)});
 }
 
 /// What speaks against the result; empty where nothing does.
-std::string verdict(const Show& show, samples::Device& device) {
-  const std::vector<std::string> messages = device.takeValidationMessages();
-  if (!messages.empty()) return "the validation layer says: " + messages.front();
-  const CheckTotals& totals = show.check.totals();
+std::string verdict(const CrowdCheck& check, const ShownPoses& shown) {
+  const CheckTotals& totals = check.totals();
   if (totals.failures != 0) {
     return fmt::format("{} of {} instances are not as they must be; the first: {}", totals.failures,
                        totals.instances, totals.firstFailure);
   }
-  if (show.shown.overdue() != 0) {
-    return fmt::format("{} times an instance was not skinned although it was due",
-                       show.shown.overdue());
+  if (shown.overdue() != 0) {
+    return fmt::format("{} times an instance was not skinned although it was due", shown.overdue());
   }
   return {};
 }
@@ -196,6 +199,46 @@ ExitStatus addFilm(Show& show, samples::OpenDevice& open, const Character& chara
   return ExitStatus::done;
 }
 
+/// The proof of what was played, in words and in a file. `complaint` is empty if all is well.
+ExitStatus reportOn(const CrowdReport& report, const CheckTotals& check, const Options& options,
+                    const std::string& complaint) {
+  const CheckTotals* totals = options.verifies ? &check : nullptr;
+  if (totals != nullptr) report.printCheck(*totals);
+  if (!options.json.empty()) {
+    if (Result<void> written = report.writeJson(options.json, totals); !written)
+      return reportError(ExitStatus::stopped, written.error().message);
+  }
+  return complaint.empty() ? ExitStatus::done
+                           : reportError(ExitStatus::verificationFailed, complaint);
+}
+
+/// The whole show without Vulkan.
+ExitStatus runOnCpu(const Character& character, const Figures& script, const Options& options) {
+  Result<Crowd> crowd = Crowd::createOnCpu(character, script, options.crowd);
+  if (!crowd) return reportDeviceError(crowd.error());
+  ReportTitle title = titleOf(character, options);
+  title.device = samples::CpuTarget().name();
+  title.isOnCpu = true;
+  ShownPoses shown(character);
+  CrowdCheck check(nullptr, character);
+  CrowdReport report(std::move(title));
+  report.printTitle();
+  const auto play = [&](std::uint64_t frame) -> Result<void> {
+    if (Result<void> done = crowd->skinOnCpu(frame); !done) return done;
+    shown.follow(*crowd, frame);
+    report.add(*crowd, shown.counts());
+    if (!options.verifies || (frame % options.checkInterval != 0 && frame != options.frames))
+      return {};
+    if (Result<void> done = check.captureOnCpu(*crowd, shown, frame); !done) return done;
+    return check.compareUpTo(frame);
+  };
+  for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
+    if (Result<void> played = play(frame); !played) return reportDeviceError(played.error());
+  }
+  report.finish(*crowd);
+  return reportOn(report, check.totals(), options, verdict(check, shown));
+}
+
 ExitStatus run(const Options& options) {
   const bool isFilm = !options.film.output.empty() &&
                       samples::pictureKind(options.film.output) != samples::PictureKind::png;
@@ -209,6 +252,7 @@ ExitStatus run(const Options& options) {
     return samples::reportWrongUsage(kept.error().message);
   const Result<std::unique_ptr<Script>> script = makeScript(*character, options);
   if (!script) return reportError(ExitStatus::badInput, script.error().message);
+  if (options.device == "cpu") return runOnCpu(*character, *(*script)->figures, options);
   samples::DeviceOptions deviceOptions;
   deviceOptions.device = options.device;
   deviceOptions.validation = options.validates;
@@ -225,15 +269,10 @@ ExitStatus run(const Options& options) {
   if (Result<void> played = play(**show, options); !played)
     return reportDeviceError(played.error());
 
-  const CheckTotals* totals = options.verifies ? &(*show)->check.totals() : nullptr;
-  if (totals != nullptr) (*show)->report.printCheck(*totals);
-  if (!options.json.empty()) {
-    if (Result<void> written = (*show)->report.writeJson(options.json, totals); !written)
-      return reportError(ExitStatus::stopped, written.error().message);
-  }
-  const std::string complaint = verdict(**show, *open->device);
-  return complaint.empty() ? ExitStatus::done
-                           : reportError(ExitStatus::verificationFailed, complaint);
+  const std::vector<std::string> messages = open->device->takeValidationMessages();
+  const std::string complaint = !messages.empty() ? "the validation layer says: " + messages.front()
+                                                  : verdict((*show)->check, (*show)->shown);
+  return reportOn((*show)->report, (*show)->check.totals(), options, complaint);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <array>
 #include <filesystem>
+#include <utility>
 
 #include "file_name.h"
 #include "picture_writer.h"
@@ -81,10 +82,10 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
           ->check(CLI::Range(1u, mostFrames));
   app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
   app.add_option("--device", options.device,
-                 "auto, a number of 'dermis devices', or part of a name");
-  app.add_option("--frames-in-flight", options.crowd.framesInFlight,
-                 "Frames that the CPU is ahead of the GPU [3]")
-      ->check(CLI::Range(1u, mostFramesInFlight));
+                 "auto, cpu (without Vulkan), a number of 'dermis devices', or part of a name");
+  const CLI::Option* inFlight = app.add_option("--frames-in-flight", options.crowd.framesInFlight,
+                                               "Frames that the CPU is ahead of the GPU [3]")
+                                    ->check(CLI::Range(1u, mostFramesInFlight));
   app.add_option("--output-budget", outputMebibytes,
                  "MiB of skinned vertices; figures without room come later [enough for all]")
       ->check(CLI::Range(1u, mostMebibytes));
@@ -98,6 +99,17 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   addFilm(app, options.film);
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
   if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
+  if (options.device == "cpu") {
+    for (const auto& [isAsked, name] : {std::pair{!options.film.output.empty(), "--film"},
+                                        {options.crowd.culledOnGpu, "--gpu-culling"},
+                                        {inFlight->count() != 0, "--frames-in-flight"},
+                                        {options.validates, "--validate"}}) {
+      if (isAsked) {
+        return samples::reportWrongUsage(
+            fmt::format("{} needs a Vulkan device, and --device cpu is none", name));
+      }
+    }
+  }
   if (!options.film.output.empty()) {
     const std::string complaint = complaintAbout(options.film, frames->count() != 0);
     if (!complaint.empty()) return samples::reportWrongUsage(complaint);

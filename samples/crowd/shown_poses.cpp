@@ -25,8 +25,11 @@ void ShownPoses::follow(const Crowd& crowd, std::uint64_t frame) {
 }
 
 void ShownPoses::markSkinned(const Crowd& crowd) {
-  skinned_.assign(crowd.system().instanceCapacity(), 0);
-  for (const InstanceHandle handle : crowd.system().skinnedInstances()) skinned_[handle.index] = 1;
+  std::ranges::fill(skinned_, std::uint8_t{0});
+  for (const InstanceHandle handle : crowd.system().skinnedInstances()) {
+    if (skinned_.size() <= handle.index) skinned_.resize(handle.index + 1);
+    skinned_[handle.index] = 1;
+  }
 }
 
 void ShownPoses::followInstance(const Crowd& crowd, const FigureFrame& now, Entry& entry,
@@ -44,7 +47,8 @@ void ShownPoses::followInstance(const Crowd& crowd, const FigureFrame& now, Entr
   }
   ++counts_.displayed;
   const bool isKnown = !crowd.isCulledOnGpu();
-  const bool wasSkinned = isKnown && skinned_[entry.handle.index] != 0;
+  const bool wasSkinned =
+      isKnown && entry.handle.index < skinned_.size() && skinned_[entry.handle.index] != 0;
   display(now, entry, frame, !isKnown ? Skinned::unknown : wasSkinned ? Skinned::yes : Skinned::no);
 }
 

@@ -56,6 +56,35 @@ INSTANTIATE_TEST_SUITE_P(All, CrowdTest,
                                            Arguments{"--output-budget", "1", "--gpu-culling"}),
                          nameOf);
 
+// Without Vulkan: there is no driver.
+TEST(CpuCrowdTest, EveryVertexIsRight) {
+  const std::vector<std::string> noDriver{"VK_DRIVER_FILES=/nonexistent.json",
+                                          "VK_ICD_FILENAMES=/nonexistent.json"};
+  const CommandResult result =
+      runCommand({dermisCrowdProgram, "--figures", "12", "--frames", "40", "--check-every", "1",
+                  "--device", "cpu", "--output-budget", "1"},
+                 noDriver);
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_TRUE(result.errors.empty()) << result.errors;
+  EXPECT_NE(result.output.find("checked   in 40 frames"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("refused"), std::string::npos) << "the budget is too large";
+}
+
+TEST(CpuCrowdTest, WhatNeedsVulkanIsRefused) {
+  for (const std::vector<std::string>& added :
+       std::initializer_list<std::vector<std::string>>{{"--film", outFile("cpu.png")},
+                                                       {"--gpu-culling"},
+                                                       {"--frames-in-flight", "2"},
+                                                       {"--validate"}}) {
+    std::vector<std::string> arguments{"--device", "cpu"};
+    arguments.insert(arguments.end(), added.begin(), added.end());
+    const CommandResult result = crowd(arguments);
+    EXPECT_EQ(result.status, 2) << added.front();
+    EXPECT_NE(result.errors.find(added.front() + " needs a Vulkan device"), std::string::npos)
+        << result.errors;
+  }
+}
+
 nlohmann::json readJson(const std::string& path) {
   std::ifstream file(path);
   return nlohmann::json::parse(file);
