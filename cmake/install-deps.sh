@@ -2,7 +2,9 @@
 # Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). Does nothing, and needs no
 # rights, where all of it is there. On another system it lists what is needed and ends with an error.
 #
-#   cmake/install-deps.sh [nightly]    nightly: also what only tests/run.sh nightly needs
+#   cmake/install-deps.sh [nightly|arm64]
+#
+# nightly: also what only tests/run.sh nightly needs. arm64: also what it needs to cross-build for arm64.
 set -eu
 
 packages="
@@ -26,6 +28,14 @@ clang ffmpeg blender python3-numpy
     clang_runtime=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/libclang-rt-\1-dev/p' | head -n 1)
     packages="$packages $clang_runtime"
   fi
+fi
+
+architecture=
+if [ "${1:-}" = arm64 ]; then
+  architecture=arm64
+  packages="$packages
+g++-aarch64-linux-gnu qemu-user libhwy-dev:arm64 libgtest-dev:arm64
+"
 fi
 
 if ! command -v dpkg-query >/dev/null 2>&1; then
@@ -55,6 +65,7 @@ fi
 
 echo "install-deps: installing$missing"
 export DEBIAN_FRONTEND=noninteractive
+[ -z "$architecture" ] || $as_root dpkg --add-architecture "$architecture"
 $as_root apt-get update -q
 # shellcheck disable=SC2086 # a list of words
 $as_root apt-get install -y -q --no-install-recommends $missing

@@ -7,6 +7,7 @@
 #   asan-rest    all other tests under them
 #   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
+#   arm64        the CPU path built for arm64, its tests run by qemu
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   exhaustive   every combination of methods and formats, and every real model, on the device
@@ -19,7 +20,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang fuzz mesa exhaustive golden programs"
+parts="asan asan-rest tsan clang arm64 fuzz mesa exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -56,7 +57,9 @@ part_tsan() {
   # What lavapipe and the validation layer do among themselves is not ours: they were not built with the sanitizer.
   export TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp halt_on_error=1 ${TSAN_OPTIONS:-}"
   build tsan gpu_test system_test
-  tests tsan -R 'ThreadsTest|SystemModelTest'
+  tests tsan -R 'ThreadsTest|ModelTest'
+  build tsan cpu_test
+  tests tsan -R 'Cpu(Skin|Scene)Test'
 }
 
 part_clang() {
@@ -65,6 +68,14 @@ part_clang() {
   build clang
   tests clang -L sanitized
   tests clang -R '^package\.'
+}
+
+part_arm64() {
+  ./cmake/install-deps.sh arm64
+  cmake -S tests/arm64 -B build/arm64 -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
+    -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ -DCMAKE_LIBRARY_ARCHITECTURE=aarch64-linux-gnu
+  cmake --build build/arm64 --target arm64_test
+  qemu-aarch64 build/arm64/arm64_test --gtest_brief=1
 }
 
 part_fuzz() {

@@ -402,8 +402,11 @@ namespace {
 
 HWY_EXPORT(skinTask);
 
+/// A build for one instruction set has a table of one, and needs that.
+constexpr bool isForOne = std::size(HWY_DISPATCH_TABLE(skinTask)) == 1;
+
 std::int64_t usable() {
-  return hwy::SupportedTargets() & HWY_TARGETS;
+  return isForOne ? HWY_TARGETS : hwy::SupportedTargets() & HWY_TARGETS;
 }
 
 /// Of our own: Highway's is that of the whole process, which the engine may use too.
@@ -417,9 +420,7 @@ hwy::ChosenTarget& chosenTarget() {
 }  // namespace
 
 void dispatchTask(const Task& task, Scratch* scratch) {
-  // A build for one instruction set has a table of one.
-  const auto& table = HWY_DISPATCH_TABLE(skinTask);
-  table[std::size(table) == 1 ? 0 : chosenTarget().GetIndex()](task, scratch);
+  HWY_DISPATCH_TABLE(skinTask)[isForOne ? 0 : chosenTarget().GetIndex()](task, scratch);
 }
 
 std::vector<std::string_view> targetNames() {

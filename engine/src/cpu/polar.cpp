@@ -99,7 +99,7 @@ double determinantOf(const Matrix3& m, const Matrix3& cofactors) {
 }
 
 /// Newton's method for the orthogonal factor (Higham 1986, "Computing the polar decomposition"):
-/// X ← (X + X⁻ᵀ) / 2, from C / det(C)^⅓ on. It converges quadratically, to a rotation if
+/// X ← (X + X⁻ᵀ) / 2, from about C / det(C)^⅓ on. It converges quadratically, to a rotation if
 /// det(C) > 0. Returns whether it did within a few steps, as it does where C is far from flat.
 bool nearestRotation(const double c[3][3], Matrix3& x) {
   for (std::size_t i = 0; i < 3; ++i) x[i] = {c[i][0], c[i][1], c[i][2]};
@@ -107,7 +107,10 @@ bool nearestRotation(const double c[3][3], Matrix3& x) {
   const double determinant = determinantOf(x, cofactors);
   // The largest entry is 1. What is flatter is left to Jacobi's method.
   if (!(determinant > 1e-4)) return false;
-  const double scale = 1 / std::cbrt(determinant);
+  // By a power of two: libraries round cube roots in different ways.
+  int exponent = 0;
+  static_cast<void>(std::frexp(determinant, &exponent));
+  const double scale = std::ldexp(1.0, -exponent / 3);
   for (auto& row : x) {
     for (double& entry : row) entry *= scale;
   }
