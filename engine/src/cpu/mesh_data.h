@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "dermis/cpu/mesh.h"
 #include "dermis/mesh.h"
 #include "dermis/pack.h"
 
@@ -85,5 +86,9 @@ struct MeshData {
   MeshData select(std::span<const std::uint32_t> vertices,
                   std::span<const MorphWeight> morphs) const;
 };
+
+inline const MeshData& dataOf(const Mesh& mesh) {
+  return *mesh.data_;
+}
 
 }  // namespace dermis::cpu

@@ -141,7 +141,7 @@ Result<void> skin(const Job& job) {
   for (const Instance& instance : job.instances) {
     if (instance.result != nullptr) *instance.result = {};
   }
-  if (clipped.firstVertex != clipped.vertexEnd) skinMesh(clipped, job.mesh->data());
+  if (clipped.firstVertex != clipped.vertexEnd) skinMesh(clipped, dataOf(*job.mesh));
   return {};
 }
 
@@ -172,7 +172,7 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
   if (!places) return places.error();
   job.places = *places;
   if (Result<void> good = check(job); !good) return good;
-  const MeshData selected = mesh.data().select(vertices, own.morphs);
+  const MeshData selected = dataOf(mesh).select(vertices, own.morphs);
   own.morphs = {};
   job.vertexEnd = static_cast<std::uint32_t>(vertices.size());
   skinMesh(job, selected);

@@ -388,7 +388,7 @@ void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
     attributes[stream]->format = formats[stream];
   for (std::uint32_t number = 0; number < push.groupCount; ++number) {
     const auto group = abi::load<abi::GroupRecord>(tables, push.groups + number * abi::GROUP_WORDS);
-    task.mesh = &meshes.find(group.mesh)->second.mesh.data();
+    task.mesh = &dataOf(meshes.find(group.mesh)->second.mesh);
     task.firstVertex = group.firstVertex;
     task.vertexEnd = group.vertexEnd;
     const std::array<std::uint32_t, streamCount> strides{group.positionStride, group.normalStride,

@@ -24,9 +24,9 @@ class Mesh {
   Mesh& operator=(Mesh&&) noexcept;
 
   const MeshInfo& info() const;
-  const MeshData& data() const { return *data_; }  ///< internal
 
  private:
+  friend const MeshData& dataOf(const Mesh& mesh);
   explicit Mesh(std::unique_ptr<const MeshData> data);
   std::unique_ptr<const MeshData> data_;
 };

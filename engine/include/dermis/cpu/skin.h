@@ -75,7 +75,7 @@ struct Job {
 
 /// Writes the vertices. Every vertex comes out the same, to the bit, whatever the range, the other
 /// instances, the thread and the processor. Any number of threads may call it at once, with output
-/// that does not overlap. Each thread keeps the memory that it worked in: at most 0.7 MiB where no
+/// that does not overlap. Each thread keeps the memory that it worked in: at most 1.5 MiB where no
 /// vertex has more than 128 influences.
 ///
 /// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
