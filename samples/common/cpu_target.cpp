@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <thread>
 
 #include "batch_runner.h"
 #include "dermis/cpu/skin.h"

@@ -121,7 +121,7 @@ std::uint64_t hashOfMethod(Method method) {
         instances[i].pose = poses[i];
         instances[i].output = output.data() + job.places.size * i;
         instances[i].box = {{-3, -3, -3}, {3, 3, 3}};
-        instances[i].restartsMotion = true;
+        instances[i].restartsMotion = layout.motion != Motion::none;
       }
       job.instances = instances;
       EXPECT_TRUE(cpu::skin(job).ok());

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <thread>
 #include <vector>
@@ -297,6 +299,53 @@ TEST_F(CpuSkinTest, PositionsOutsideTheBoxAreClampedAndCounted) {
   EXPECT_GT(outside, 10u);
 }
 
+// NaN in one component: the others count, by every instruction set.
+TEST_F(CpuSkinTest, VerticesWithNanOutsideTheBoxAreCountedAlike) {
+  Crowd crowd(203, 4, Rigidity::rigid,
+              layoutOf(VertexFormat::snorm16x4, VertexFormat::none, VertexFormat::none));
+  for (int nan = 0; nan < 3; ++nan) {
+    for (int far = 0; far < 3; ++far) {
+      if (far == nan) continue;
+      for (JointMatrix& joint : crowd.poses[0]) {
+        joint = {};
+        joint.m[far][3] = 100;
+        joint.m[nan][3] = std::numeric_limits<float>::quiet_NaN();
+      }
+      crowd.place();
+      for (const std::string_view target : cpu::targetNames()) {
+        ASSERT_TRUE(cpu::setTarget(target).ok());
+        InstanceResult result;
+        crowd.instances[0].result = &result;
+        crowd.skin(Method::linear);
+        const reference::SkinnedMesh still =
+            reference::skin(crowd.source.view(), crowd.poses[0], Method::linear).value();
+        const auto moved = std::ranges::count_if(still.positions, [](const auto& position) {
+          return std::isnan(position[0] + position[1] + position[2]);
+        });
+        EXPECT_EQ(result.clampedVertices, moved) << target << ' ' << nan << ' ' << far;
+      }
+    }
+  }
+}
+
+// No rule of GPUs.
+TEST_F(CpuSkinTest, AttributesMayStandAnywhere) {
+  Crowd aligned(203, 4, Rigidity::rigid, plainLayout), other(203, 4, Rigidity::rigid, plainLayout);
+  aligned.skin(Method::dualQuaternion);
+  std::vector<std::byte> output(203 * 32);
+  cpu::Job job = other.job(Method::dualQuaternion);
+  job.places.positions = {4, 32, VertexFormat::float32x3};
+  job.places.normals = {16, 32, VertexFormat::float32x3};
+  other.instances[0].output = output.data();
+  job.instances = std::span(other.instances).first(1);
+  const Result<void> done = cpu::skin(job);
+  ASSERT_TRUE(done.ok()) << done.error().message;
+  for (std::size_t vertex = 0; vertex < 203; ++vertex) {
+    EXPECT_EQ(std::memcmp(output.data() + vertex * 32 + 4, aligned.output.data() + vertex * 24, 24),
+              0);
+  }
+}
+
 TEST_F(CpuSkinTest, PreviousPositionsAreKeptReskinnedRestartedAndSettled) {
   for (const Motion motion : {Motion::kept, Motion::reskinned}) {
     Crowd crowd(203, 4, Rigidity::shear,
@@ -521,6 +570,10 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   expectBadInstance([&](cpu::Instance& i) { i.morphs = {&unknown, 1}; }, "");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = falling; },
                     ": its morph targets do not rise");
+  expectBadInstance([](cpu::Instance& i) { i.settles = true; },
+                    " settles or restarts its motion, but has no previous positions");
+  expectBadInstance([](cpu::Instance& i) { i.restartsMotion = true; },
+                    " settles or restarts its motion, but has no previous positions");
   EXPECT_TRUE(cpu::skin(good).ok());
 }
 

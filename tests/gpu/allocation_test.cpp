@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "dermis/cpu/skin.h"
 #include "dermis/cpu/skinning_system.h"
 #include "open_device.h"
 #include "system_test.h"
@@ -205,6 +206,36 @@ TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
   }
   EXPECT_GT(counted, 1000u);
   EXPECT_EQ(allocations, 0u);
+}
+
+TEST(CpuAllocationTest, WarmJobsAllocateNothing) {
+  const cpu::Mesh mesh = must(cpu::Mesh::create(systemMesh(1, 500)));
+  const Pose rigid = systemPose(1), sheared = systemPose(4);
+  std::array<cpu::Instance, 8> instances;
+  std::vector<std::byte> output;
+  for (const Method method : {Method::linear, Method::dualQuaternion, Method::blended}) {
+    for (const VertexLayout& layout : {plainLayout(), motionLayout()}) {
+      cpu::Job job;
+      job.mesh = &mesh;
+      job.method = method;
+      job.places = must(placeVertices(layout, 500));
+      output.resize(job.places.size * instances.size());
+      for (std::size_t i = 0; i < instances.size(); ++i) {
+        instances[i].pose = i % 2 == 0 ? rigid : sheared;
+        instances[i].output = output.data() + job.places.size * i;
+      }
+      job.instances = instances;
+      must(cpu::skin(job));
+      allocations = 0;
+      bool isDone = false;
+      {
+        const Counting counting;
+        isDone = cpu::skin(job).ok();
+      }
+      EXPECT_TRUE(isDone);
+      EXPECT_EQ(allocations, 0u) << methodName(method);
+    }
+  }
 }
 
 }  // namespace

@@ -285,7 +285,10 @@ struct Palette {
 
 inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
   const std::size_t lines = (count + std::size(CacheLine().v) - 1) / std::size(CacheLine().v);
-  if (memory.size() < lines) memory.resize(lines);
+  if (memory.size() < lines) {
+    memory.reserve(lines);  // not twice as much
+    memory.resize(lines);
+  }
   return memory.data()->v;
 }
 
@@ -587,7 +590,11 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
     const Vec3<D> relative = relativeTo(d, task.instance, position);
     if (mayCount) {
       // A vertex of the engine's own box may stand a rounding outside.
-      const auto isOutside = hn::Gt(largest3(relative), hn::Set(d, 1.00001f));
+      const auto isBeyond = [&](Vec<D> component) HWY_ATTR {
+        return hn::Gt(hn::Abs(component), hn::Set(d, 1.00001f));
+      };
+      const auto isOutside =
+          hn::Or(isBeyond(relative.x), hn::Or(isBeyond(relative.y), isBeyond(relative.z)));
       findings.clamped += static_cast<std::uint32_t>(
           hn::CountTrue(d, hn::And(isOutside, lanesFrom(d, first, end))));
     }

@@ -136,8 +136,6 @@ class Slots {
     section.firstPair = firstPair_;
     section.jointEnd = firstJoint_ = static_cast<std::uint32_t>(data_.joints.size());
     section.pairEnd = firstPair_ = static_cast<std::uint32_t>(data_.pairs.size());
-    data_.mostJoints = std::max(data_.mostJoints, section.jointCount());
-    data_.mostPairs = std::max(data_.mostPairs, section.pairCount());
     data_.sections.push_back(section);
     firstSlot_ = data_.weights.size();
     joints_.clear();
@@ -220,13 +218,12 @@ std::vector<abi::InfluenceRecord> MeshData::influencesOf(std::uint32_t vertex) c
 MeshData MeshData::select(std::span<const std::uint32_t> vertices,
                           std::span<const MorphWeight> morphs) const {
   MeshData selected;
-  selected.blockCount =
-      static_cast<std::uint32_t>((vertices.size() + blockVertices - 1) / blockVertices);
-  selected.positions.resize(std::size_t{selected.blockCount} * 3);
+  const std::size_t blocks = (vertices.size() + blockVertices - 1) / blockVertices;
+  selected.positions.resize(blocks * 3);
   const auto copy = [&](const std::vector<Lanes>& from, std::size_t components,
                         std::vector<Lanes>& to) {
     if (from.empty()) return;
-    to.resize(selected.blockCount * components);
+    to.resize(blocks * components);
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       for (std::size_t k = 0; k < components; ++k) {
         to[i / blockVertices * components + k].v[i % blockVertices] =
@@ -276,7 +273,7 @@ Result<Mesh> Mesh::create(const PackedMesh& packed) {
   }
   const Reader reader(packed);
   const abi::MeshHeader& header = reader.header;
-  data->blockCount = (header.vertexCount + blockVertices - 1) / blockVertices;
+  const std::uint32_t blocks = (header.vertexCount + blockVertices - 1) / blockVertices;
   data->positions = lanesOf(reader, header.positions, 3);
   if (header.normals != 0) {
     data->givenNormals = lanesOf(reader, header.normals, 3);
@@ -296,7 +293,7 @@ Result<Mesh> Mesh::create(const PackedMesh& packed) {
 
   Slots slots(*data);
   std::array<std::vector<abi::InfluenceRecord>, blockVertices> vertices;
-  for (std::uint32_t block = 0; block < data->blockCount; ++block) {
+  for (std::uint32_t block = 0; block < blocks; ++block) {
     for (std::uint32_t lane = 0; lane < blockVertices; ++lane) {
       const std::uint32_t vertex = block * blockVertices + lane;
       vertices[lane].clear();

@@ -60,7 +60,6 @@ struct Run {
 
 struct MeshData {
   MeshInfo info;
-  std::uint32_t blockCount = 0;
   std::vector<Lanes> positions;     ///< 3 a block
   std::vector<Lanes> normals;       ///< 3 a block, of unit length; empty where there are none
   std::vector<Lanes> givenNormals;  ///< as the mesh has them
@@ -75,9 +74,8 @@ struct MeshData {
   std::vector<std::uint32_t> joints;         ///< of sections: joints of the pose
   std::vector<Pair> pairs;                   ///< of sections
   std::vector<Section> sections;
-  std::vector<Run> runs;                        ///< in the order of blocks
-  std::uint32_t mostJoints = 0, mostPairs = 0;  ///< of a section
-  std::vector<std::uint32_t> packed;            ///< with morph targets: the packed mesh
+  std::vector<Run> runs;              ///< in the order of blocks
+  std::vector<std::uint32_t> packed;  ///< with morph targets: the packed mesh
 
   std::uint32_t runOf(std::uint32_t block) const;
   /// Those that count, the pivot first.

@@ -1,5 +1,5 @@
 // What most instances need, as fast as it can be: positions and normals in float32, side by side,
-// by dual quaternions that do not scale. Several instances at a time: weights and numbers of joints
+// by dual quaternions or matrices. Several instances at a time: weights and numbers of joints
 // are read once for all of them, and each has its own 128 bits of a vector, so that nothing crosses
 // from one to another before it is stored.
 

@@ -150,10 +150,11 @@ inline void convertOther(const float* matrix, float rotation[4], ScaleShear& par
 }
 
 /// Whether normals may go by the cofactors of blended matrices as they are: no entry is larger than
-/// 2^40, and no joint flattens all to less than 2^-40. What cancels in a blend leaves roundings
-/// that are larger than 2^-70, the products of which are not yet subnormal.
+/// 2^40, and no joint shrinks all to less than 2^-10. A determinant, the product of three, is then
+/// at most 2^120, and at most 2^-30 of what it would be if each matrix were scaled to entries of
+/// about 1, as the kernels do.
 inline bool areModerate(std::span<const std::uint32_t> joints, std::span<const JointMatrix> pose) {
-  constexpr float most = 1099511627776.0f;
+  constexpr float most = 0x1p40f, least = 0x1p-10f;
   bool are = true;
   for (const std::uint32_t joint : joints) {
     if (joint == stillJoint) continue;
@@ -162,7 +163,7 @@ inline bool areModerate(std::span<const std::uint32_t> joints, std::span<const J
       for (std::size_t column = 0; column < 3; ++column)
         largest = std::max(largest, std::abs(row[column]));
     }
-    are = are && largest <= most && largest >= 1 / most;
+    are = are && largest <= most && largest >= least;
   }
   return are;
 }

@@ -23,6 +23,10 @@ Result<void> checkLayout(const Job& job) {
   checked.mesh = info;
   checked.method = job.method;
   checked.place(job.places);
+  // They count from the engine's addresses.
+  for (OutputAttribute* attribute :
+       {&checked.positions, &checked.normals, &checked.tangents, &checked.previousPositions})
+    attribute->offset = 0;
   if (checked.motion == Motion::reskinned) checked.motion = Motion::kept;  // checked by instances
   checked.box = {{-1, -1, -1}, {1, 1, 1}};
   const PoseDescription pose{info.requiredJoints, 0, true};
@@ -66,6 +70,9 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
     return wrong(subject.name() +
                  ": the box of its snorm16 positions must be finite, each side longer than 0");
   }
+  if (job.places.motion == Motion::none && (instance.settles || instance.restartsMotion)) {
+    return wrong(subject.name() + " settles or restarts its motion, but has no previous positions");
+  }
   if (job.places.motion != Motion::reskinned || instance.restartsMotion) return {};
   if (Result<void> good = checkPose(instance.previousPose, info, subject, "previous pose"); !good)
     return good;
@@ -76,10 +83,7 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
 
 Result<void> check(const Job& job) {
   if (job.mesh == nullptr) return wrong("the job has no mesh");
-  if (isForComparison(job.method)) {
-    return wrong("the job: " + std::string(methodName(job.method)) +
-                 " is for comparison, the CPU path has the everyday methods only");
-  }
+  if (Result<void> good = checkMethod(job.method, "the job: "); !good) return good;
   const std::uint32_t end = std::min(job.vertexEnd, job.mesh->info().vertexCount);
   if (job.firstVertex > end) {
     return wrong("the job's vertices begin at " + std::to_string(job.firstVertex) + " and end at " +
@@ -110,11 +114,10 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
                  at(instance.output.normals, places.normals),
                  at(instance.output.tangents, places.tangents),
                  at(instance.output.previousPositions, places.previousPositions)};
-  const bool hasBox = isSnormPosition(places.positions.format);
-  for (std::size_t axis = 0; hasBox && axis < 3; ++axis) {
-    const double least = double{instance.box.min[axis]}, greatest = double{instance.box.max[axis]};
-    own.boxCentre[axis] = static_cast<float>((least + greatest) / 2);
-    own.boxInverse[axis] = static_cast<float>(2 / (greatest - least));
+  if (isSnormPosition(places.positions.format)) {
+    const BoxScale scale = boxScale(instance.box);
+    std::ranges::copy(scale.centre, own.boxCentre);
+    std::ranges::copy(scale.inverse, own.boxInverse);
   }
   return own;
 }
@@ -128,6 +131,12 @@ void skinMesh(const Job& job, const MeshData& mesh) {
 }
 
 }  // namespace
+
+Result<void> checkMethod(Method method, const char* subject) {
+  if (!isForComparison(method)) return {};
+  return wrong(subject + std::string(methodName(method)) +
+               " is for comparison, the CPU path has the everyday methods only");
+}
 
 void skinTask(const Task& task) {
   static thread_local Scratch scratch[4];

@@ -47,12 +47,6 @@ Error wrong(const std::string& what) {
   return {ErrorCode::invalidArgument, what};
 }
 
-Result<void> checkMethod(Method method) {
-  if (!isForComparison(method)) return {};
-  return wrong(std::string(methodName(method)) +
-               " is for comparison, the CPU path has the everyday methods only");
-}
-
 /// The joint matrices that a palette is made of.
 struct PaletteSource {
   std::span<const JointMatrix> pose;
@@ -141,7 +135,7 @@ SkinningSystem::SkinningSystem(SkinningSystem&&) noexcept = default;
 SkinningSystem& SkinningSystem::operator=(SkinningSystem&&) noexcept = default;
 
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
-  const bool ownsOutput = description.output.data() == nullptr;
+  const bool ownsOutput = description.output.empty();
   if (!ownsOutput && description.output.size() < 4)
     return wrong("SkinningSystemDescription::output has fewer than 4 bytes");
   auto self = std::make_unique<State*>(nullptr);
@@ -183,8 +177,7 @@ Result<MeshHandle> SkinningSystem::addMesh(Mesh mesh) {
   Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
   if (!handle) return handle;
   const auto word = static_cast<std::uint32_t>(*state_->scene.meshOffset(*handle) / 4);
-  // One that was removed may have stood there.
-  state_->meshes.insert_or_assign(word, State::OwnMesh{*handle, std::move(mesh)});
+  state_->meshes.emplace(word, State::OwnMesh{*handle, std::move(mesh)});
   return handle;
 }
 Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
@@ -216,7 +209,8 @@ Result<void> SkinningSystem::removePose(PoseHandle pose) {
   return state_->scene.removePose(pose);
 }
 Result<InstanceHandle> SkinningSystem::addInstance(const InstanceDescription& description) {
-  if (Result<void> good = checkMethod(description.method); !good) return good.error();
+  if (Result<void> good = checkMethod(description.method, "the instance: "); !good)
+    return good.error();
   if (description.culledOnGpu)
     return wrong("an instance that is culled on the GPU cannot be skinned on the CPU");
   return state_->scene.addInstance(description);
@@ -247,7 +241,7 @@ Result<std::span<JointMatrix>> SkinningSystem::writePose(PoseHandle pose) {
 }
 Result<void> SkinningSystem::change(const InstanceChange& change) {
   if (change.method) {
-    if (Result<void> good = checkMethod(*change.method); !good) return good;
+    if (Result<void> good = checkMethod(*change.method, "the change: "); !good) return good;
   }
   return state_->scene.change(change);
 }
@@ -260,7 +254,7 @@ Result<void> SkinningSystem::change(std::span<const InstanceChange> changes) {
   if (Result<void> done = state_->scene.change(changes.first(number)); !done) return done;
   if (bad == changes.end()) return {};
   return wrong("change " + std::to_string(number) + ": " +
-               checkMethod(*bad->method).error().message);
+               checkMethod(*bad->method, "").error().message);
 }
 Result<void> SkinningSystem::setVisibility(std::span<const InstanceVisibility> instances) {
   return state_->scene.setVisibility(instances);

@@ -49,6 +49,9 @@ struct Task {
   std::span<const TaskInstance> instances;
 };
 
+/// Fails with `invalidArgument` for a method for comparison. The message begins with `subject`.
+Result<void> checkMethod(Method method, const char* subject);
+
 /// With memory that the thread keeps.
 void skinTask(const Task& task);
 

@@ -26,6 +26,8 @@
 namespace dermis::cpu {
 
 /// Where the vertices of an instance are written: what the offsets of `Job::places` count from.
+/// Each attribute that is written needs offset + (vertexCount - 1) × stride + `formatSize` bytes
+/// from there on.
 struct OutputMemory {
   void* positions = nullptr;
   void* normals = nullptr;
@@ -36,7 +38,8 @@ struct OutputMemory {
   /// The same for all attributes: the usual case.
   constexpr OutputMemory(void* all)
       : positions(all), normals(all), tangents(all), previousPositions(all) {}
-  /// An array for each attribute; null for those that the job does not write.
+  /// An array for each attribute; null for those that the job does not write. Offsets are then
+  /// mostly 0, not those of `placeVertices`.
   constexpr OutputMemory(void* positionArray, void* normalArray, void* tangentArray,
                          void* previousArray)
       : positions(positionArray),
@@ -74,9 +77,11 @@ struct Job {
 };
 
 /// Writes the vertices. Every vertex comes out the same, to the bit, whatever the range, the other
-/// instances, the thread and the processor. Any number of threads may call it at once, with output
-/// that does not overlap. Each thread keeps the memory that it worked in: at most 1.5 MiB where no
-/// vertex has more than 128 influences.
+/// instances, the thread and the processor. This is true of finite poses, and of threads that round
+/// to nearest and do not flush subnormal numbers to zero. Any number of threads may call it at
+/// once, with output that does not overlap. It allocates until a thread has seen its longest job.
+/// Each thread keeps the memory that it worked in: at most 1.5 MiB where no vertex has more than
+/// 128 influences, and 150 bytes for each instance of a job.
 ///
 /// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
 /// then.
@@ -84,9 +89,9 @@ Result<void> skin(const Job& job);
 
 /// Where some vertices of an instance are, without skinning the others: for picking, and for things
 /// that hang on a vertex. `positions` gets three floats for each of `vertices`, which may stand in
-/// any order: the same values that `skin` writes as float32x3. O(vertices × influences); it
-/// allocates. Of the instance, pose, `mayScale` and morph targets count. Fails as `skin`, and with
-/// `invalidArgument` for a vertex that the mesh does not have.
+/// any order: of finite poses the same values that `skin` writes as float32x3. O(vertices ×
+/// influences); it allocates. Of the instance, pose, `mayScale` and morph targets count. Fails as
+/// `skin`, and with `invalidArgument` for a vertex that the mesh does not have.
 Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
                           std::span<const std::uint32_t> vertices, std::span<float> positions);
 

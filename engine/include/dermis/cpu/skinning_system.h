@@ -29,6 +29,7 @@ namespace dermis::cpu {
 struct PlannedTask;
 
 /// Some vertices of some instances that are skinned alike, as `SkinningSystem::jobs` lists them.
+/// Only those may be done.
 class PlannedJob {
  public:
   /// Of all its instances: how long it takes, beside other jobs.
@@ -56,7 +57,8 @@ struct SkinningSystemDescription {
 };
 
 /// One thread at a time may call a member function. From `jobs` until its jobs are done, only these
-/// may be called: `output`, `outputBytes`, `statistics`, and those that list instances.
+/// may be called: `output`, `outputBytes`, `statistics`, and those that list instances. If none of
+/// them is ever done, anything may be called, and `abandonFrame` before the next `beginFrame`.
 class SkinningSystem {
  public:
   /// Fails as `Scene::create`, and with `invalidArgument` for an output of less than 4 bytes.
@@ -86,11 +88,13 @@ class SkinningSystem {
 
   // -- What changes: as `Scene`.
 
-  /// Begins the next frame; frames count from 1. All jobs of the last one are done, or will never
-  /// be (`abandonFrame`).
+  /// Begins the next frame; frames count from 1. All jobs of the last one are done, or it was
+  /// abandoned.
   void beginFrame();
   std::uint64_t frame() const;
-  /// Where to write the joint matrices of this frame, until `jobs`: as a whole.
+  /// Where to write the joint matrices of this frame: all of them, before `jobs`. They are read by
+  /// the jobs of this frame and of later ones, so the memory stays as it is until the next
+  /// `writePose`.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
   Result<void> change(const InstanceChange& change);
   Result<void> change(std::span<const InstanceChange> changes);
@@ -100,11 +104,12 @@ class SkinningSystem {
 
   // -- Frames.
 
-  /// The jobs for everything that changed; none if nothing did. Once after each `beginFrame`. They
-  /// are there until the next call of `beginFrame` or `abandonFrame`. What `compact` moves is moved
-  /// by this call. Short jobs are spread better over threads; but a pose is converted for each job
-  /// that needs it, and instances of one mesh take less time together. `verticesPerJob` is a guess
-  /// that suits most. Fails with `invalidArgument` without `beginFrame`.
+  /// The jobs for everything that changed; none if nothing did. Once after each `beginFrame` and
+  /// `abandonFrame`. They are there until the next call of `beginFrame` or `abandonFrame`. What
+  /// `compact` moves is moved by this call. Short jobs are spread better over threads; but a pose
+  /// is converted for each job that needs it, and instances of one mesh take less time together.
+  /// `verticesPerJob` is a guess that suits most. Fails with `invalidArgument` without
+  /// `beginFrame`, and as `Scene::plan`.
   Result<std::span<const PlannedJob>> jobs(std::uint32_t verticesPerJob = 1 << 16);
   /// None of the jobs of this frame was done, nor will be. As `Scene::abandonFrame`.
   Result<void> abandonFrame();

@@ -28,20 +28,13 @@ void alignToUnit(std::vector<std::uint32_t>& tables) {
 using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
-  const auto centre = [&](std::size_t axis) {
-    return static_cast<float>(
-        (static_cast<double>(box.min[axis]) + static_cast<double>(box.max[axis])) / 2);
-  };
-  const auto inverse = [&](std::size_t axis) {
-    return static_cast<float>(
-        2 / (static_cast<double>(box.max[axis]) - static_cast<double>(box.min[axis])));
-  };
-  extension.centreX = centre(0);
-  extension.centreY = centre(1);
-  extension.centreZ = centre(2);
-  extension.inverseX = inverse(0);
-  extension.inverseY = inverse(1);
-  extension.inverseZ = inverse(2);
+  const BoxScale scale = boxScale(box);
+  extension.centreX = scale.centre[0];
+  extension.centreY = scale.centre[1];
+  extension.centreZ = scale.centre[2];
+  extension.inverseX = scale.inverse[0];
+  extension.inverseY = scale.inverse[1];
+  extension.inverseZ = scale.inverse[2];
 }
 
 }  // namespace

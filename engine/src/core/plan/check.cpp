@@ -35,29 +35,32 @@ Result<void> checkFormats(const Job& job, const Subject& subject) {
 Result<void> checkStream(const OutputStream& stream, const char* name, std::uint32_t vertexCount,
                          std::uint64_t bufferSize, const Subject& subject,
                          const DeviceLimits& limits) {
-  const std::string place = subject.name() + ": the offset " + std::to_string(stream.offset) +
-                            ", stride " + std::to_string(stream.stride) + " and size " +
-                            std::to_string(stream.size) + " of its " + name;
+  // Only where something is wrong: every job of every plan comes by.
+  const auto place = [&] {
+    return subject.name() + ": the offset " + std::to_string(stream.offset) + ", stride " +
+           std::to_string(stream.stride) + " and size " + std::to_string(stream.size) + " of its " +
+           name;
+  };
   if (stream.stride < stream.size) {
-    return invalid(place + ": the stride must be at least the size");
+    return invalid(place() + ": the stride must be at least the size");
   }
   const std::uint8_t unit = storeUnit(stream);
   if (unit != 4 && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
-    return Error{ErrorCode::missingFeature, place + " must be multiples of 4 on a device with " +
+    return Error{ErrorCode::missingFeature, place() + " must be multiples of 4 on a device with " +
                                                 std::to_string(limits.maxStorageBuffersPerStage) +
                                                 " storage buffers a stage"};
   }
   if (unit == 2 && !limits.storage16Bit) {
     return Error{
         ErrorCode::missingFeature,
-        place +
+        place() +
             " must be multiples of 4, or storageBuffer16BitAccess enabled, and Dermis built "
             "with DERMIS_SUBWORD_STORES"};
   }
   if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
     return Error{
         ErrorCode::missingFeature,
-        place +
+        place() +
             " must be multiples of 4, or storageBuffer8BitAccess and "
             "storageBuffer16BitAccess enabled, and Dermis built with DERMIS_SUBWORD_STORES"};
   }
@@ -85,13 +88,14 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& sub
 
 Result<void> checkPair(const Batch& batch, const Job& job, const Subject& subject) {
   if (!standsInPairs(job)) return {};
-  const std::string name = subject.name() +
-                           ": its normals stand right behind its positions, with a stride of " +
-                           std::to_string(job.positions.stride);
+  const auto name = [&] {
+    return subject.name() + ": its normals stand right behind its positions, with a stride of " +
+           std::to_string(job.positions.stride);
+  };
   if (!batch.outputs.isOneBuffer)
-    return invalid(name + ": both must go to one buffer (OutputSizes::isOneBuffer)");
+    return invalid(name() + ": both must go to one buffer (OutputSizes::isOneBuffer)");
   if (job.positions.offset % 8 != 0) {
-    return invalid(name + ": they must begin at a multiple of 8, not at " +
+    return invalid(name() + ": they must begin at a multiple of 8, not at " +
                    std::to_string(job.positions.offset));
   }
   return {};
@@ -123,6 +127,16 @@ Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targ
     }
   }
   return {};
+}
+
+BoxScale boxScale(const Box& box) {
+  BoxScale scale;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double least = double{box.min[axis]}, greatest = double{box.max[axis]};
+    scale.centre[axis] = static_cast<float>((least + greatest) / 2);
+    scale.inverse[axis] = static_cast<float>(2 / (greatest - least));
+  }
+  return scale;
 }
 
 bool isBox(const Box& box) {

@@ -38,6 +38,11 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                       const DeviceLimits& limits);
 /// Whether positions in snorm16 can be relative to it.
 bool isBox(const Box& box);
+/// What positions in snorm16 are made of: less the centre, times 1 / half the size.
+struct BoxScale {
+  float centre[3], inverse[3];
+};
+BoxScale boxScale(const Box& box);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
                          const Subject& subject);
 /// Whether a kernel can see all windows that a run is written to. `sizes`: of the outputs.
