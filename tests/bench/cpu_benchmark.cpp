@@ -55,38 +55,6 @@ struct alignas(64) CacheLine {
   std::byte bytes[64];
 };
 
-/// A long figure: the joints of a vertex are neighbours.
-bench::Crowd longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount) {
-  constexpr int jointCount = 60;
-  bench::Crowd crowd;
-  crowd.name = "a long figure";
-  std::mt19937 random(7);
-  std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
-  for (std::uint32_t v = 0; v < vertexCount; ++v) {
-    bench::PlainVertex& vertex = crowd.vertices.emplace_back();
-    const auto middle = static_cast<int>(std::uint64_t{v} * jointCount / vertexCount);
-    const int side = random() % 2 == 0 ? 1 : -1;
-    const std::array<int, 4> steps{0, side, -side, 2 * side};
-    float sum = 0, length = 0;
-    for (float& w : vertex.weights) sum += w = weight(random);
-    std::ranges::sort(vertex.weights, std::greater<>());
-    for (std::size_t k = 0; k < 4; ++k) {
-      // Around at the ends: four different joints.
-      vertex.joints[k] = static_cast<std::uint16_t>((middle + steps[k] + jointCount) % jointCount);
-      vertex.weights[k] /= sum;
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      vertex.position[axis] = coordinate(random);
-      vertex.normal[axis] = coordinate(random);
-      length += vertex.normal[axis] * vertex.normal[axis];
-    }
-    for (float& component : vertex.normal) component /= std::sqrt(length);
-  }
-  for (std::uint32_t i = 0; i < instanceCount; ++i)
-    crowd.poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
-  return crowd;
-}
-
 /// With everything that a method or a layout may want.
 PackedMesh packWhole(const bench::Crowd& crowd) {
   const bench::PlainVertex& first = crowd.vertices.front();
@@ -339,7 +307,7 @@ int main(int argc, char** argv) {
   };
   const std::string subject = argc > 1 ? argv[1] : "10000";
   const bool isNumber = std::ranges::all_of(subject, [](char c) { return c >= '0' && c <= '9'; });
-  Scene scene(isNumber ? longFigure(argument(1, 10'000), argument(2, 200))
+  Scene scene(isNumber ? must(bench::longFigure(argument(1, 10'000), argument(2, 200)))
                        : must(bench::loadCrowd(subject, argument(2, 200))));
   std::vector<Contender> contenders;
 #ifdef DERMIS_BENCH_OZZ

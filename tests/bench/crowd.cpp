@@ -1,10 +1,15 @@
 #include "crowd.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <numeric>
+#include <random>
 
 #include "dermis/gltf.h"
+#include "random_rig.h"
 
 namespace dermis::bench {
 namespace {
@@ -111,6 +116,40 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
     const double phase = std::fmod(instance * step, 1.0);
     crowd.poses.push_back(gltf::pose(*model, skin, clip, phase * duration));
   }
+  return crowd;
+}
+
+Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount) {
+  constexpr int jointCount = 60;
+  Crowd crowd;
+  crowd.name = "a long figure";
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> coordinate(-1, 1), weight(0.05f, 1);
+  for (std::uint32_t v = 0; v < vertexCount; ++v) {
+    PlainVertex& vertex = crowd.vertices.emplace_back();
+    const auto middle = static_cast<int>(std::uint64_t{v} * jointCount / vertexCount);
+    const int side = random() % 2 == 0 ? 1 : -1;
+    const std::array<int, 4> steps{0, side, -side, 2 * side};
+    float sum = 0, length = 0;
+    for (float& w : vertex.weights) sum += w = weight(random);
+    std::ranges::sort(vertex.weights, std::greater<>());
+    for (std::size_t k = 0; k < 4; ++k) {
+      // Around at the ends: four different joints.
+      vertex.joints[k] = static_cast<std::uint16_t>((middle + steps[k] + jointCount) % jointCount);
+      vertex.weights[k] /= sum;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      vertex.position[axis] = coordinate(random);
+      vertex.normal[axis] = coordinate(random);
+      length += vertex.normal[axis] * vertex.normal[axis];
+    }
+    for (float& component : vertex.normal) component /= std::sqrt(length);
+  }
+  for (std::uint32_t i = 0; i < instanceCount; ++i)
+    crowd.poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
+  Result<PackedMesh> packed = packVertices(crowd.vertices, jointCount);
+  if (!packed) return packed.error();
+  crowd.mesh.emplace(std::move(*packed));
   return crowd;
 }
 

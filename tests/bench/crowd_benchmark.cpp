@@ -30,15 +30,18 @@ struct CrowdScenes {
   explicit CrowdScenes(Crowd loaded) : crowd(std::move(loaded)) {}
 
   Crowd crowd;
-  std::unique_ptr<PlainScene> plain;
+  std::map<PlainKernel, std::unique_ptr<PlainScene>> plain;
   std::map<Method, std::unique_ptr<BenchScene>> scenes;
 };
 
 /// How far the plain kernel's floats are from those of Dermis, at most; NaN counts as infinitely
 /// far.
-double greatestDifference(std::span<const std::byte> plain, std::span<const std::byte> dermis) {
+double greatestDifference(std::span<const std::byte> plain, std::span<const std::byte> dermis,
+                          bool ofPositions) {
+  constexpr std::size_t stride = 24, positionSize = 12;
   double greatest = 0;
   for (std::size_t place = 0; place + 4 <= std::min(plain.size(), dermis.size()); place += 4) {
+    if (ofPositions && place % stride >= positionSize) continue;
     float a, b;
     std::memcpy(&a, plain.data() + place, 4);
     std::memcpy(&b, dermis.data() + place, 4);
@@ -46,16 +49,6 @@ double greatestDifference(std::span<const std::byte> plain, std::span<const std:
     if (!(difference <= greatest)) greatest = std::isnan(difference) ? HUGE_VAL : difference;
   }
   return greatest;
-}
-
-/// A baseline that does not do the same work is none.
-std::string disagreement(const CrowdScenes& scenes) {
-  const std::span<const std::byte> plain = scenes.plain->output();
-  const std::span<const std::byte> dermis = scenes.scenes.at(Method::dualQuaternion)->output();
-  if (plain.size() != dermis.size()) return "the outputs differ in size";
-  const double difference = greatestDifference(plain, dermis);
-  if (difference <= 1e-4) return {};
-  return "the plain kernel is " + std::to_string(difference) + " from Dermis";
 }
 
 BenchScene& sceneOf(CrowdScenes& scenes, Method method) {
@@ -74,14 +67,27 @@ void count(benchmark::State& state, const Crowd& crowd) {
       benchmark::Counter(vertices, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-void measurePlain(benchmark::State& state, CrowdScenes& scenes) {
-  if (scenes.plain == nullptr) {
-    scenes.plain = std::make_unique<PlainScene>(*benchDevice(), scenes.crowd);
-    sceneOf(scenes, Method::dualQuaternion);
-    if (const std::string text = disagreement(scenes); !text.empty())
+/// A baseline that does not do the same work is none.
+std::string disagreement(CrowdScenes& scenes, PlainKernel kernel) {
+  if (kernel == PlainKernel::copy) return {};
+  const Method method = kernel == PlainKernel::linear ? Method::linear : Method::dualQuaternion;
+  const std::span<const std::byte> plain = scenes.plain.at(kernel)->output();
+  const std::span<const std::byte> dermis = sceneOf(scenes, method).output();
+  if (plain.size() != dermis.size()) return "the outputs differ in size";
+  // The plain linear kernel's normals go by the blended matrix, which is not what they should.
+  const double difference = greatestDifference(plain, dermis, kernel == PlainKernel::linear);
+  if (difference <= 1e-4) return {};
+  return "the plain kernel is " + std::to_string(difference) + " from Dermis";
+}
+
+void measurePlain(benchmark::State& state, CrowdScenes& scenes, PlainKernel kernel) {
+  std::unique_ptr<PlainScene>& plain = scenes.plain[kernel];
+  if (plain == nullptr) {
+    plain = std::make_unique<PlainScene>(*benchDevice(), scenes.crowd, kernel);
+    if (const std::string text = disagreement(scenes, kernel); !text.empty())
       return state.SkipWithError(text.c_str());
   }
-  for ([[maybe_unused]] auto iteration : state) state.SetIterationTime(scenes.plain->skin());
+  for ([[maybe_unused]] auto iteration : state) state.SetIterationTime(plain->skin());
   count(state, scenes.crowd);
 }
 
@@ -98,10 +104,8 @@ void add(const std::string& name, std::function<void(benchmark::State&)> run) {
 }
 
 /// The crowd lives until the process ends: its benchmarks refer to it.
-void registerCrowd(const std::string& name, const std::filesystem::path& path,
-                   std::vector<Ratio>& ratios) {
+void registerCrowd(const std::string& name, Result<Crowd> crowd, std::vector<Ratio>& ratios) {
   static std::vector<std::unique_ptr<CrowdScenes>> all;
-  Result<Crowd> crowd = loadCrowd(path, instanceCount);
   if (!crowd) {
     std::printf("%s: skipped: %s\n", name.c_str(), crowd.error().message.c_str());
     return;
@@ -109,13 +113,23 @@ void registerCrowd(const std::string& name, const std::filesystem::path& path,
   std::printf("%s: '%s', %u vertices, %u joints\n", name.c_str(), crowd->name.c_str(),
               crowd->vertexCount(), crowd->jointCount());
   CrowdScenes& scenes = *all.emplace_back(std::make_unique<CrowdScenes>(std::move(*crowd)));
-  add(name + "/plain", [&scenes](benchmark::State& state) { measurePlain(state, scenes); });
+  for (const auto& [kernel, plain] : {std::pair{PlainKernel::dualQuaternion, "/plain"},
+                                      {PlainKernel::linear, "/plain_linear"},
+                                      {PlainKernel::copy, "/copy"}}) {
+    add(name + plain, [&scenes, kernel = kernel](benchmark::State& state) {
+      measurePlain(state, scenes, kernel);
+    });
+  }
   for (const Method method : {Method::dualQuaternion, Method::linear}) {
     add(name + "/" + std::string(methodName(method)),
         [&scenes, method](benchmark::State& state) { measure(state, scenes, method); });
   }
   ratios.push_back(
       {name + "/plain", name + "/dual_quaternion", name + ": the plain kernel / dual quaternions"});
+  ratios.push_back(
+      {name + "/plain_linear", name + "/linear", name + ": the plain linear kernel / linear"});
+  ratios.push_back(
+      {name + "/dual_quaternion", name + "/copy", name + ": dual quaternions / a copy"});
   ratios.push_back(
       {name + "/dual_quaternion", name + "/linear", name + ": dual quaternions / linear"});
 }
@@ -124,11 +138,13 @@ void registerCrowd(const std::string& name, const std::filesystem::path& path,
 
 std::vector<Ratio> registerCrowdBenchmarks() {
   std::vector<Ratio> ratios;
-  registerCrowd("crowd/1000_figure", std::filesystem::path(test::sampleModels) / "figure.glb",
-                ratios);
+  registerCrowd("crowd/1000_of_four_influences", longFigure(10'000, instanceCount), ratios);
+  const std::filesystem::path models = test::sampleModels;
+  registerCrowd("crowd/1000_figure", loadCrowd(models / "figure.glb", instanceCount), ratios);
   const std::string real = "crowd/1000_real_model";
   if (const test::TestData data = test::findTestData(); data.folder) {
-    registerCrowd(real, *data.folder / "models/CesiumMan/glTF-Binary/CesiumMan.glb", ratios);
+    const std::filesystem::path model = *data.folder / "models/CesiumMan/glTF-Binary/CesiumMan.glb";
+    registerCrowd(real, loadCrowd(model, instanceCount), ratios);
   } else {
     std::printf("%s: skipped: %s\n", real.c_str(), data.absence.c_str());
   }

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::uint32_t workgroupSize = 64;  // of both kernels
 constexpr std::uint64_t outputStride = 24;
+constexpr std::uint64_t copiedTogether = 24;  // instances, by an invocation of plain_copy.comp
 constexpr std::uint32_t bindingCount = 3;
 constexpr std::uint32_t mostSets = 64;
 /// Whole instances to a dispatch, so many at a time: with 24 bytes a vertex their output begins at
@@ -58,14 +59,18 @@ PlainFunctions loadFunctions(const samples::Device& device) {
 
 }  // namespace
 
-PlainScene::PlainScene(samples::OpenDevice& open, const Crowd& crowd)
+PlainScene::PlainScene(samples::OpenDevice& open, const Crowd& crowd, PlainKernel kernel)
     : device_(*open.device),
+      kernel_(kernel),
       maxRange_(open.context.limits().maxStorageBufferRange),
       functions_(loadFunctions(device_)) {
   makeBuffers(crowd);
   makeLayouts();
-  palettePipeline_ = makePipeline(plain_kernels::plain_palette_spirv);
-  skinPipeline_ = makePipeline(plain_kernels::plain_skin_spirv);
+  if (kernel == PlainKernel::dualQuaternion)
+    palettePipeline_ = makePipeline(plain_kernels::plain_palette_spirv);
+  skinPipeline_ = makePipeline(kernel == PlainKernel::linear ? plain_kernels::plain_linear_spirv
+                               : kernel == PlainKernel::copy ? plain_kernels::plain_copy_spirv
+                                                             : plain_kernels::plain_skin_spirv);
   record(crowd);
   // The first time drivers compile, and memory is touched.
   skin();
@@ -206,15 +211,20 @@ void PlainScene::recordSkinning(const Crowd& crowd) {
   const std::uint64_t step = std::max(most - most % instanceStep, instanceStep);
   for (std::uint64_t first = 0; first < crowd.instanceCount(); first += step) {
     const std::uint64_t count = std::min(step, crowd.instanceCount() - first);
-    bind(skinPipeline_, std::array{vertices_.range(), palettes_.range(),
+    const samples::MappedBuffer& joints =
+        kernel_ == PlainKernel::dualQuaternion ? palettes_ : matrices_;
+    bind(skinPipeline_, std::array{vertices_.range(), joints.range(),
                                    vulkan::BufferRange{output_.range().buffer, first * instanceSize,
                                                        count * instanceSize}});
-    const std::array<std::uint32_t, 3> push{crowd.vertexCount(), crowd.jointCount(),
-                                            static_cast<std::uint32_t>(first)};
+    const bool copies = kernel_ == PlainKernel::copy;
+    const std::array<std::uint32_t, 3> push{
+        crowd.vertexCount(), copies ? static_cast<std::uint32_t>(count) : crowd.jointCount(),
+        static_cast<std::uint32_t>(first)};
+    const std::uint64_t rows = copies ? (count + copiedTogether - 1) / copiedTogether : count;
     functions_.cmdPushConstants(commandBuffer_, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                                 sizeof(push), push.data());
     functions_.cmdDispatch(commandBuffer_, groupsOf(crowd.vertexCount()),
-                           static_cast<std::uint32_t>(count), 1);
+                           static_cast<std::uint32_t>(rows), 1);
   }
 }
 
@@ -223,7 +233,7 @@ void PlainScene::record(const Crowd& crowd) {
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   orStop(device_.functions().BeginCommandBuffer(commandBuffer_, &begin), "vkBeginCommandBuffer");
-  recordPalettes(crowd);
+  if (kernel_ == PlainKernel::dualQuaternion) recordPalettes(crowd);
   recordSkinning(crowd);
   orStop(device_.functions().EndCommandBuffer(commandBuffer_), "vkEndCommandBuffer");
 }

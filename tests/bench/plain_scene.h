@@ -1,4 +1,5 @@
-// The baseline: a crowd skinned by the plain kernels, plain_palette.comp and plain_skin.comp.
+// The baselines: a crowd skinned by the plain kernels, plain_palette.comp with plain_skin.comp, or
+// plain_linear.comp; and only copied, by plain_copy.comp.
 #pragma once
 
 #include <cstddef>
@@ -32,11 +33,14 @@ struct PlainFunctions {
   PFN_vkCmdDispatch cmdDispatch = nullptr;
 };
 
+enum class PlainKernel : std::uint8_t { dualQuaternion, linear, copy };
+
 class PlainScene {
  public:
   /// Ends the process with a message where a Vulkan call fails. As many dispatches as the output
   /// needs storage buffer ranges, each of whole instances.
-  PlainScene(samples::OpenDevice& open, const Crowd& crowd);
+  PlainScene(samples::OpenDevice& open, const Crowd& crowd,
+             PlainKernel kernel = PlainKernel::dualQuaternion);
   ~PlainScene();
   PlainScene(const PlainScene&) = delete;
   PlainScene& operator=(const PlainScene&) = delete;
@@ -57,6 +61,7 @@ class PlainScene {
   void bind(VkPipeline pipeline, std::span<const vulkan::BufferRange> buffers);
 
   samples::Device& device_;
+  PlainKernel kernel_;
   std::uint64_t maxRange_;
   PlainFunctions functions_;
   samples::MappedBuffer vertices_, matrices_, palettes_, output_;
