@@ -38,7 +38,7 @@ struct SkinnedVertices {
 };
 
 struct RunOptions {
-  /// Of the device. On the CPU a job has so many vertices, of so many instances.
+  /// On the CPU, a job has at most `workgroupSize` vertices of `instancesPerInvocation` instances.
   Tuning tuning;
   std::string instructions;  ///< of the CPU, one of `cpu::targetNames`; empty: the target's
   OutputLayout output;

@@ -73,7 +73,7 @@ cpu::Instance CpuRunner::instanceOf(const Job& job) {
   return instance;
 }
 
-/// Into ranges of vertices, of so many instances of one mesh and method.
+/// A job has a range of vertices of some instances with the same mesh and method (`Tuning`).
 std::vector<cpu::Job> CpuRunner::cutUp(std::span<const cpu::Instance> instances) const {
   std::vector<cpu::Job> jobs;
   for (std::size_t first = 0; first < instances.size();) {

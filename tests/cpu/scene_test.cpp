@@ -214,7 +214,7 @@ TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
   }
 }
 
-// As in a job of its own.
+// The vertices are those that a job with this instance alone writes.
 TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
   engine_.begin();
   mesh_ = engine_.addMesh(packed_);

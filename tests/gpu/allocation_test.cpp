@@ -1,6 +1,6 @@
-// Frames of a scene that is warm allocate nothing on the CPU: every `operator new` of this thread
-// is counted while Dermis works, for the GPU or on the CPU. A program of its own, since it replaces
-// that operator.
+// A scene allocates no memory once it has run some frames, on the GPU and on the CPU. The test
+// counts every `operator new` of this thread while Dermis works. It is a separate program because
+// it replaces that operator.
 
 #include <gtest/gtest.h>
 

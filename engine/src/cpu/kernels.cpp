@@ -137,7 +137,7 @@ struct PlainGroup {
   DualQuaternionArray<float> parts = joints;
   float* palettes = nullptr;  ///< of those that are skinned next
 
-  /// The memory of so many joints and pairs.
+  /// Gets memory for the joints and the palettes of `mostInstances` instances.
   void assign(Scratch& scratch, std::size_t jointCount, std::size_t paletteFloats) {
     // Joints are converted as many at a time as there are lanes.
     joints.dual = parts.dual = (jointCount + blockVertices) * joints.stride;

@@ -61,7 +61,6 @@ struct SkinningSystem::State {
 
   Result<void> grow(const BufferGrowth& growth);
   void addPoseBuffer(std::uint64_t bytes);
-  Result<MeshHandle> addMesh(Mesh&& mesh);
   std::span<JointMatrix> poseAt(const PosePlace& place) {
     return std::span(poseBuffers[place.poseBuffer])
         .subspan(place.offset / sizeof(JointMatrix), place.jointCount);
@@ -436,7 +435,7 @@ void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
         static_cast<std::uint32_t>(std::min<std::uint64_t>(begin + step, task.vertexEnd));
     const bool isAgain = begin != task.firstVertex && findOut;
     for (std::size_t instance = 0; isAgain && instance < count; ++instance) {
-      // Each range finds out something of its own.
+      // Ranges may be done at the same time, so each has its own results.
       instances.push_back(TaskInstance(instances[first + instance]));
       resultOf.push_back(std::uint32_t{resultOf[first + instance]});
     }
