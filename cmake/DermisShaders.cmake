@@ -7,7 +7,9 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 #                      [NAMESPACE dermis::kernels]       # C++ namespace of the symbols
 #                      [ALLOW_CONTRACTION]               # do not demand `precise` everywhere
 #                      KERNELS "skin.comp TEXELS" ...    # a file, relative to the current source folder (or .vert,
-#                                                        # .frag), and the macros that this module is compiled with
+#                                                        # .frag), and the macros that this module is compiled with;
+#                                                        # --scalar-block-layout among them: blocks may have that layout,
+#                                                        # which devices must have enabled
 #                      [INCLUDES abi.h ...]              # shown in an IDE; dependencies are found
 #                      [INCLUDE_FOLDERS folder ...]      # where #include is looked up as well
 #                      [DEFINES NAME=VALUE ...])
@@ -58,6 +60,11 @@ function(dermis_embed_shaders)
     list(POP_FRONT macros kernel)
     list(APPEND sources ${kernel})
     set(ownFlags ${flags})
+    set(layoutFlags)
+    if("--scalar-block-layout" IN_LIST macros)
+      list(REMOVE_ITEM macros "--scalar-block-layout")
+      set(layoutFlags --scalar-block-layout)
+    endif()
     foreach(macro IN LISTS macros)
       list(APPEND ownFlags --define ${macro})
     endforeach()
@@ -77,9 +84,9 @@ function(dermis_embed_shaders)
     set(unchecked ${folder}/${name}.unchecked.spv)
     add_custom_command(
       OUTPUT ${module}
-      COMMAND dermis_embed_shaders compile --input ${kernel} --output ${unchecked} ${ownFlags}
+      COMMAND dermis_embed_shaders compile --input ${kernel} --output ${unchecked} ${ownFlags} ${layoutFlags}
               --depfile ${module}.d --depfile-target ${module}
-      COMMAND ${DERMIS_SPIRV_VAL} --target-env vulkan1.1 ${unchecked}
+      COMMAND ${DERMIS_SPIRV_VAL} ${layoutFlags} --target-env vulkan1.1 ${unchecked}
       COMMAND ${CMAKE_COMMAND} -E rename ${unchecked} ${module}
       DEPENDS dermis_embed_shaders ${kernel}
       DEPFILE ${module}.d

@@ -47,7 +47,7 @@ DERMIS_CONSTANT CONSTANT_INSTANCES = 3u;   // instances per invocation
 DERMIS_CONSTANT CONSTANT_POSITION_FORMAT = 4u;
 DERMIS_CONSTANT CONSTANT_NORMAL_FORMAT = 5u;
 DERMIS_CONSTANT CONSTANT_TANGENT_FORMAT = 6u;
-DERMIS_CONSTANT CONSTANT_POSITION_UNIT = 7u;  // bytes of one store: 4, 2 or 1
+DERMIS_CONSTANT CONSTANT_POSITION_UNIT = 7u;  // bytes of one store: 1, 2, 4, 8, 12 or 16
 DERMIS_CONSTANT CONSTANT_NORMAL_UNIT = 8u;
 DERMIS_CONSTANT CONSTANT_TANGENT_UNIT = 9u;
 DERMIS_CONSTANT CONSTANT_PREVIOUS_UNIT = 10u;
@@ -55,7 +55,11 @@ DERMIS_CONSTANT CONSTANT_MOTION = 11u;
 DERMIS_CONSTANT CONSTANT_MORPHS = 12u;  // 0 or 1
 DERMIS_CONSTANT CONSTANT_BOUNDS = 13u;  // 0 or 1
 DERMIS_CONSTANT CONSTANT_SCALES = 14u;  // 0 or 1: whether palettes may be two-phase
-DERMIS_CONSTANT CONSTANT_COUNT = 15u;
+DERMIS_CONSTANT CONSTANT_FULL = 15u;    // 0 or 1: every vertex has CONSTANT_INFLUENCES
+DERMIS_CONSTANT CONSTANT_RECORD = 16u;  // bytes of one store of all attributes, or one of these:
+DERMIS_CONSTANT CONSTANT_COUNT = 17u;
+DERMIS_CONSTANT RECORD_APART = 0u;     // each attribute by itself
+DERMIS_CONSTANT RECORD_IN_PAIRS = 1u;  // positions and normals, float32x3, by 8 bytes
 
 // The numbers of Method.
 DERMIS_CONSTANT METHOD_LINEAR = 0u;
@@ -89,7 +93,7 @@ DERMIS_CONSTANT MOTION_RESKINNED = 2u;
 // ---- Packed mesh: a header, then sections at word offsets from its start. What every vertex is
 // read from begins at multiples of 4 words, which kernels read at once (a unit).
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
-DERMIS_CONSTANT MESH_VERSION = 5u;
+DERMIS_CONSTANT MESH_VERSION = 6u;
 struct MeshHeader {
   uint magic;
   uint version;
@@ -111,8 +115,8 @@ struct MeshHeader {
   float dualQuaternionWeight;  // … this one
   uint bulgeStrengths;         // the same
   float bulgeStrength;
+  uint minInfluences;  // of a vertex
   uint reserved;
-  uint reserved1;
 };
 DERMIS_CONSTANT MESH_HEADER_WORDS = 20u;
 
@@ -196,7 +200,7 @@ struct GroupRecord {
   uint normalStride;
   uint tangentStride;
   uint previousStride;
-  uint reserved;
+  uint evenlySpaced;  // 1: each word of its instance records rises by the same from one to the next
 };
 DERMIS_CONSTANT GROUP_WORDS = 12u;
 

@@ -55,7 +55,7 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pos
 #else
   const bool branches = false;
 #endif
-  bool still = influences.count == 0u;
+  bool still = !hasSlot(influences.count, 0u);
   if (branches && still) return vertex;
   Vertex skinned = skinByMethod(vertex, influences, inputs, pose, withNormal, withTangent);
   if (still) skinned = vertex;

@@ -14,7 +14,9 @@ struct DirectionMap {
   float side;
 };
 
+// Where no pose may scale, products are in range as they are. The scale is a power of two, so that bits are the same without it.
 DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
+  if (!SCALES) return DirectionMap(r0, r1, r2, dot3(r0, cross3(r1, r2)) < 0.0 ? -1.0 : 1.0);
   float scale = powerScale(max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2))));
   precise vec3 n0 = r0 * scale;
   precise vec3 n1 = r1 * scale;
@@ -28,6 +30,14 @@ vec3 mapNormal(DirectionMap map, vec3 normal) {
   precise vec3 turned = map.side * vec3(dot3(cross3(map.r1, map.r2), normal), dot3(cross3(map.r2, map.r0), normal),
                                         dot3(cross3(map.r0, map.r1), normal));
   return turned;
+}
+
+// What a direction became, with length 1, or `fallback` where it vanished.
+vec3 unitOfMapped(vec3 direction, vec3 fallback) {
+  if (SCALES) return unitOr(direction, fallback);
+  float squared = dot3(direction, direction);
+  precise vec3 unit = direction * inversesqrt(squared);
+  return squared == 0.0 ? fallback : unit;
 }
 
 // Tangents go by the matrix itself.

@@ -33,7 +33,7 @@ Blend blendJoints(Influences influences, Pose pose) {
   precise vec4 dual = influences.weights.x * paletteDual(pose.palette, influences.joints.x);
   Blend blend = Blend(real, dual);
   for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (slot >= influences.count) break;
+    if (!hasSlot(influences.count, slot)) break;
     blend = addJoint(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
   }
   if (hasFurther(influences)) {
@@ -59,7 +59,7 @@ ScaleShear blendScaleShear(Influences influences, Pose pose) {
   ScaleShear pivot = paletteScaleShear(pose, influences.joints.x);
   ScaleShear blend = pivot;
   for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (slot >= influences.count) break;
+    if (!hasSlot(influences.count, slot)) break;
     blend = addScaleShear(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
   }
   if (hasFurther(influences)) {

@@ -16,9 +16,9 @@ Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, 
   skinned.position = position;
   if (withNormal || withTangent) {
     DirectionMap map = directionMap(r0.xyz, r1.xyz, r2.xyz);
-    if (withNormal) skinned.normal = unitOr(mapNormal(map, vertex.normal), vertex.normal);
+    if (withNormal) skinned.normal = unitOfMapped(mapNormal(map, vertex.normal), vertex.normal);
     if (withTangent) {
-      vec3 direction = unitOr(mapTangent(map, vertex.tangent.xyz), vertex.tangent.xyz);
+      vec3 direction = unitOfMapped(mapTangent(map, vertex.tangent.xyz), vertex.tangent.xyz);
       skinned.tangent = tangentOf(direction, vertex.tangent.w, map.side);
     }
   }
@@ -45,7 +45,7 @@ Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNorm
   precise vec4 r2 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 2u);
   Rows blend = Rows(r0, r1, r2);
   for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (slot >= influences.count) break;
+    if (!hasSlot(influences.count, slot)) break;
     blend = addMatrix(blend, influences.weights[slot], pose, influences.joints[slot]);
   }
   if (hasFurther(influences)) {

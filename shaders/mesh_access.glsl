@@ -68,6 +68,9 @@ Sections sectionsOf(uint mesh) {
 // Influences of a vertex that are read once, for all its instances. Bounds the loops over them, so that drivers unroll these.
 const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
 
+// Whether a vertex has that many: a constant where every vertex of a mesh has.
+bool hasSlot(uint count, uint slot) { return FULL || slot < count; }
+
 // The influences of one vertex: the loaded ones, and where all of them stand.
 struct Influences {
   uint unit;
@@ -86,12 +89,12 @@ Influences influencesOf(Sections sections, uint vertex, uint first) {
   influences.weights = vec4(0.0);
   influences.joints = uvec4(0u);
   uvec4 two = uvec4(0u);
-  if (influences.count > 0u) two = meshUnit(influences.unit);
+  if (hasSlot(influences.count, 0u)) two = meshUnit(influences.unit);
   influences.weights.xy = uintBitsToFloat(two.xz);
   influences.joints.xy = two.yw;
   if (LOADED_INFLUENCES > 2u) {
     two = uvec4(0u);
-    if (influences.count > 2u) two = meshUnit(influences.unit + 1u);
+    if (hasSlot(influences.count, 2u)) two = meshUnit(influences.unit + 1u);
     influences.weights.zw = uintBitsToFloat(two.xz);
     influences.joints.zw = two.yw;
   }

@@ -5,7 +5,7 @@
 
 #include "abi.h"
 
-#ifdef PAIRS
+#if defined(PAIRS) || defined(WIDE)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
 
 // A position and the normal behind it, two words at a time: drivers that store lane by lane take half as long.
@@ -15,9 +15,17 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
   positionsPairs[pair + 1u] = packUint2x32(uvec2(position.z, normal.x));
   positionsPairs[pair + 2u] = packUint2x32(normal.yz);
 }
+#else
+void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #endif
 
 #define STREAM_BINDING BINDING_POSITIONS
+#define STREAM_VECTORS_2_BLOCK PositionsVectors2
+#define STREAM_VECTORS_2 positionsVectors2
+#define STREAM_VECTORS_3_BLOCK PositionsVectors3
+#define STREAM_VECTORS_3 positionsVectors3
+#define STREAM_VECTORS_4_BLOCK PositionsVectors4
+#define STREAM_VECTORS_4 positionsVectors4
 #define STREAM_WORDS_BLOCK PositionsWords
 #define STREAM_WORDS positionsWords
 #define STREAM_HALVES_BLOCK PositionsHalves
@@ -30,12 +38,73 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
 #endif
 #include "stream.glsl"
 
+#ifdef WIDE
+layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
+layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
+
+// Of an attribute of so many bytes that begins at byte `begin` of a record, what stands in the record's word `word`. All but the
+// value is constant: what is left is a move, or a shift.
+uint partOfWord(uvec4 value, uint size, uint begin, uint word) {
+  int from = int(word * 4u) - int(begin);  // the byte of the attribute that the word begins with
+  if (from <= -4 || from >= int(size)) return 0u;
+  if (from < 0) {
+    uint first = size < 4u ? value.x & ((1u << (size * 8u)) - 1u) : value.x;
+    return first << uint(-from * 8);
+  }
+  uint left = size - uint(from);  // bytes from there on
+  uint index = uint(from) / 4u;
+  uint shift = uint(from) % 4u * 8u;
+  uint part = value[index];
+  if (shift != 0u) part = part >> shift | (index < 3u ? value[index + 1u] << (32u - shift) : 0u);
+  return left < 4u ? part & ((1u << (left * 8u)) - 1u) : part;
+}
+
+uint wordOfRecord(uvec4 position, uvec4 normal, uvec4 tangent, uint word) {
+  uint positions = formatBytes(POSITION_FORMAT);
+  uint normals = formatBytes(NORMAL_FORMAT);
+  return partOfWord(position, positions, 0u, word) | partOfWord(normal, normals, positions, word) |
+         partOfWord(tangent, formatBytes(TANGENT_FORMAT), positions + normals, word);
+}
+
+// All attributes of a vertex, which stand one behind the other, by one store of RECORD bytes. Drivers that store lane by lane take
+// less time for it.
+void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
+#define RECORD_WORD(word) wordOfRecord(position, normal, tangent, word)
+  uvec4 low = uvec4(RECORD_WORD(0u), RECORD_WORD(1u), RECORD_WORD(2u), RECORD_WORD(3u));
+  uvec4 high = uvec4(RECORD_WORD(4u), RECORD_WORD(5u), RECORD_WORD(6u), RECORD_WORD(7u));
+  switch (RECORD) {
+    case 8u:
+      positionsVectors2[place / 8u] = low.xy;
+      break;
+    case 12u:
+      positionsVectors3[place / 12u] = low.xyz;
+      break;
+    case 16u:
+      positionsVectors4[place / 16u] = low;
+      break;
+    case 24u:
+      records24[place / 24u] = u64vec3(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy));
+      break;
+    default:
+      records32[place / 32u] = u64vec4(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy), packUint2x32(high.zw));
+  }
+}
+#else
+void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {}
+#endif
+
 #ifdef ONE_OUTPUT
 #define storeNormals storePositions
 #define storeTangents storePositions
 #define storePrevious storePositions
 #else
 #define STREAM_BINDING BINDING_NORMALS
+#define STREAM_VECTORS_2_BLOCK NormalsVectors2
+#define STREAM_VECTORS_2 normalsVectors2
+#define STREAM_VECTORS_3_BLOCK NormalsVectors3
+#define STREAM_VECTORS_3 normalsVectors3
+#define STREAM_VECTORS_4_BLOCK NormalsVectors4
+#define STREAM_VECTORS_4 normalsVectors4
 #define STREAM_WORDS_BLOCK NormalsWords
 #define STREAM_WORDS normalsWords
 #define STREAM_HALVES_BLOCK NormalsHalves
@@ -46,6 +115,12 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
 #include "stream.glsl"
 
 #define STREAM_BINDING BINDING_TANGENTS
+#define STREAM_VECTORS_2_BLOCK TangentsVectors2
+#define STREAM_VECTORS_2 tangentsVectors2
+#define STREAM_VECTORS_3_BLOCK TangentsVectors3
+#define STREAM_VECTORS_3 tangentsVectors3
+#define STREAM_VECTORS_4_BLOCK TangentsVectors4
+#define STREAM_VECTORS_4 tangentsVectors4
 #define STREAM_WORDS_BLOCK TangentsWords
 #define STREAM_WORDS tangentsWords
 #define STREAM_HALVES_BLOCK TangentsHalves
@@ -57,6 +132,12 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
 
 #ifdef EXTRAS
 #define STREAM_BINDING BINDING_PREVIOUS
+#define STREAM_VECTORS_2_BLOCK PreviousVectors2
+#define STREAM_VECTORS_2 previousVectors2
+#define STREAM_VECTORS_3_BLOCK PreviousVectors3
+#define STREAM_VECTORS_3 previousVectors3
+#define STREAM_VECTORS_4_BLOCK PreviousVectors4
+#define STREAM_VECTORS_4 previousVectors4
 #define STREAM_WORDS_BLOCK PreviousWords
 #define STREAM_WORDS previousWords
 #define STREAM_HALVES_BLOCK PreviousHalves

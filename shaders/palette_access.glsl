@@ -32,8 +32,8 @@ StatusRecord loadStatus(uint palette) {
   return StatusRecord(a.x, a.y, a.z, a.w);
 }
 
-// False, and a constant, where no palette may scale: nothing of what scales is left in the code.
-bool paletteScales(uint palette) { return SCALES && loadStatus(palette).twoPhase != 0u; }
+// False, and a constant, where no palette may scale: nothing of what scales is left in the code. Matrices have no status.
+bool paletteScales(uint palette) { return SCALES && METHOD != METHOD_LINEAR && loadStatus(palette).twoPhase != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
 vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }

@@ -9,7 +9,8 @@
 //                   for used, whatever its constants say
 //   COMPARISON      the methods that are there for comparison, instead of those for every day
 //   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
-//   PAIRS           positions and normals, float32x3 each, are stored together (needs 64-bit integers)
+//   PAIRS           positions and normals, float32x3 each, are stored together, 8 bytes at a time (needs 64-bit integers)
+//   WIDE            an attribute, or all of a vertex, by one store (needs scalar block layout and 64-bit integers)
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #ifdef BYTES
@@ -22,8 +23,11 @@
 #ifdef TEXELS
 #extension GL_EXT_samplerless_texture_functions : require
 #endif
-#ifdef PAIRS
+#if defined(PAIRS) || defined(WIDE)
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#endif
+#ifdef WIDE
+#extension GL_EXT_scalar_block_layout : require
 #endif
 
 #include "abi.h"
@@ -44,6 +48,12 @@ layout(constant_id = CONSTANT_TANGENT_UNIT) const uint TANGENT_UNIT = 4u;
 layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
 layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
+layout(constant_id = CONSTANT_FULL) const bool FULL = false;
+#if defined(PAIRS) || defined(WIDE)
+layout(constant_id = CONSTANT_RECORD) const uint RECORD = RECORD_APART;
+#else
+const uint RECORD = RECORD_APART;
+#endif
 #if defined(EXTRAS) || defined(ONE_OUTPUT)
 layout(constant_id = CONSTANT_MOTION) const uint MOTION = MOTION_NONE;
 #define HAS_MOTION
@@ -125,9 +135,29 @@ struct Instance {
   uvec4 places;
 };
 
+uvec4 placesOf(InstanceRecord r) { return uvec4(r.positions, r.normals, r.tangents, r.previousPositions); }
+
 Instance readInstance(uint word, uvec4 offsets) {
   InstanceRecord record = loadInstance(word);
-  return Instance(record, uvec4(record.positions, record.normals, record.tangents, record.previousPositions) + offsets);
+  return Instance(record, placesOf(record) + offsets);
+}
+
+// From one instance to the next where they are evenly spaced.
+Instance stepBetween(InstanceRecord a, InstanceRecord b) {
+  InstanceRecord step = a;
+  step.palette = b.palette - a.palette;
+  step.jointCount = b.jointCount - a.jointCount;
+  step.flags = b.flags - a.flags;
+  step.extension = b.extension - a.extension;
+  return Instance(step, placesOf(b) - placesOf(a));
+}
+
+void advance(inout Instance instance, Instance by) {
+  instance.record.palette += by.record.palette;
+  instance.record.jointCount += by.record.jointCount;
+  instance.record.flags += by.record.flags;
+  instance.record.extension += by.record.extension;
+  instance.places += by.places;
 }
 
 // What an invocation has read of its vertex, for all its instances.
@@ -175,21 +205,32 @@ void skinInstance(Instance instance, Work work, bool scales) {
   if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
   uvec4 position = encodePosition(skinned.position, instance.record.extension, true);
 #ifdef HAS_MOTION
-  if (MOTION != MOTION_NONE) {
+  // Those that were kept stand where the new ones will.
+  if (MOTION == MOTION_KEPT) {
     uvec4 words = previousPosition(instance, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
   }
 #endif
-#ifdef PAIRS
-  storePositionAndNormal(instance.places.x, position.xyz, floatBitsToUint(skinned.normal));
-#else
-  storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-  if (NORMALS)
-    storeNormals(instance.places.y, encodeNormal(NORMAL_FORMAT, skinned.normal), formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
-#endif
-  if (TANGENTS) {
-    storeTangents(instance.places.z, encodeTangent(TANGENT_FORMAT, skinned.tangent), formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+  uvec4 normal = NORMALS ? encodeNormal(NORMAL_FORMAT, skinned.normal) : uvec4(0u);
+  uvec4 tangent = TANGENTS ? encodeTangent(TANGENT_FORMAT, skinned.tangent) : uvec4(0u);
+  if (RECORD > RECORD_IN_PAIRS) {
+    storeRecord(instance.places.x, position, normal, tangent);
+  } else {
+    if (RECORD == RECORD_IN_PAIRS) {
+      storePositionAndNormal(instance.places.x, position.xyz, normal.xyz);
+    } else {
+      storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+      if (NORMALS) storeNormals(instance.places.y, normal, formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+    }
+    if (TANGENTS) storeTangents(instance.places.z, tangent, formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
   }
+#ifdef HAS_MOTION
+  // At last: little of the vertex is needed any more.
+  if (MOTION == MOTION_RESKINNED) {
+    uvec4 words = previousPosition(instance, position, work);
+    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+  }
+#endif
 }
 
 // Whether instances with scaling joints have their own loop. lavapipe predicates instead of branching, so without that loop rigid
@@ -198,10 +239,28 @@ void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef COMPARISON
 const bool APART = false;
 #elif defined(HAS_MOTION)
-const bool APART = SCALES && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
+const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
 #else
-const bool APART = SCALES && INSTANCES >= 8u;
+const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u;
 #endif
+
+// Skins some of an invocation's instances, a bit each, in order. Records are read once for a run of instances that follow each
+// other and are evenly spaced: it is as long as the bits are, or one instance.
+void skinInstances(uint left, uint records, uvec4 offsets, bool even, Instance by, Work work, bool scales) {
+  // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
+  // lanes off, which doubles the work of an invocation with one instance.
+  do {
+    Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
+    uint lowest = left & (~left + 1u);
+    uint after = left & (even ? left + lowest : left - 1u);  // the sum carries through the bits of the run
+    int run = bitCount(left ^ after);
+    left = after;
+    do {
+      skinInstance(instance, work, scales || (!APART && paletteScales(instance.record.palette)));
+      advance(instance, by);
+    } while (--run != 0);
+  } while (left != 0u);
+}
 
 void main() {
   uint number = workgroupNumber();
@@ -238,9 +297,9 @@ void main() {
   // Outside the loop, because lavapipe reads a push constant each time it is named.
   uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
   uvec4 offsets = run * uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
-  // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
-  // lanes off, which doubles the work of an invocation with one instance.
   uint left = 0xffffffffu >> (32u - count);  // a bit an instance
+  bool even = group.evenlySpaced != 0u;
+  Instance by = stepBetween(loadInstance(records), loadInstance(records + min(1u, count - 1u) * INSTANCE_WORDS));
   if (APART) {
     uint scaling = 0u;
     uint i = 0u;
@@ -248,18 +307,9 @@ void main() {
       if (paletteScales(loadInstance(records + i * INSTANCE_WORDS).palette)) scaling |= 1u << i;
     } while (++i < count);
     uint rigid = left & ~scaling;
-    if (rigid != 0u) {
-      do {
-        skinInstance(readInstance(records + uint(findLSB(rigid)) * INSTANCE_WORDS, offsets), work, false);
-        rigid &= rigid - 1u;
-      } while (rigid != 0u);
-    }
+    if (rigid != 0u) skinInstances(rigid, records, offsets, even, by, work, false);
     left = scaling;
     if (left == 0u) return;
   }
-  do {
-    Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
-    skinInstance(instance, work, APART || paletteScales(instance.record.palette));
-    left &= left - 1u;
-  } while (left != 0u);
+  skinInstances(left, records, offsets, even, by, work, APART);
 }

@@ -44,6 +44,7 @@ layout(set = DERMIS_SET, binding = DERMIS_PALETTES_BINDING, std430) readonly buf
 
 const uint METHOD = DERMIS_METHOD;
 const uint INFLUENCES = DERMIS_INFLUENCES;
+const bool FULL = false;
 const bool SCALES = DERMIS_SCALES;
 
 uvec4 meshUnit(uint unit) { return DERMIS_MESH_UNIT(unit); }

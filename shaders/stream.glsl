@@ -1,5 +1,5 @@
-// One output attribute: the buffer it goes to, as words and, where the kernel may store less, as halves and bytes. Included once
-// for each attribute, with STREAM_BINDING and the names to declare defined.
+// One output attribute: the buffer it goes to, as words and, where the kernel may store less or more at a time, as halves, bytes
+// and vectors. Included once for each attribute, with STREAM_BINDING and the names to declare defined.
 
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_WORDS_BLOCK { uint STREAM_WORDS[]; };
 #ifdef HALVES
@@ -7,6 +7,12 @@ layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_HALVES_BLOCK { u
 #endif
 #ifdef BYTES
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_BYTES_BLOCK { uint8_t STREAM_BYTES[]; };
+#endif
+
+#ifdef WIDE
+layout(set = 0, binding = STREAM_BINDING, scalar) buffer STREAM_VECTORS_2_BLOCK { uvec2 STREAM_VECTORS_2[]; };
+layout(set = 0, binding = STREAM_BINDING, scalar) buffer STREAM_VECTORS_3_BLOCK { uvec3 STREAM_VECTORS_3[]; };
+layout(set = 0, binding = STREAM_BINDING, scalar) buffer STREAM_VECTORS_4_BLOCK { uvec4 STREAM_VECTORS_4[]; };
 #endif
 
 // Stores the first `size` bytes of `words`, `unit` bytes at a time; nothing else is touched. `place` counts bytes.
@@ -21,6 +27,14 @@ void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
   if (unit == 2u) {
     uint first = place / 2u;
     for (uint i = 0u; i < size / 2u; ++i) STREAM_HALVES[first + i] = uint16_t((words[i / 2u] >> (i % 2u * 16u)) & 0xffffu);
+    return;
+  }
+#endif
+#ifdef WIDE
+  if (unit > 4u) {
+    if (unit == 8u) STREAM_VECTORS_2[place / 8u] = words.xy;
+    if (unit == 12u) STREAM_VECTORS_3[place / 12u] = words.xyz;
+    if (unit == 16u) STREAM_VECTORS_4[place / 16u] = words;
     return;
   }
 #endif
@@ -48,6 +62,14 @@ uvec4 STREAM_LOAD(uint place, uint size, uint unit) {
     return words;
   }
 #endif
+#ifdef WIDE
+  if (unit > 4u) {
+    if (unit == 8u) words.xy = STREAM_VECTORS_2[place / 8u];
+    if (unit == 12u) words.xyz = STREAM_VECTORS_3[place / 12u];
+    if (unit == 16u) words = STREAM_VECTORS_4[place / 16u];
+    return words;
+  }
+#endif
   uint word = place / 4u;
   words.x = STREAM_WORDS[word];
   if (size > 4u) words.y = STREAM_WORDS[word + 1u];
@@ -59,6 +81,12 @@ uvec4 STREAM_LOAD(uint place, uint size, uint unit) {
 #endif
 
 #undef STREAM_BINDING
+#undef STREAM_VECTORS_2_BLOCK
+#undef STREAM_VECTORS_2
+#undef STREAM_VECTORS_3_BLOCK
+#undef STREAM_VECTORS_3
+#undef STREAM_VECTORS_4_BLOCK
+#undef STREAM_VECTORS_4
 #undef STREAM_WORDS_BLOCK
 #undef STREAM_WORDS
 #undef STREAM_HALVES_BLOCK

@@ -110,6 +110,11 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     storage16Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
     const bool has8Bit = hasExtension(extensions, VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
     if (has8Bit) storage16Bit.pNext = &storage8Bit;
+    VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout{};
+    scalarBlockLayout.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
+    const bool hasScalar = hasExtension(extensions, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
+    if (hasScalar) storage8Bit.pNext = &scalarBlockLayout;
+    if (hasScalar && !has8Bit) storage16Bit.pNext = &scalarBlockLayout;
     VkPhysicalDeviceFeatures2 features{};
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     features.pNext = &storage16Bit;
@@ -117,6 +122,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
     info.int64 = features.features.shaderInt64 == VK_TRUE;
     info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
+    info.scalarBlockLayout = hasScalar && scalarBlockLayout.scalarBlockLayout == VK_TRUE;
     info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
     info.accelerationStructures = rayTracing.accelerationStructures();
@@ -295,6 +301,14 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
     storage8Bit_.storageBuffer8BitAccess = VK_TRUE;
     storage16Bit_.pNext = &storage8Bit_;
     extensions.push_back(VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
+  }
+  // At the front of the chain.
+  scalarBlockLayout_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
+  if (info_.scalarBlockLayout) {
+    scalarBlockLayout_.scalarBlockLayout = VK_TRUE;
+    scalarBlockLayout_.pNext = features_.pNext;
+    features_.pNext = &scalarBlockLayout_;
+    extensions.push_back(VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
   }
   if (options.rayTracing) {
     rayTracing_ = RayTracingFeatures(functions_, physicalDevice_,

@@ -24,9 +24,10 @@ struct DeviceInfo {
   std::uint32_t maxWorkgroupCount = 0;
   std::uint32_t storageBuffersPerStage = 0;
   bool pushDescriptors = false;
-  bool storage16Bit = false;  ///< kernels can store 2 bytes
-  bool storage8Bit = false;   ///< ... and 1 byte
-  bool int64 = false;         ///< kernels can use 64-bit integers
+  bool storage16Bit = false;       ///< kernels can store 2 bytes
+  bool storage8Bit = false;        ///< ... and 1 byte
+  bool int64 = false;              ///< kernels can use 64-bit integers
+  bool scalarBlockLayout = false;  ///< kernels can store up to 32 bytes at once
   bool accelerationStructures = false;
   bool rayQueries = false;
   bool pipelineStatistics = false;
@@ -113,6 +114,7 @@ class Device {
   VkPhysicalDeviceFeatures2 features_{};
   VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
   VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
+  VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout_{};
   RayTracingFeatures rayTracing_;
   std::mutex messagesMutex_;
   std::vector<std::string> messages_;

@@ -198,7 +198,7 @@ TEST_F(SystemGrowthTest, TheOutputGrowsToItsMaximumAndNoFurther) {
 
 /// Guards around what the system may use of one buffer of the engine's, in which all stands.
 TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
-  constexpr std::uint64_t part = 64 << 10, guard = 4096;
+  constexpr std::uint64_t part = 85 * 768, guard = 6 * 768;  // of any alignment
   SkinningSystemDescription ranged = description();
   VkBufferUsageFlags usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   for (const BufferRole role :

@@ -1,4 +1,5 @@
-// Reading through uniform texel buffers and through storage buffers: the same bits.
+// Reading through uniform texel buffers and through storage buffers, stores of one word, of two and
+// of whole vertices, records that are read and records that are counted up: the same bits.
 
 #include <gtest/gtest.h>
 
@@ -110,6 +111,97 @@ TEST_F(TexelTest, BothPathsGiveTheSameBitsForEveryLayoutAndNumberOfInfluences) {
     const Rigs rigs(Method::dualQuaternion, {1, 2, 4, 7});
     for (const samples::OutputLayout& layout : layouts()) expectSameOn(*storage, rigs, layout);
   }
+}
+
+// Stores of all of a vertex or of an attribute, against stores of one or two words.
+TEST_F(TexelTest, StoresOfAnyWidthGiveTheSameBits) {
+  using enum VertexFormat;
+  ASSERT_TRUE(context().limits().scalarBlockLayout);
+  struct Case {
+    VertexFormat positions, normals, tangents;
+    Motion motion = Motion::none;
+  };
+  Rigs rigs(Method::dualQuaternion, {4});
+  for (samples::SkinRequest& request : rigs.requests) {
+    request.mayScale = false;
+    request.morphs = {};
+  }
+  VkPhysicalDevice8BitStorageFeatures bytes{};
+  bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+  bytes.storageBuffer8BitAccess = VK_TRUE;
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  halves.storageBuffer16BitAccess = VK_TRUE;
+  halves.pNext = &bytes;
+  VkPhysicalDeviceFeatures2 integers{};
+  integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  integers.features.shaderInt64 = VK_TRUE;
+  integers.pNext = &halves;
+  vulkan::DeviceDescription description = device().description();
+  description.enabledFeatures = &integers;
+  Result<vulkan::Context> narrow = vulkan::Context::create(description);
+  ASSERT_TRUE(narrow.ok());
+  ASSERT_FALSE(narrow->limits().scalarBlockLayout);
+  for (const Case& formats :
+       {Case{float32x3, float32x3, none}, Case{float32x3, octahedral16x2, none},
+        Case{float16x4, octahedral16x2, none}, Case{snorm16x4, snorm8x4, snorm8x4},
+        Case{float32x4, float32x4, none}, Case{float32x4, float32x4, float32x4},
+        Case{float32x3, float32x3, none, Motion::kept}, Case{float16x4, none, none},
+        Case{float16x3, octahedral8x2, none}, Case{float16x3, octahedral8x2, octahedral16x2},
+        Case{snorm16x3, octahedral8x2, none}}) {
+    samples::OutputLayout layout;
+    layout.positions = formats.positions;
+    layout.normals = formats.normals;
+    layout.tangents = formats.tangents;
+    layout.motion = formats.motion;
+    expectSameOn(*narrow, rigs, layout);
+  }
+}
+
+// Poses in the order of their instances are evenly spaced in the palettes, others are not; some
+// scale, which other loops skin.
+TEST_F(TexelTest, EvenlySpacedInstancesGetTheSameBits) {
+  for (const Method method : {Method::linear, Method::dualQuaternion}) {
+    Rigs even(method, {4});
+    for (const bool scales : {true, false}) {
+      for (samples::SkinRequest& request : even.requests) {
+        request.mayScale = scales;
+        request.morphs = {};
+      }
+      // The second has extensions, and previous poses.
+      for (const samples::OutputLayout& layout : {samples::OutputLayout{}, layouts()[2]}) {
+        if (layout.bounds && method == Method::linear) continue;
+        const Result<samples::BatchResult> together = runOn(context(), even.requests, layout);
+        ASSERT_TRUE(together.ok());
+        for (std::size_t i = 0; i < even.requests.size(); i += 5) {
+          const Result<samples::BatchResult> alone =
+              runOn(context(), std::span(even.requests).subspan(i, 1), layout);
+          ASSERT_TRUE(alone.ok());
+          EXPECT_EQ(together->instances[i].streams, alone->instances[0].streams) << i;
+        }
+        // Every second one again, in an order without a step.
+        std::vector<samples::SkinRequest> mixed;
+        std::vector<std::size_t> order{3, 0, 7, 7, 20, 1, 2, 4, 23, 22, 5};
+        for (const std::size_t i : order) mixed.push_back(even.requests[i]);
+        const Result<samples::BatchResult> others = runOn(context(), mixed, layout);
+        ASSERT_TRUE(others.ok());
+        for (std::size_t i = 0; i < order.size(); ++i)
+          EXPECT_EQ(others->instances[i].streams, together->instances[order[i]].streams) << i;
+      }
+    }
+  }
+}
+
+// Where no joint scales, `mayScale` changes nothing: directions are scaled by powers of two.
+TEST_F(TexelTest, LinearDirectionsHaveTheSameBitsWhetherJointsMayScaleOrNot) {
+  Rigs rigs(Method::linear, {1, 4, 7});
+  samples::OutputLayout layout;
+  layout.tangents = VertexFormat::float32x4;
+  const Result<samples::BatchResult> may = runOn(context(), rigs.requests, layout);
+  for (samples::SkinRequest& request : rigs.requests) request.mayScale = false;
+  const Result<samples::BatchResult> mayNot = runOn(context(), rigs.requests, layout);
+  ASSERT_TRUE(may.ok() && mayNot.ok());
+  expectSame(*may, *mayNot);
 }
 
 // Read as unsigned integers, NaNs are what they were; the sums that they get into need not be.

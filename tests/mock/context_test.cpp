@@ -416,6 +416,8 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.morphs = true;
   variant.bounds = true;
   variant.scales = true;
+  variant.fullInfluences = true;
+  variant.recordBytes = 24;
   variant.influences = 4;
   variant.instancesPerInvocation = 3;
   variant.workgroupSize = 32;
@@ -436,7 +438,9 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_MOTION, abi::MOTION_RESKINNED},
       {abi::CONSTANT_MORPHS, 1},
       {abi::CONSTANT_BOUNDS, 1},
-      {abi::CONSTANT_SCALES, 1}};
+      {abi::CONSTANT_SCALES, 1},
+      {abi::CONSTANT_FULL, 1},
+      {abi::CONSTANT_RECORD, 24}};
   ASSERT_EQ(std::size(expected), abi::CONSTANT_COUNT);
   for (const auto& [id, value] : expected) EXPECT_EQ(constants.values[id], value) << id;
 }

@@ -393,7 +393,8 @@ TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
       "positions, bounds, for 4 influences";
   const std::string end = " has not been prepared";
   const std::string sentences[] = {
-      "the palette kernel has not been prepared", "the variant of linear" + skin + end,
+      "the palette kernel has not been prepared",
+      "the variant of linear" + skin + " and joints that scale" + end,
       "the variant of dual_quaternion" + skin + " and joints that scale" + end};
   ASSERT_EQ(batch.plan.variants().size(), 3u);
   for (std::size_t prepared = 0; prepared < 3; ++prepared) {
@@ -417,7 +418,7 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
   EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().message,
             "the variant of linear with positions as float32x3, morph targets, for any number of "
-            "influences has not been prepared");
+            "influences and joints that scale has not been prepared");
 }
 
 /// A few methods and layouts, and batches of nothing else.

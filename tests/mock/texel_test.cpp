@@ -167,6 +167,60 @@ TEST_F(TexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
       [](Job& job, Batch&, DeviceLimits&) { job.positions.stride = job.normals.stride = 36; }));
 }
 
+// An attribute, or all of a vertex, by one store, where the engine enabled scalarBlockLayout.
+TEST_F(TexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize) {
+  using enum VertexFormat;
+  DeviceLimits limits = richLimits();
+  limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
+  MockBatch mockBatch;
+  mockBatch.batch.addJob(0, 0, Method::dualQuaternion, true);
+  const Job plain = mockBatch.batch.jobs[0];
+  const auto variantOf = [&](const VertexLayout& layout, std::uint64_t offset = 0) {
+    Job job = plain;
+    job.place(*placeVertices(layout, 7, offset));
+    const Variant variant = everyVariant(job, limits, {}).back();
+    EXPECT_TRUE(variant.wideStores == limits.scalarBlockLayout || !variant.texels);
+    return variant;
+  };
+  const auto record = [&](VertexFormat positions, VertexFormat normals,
+                          VertexFormat tangents = none) {
+    return variantOf({.positions = positions, .normals = normals, .tangents = tangents})
+        .recordBytes;
+  };
+  EXPECT_EQ(record(float32x3, float32x3), 24);
+  EXPECT_EQ(record(float32x3, octahedral16x2), 16);
+  EXPECT_EQ(record(float32x4, octahedral16x2, snorm8x4), 24);
+  EXPECT_EQ(record(float32x4, float32x4), 32);
+  EXPECT_EQ(record(float16x4, octahedral16x2), 12);
+  EXPECT_EQ(record(snorm16x4, snorm8x4, snorm8x4), 16);
+  EXPECT_EQ(record(float16x3, octahedral8x2), 8);  // no store of less than a word
+  EXPECT_EQ(record(float16x3, octahedral8x2, octahedral16x2), 12);
+  EXPECT_EQ(record(float16x3, octahedral16x2), 0);   // 10 bytes
+  EXPECT_EQ(record(float32x3, none, float32x4), 0);  // 28 bytes
+  EXPECT_EQ(record(float32x3, none), 0);
+  EXPECT_EQ(variantOf({.positions = float32x3}).units[0], 12);
+  EXPECT_EQ(variantOf({.positions = float32x3, .stride = 16}).units[0], 4);
+  // Previous positions, and attributes of the engine's, are no part of the record.
+  const Variant kept = variantOf({.normals = float32x3, .motion = Motion::kept});
+  EXPECT_EQ(kept.recordBytes, 0);  // at multiples of 36 bytes
+  EXPECT_EQ(kept.units, (std::array<std::uint8_t, streamCount>{12, 12, 4, 12}));
+  EXPECT_EQ(variantOf({.normals = float32x3, .stride = 48}).recordBytes, 24);
+  const Variant between = variantOf({.normals = float32x3, .stride = 32});
+  EXPECT_TRUE(between.recordBytes == 0 && between.pairs);
+  const Variant planar =
+      variantOf({.normals = float16x4, .arrangement = dermis::Arrangement::planar}, 48);
+  EXPECT_EQ(planar.recordBytes, 0);
+  EXPECT_EQ(planar.units, (std::array<std::uint8_t, streamCount>{12, 8, 4, 4}));
+  // Previous positions would be stored by 2 bytes.
+  const Variant halves = variantOf(
+      {.positions = float16x3, .normals = octahedral8x2, .motion = Motion::kept, .stride = 16});
+  EXPECT_FALSE(halves.texels || halves.wideStores || halves.recordBytes != 0);
+  EXPECT_EQ(halves.units, (std::array<std::uint8_t, streamCount>{2, 2, 4, 2}));
+  limits.scalarBlockLayout = false;
+  const Variant pairs = variantOf({.normals = float32x3});
+  EXPECT_TRUE(pairs.pairs && pairs.recordBytes == 0 && pairs.units[0] == 4);
+}
+
 TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   VkPhysicalDeviceFeatures2 features{};
   features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;

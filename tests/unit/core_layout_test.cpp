@@ -43,13 +43,13 @@ TEST(Layout, PlacesAttributesVertexByVertex) {
 TEST(Layout, PlacesAttributesOneAfterTheOther) {
   VertexLayout layout = full;
   layout.arrangement = Arrangement::planar;
-  const Result<VertexPlaces> places = placeVertices(layout, 5, 16);
+  const Result<VertexPlaces> places = placeVertices(layout, 5, 48);
   ASSERT_TRUE(places.ok());
-  expectPlace(places->positions, 16, 12, VertexFormat::float32x3);  // 60 bytes
-  expectPlace(places->normals, 80, 4, VertexFormat::octahedral16x2);
-  expectPlace(places->tangents, 112, 4, VertexFormat::snorm8x4);
-  expectPlace(places->previousPositions, 144, 12, VertexFormat::float32x3);
-  EXPECT_EQ(places->size, 192u);
+  expectPlace(places->positions, 48, 12, VertexFormat::float32x3);  // 60 bytes
+  expectPlace(places->normals, 144, 4, VertexFormat::octahedral16x2);
+  expectPlace(places->tangents, 192, 4, VertexFormat::snorm8x4);
+  expectPlace(places->previousPositions, 240, 12, VertexFormat::float32x3);
+  EXPECT_EQ(places->size, 288u);
 }
 
 TEST(Layout, RefusesWhatCannotStandSo) {
@@ -84,19 +84,30 @@ TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
   limits.texelBuffers = limits.shaderInt64 = limits.storage16Bit = limits.storage8Bit = true;
-  for (const VertexFormat normals : {VertexFormat::none, VertexFormat::float32x3,
-                                     VertexFormat::snorm8x3, VertexFormat::octahedral8x2}) {
-    for (const std::uint32_t stride : {0u, 24u, 36u, 37u, 50u}) {
-      const PipelineNeeds needs{.layout = {.normals = normals, .stride = stride}};
-      const std::vector<Variant> foreseen = *everyVariant(needs, limits, {});
-      for (std::uint64_t place = 0; place < 9; ++place) {
-        const std::uint64_t alignment = placeVertices(needs.layout, 1)->alignment;
-        Job job;
-        job.method = needs.method;
-        job.place(*placeVertices(needs.layout, 7, place * alignment));
-        for (const Variant& variant : everyVariant(job, limits, {})) {
-          EXPECT_TRUE(std::ranges::find(foreseen, variant) != foreseen.end())
-              << stride << " bytes, at " << place * alignment;
+  for (const bool scalar : {false, true}) {
+    limits.scalarBlockLayout = scalar;
+    for (const VertexFormat normals : {VertexFormat::none, VertexFormat::float32x3,
+                                       VertexFormat::snorm8x3, VertexFormat::octahedral8x2}) {
+      // 1: planar.
+      for (const std::uint32_t stride : {0u, 1u, 24u, 36u, 37u, 50u}) {
+        // Of a scene: kernels count from the beginning of its output.
+        for (const std::uint64_t outputOffset : {0u, 96u, 768u}) {
+          PipelineNeeds needs{.layout = {.normals = normals, .stride = stride}};
+          if (stride == 1) needs.layout = {.normals = normals, .arrangement = Arrangement::planar};
+          const std::vector<Variant> foreseen = *everyVariant(needs, limits, {});
+          const std::uint64_t alignment = placeVertices(needs.layout, 1)->alignment;
+          const std::uint64_t first = (outputOffset + alignment - 1) / alignment;
+          for (std::uint64_t place = first; place < first + 9; ++place) {
+            Job job;
+            job.method = needs.method;
+            job.place(*placeVertices(needs.layout, 7, place * alignment));
+            for (OutputAttribute* attribute : {&job.positions, &job.normals})
+              attribute->offset -= attribute->format != VertexFormat::none ? outputOffset : 0;
+            for (const Variant& variant : everyVariant(job, limits, {})) {
+              EXPECT_TRUE(std::ranges::find(foreseen, variant) != foreseen.end())
+                  << stride << " bytes, at " << place * alignment << " of " << outputOffset;
+            }
+          }
         }
       }
     }

@@ -156,8 +156,8 @@ TEST_F(DamagedBlob, SwappedWordsAreRefused) {
 }
 
 TEST_F(DamagedBlob, AnotherVersionIsNamed) {
-  ASSERT_EQ(abi::MESH_VERSION, 5u);
-  for (const std::uint32_t version : {0u, 1u, 2u, 3u, 4u, 6u, 0xffffffffu}) {
+  ASSERT_EQ(abi::MESH_VERSION, 6u);
+  for (const std::uint32_t version : {0u, 1u, 2u, 3u, 4u, 5u, 7u, 0xffffffffu}) {
     Blob changed = blob;
     changed.words()[header::version] = version;
     changed.seal();
@@ -179,6 +179,8 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
     expectRefusedWith(header::requiredJoints, joints);
   for (const std::uint32_t influences : {0u, 1u, good.info().maxInfluences - 1})
     expectRefusedWith(header::maxInfluences, influences);
+  for (const std::uint32_t influences : {good.info().minInfluences + 1, 5u, 0xffffffffu})
+    expectRefusedWith(header::minInfluences, influences);
   // Each section's offset: in the header, too late for what it holds, behind the end.
   const std::pair<std::uint32_t, std::uint32_t> sections[] = {
       {header::positions, 67 * 4},

@@ -223,7 +223,28 @@ class Simulation {
     }
   }
 
+  /// The kernel steps from the first two records to all others where the group says so.
+  void checkSpacing(const PlannedDispatch& dispatch, std::uint32_t group) {
+    const std::uint32_t count = groupAt(group).instanceCount;
+    const auto word = [&](std::uint32_t instance, std::uint32_t index) {
+      const std::uint64_t record = std::uint64_t{dispatch.skinPush().instances} +
+                                   (groupAt(group).firstInstance + instance) * abi::INSTANCE_WORDS;
+      return tables_.at(record + index);
+    };
+    bool isEven = count > 1;
+    for (std::uint32_t instance = 2; instance < count; ++instance) {
+      for (std::uint32_t index = 0; index < abi::INSTANCE_WORDS; ++index) {
+        const std::uint32_t step = word(1, index) - word(0, index);
+        isEven = isEven && word(instance, index) == word(0, index) + instance * step;
+      }
+    }
+    ASSERT_EQ(groupAt(group).evenlySpaced, isEven ? 1u : 0u);
+  }
+
   void runWorkgroup(const PlannedDispatch& dispatch, std::uint32_t group, std::uint32_t local) {
+    if (local == 0) {
+      ASSERT_NO_FATAL_FAILURE(checkSpacing(dispatch, group));
+    }
     const std::uint32_t vertexGroups = groupAt(group).vertexGroups;
     const std::uint32_t firstVertex = groupAt(group).firstVertex;
     const std::uint32_t vertexEnd = groupAt(group).vertexEnd;
@@ -273,6 +294,8 @@ class Simulation {
     ASSERT_EQ(variant.bounds, job.bounds);
     ASSERT_EQ(variant.morphs, isMorphed(job));
     ASSERT_TRUE(variant.influences == 0 || variant.influences >= job.mesh.maxInfluences);
+    ASSERT_TRUE(!variant.fullInfluences || (variant.influences == job.mesh.maxInfluences &&
+                                            variant.influences == job.mesh.minInfluences));
     ASSERT_TRUE(variant.scales || !mayScale(job));
     const std::vector<Variant> foreseen = everyVariant(job, limits_, tuning_);
     ASSERT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
@@ -295,7 +318,6 @@ class Simulation {
   }
 
   bool mayScale(const Job& job) const {
-    if (job.method == Method::linear) return false;
     return batch_.poses[job.pose].mayScale ||
            (job.motion == Motion::reskinned && batch_.poses[job.previousPose].mayScale);
   }

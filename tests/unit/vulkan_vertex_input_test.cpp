@@ -70,7 +70,7 @@ TEST(VertexInput, APlanarLayoutHasABindingForEachAttribute) {
   VertexLayout layout = everything;
   layout.arrangement = Arrangement::planar;
   layout.normals = VertexFormat::none;  // the numbers of bindings have no hole
-  const VertexPlaces places = *placeVertices(layout, 100, 1600);
+  const VertexPlaces places = *placeVertices(layout, 100, 1584);
   const VertexInput input = *vulkan::vertexInput(layout, otherNumbers);
   ASSERT_EQ(input.bindingCount, 3u);
   ASSERT_EQ(input.attributeCount, 3u);

@@ -12,9 +12,10 @@ namespace dermis {
 /// Where one attribute of the skinned vertices is written: vertex v at `offset + v * stride` in the
 /// output buffer of that attribute. Bytes between attributes are never written.
 ///
-/// If positions and normals are float32x3 with equal strides, a multiple of 8, and normals begin 12
-/// bytes behind positions, both must go to one buffer (`OutputSizes::isOneBuffer`) and positions
-/// must begin at a multiple of 8.
+/// If a job's attributes stand one right behind the other in the order positions, normals,
+/// tangents, with equal strides, all must go to one buffer (`OutputSizes::isOneBuffer`). If
+/// positions and normals are float32x3 as well and the stride is a multiple of 8, positions must
+/// begin at a multiple of 8.
 ///
 /// Offset, stride and the format's size must be multiples of 4; with `DeviceLimits::storage16Bit`,
 /// of 2; with `storage8Bit` too, they may be any number. On a device with fewer storage buffers
@@ -40,7 +41,7 @@ enum class Arrangement : std::uint8_t {
   /// Vertex after vertex: positions, normals, tangents, previous positions, each at a multiple of
   /// `formatAlignment`.
   interleaved,
-  /// Attribute after attribute, each beginning at a multiple of 16 bytes.
+  /// Attribute after attribute, each beginning at a multiple of 48 bytes.
   planar,
 };
 

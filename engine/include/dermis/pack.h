@@ -22,6 +22,7 @@ struct MeshInfo {
   std::uint32_t requiredJoints =
       0;  ///< the fewest joints of a pose for this mesh: its largest joint index + 1
   std::uint32_t maxInfluences = 0;  ///< the most influences of one vertex
+  std::uint32_t minInfluences = 0;  ///< the fewest
   std::uint32_t morphTargetCount = 0;
   bool hasNormals = false;
   bool hasTangents = false;

@@ -67,6 +67,10 @@ struct DeviceLimits {
   /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64) to store 8
   /// bytes at a time, which is faster on lavapipe.
   bool shaderInt64 = false;
+  /// Whether kernels may use the scalar block layout (VkPhysicalDeviceScalarBlockLayoutFeatures) to
+  /// store an attribute, or all of a vertex, at once, which is faster on lavapipe. Used with
+  /// `texelBuffers` and `shaderInt64` only.
+  bool scalarBlockLayout = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
   Promises promises;
@@ -91,6 +95,8 @@ struct PoseDescription {
   /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
   /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
   /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`.
+  /// `Method::linear` applies them all the same; its normals and tangents then need scales between
+  /// 2^-30 and 2^30.
   bool mayScale = true;
   /// The engine's own shaders read the palette, by dermis_skin.glsl: it is converted to dual
   /// quaternions even if no job reads it. It stands at `Plan::paletteOffset`.
@@ -197,23 +203,31 @@ struct Variant {
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::none;
   VertexFormat tangents = VertexFormat::none;
-  /// Bytes that one store writes to each stream: 4, 2 or 1.
+  /// Bytes that one store writes to each stream: 1, 2 or 4; with `DeviceLimits::scalarBlockLayout`
+  /// also 8, 12 or 16, the size of the attribute.
   std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
   Motion motion = Motion::none;
   bool bounds = false;
   /// Whether instances have active morph targets.
   bool morphs = false;
-  /// Whether joints may scale or shear (`PoseDescription::mayScale`). Always false for linear
-  /// blending, which does not distinguish them.
+  /// Whether joints may scale or shear (`PoseDescription::mayScale`).
   bool scales = false;
   /// Tables, meshes and palettes are read through uniform texel buffers, not storage buffers.
   bool texels = false;
   /// Each position and the normal behind it are stored together, 8 bytes at a time
-  /// (`OutputAttribute`). Only with `texels` and `DeviceLimits::shaderInt64`, without motion and
-  /// results.
+  /// (`OutputAttribute`). Only with `texels` and `DeviceLimits::shaderInt64`, and where
+  /// `recordBytes` is 0; with motion or results only with `wideStores`.
   bool pairs = false;
+  /// Bytes of one store that writes the positions, normals and tangents of a vertex, which stand
+  /// one behind the other: 8, 12, 16, 24 or 32. 0: there is none. Only with `texels` and
+  /// `DeviceLimits::scalarBlockLayout`.
+  std::uint8_t recordBytes = 0;
+  /// Stores may be wider than 4 bytes: which module it is.
+  bool wideStores = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
+  /// Every vertex has as many influences as that.
+  bool fullInfluences = false;
   std::uint8_t instancesPerInvocation = 1;
   std::uint16_t workgroupSize = 64;
 
@@ -227,9 +241,9 @@ bool hasResults(const Variant& variant);
 
 /// All variants that jobs with the method, outputs, motion and bounds of this job can need,
 /// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
-/// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for 4 with
-/// joints that scale; for any number; and for any number with morph targets. Some methods need
-/// fewer. `Promises` reduce the number further.
+/// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for exactly
+/// 4; for 4 with joints that scale; for any number; and for any number with morph targets. Some
+/// methods need fewer. `Promises` reduce the number further.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// What pipelines depend on, known while loading.

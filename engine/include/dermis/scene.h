@@ -76,7 +76,8 @@ struct SceneDescription {
   /// them. May be more than a storage buffer range. A maximum counts in whole words.
   Capacity outputCapacity{256 << 10};
   /// Where the output begins in its buffer: `InstanceOutput` counts from the beginning of the
-  /// buffer, commands count from here. A multiple of the alignment that `buffer` tells.
+  /// buffer, commands count from here. A multiple of the alignment that `buffer` tells, which need
+  /// not be a power of two.
   std::uint64_t outputOffset = 0;
   Capacity instanceCapacity{256};  ///< live instances
   Capacity boundsCapacity{64};     ///< live instances with bounds or snorm16 positions

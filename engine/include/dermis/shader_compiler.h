@@ -26,6 +26,9 @@ struct ShaderCompilerOptions {
   std::filesystem::path cacheFolder;
   bool optimize = true;    ///< Run SPIRV-Tools' performance passes, but for inlining.
   bool debugInfo = false;  ///< Keep names and line numbers.
+  /// Blocks may have the layout of GL_EXT_scalar_block_layout. The device that gets the module must
+  /// have VkPhysicalDeviceScalarBlockLayoutFeatures enabled.
+  bool scalarBlockLayout = false;
 };
 
 struct ShaderSource {

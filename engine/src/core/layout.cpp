@@ -10,7 +10,8 @@
 namespace dermis {
 namespace {
 
-constexpr std::uint64_t planarAlignment = 16;
+/// Of all that one store may write of an attribute.
+constexpr std::uint64_t planarAlignment = 48;
 
 std::array<VertexFormat, streamCount> formatsOf(const VertexLayout& layout) {
   return {layout.positions, layout.normals, layout.tangents,

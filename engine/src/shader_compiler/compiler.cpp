@@ -69,6 +69,7 @@ Hash128 hashOf(const ShaderSource& source, const ShaderCompilerOptions& options)
   hash.add(optimizerVersion());
   hash.addWord(options.optimize ? 1 : 0);
   hash.addWord(options.debugInfo ? 1 : 0);
+  hash.addWord(options.scalarBlockLayout ? 1 : 0);
   hash.addWord(static_cast<std::uint64_t>(source.stage));
   hash.add(source.name);
   hash.add(source.text);
@@ -160,8 +161,9 @@ Result<std::vector<std::uint32_t>> ShaderCompiler::compileUnguarded(const Shader
   const Result<FrontEndOutput> translated = translateToSpirv(source, options_.debugInfo, resolver);
   lastIncludes_ = resolver.filesRead();
   if (!translated) return translated.error();
-  Result<std::vector<std::uint32_t>> words =
-      optimizeAndValidate(translated->words, {options_.optimize, options_.debugInfo}, source.name);
+  Result<std::vector<std::uint32_t>> words = optimizeAndValidate(
+      translated->words, {options_.optimize, options_.debugInfo, options_.scalarBlockLayout},
+      source.name);
   if (words && cache) {
     const std::string problem = cache->store(*translated, *words);
     if (!problem.empty()) {

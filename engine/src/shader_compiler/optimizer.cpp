@@ -30,12 +30,14 @@ class FirstErrorMessage {
   std::string text_;
 };
 
-Result<void> validate(std::span<const std::uint32_t> words, const std::string& name,
-                      const std::string& step) {
+Result<void> validate(std::span<const std::uint32_t> words, bool scalarBlockLayout,
+                      const std::string& name, const std::string& step) {
   FirstErrorMessage message;
   spvtools::SpirvTools tools(targetEnvironment);
   tools.SetMessageConsumer(message.consumer());
-  if (!tools.Validate(words.data(), words.size())) return message.asError(name, step);
+  spvtools::ValidatorOptions options;
+  options.SetScalarBlockLayout(scalarBlockLayout);
+  if (!tools.Validate(words.data(), words.size(), options)) return message.asError(name, step);
   return {};
 }
 
@@ -162,7 +164,9 @@ Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint
                                                        const OptimizerOptions& options,
                                                        const std::string& name) {
   // The passes trust their input.
-  if (const auto valid = validate(words, name, "the compiler made invalid SPIR-V"); !valid) {
+  const bool scalar = options.scalarBlockLayout;
+  if (const auto valid = validate(words, scalar, name, "the compiler made invalid SPIR-V");
+      !valid) {
     return valid.error();
   }
 
@@ -183,7 +187,8 @@ Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint
     return message.asError(name, "the SPIR-V cannot be optimised");
   }
   forgetInliningChoice(optimized);
-  if (const auto valid = validate(optimized, name, "the optimiser made invalid SPIR-V"); !valid) {
+  if (const auto valid = validate(optimized, scalar, name, "the optimiser made invalid SPIR-V");
+      !valid) {
     return valid.error();
   }
   return optimized;

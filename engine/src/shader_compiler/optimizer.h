@@ -13,6 +13,7 @@ namespace dermis {
 struct OptimizerOptions {
   bool optimize = true;
   bool keepDebugInfo = false;
+  bool scalarBlockLayout = false;  ///< Blocks may have that layout.
 };
 
 /// Checks the module, runs the passes, and checks what came out. Unused bindings and specialisation

@@ -47,7 +47,15 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
         limits.storage8Bit |= reinterpret_cast<const VkPhysicalDevice8BitStorageFeatures*>(next)
                                   ->storageBuffer8BitAccess == VK_TRUE;
         break;
+      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES:
+        limits.scalarBlockLayout |=
+            reinterpret_cast<const VkPhysicalDeviceScalarBlockLayoutFeatures*>(next)
+                ->scalarBlockLayout == VK_TRUE;
+        break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES:
+        limits.scalarBlockLayout |=
+            reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)->scalarBlockLayout ==
+            VK_TRUE;
         limits.storage8Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)
                                   ->storageBuffer8BitAccess == VK_TRUE;
         break;

@@ -79,7 +79,10 @@ std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
   if (isForComparison(variant.method)) name += "_comparison";
   if (oneOutput) return name + "_one_output";
   if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
-  if (variant.texels) return name + (variant.pairs ? "_texels_pairs" : "_texels");
+  if (variant.texels)
+    return name + (variant.wideStores ? "_texels_wide"
+                   : variant.pairs    ? "_texels_pairs"
+                                      : "_texels");
   const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
   return name + (smallest == 4 ? "" : smallest == 2 ? "_halves" : "_bytes");
 }
@@ -109,6 +112,8 @@ SpecializationConstants specializationConstants(const Variant& variant) {
   set(abi::CONSTANT_MORPHS, variant.morphs);
   set(abi::CONSTANT_BOUNDS, variant.bounds);
   set(abi::CONSTANT_SCALES, variant.scales);
+  set(abi::CONSTANT_FULL, variant.fullInfluences);
+  set(abi::CONSTANT_RECORD, variant.pairs ? abi::RECORD_IN_PAIRS : variant.recordBytes);
   return constants;
 }
 

@@ -13,10 +13,15 @@ namespace {
 /// Whether a device with these features may have the module for a variant.
 Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
   for (const std::uint8_t unit : variant.units) {
-    if (unit == 4 || (limits.storage16Bit && (unit == 2 || limits.storage8Bit))) continue;
+    if (unit >= 4 || (limits.storage16Bit && (unit == 2 || limits.storage8Bit))) continue;
     return Error{ErrorCode::missingFeature,
                  "a variant that stores less than a word at a time needs storageBuffer16BitAccess "
                  "and, for single bytes, storageBuffer8BitAccess"};
+  }
+  if (variant.wideStores && !(limits.scalarBlockLayout && limits.shaderInt64)) {
+    return Error{ErrorCode::missingFeature,
+                 "a variant that stores more than a word at a time needs scalarBlockLayout and "
+                 "shaderInt64"};
   }
   return {};
 }

@@ -35,7 +35,10 @@ std::string describe(const Variant& variant) {
   if (variant.motion != Motion::none) text += ", previous positions";
   if (variant.morphs) text += ", morph targets";
   if (variant.bounds) text += ", bounds";
-  text += ", for " +
+  if (variant.recordBytes != 0)
+    text += ", " + std::to_string(variant.recordBytes) + " bytes a store";
+  if (variant.pairs) text += ", 8 bytes a store";
+  text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
           (variant.influences == 0 ? std::string("any number of")
                                    : std::to_string(variant.influences)) +
           " influences";
@@ -71,10 +74,11 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   return {};
 }
 
-/// Variants that store pairs write normals through the binding of the positions.
-Result<void> BindingsState::checkPairs(const Plan& plan) const {
-  const bool stores = std::any_of(plan.variants().begin(), plan.variants().end(),
-                                  [](const Variant& variant) { return variant.pairs; });
+/// Variants that store attributes together do it through the binding of the positions.
+Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
+  const bool stores =
+      std::any_of(plan.variants().begin(), plan.variants().end(),
+                  [](const Variant& variant) { return variant.pairs || variant.recordBytes != 0; });
   const BufferRange& positions = buffers.outputs.positions;
   const BufferRange& normals = buffers.outputs.normals;
   if (!stores || (positions.buffer == normals.buffer && positions.offset == normals.offset))
@@ -98,7 +102,7 @@ Result<void> BindingsState::check(const Plan& plan) const {
         ErrorCode::invalidArgument,
         "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
   }
-  if (Result<void> good = checkPairs(plan); !good) return good;
+  if (Result<void> good = checkOneBuffer(plan); !good) return good;
   return checkVariants(plan);
 }
 

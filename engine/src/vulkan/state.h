@@ -120,7 +120,7 @@ struct BindingsState {
 
  private:
   Result<void> checkBuffers(const Plan& plan) const;
-  Result<void> checkPairs(const Plan& plan) const;
+  Result<void> checkOneBuffer(const Plan& plan) const;
   Result<void> checkVariants(const Plan& plan) const;
 };
 

@@ -32,7 +32,9 @@ struct DeviceDescription {
   /// `pEnabledFeatures` instead points to a VkPhysicalDeviceFeatures2. Dermis uses these if they
   /// are enabled: storageBuffer16BitAccess and storageBuffer8BitAccess of
   /// VkPhysicalDevice16BitStorageFeatures, VkPhysicalDevice8BitStorageFeatures, or
-  /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64 of VkPhysicalDeviceFeatures2.
+  /// VkPhysicalDeviceVulkan11Features and ...12Features; shaderInt64 of VkPhysicalDeviceFeatures2;
+  /// scalarBlockLayout of VkPhysicalDeviceScalarBlockLayoutFeatures or
+  /// VkPhysicalDeviceVulkan12Features.
   /// Only `create` reads the chain.
   const void* enabledFeatures = nullptr;
   /// Whether the engine's buffers have the usage that `Plan::buffer` returns, which includes

@@ -27,14 +27,15 @@ namespace dermis::vulkan {
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
 /// memory is static: variants with one module get the same span. A module that stores less than a
-/// word requires `storage16Bit` or `storage8Bit` of `DeviceLimits`. Empty if this build of Dermis
-/// does not contain the module.
+/// word requires `storage16Bit` or `storage8Bit` of `DeviceLimits`, one that stores more
+/// `shaderInt64` and perhaps `scalarBlockLayout`. Empty if this build of Dermis does not contain
+/// the module.
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits);
 
 /// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
 /// 1, 4 bytes each.
 struct SpecializationConstants {
-  std::array<std::uint32_t, 16> values{};
+  std::array<std::uint32_t, 20> values{};
   std::uint32_t count = 0;
 };
 

@@ -52,10 +52,10 @@ struct SkinningSystemDescription {
   Capacity boundsCapacity = SceneDescription().boundsCapacity;
 
   // -- Ranges of the engine's buffers. `SkinningSystem::requirement` tells their usage and
-  // alignment. A range does not grow: its size is the capacity, and the one above is not used.
-  // Dermis uses nothing outside of it. The engine destroys the buffer after the system. Without a
-  // range the system creates a buffer, and without joints at first the one for poses with the first
-  // pose.
+  // alignment, which for the output need not be a power of two. A range does not grow: its size is
+  // the capacity, and the one above is not used. Dermis uses nothing outside of it. The engine
+  // destroys the buffer after the system. Without a range the system creates a buffer, and without
+  // joints at first the one for poses with the first pose.
   BufferRange meshes;
   MappedRange poses;     ///< that the CPU writes
   BufferRange gpuPoses;  ///< that a pass of the engine writes

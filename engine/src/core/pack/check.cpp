@@ -29,8 +29,9 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::Me
   };
   for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
     const std::uint32_t first = begin(vertex), next = begin(vertex + 1), isOdd = first % 2;
-    if (next / 2 < first / 2 + isOdd ||
-        std::uint64_t{next / 2 - first / 2} * 2 - isOdd > header.maxInfluences) {
+    const std::uint64_t count = std::uint64_t{next / 2 - first / 2} * 2 - isOdd;
+    if (next / 2 < first / 2 + isOdd || count > header.maxInfluences ||
+        count < header.minInfluences) {
       return damagedBlob("the influences of vertex " + std::to_string(vertex) +
                          " do not follow those before");
     }

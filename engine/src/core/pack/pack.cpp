@@ -188,7 +188,7 @@ void appendInfluences(const MeshView& mesh, abi::MeshHeader& header,
     abi::store(words, place, record);
   };
   std::vector<PackedInfluence> influences;
-  std::uint32_t requiredJoints = 1, maxInfluences = 0;
+  std::uint32_t requiredJoints = 1, maxInfluences = 0, minInfluences = ~0u;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     const auto unit = static_cast<std::uint32_t>((words.size() - offset) / 4);
     packInfluences(mesh, vertex, influences);
@@ -202,10 +202,12 @@ void appendInfluences(const MeshView& mesh, abi::MeshHeader& header,
     }
     alignToUnit(words);
     maxInfluences = std::max(maxInfluences, count);
+    minInfluences = std::min(minInfluences, count);
   }
   setBegin(mesh.vertexCount, static_cast<std::uint32_t>((words.size() - offset) / 4 * 2));
   header.requiredJoints = requiredJoints;
   header.maxInfluences = maxInfluences;
+  header.minInfluences = std::min(minInfluences, maxInfluences);
 }
 
 /// An upper limit of the words that a mesh takes, before any is written.
@@ -289,6 +291,7 @@ MeshInfo PackedMesh::info() const {
   info.vertexCount = header.vertexCount;
   info.requiredJoints = header.requiredJoints;
   info.maxInfluences = header.maxInfluences;
+  info.minInfluences = header.minInfluences;
   info.morphTargetCount = header.morphCount;
   info.hasNormals = header.normals != 0;
   info.hasTangents = header.tangents != 0;

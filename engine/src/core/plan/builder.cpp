@@ -63,11 +63,17 @@ Result<void> Groups::place(const Job& job, const Placing& placing, const DeviceL
                      " is culled on the GPU and needs more than one output range: the GPU would "
                      "choose each part for itself"};
   }
-  const Variant variant = skinVariant(job, placing.mayScale, limits, tuning);
+  const VariantNeeds needs(job, placing.mayScale);
+  if (lastKey_ == 0 || !(needs == lastNeeds_)) {
+    lastNeeds_ = needs;
+    lastVariant_ = skinVariant(job, placing.mayScale, limits, tuning);
+    lastKey_ = lastVariant_.key();
+  }
+  const Variant& variant = lastVariant_;
   const std::uint64_t step = outputWindowStep(limits);
   GroupKey key;
   key.mesh = job.meshOffset;
-  key.variant = variant.key();
+  key.variant = lastKey_;
   key.isCulled = placing.isCulled;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     key.strides[stream] = streams[stream].size != 0 ? streams[stream].stride : 0;
@@ -126,6 +132,7 @@ void Groups::clear() {
   free_.clear();
   find_.clear();
   last_ = notUsed;
+  lastKey_ = 0;
 }
 
 // -- Plans.
@@ -378,6 +385,39 @@ void PlanBuilder::writeInstances() {
       culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;
   }
   culled_.instances = firstRecord;
+  markEvenlySpaced(firstRecord);
+}
+
+namespace {
+
+/// Whether each word of the records rises by the same from one to the next.
+bool areEvenlySpaced(const std::uint32_t* records, std::uint32_t count) {
+  constexpr std::size_t words = abi::INSTANCE_WORDS;
+  for (std::uint32_t record = 2; record < count; ++record) {
+    const std::uint32_t* last = records + (record - 1) * words;
+    std::uint32_t differences = 0;
+    for (std::size_t word = 0; word < words; ++word)
+      differences |= (last[words + word] - last[word]) ^ (records[words + word] - records[word]);
+    if (differences != 0) return false;
+  }
+  return count > 1;
+}
+
+}  // namespace
+
+/// Instances that the GPU chooses are not: their records are moved.
+void PlanBuilder::markEvenlySpaced(std::uint32_t firstRecord) {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::size_t groups = firstRecord - planGroups_.size() * abi::GROUP_WORDS;
+  for (std::size_t place = 0; place < order_.size(); ++place) {
+    const Group& group = planGroups_[order_[place]];
+    const std::size_t first = firstRecord + std::size_t{group.firstInstance} * abi::INSTANCE_WORDS;
+    if (group.key.isCulled || !areEvenlySpaced(&tables[first], group.instances)) continue;
+    const std::size_t word = groups + place * abi::GROUP_WORDS;
+    auto record = abi::load<abi::GroupRecord>(tables, word);
+    record.evenlySpaced = 1;
+    store(tables, word, record);
+  }
 }
 
 /// In the order of the instance records, which are the last.

@@ -122,6 +122,9 @@ class Groups {
   std::vector<std::uint32_t> free_;
   std::unordered_map<GroupKey, std::uint32_t, GroupKeyHash> find_;
   std::uint32_t last_ = notUsed;  ///< that was acquired: neighbours mostly belong together
+  VariantNeeds lastNeeds_;        ///< of the job that was placed last …
+  Variant lastVariant_;           ///< … its variant …
+  std::uint64_t lastKey_ = 0;     ///< … and the key of that; 0: there is none
   std::vector<VertexRun> vertexRuns_;
 };
 
@@ -180,9 +183,10 @@ struct PlanSizes {
                                 const DeviceLimits& limits) const;
 };
 
-/// Of the offset of a scene's output in its buffer. Kernels store units of 8 bytes, which count
-/// from there.
+/// Of the offset of a scene's output in its buffer. What kernels store at once counts from there:
+/// 8 bytes, or up to 32, by `DeviceLimits::scalarBlockLayout` 12 and 24 too.
 inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
+  if (storesWidely(limits)) return 3 * std::max(limits.minStorageBufferOffsetAlignment, 32u);
   return std::max(limits.minStorageBufferOffsetAlignment, 16u);
 }
 
@@ -297,6 +301,7 @@ class PlanBuilder {
   template <typename Push>
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
   void writeInstances();
+  void markEvenlySpaced(std::uint32_t firstRecord);
   std::uint32_t appendMorphs(std::span<const MorphWeight> morphs);
   std::uint32_t appendExtension(const InstanceExtras& extras);
   void appendCandidates();

@@ -86,15 +86,14 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& sub
   return {};
 }
 
-Result<void> checkPair(const Batch& batch, const Job& job, const Subject& subject) {
-  if (!standsInPairs(job)) return {};
+Result<void> checkTogether(const Batch& batch, const Job& job, const Subject& subject) {
   const auto name = [&] {
-    return subject.name() + ": its normals stand right behind its positions, with a stride of " +
+    return subject.name() + ": its attributes stand one right behind the other, with a stride of " +
            std::to_string(job.positions.stride);
   };
-  if (!batch.outputs.isOneBuffer)
-    return invalid(name() + ": both must go to one buffer (OutputSizes::isOneBuffer)");
-  if (job.positions.offset % 8 != 0) {
+  if (!batch.outputs.isOneBuffer && standsTogether(job))
+    return invalid(name() + ": all must go to one buffer (OutputSizes::isOneBuffer)");
+  if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
     return invalid(name() + ": they must begin at a multiple of 8, not at " +
                    std::to_string(job.positions.offset));
   }
@@ -230,7 +229,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                      std::to_string(limits.maxStorageBuffersPerStage) +
                      " storage buffers a stage there are none"};
   }
-  if (Result<void> good = checkPair(batch, job, subject); !good) return good;
+  if (Result<void> good = checkTogether(batch, job, subject); !good) return good;
   return checkStreams(batch, job, subject, limits);
 }
 
@@ -259,14 +258,15 @@ Result<void> checkWindows(const OutputStreams& streams,
 
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
                        const Promises& promises) {
-  const std::string name = "pose " + std::to_string(index);
+  // Only where something is wrong: every pose of every plan comes by.
+  const auto name = [index] { return "pose " + std::to_string(index); };
   if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
-    return invalid(name + " has " + std::to_string(pose.jointCount) + " joints, it may have 1 to " +
-                   std::to_string(maxPoseJoints));
+    return invalid(name() + " has " + std::to_string(pose.jointCount) +
+                   " joints, it may have 1 to " + std::to_string(maxPoseJoints));
   }
   if (pose.matrixOffset % matrixAlignment != 0 || pose.matrixOffset > batch.posesSize ||
       std::uint64_t{pose.jointCount} * sizeof(JointMatrix) > batch.posesSize - pose.matrixOffset) {
-    return invalid(name + ": " + std::to_string(pose.jointCount) +
+    return invalid(name() + ": " + std::to_string(pose.jointCount) +
                    " matrices cannot stand at byte " + std::to_string(pose.matrixOffset) +
                    " of a poses buffer of " + std::to_string(batch.posesSize));
   }

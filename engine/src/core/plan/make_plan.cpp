@@ -101,9 +101,8 @@ Result<void> PlanMaker::placeJob(const Batch& batch, std::size_t index, const De
   placing.subject = {"job", index};
   placing.outputs = batch.outputs;
   placing.jointCount = pose.jointCount;
-  placing.mayScale = job.method != Method::linear &&
-                     (pose.mayScale ||
-                      (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale));
+  placing.mayScale =
+      pose.mayScale || (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale);
   return groups_.place(job, placing, limits, tuning, runs_);
 }
 

@@ -70,6 +70,7 @@ namespace {
 /// What decides on the form besides the method.
 struct Needs {
   std::uint32_t influences;  ///< of a vertex, at most
+  bool full;                 ///< every vertex has as many
   bool scales;
   bool morphs;
 };
@@ -81,11 +82,12 @@ bool hasFormsForFewInfluences(Method method) {
 
 void chooseForm(const Needs& needs, const Promises& promises, Variant& variant) {
   const std::uint8_t any = promises.maxInfluences;
-  variant.scales = needs.scales && variant.method != Method::linear;
+  variant.scales = needs.scales;
   variant.morphs = needs.morphs;
+  variant.fullInfluences = false;
   if (needs.morphs || needs.influences > 4 || (variant.scales && isForComparison(variant.method))) {
     variant.influences = any;
-    variant.scales = variant.method != Method::linear && !promises.noScale;
+    variant.scales = !promises.noScale;
   } else if (any != 0) {
     variant.influences = any;
   } else if (variant.scales || !hasFormsForFewInfluences(variant.method)) {
@@ -93,6 +95,7 @@ void chooseForm(const Needs& needs, const Promises& promises, Variant& variant) 
   } else {
     variant.influences =
         static_cast<std::uint8_t>(needs.influences <= 2 ? std::max(needs.influences, 1u) : 4);
+    variant.fullInfluences = needs.full && needs.influences == 4;
   }
 }
 
@@ -107,16 +110,73 @@ bool standsInPairs(const Job& job) {
 
 namespace {
 
+/// Of positions, normals and tangents together.
+std::uint32_t recordSize(const Job& job) {
+  return formatSize(job.positions.format) + formatSize(job.normals.format) +
+         formatSize(job.tangents.format);
+}
+
+bool isRecordSize(std::uint32_t bytes) {
+  return bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32;
+}
+
+/// Bytes that one store writes where kernels may store up to 16.
+std::uint8_t wideUnit(const OutputStream& stream) {
+  const bool isVector = stream.size == 8 || stream.size == 12 || stream.size == 16;
+  if (!isVector || stream.offset % stream.size != 0 || stream.stride % stream.size != 0) return 4;
+  return static_cast<std::uint8_t>(stream.size);
+}
+
+}  // namespace
+
+bool standsTogether(const Job& job) {
+  std::uint64_t end = job.positions.offset + formatSize(job.positions.format);
+  bool together =
+      job.normals.format != VertexFormat::none || job.tangents.format != VertexFormat::none;
+  for (const OutputAttribute* attribute : {&job.normals, &job.tangents}) {
+    if (attribute->format == VertexFormat::none) continue;
+    together = together && attribute->offset == end && attribute->stride == job.positions.stride;
+    end += formatSize(attribute->format);
+  }
+  return together;
+}
+
+namespace {
+
+bool storesWholeWords(const Variant& variant) {
+  return std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit >= 4; });
+}
+
+/// Where all of a vertex is stored together, attributes may be smaller than a word. Unchanged where
+/// something else is stored by less.
+Variant withWideStores(const Job& job, const Variant& variant) {
+  Variant wide = variant;
+  const std::uint32_t size = recordSize(job);
+  if (isRecordSize(size) && standsTogether(job) && job.positions.offset % size == 0 &&
+      job.positions.stride % size == 0)
+    wide.recordBytes = static_cast<std::uint8_t>(size);
+  const OutputStreams streams = outputStreams(job);
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    const bool isOfRecord = wide.recordBytes != 0 && stream + 1 < streamCount;
+    const bool isWhole = isOfRecord || wide.units[stream] == 4;
+    if (streams[stream].size != 0 && isWhole) wide.units[stream] = wideUnit(streams[stream]);
+  }
+  wide.wideStores = true;
+  return storesWholeWords(wide) ? wide : variant;
+}
+
 /// The skin kernel for a job, but for its form.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = outputVariant(job);
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+  if (storesWidely(limits)) variant = withWideStores(job, variant);
   variant.texels = limits.texelBuffers &&
                    limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
-                   std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit == 4; });
-  variant.pairs = variant.texels && limits.shaderInt64 && !hasResult(job) &&
-                  job.motion == Motion::none && standsInPairs(job);
+                   storesWholeWords(variant);
+  const bool isPlain = !hasResult(job) && job.motion == Motion::none;
+  variant.pairs = variant.texels && limits.shaderInt64 && variant.recordBytes == 0 &&
+                  (isPlain || variant.wideStores) && standsInPairs(job);
   return variant;
 }
 
@@ -127,8 +187,35 @@ Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
   Variant variant = layoutVariant(job, limits, tuning);
   const bool morphs =
       hasActive(job.morphs) || (job.motion == Motion::reskinned && hasActive(job.previousMorphs));
-  chooseForm({job.mesh.maxInfluences, mayScale, morphs}, limits.promises, variant);
+  const bool full = job.mesh.minInfluences == job.mesh.maxInfluences;
+  chooseForm({job.mesh.maxInfluences, full, mayScale, morphs}, limits.promises, variant);
   return variant;
+}
+
+VariantNeeds::VariantNeeds(const Job& job, bool mayScale)
+    : choices{static_cast<std::uint8_t>(job.method),
+              static_cast<std::uint8_t>(job.positions.format),
+              static_cast<std::uint8_t>(job.normals.format),
+              static_cast<std::uint8_t>(job.tangents.format),
+              static_cast<std::uint8_t>(job.motion),
+              static_cast<std::uint8_t>(job.bounds),
+              static_cast<std::uint8_t>(mayScale),
+              static_cast<std::uint8_t>(hasActive(job.morphs) || (job.motion == Motion::reskinned &&
+                                                                  hasActive(job.previousMorphs)))},
+      minInfluences(job.mesh.minInfluences),
+      maxInfluences(job.mesh.maxInfluences),
+      strides{job.positions.stride, job.normals.stride, job.tangents.stride,
+              job.previousPositions.stride},
+      toNormals(job.normals.format != VertexFormat::none ? job.normals.offset - job.positions.offset
+                                                         : 0),
+      toTangents(job.tangents.format != VertexFormat::none
+                     ? job.tangents.offset - job.positions.offset
+                     : 0) {
+  constexpr std::uint64_t stores = 96;  // a multiple of all that one store may write
+  residues = {static_cast<std::uint32_t>(job.positions.offset % stores),
+              static_cast<std::uint32_t>(job.normals.offset % stores),
+              static_cast<std::uint32_t>(job.tangents.offset % stores),
+              static_cast<std::uint32_t>(job.previousPositions.offset % stores)};
 }
 
 namespace {
@@ -160,16 +247,19 @@ std::uint64_t Variant::key() const {
   add(positions, 4);
   add(normals, 4);
   add(tangents, 4);
-  for (const std::uint8_t unit : units) add(unit / 2, 2);
+  for (const std::uint8_t unit : units) add(unit / 2, 4);
   add(motion, 2);
   add(morphs, 1);
   add(bounds, 1);
   add(scales, 1);
   add(texels, 1);
   add(pairs, 1);
-  add(influences, 4);
-  add(instancesPerInvocation, 8);
-  add(workgroupSize, 16);
+  add(wideStores, 1);
+  add(recordBytes / 4, 4);
+  add(influences, 3);
+  add(fullInfluences, 1);
+  add(instancesPerInvocation, 6);
+  add(workgroupSize, 8);
   return key;
 }
 
@@ -184,8 +274,10 @@ std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
       if (scales && promises.noScale) continue;
       for (const bool morphs : {false, true}) {
         if (morphs && promises.noMorphTargets) continue;
-        chooseForm({influences, scales, morphs}, promises, variant);
-        if (std::ranges::find(variants, variant) == variants.end()) variants.push_back(variant);
+        for (const bool full : {false, true}) {
+          chooseForm({influences, full, scales, morphs}, promises, variant);
+          if (std::ranges::find(variants, variant) == variants.end()) variants.push_back(variant);
+        }
       }
     }
   }
@@ -253,13 +345,19 @@ bool chooseWindows(const OutputStreams& streams, const Oversized& oversized,
 
 std::uint64_t outputWindowStep(const DeviceLimits& limits) {
   const std::uint64_t step = limits.maxStorageBufferRange - windowOverlap(limits);
-  return step - step % std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 16);
+  // A multiple of everything that one store may write.
+  return step - step % (3 * std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 32));
 }
 
 void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
                  const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
                  std::vector<VertexRun>& runs) {
   runs.clear();
+  const std::uint64_t largest = *std::ranges::max_element(sizes);
+  if (largest <= limits.maxStorageBufferRange) {  // mostly
+    runs.push_back({0, vertexCount, {}});
+    return;
+  }
   Oversized oversized{};
   std::uint64_t longest = vertexCount;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {

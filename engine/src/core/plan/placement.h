@@ -29,7 +29,7 @@ std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes);
 
 const char* streamName(std::size_t stream);
 
-/// Bytes that one store may write: 4, 2 or 1.
+/// Bytes that one store may write on every device that can: 4, 2 or 1.
 std::uint8_t storeUnit(const OutputStream& stream);
 
 /// Whether the kernel finds something out about the instance.
@@ -45,8 +45,32 @@ Variant visibilityVariant(const Tuning& tuning);
 Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
                     const Tuning& tuning);
 
-/// Whether positions and normals of a job stand together, so that a kernel may store them together.
+/// All that `skinVariant` looks at, on one device with one tuning: neighbours mostly have the same.
+struct VariantNeeds {
+  VariantNeeds() = default;
+  VariantNeeds(const Job& job, bool mayScale);
+
+  std::array<std::uint8_t, 8> choices{};  ///< method, formats, motion, and what may be or not
+  std::uint32_t minInfluences = 0, maxInfluences = 0;
+  std::array<std::uint32_t, streamCount> strides{}, residues{};
+  std::uint64_t toNormals = 0, toTangents = 0;  ///< from positions
+
+  friend bool operator==(const VariantNeeds&, const VariantNeeds&) = default;
+};
+
+/// Whether kernels on the device may store an attribute, or all of a vertex, at once.
+inline bool storesWidely(const DeviceLimits& limits) {
+  return limits.texelBuffers && limits.shaderInt64 && limits.scalarBlockLayout &&
+         limits.maxStorageBuffersPerStage >= storageBuffersWanted;
+}
+
+/// Whether positions and normals of a job are float32x3 that stand together, with a stride that
+/// lets a kernel store them 8 bytes at a time.
 bool standsInPairs(const Job& job);
+
+/// Whether what a job has of normals and tangents stands right behind its positions, so that a
+/// kernel may store all of a vertex together.
+bool standsTogether(const Job& job);
 
 // -- Windows: output that is larger than a storage buffer range may be is written through several
 // ranges.

@@ -135,7 +135,7 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   placing.subject = theInstance;
   placing.outputs = OutputSizes::oneBuffer(outputStore_.ranges.capacity());
   placing.jointCount = pose.jointCount;
-  placing.mayScale = instance.method != Method::linear && pose.mayScale;
+  placing.mayScale = pose.mayScale;
   placing.isCulled = isCulled;
   runsScratch_.clear();
   if (Result<void> placed = groups_.place(jobOf(instance, mesh, *laidOut), placing,

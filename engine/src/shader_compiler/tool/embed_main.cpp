@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view usage =
     "usage: dermis_embed_shaders compile --input FILE --output FILE.spv\n"
     "           [--include FOLDER]... [--define NAME[=VALUE]]... [--require-no-contraction]\n"
-    "           [--depfile FILE --depfile-target FILE]\n"
+    "           [--scalar-block-layout] [--depfile FILE --depfile-target FILE]\n"
     "       dermis_embed_shaders embed --namespace NAME --header FILE --source FILE\n"
     "           [--module NAME=FILE.spv]...\n";
 
@@ -40,6 +40,7 @@ struct Arguments {
   std::vector<Pair> defines;
   std::vector<Pair> modules;
   bool requireNoContraction = false;
+  bool scalarBlockLayout = false;
 };
 
 Pair splitAtEquals(const std::string& text) {
@@ -84,6 +85,8 @@ std::optional<Arguments> parse(const std::vector<std::string>& words) {
   for (std::size_t index = 1; index < words.size(); ++index) {
     if (words[index] == "--require-no-contraction") {
       arguments.requireNoContraction = true;
+    } else if (words[index] == "--scalar-block-layout") {
+      arguments.scalarBlockLayout = true;
     } else if (index + 1 == words.size() || !store(arguments, words[index], words[index + 1])) {
       return std::nullopt;
     } else {
@@ -124,6 +127,7 @@ Result<void> writeDepfile(const Arguments& arguments,
 ShaderCompilerOptions optionsFor(const Arguments& arguments) {
   ShaderCompilerOptions options;
   options.includeFolders = arguments.includeFolders;
+  options.scalarBlockLayout = arguments.scalarBlockLayout;
   return options;
 }
 
