@@ -40,6 +40,7 @@ inline ExitStatus checkSideFiles(const gltf::Model& model,
 
 using Run = std::function<ExitStatus()>;
 
+Run addBench(CLI::App& app);
 Run addCompare(CLI::App& app);
 Run addDevices(CLI::App& app);
 Run addInfo(CLI::App& app);

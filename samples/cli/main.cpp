@@ -21,13 +21,14 @@ ExitStatus run(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("dermis {}.{}.{}", DERMIS_VERSION_MAJOR,
                                                 DERMIS_VERSION_MINOR, DERMIS_VERSION_PATCH));
   app.footer(dermis::samples::exitStatusHelp);
-  const std::array<std::pair<const char*, dermis::cli::Run>, 6> commands{{
+  const std::array<std::pair<const char*, dermis::cli::Run>, 7> commands{{
       {"devices", dermis::cli::addDevices(app)},
       {"info", dermis::cli::addInfo(app)},
       {"skin", dermis::cli::addSkin(app)},
       {"render", dermis::cli::addRender(app)},
       {"verify", dermis::cli::addVerify(app)},
       {"compare", dermis::cli::addCompare(app)},
+      {"bench", dermis::cli::addBench(app)},
   }};
   if (argc > 1 && argv[1][0] != '-' &&
       std::none_of(commands.begin(), commands.end(), [&](const auto& command) {

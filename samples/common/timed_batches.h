@@ -36,6 +36,9 @@ class TimedBatches {
 
   bool hasTimestamps() const { return timestamps_.has(); }
 
+  /// Of the batch that was skinned last.
+  std::span<const std::byte> output() const { return output_.bytes(); }
+
   const Plan& plan(std::size_t batch) const { return batches_[batch]->plan; }
 
  private:

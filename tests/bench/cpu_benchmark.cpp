@@ -56,11 +56,11 @@ struct alignas(64) CacheLine {
 };
 
 /// With everything that a method or a layout may want.
-PackedMesh packWhole(const bench::Crowd& crowd) {
-  const bench::PlainVertex& first = crowd.vertices.front();
+PackedMesh packWhole(const samples::Crowd& crowd) {
+  const samples::PlainVertex& first = crowd.vertices.front();
   const std::uint32_t count = crowd.vertexCount();
   std::vector<float> tangents, centers;
-  for (const bench::PlainVertex& vertex : crowd.vertices) {
+  for (const samples::PlainVertex& vertex : crowd.vertices) {
     const auto& n = vertex.normal;
     tangents.insert(tangents.end(), {n[1], n[2], n[0], 1});
     for (const float coordinate : vertex.position) centers.push_back(coordinate / 2);
@@ -78,7 +78,7 @@ PackedMesh packWhole(const bench::Crowd& crowd) {
 }
 
 struct Scene {
-  explicit Scene(bench::Crowd own)
+  explicit Scene(samples::Crowd own)
       : crowd(std::move(own)),
         vertexCount(crowd.vertexCount()),
         instanceCount(crowd.instanceCount()),
@@ -90,7 +90,7 @@ struct Scene {
     return reinterpret_cast<Vertex*>(output.data()) + std::size_t{instance} * vertexCount;
   }
 
-  bench::Crowd crowd;
+  samples::Crowd crowd;
   std::uint32_t vertexCount, instanceCount, jointCount;
   std::vector<CacheLine> output;
   cpu::Mesh mesh;
@@ -194,7 +194,7 @@ void skinPlainly(Scene& scene, std::uint32_t instance) {
   }
   Vertex* const output = scene.outputOf(instance);
   for (std::uint32_t v = 0; v < scene.vertexCount; ++v) {
-    const bench::PlainVertex& vertex = scene.crowd.vertices[v];
+    const samples::PlainVertex& vertex = scene.crowd.vertices[v];
     const std::uint16_t* const joints = vertex.joints.data();
     const std::array<float, 8>& pivot = palette[joints[0]];
     std::array<float, 8> q{};
@@ -247,7 +247,7 @@ Contender ozzContender(Scene& scene) {
   std::vector<Vertex> bind;
   std::vector<std::uint16_t> joints;
   std::vector<float> weights;  // the last one is what is left of 1
-  for (const bench::PlainVertex& vertex : scene.crowd.vertices) {
+  for (const samples::PlainVertex& vertex : scene.crowd.vertices) {
     Vertex& to = bind.emplace_back();
     std::ranges::copy(vertex.position, to.position);
     std::ranges::copy(vertex.normal, to.normal);
@@ -307,8 +307,8 @@ int main(int argc, char** argv) {
   };
   const std::string subject = argc > 1 ? argv[1] : "10000";
   const bool isNumber = std::ranges::all_of(subject, [](char c) { return c >= '0' && c <= '9'; });
-  Scene scene(isNumber ? must(bench::longFigure(argument(1, 10'000), argument(2, 200)))
-                       : must(bench::loadCrowd(subject, argument(2, 200))));
+  Scene scene(isNumber ? must(samples::longFigure(argument(1, 10'000), argument(2, 200)))
+                       : must(samples::loadCrowd(subject, argument(2, 200))));
   std::vector<Contender> contenders;
 #ifdef DERMIS_BENCH_OZZ
   contenders.push_back(ozzContender(scene));

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "bench_scene.h"
-#include "crowd_benchmark.h"
 #include "random_rig.h"
 #include "ratio_reporter.h"
 
@@ -255,9 +254,7 @@ int main(int argc, char** argv) {
   if (open == nullptr) return 4;
   std::printf("device: %s\n", open->device->info().name.c_str());
   registerAll();
-  std::vector<Ratio> reported = ratios;
-  for (Ratio& ratio : registerCrowdBenchmarks()) reported.push_back(std::move(ratio));
-  RatioReporter reporter(std::move(reported));
+  RatioReporter reporter(ratios);
   benchmark::RunSpecifiedBenchmarks(&reporter);
   benchmark::Shutdown();
   return 0;

@@ -10,6 +10,7 @@
 #   arm64        the CPU path built for arm64, its tests run by qemu
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
+#   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
 #   exhaustive   every combination of methods and formats, and every real model, on the device
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
@@ -20,7 +21,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang arm64 fuzz mesa exhaustive golden programs"
+parts="asan asan-rest tsan clang arm64 fuzz mesa speed exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -100,6 +101,25 @@ part_mesa() {
   build/ci/samples/cli/dermis devices
   tests ci -LE nightly -R "$device_suites|Render|Crowd|Comparison"
   build/ci/samples/cli/dermis verify build/ci/samples/models/*.glb
+}
+
+# What is measured on a quiet machine is in docs/performance.md; a third less fails.
+check_speed() { # JSON PLAIN LINEAR COMPACT
+  gpu=gpu/dual_quaternion/float32x3
+  ./tests/bench/check_ratios.sh "$1" $gpu gpu/plain/dual_quaternion "$2" gpu/linear/float32x3 gpu/plain/linear "$3" \
+    gpu/dual_quaternion/float16x4+octahedral16x2 $gpu "$4" $gpu/bounds $gpu 0.35 $gpu/previous_positions $gpu 0.35 \
+    $gpu/10_instances $gpu 0.5 cpu/dual_quaternion/1 gpu/plain/dual_quaternion 2.5 cpu/linear/1 gpu/plain/linear 2.5
+}
+
+part_speed() {
+  build ci dermis_cli
+  build/ci/samples/cli/dermis bench --json build/nightly/bench.json
+  check_speed build/nightly/bench.json 2.1 2.1 0.5
+  settings=$(./tests/nightly/unpack_mesa.sh build/nightly/mesa)
+  # shellcheck disable=SC2086 # NAME=VALUE words
+  export $settings
+  build/ci/samples/cli/dermis bench --json build/nightly/bench-mesa.json
+  check_speed build/nightly/bench-mesa.json 1.2 1.4 0.5
 }
 
 part_exhaustive() {

@@ -11,7 +11,7 @@
 #include "dermis/gltf.h"
 #include "random_rig.h"
 
-namespace dermis::bench {
+namespace dermis::samples {
 namespace {
 
 template <typename T>
@@ -49,7 +49,7 @@ PlainVertex plainVertex(const gltf::Primitive& primitive, std::size_t vertex) {
     plain.weights[slot] = weightOf(primitive.influences[0], vertex * 4 + slot);
   }
   const float sum = std::accumulate(plain.weights.begin(), plain.weights.end(), 0.0f);
-  for (float& weight : plain.weights) weight /= sum;
+  for (float& weight : plain.weights) weight /= sum != 0 ? sum : 1;
   return plain;
 }
 
@@ -67,19 +67,37 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
   mesh.positions = view(&first.position, ComponentType::float32, 3);
   mesh.normals = view(&first.normal, ComponentType::float32, 3);
+  // What a method that reads centres costs does not depend on where they are.
+  mesh.centersOfRotation = mesh.positions;
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);
 }
 
 }  // namespace
 
-std::vector<samples::SkinRequest> Crowd::requests(Method method) const {
-  std::vector<samples::SkinRequest> requests;
+bool Crowd::isRigid() const {
+  constexpr float tolerance = 1e-3f;
   for (const std::vector<JointMatrix>& pose : poses) {
-    samples::SkinRequest& request = requests.emplace_back();
+    for (const JointMatrix& joint : pose) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t b = a; b < 3; ++b) {
+          float product = 0;
+          for (std::size_t row = 0; row < 3; ++row) product += joint.m[row][a] * joint.m[row][b];
+          if (!(std::abs(product - (a == b ? 1.0f : 0.0f)) <= tolerance)) return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+std::vector<SkinRequest> Crowd::requests(Method method, std::uint32_t count) const {
+  std::vector<SkinRequest> requests;
+  for (const std::vector<JointMatrix>& pose : std::span(poses).first(count)) {
+    SkinRequest& request = requests.emplace_back();
     request.mesh = &*mesh;
     request.pose = pose;
-    request.mayScale = false;  // nor does the plain kernel know of scale
+    request.mayScale = false;
     request.method = method;
   }
   return requests;
@@ -146,11 +164,11 @@ Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount)
     for (float& component : vertex.normal) component /= std::sqrt(length);
   }
   for (std::uint32_t i = 0; i < instanceCount; ++i)
-    crowd.poses.push_back(samples::randomPose(i, jointCount, samples::Rigidity::rigid));
+    crowd.poses.push_back(randomPose(i, jointCount, Rigidity::rigid));
   Result<PackedMesh> packed = packVertices(crowd.vertices, jointCount);
   if (!packed) return packed.error();
   crowd.mesh.emplace(std::move(*packed));
   return crowd;
 }
 
-}  // namespace dermis::bench
+}  // namespace dermis::samples

@@ -12,7 +12,7 @@
 #include "dermis/pack.h"
 #include "dermis/result.h"
 
-namespace dermis::bench {
+namespace dermis::samples {
 
 /// A vertex as the plain kernel reads it, with four influences whether it needs them or not.
 struct PlainVertex {
@@ -27,12 +27,15 @@ struct Crowd {
   std::string name;
   std::vector<PlainVertex> vertices;
   std::optional<PackedMesh> mesh;               ///< of the same vertices
-  std::vector<std::vector<JointMatrix>> poses;  ///< one an instance, rigid
+  std::vector<std::vector<JointMatrix>> poses;  ///< one an instance
 
   std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(vertices.size()); }
   std::uint32_t jointCount() const { return static_cast<std::uint32_t>(poses.front().size()); }
   std::uint32_t instanceCount() const { return static_cast<std::uint32_t>(poses.size()); }
-  std::vector<samples::SkinRequest> requests(Method method) const;
+  /// Whether no joint scales or shears, by a thousandth. The plain kernels know of neither.
+  bool isRigid() const;
+  /// The first instances. Scale is ignored, as the plain kernels do.
+  std::vector<SkinRequest> requests(Method method, std::uint32_t count) const;
 };
 
 /// All primitives of a file that the first one's skin moves, as one mesh, so many times, each
@@ -43,4 +46,4 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
 /// A long figure of 60 joints, four influences everywhere: the joints of a vertex are neighbours.
 Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount);
 
-}  // namespace dermis::bench
+}  // namespace dermis::samples

@@ -1,0 +1,143 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "batch_runner.h"
+#include "commands.h"
+#include "driver_version.h"
+#include "file_name.h"
+#include "open_device.h"
+#include "output_file.h"
+#include "picture_writer.h"
+#include "progress.h"
+#include "throughput_report.h"
+
+namespace dermis::cli {
+namespace {
+
+constexpr std::uint32_t mostRounds = 10'000, mostInstances = 100'000;
+/// The figure of which a crowd is made where there is no model.
+constexpr std::uint32_t figureVertices = 10'000;
+
+struct BenchOptions {
+  std::string model;
+  std::string output;
+  std::string json;
+  std::string device = "auto";
+  std::uint32_t instances = 1000;
+  std::uint32_t rounds = 10;
+};
+
+ExitStatus checkUsage(const BenchOptions& options) {
+  if (options.rounds == 0 || options.rounds > mostRounds)
+    return reportWrongUsage(fmt::format("--rounds must be from 1 to {}", mostRounds));
+  if (options.instances == 0 || options.instances > mostInstances)
+    return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostInstances));
+  if (options.device == "reference")
+    return reportWrongUsage("--device reference is not timed: it is not made to be fast");
+  if (options.output.empty()) return ExitStatus::done;
+  if (samples::pictureKind(options.output) != samples::PictureKind::png)
+    return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
+  if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
+    return reportWrongUsage("-o OUT has a place for a number; there is one picture only");
+  return ExitStatus::done;
+}
+
+ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
+                 const std::vector<samples::ThroughputRow>& rows) {
+  if (!options.json.empty()) {
+    if (Result<void> written = writeJsonThroughput(options.json, title, rows); !written)
+      return reportError(ExitStatus::stopped, written.error().message);
+  }
+  if (options.output.empty()) return ExitStatus::done;
+  Result<samples::render::Font> font = samples::render::Font::load();
+  if (!font) reportNote(font.error().message + ": the picture has no words");
+  const Result<std::vector<std::byte>> file =
+      samples::render::encodePng(drawThroughput(title, rows, font ? &*font : nullptr));
+  if (!file) return reportError(ExitStatus::stopped, file.error().message);
+  if (Result<void> written = samples::writeFile(options.output, *file); !written)
+    return reportError(ExitStatus::stopped, written.error().message);
+  return ExitStatus::done;
+}
+
+ExitStatus bench(const BenchOptions& options) {
+  if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
+  const std::array<samples::RequestedOutput, 2> outputs{
+      {{"-o", options.output}, {"--json", options.json}}};
+  if (const ExitStatus kept = checkInput(options.model, outputs); kept != ExitStatus::done)
+    return kept;
+  const Result<samples::Crowd> crowd = options.model.empty()
+                                           ? samples::longFigure(figureVertices, options.instances)
+                                           : samples::loadCrowd(options.model, options.instances);
+  if (!crowd) return reportModelError(crowd.error());
+
+  ThroughputTitle title;
+  title.model = crowd->name;
+  title.vertices = crowd->vertexCount();
+  title.joints = crowd->jointCount();
+  title.instances = options.instances;
+  title.rounds = options.rounds;
+  std::optional<samples::OpenDevice> open;
+  if (!samples::needsNoVulkan(options.device)) {
+    samples::DeviceOptions deviceOptions;
+    deviceOptions.device = options.device;
+    Result<samples::OpenDevice> opened = samples::openDevice(deviceOptions);
+    if (!opened) return reportDeviceError(opened.error());
+    open.emplace(std::move(*opened));
+    title.device = open->device->info().name;
+    title.driver = samples::driverVersion(*open->device);
+  }
+  samples::OpenDevice* const device = open ? &*open : nullptr;
+  Result<std::unique_ptr<samples::Throughput>> throughput = [&] {
+    samples::Progress progress("preparing", samples::Throughput::rowCount(device, *crowd));
+    return samples::Throughput::create(device, *crowd, [&progress] { progress.step(); });
+  }();
+  if (!throughput) {
+    return throughput.error().code == ErrorCode::invalidData
+               ? reportError(ExitStatus::verificationFailed, throughput.error().message)
+               : reportDeviceError(throughput.error());
+  }
+  {
+    samples::Progress progress("rounds", options.rounds);
+    for (std::uint32_t round = 0; round < options.rounds; ++round) {
+      if (Result<void> done = (*throughput)->runRound(); !done)
+        return reportDeviceError(done.error());
+      progress.step();
+    }
+  }
+  printThroughput(title, (*throughput)->rows());
+  return write(options, title, (*throughput)->rows());
+}
+
+}  // namespace
+
+Run addBench(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "bench",
+      "How many vertices a second a crowd is skinned at: by methods, formats and instances, "
+      "on a device and on the CPU, beside plain kernels");
+  const auto options = std::make_shared<BenchOptions>();
+  command->add_option(
+      "MODEL", options->model,
+      "A .gltf or .glb file: all of its first skin [a figure of 10,000 vertices, 60 "
+      "joints and four influences everywhere]");
+  command->add_option("--json", options->json, "Write the same numbers to a file");
+  command->add_option("-o,--output", options->output, "Draw them as bars: OUT.png");
+  command->add_option("--device", options->device,
+                      "auto, cpu (the CPU alone), a number of 'dermis devices', or part of a name");
+  command->add_option(
+      "--instances", options->instances,
+      fmt::format("Of the crowd, each in a pose of its own [{}]", options->instances));
+  command->add_option("--rounds", options->rounds,
+                      fmt::format("In each of which every row is measured once; the best counts "
+                                  "[{}]",
+                                  options->rounds));
+  return [options] { return bench(*options); };
+}
+
+}  // namespace dermis::cli

@@ -1,0 +1,32 @@
+// What `bench` measured, for people and for programs.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "render/picture.h"
+#include "throughput.h"
+
+namespace dermis::cli {
+
+struct ThroughputTitle {
+  std::string device, driver;  ///< empty: only the CPU was measured
+  std::string model;
+  std::uint32_t vertices = 0, joints = 0, instances = 0, rounds = 0;
+};
+
+/// A line for each row on standard output.
+void printThroughput(const ThroughputTitle& title, std::span<const samples::ThroughputRow> rows);
+
+/// Fails with `ioError`.
+Result<void> writeJsonThroughput(const std::filesystem::path& path, const ThroughputTitle& title,
+                                 std::span<const samples::ThroughputRow> rows);
+
+/// A bar for each row, in sections. `font` may be null: no words then.
+samples::render::Picture drawThroughput(const ThroughputTitle& title,
+                                        std::span<const samples::ThroughputRow> rows,
+                                        const samples::render::Font* font);
+
+}  // namespace dermis::cli

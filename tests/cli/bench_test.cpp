@@ -1,0 +1,119 @@
+// `dermis bench`: the rows that programs look for are there, and each was measured. How fast they
+// are is the machine's affair: no test asks for a time.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dermis_command.h"
+#include "test_paths.h"
+
+namespace dermis::test {
+namespace {
+
+struct Measured {
+  CommandResult result;
+  nlohmann::json json;
+  std::map<std::string, nlohmann::json> rows;
+};
+
+/// Runs `bench` with --json besides.
+Measured bench(std::vector<std::string> arguments) {
+  const std::string path = outFile("bench.json");
+  std::filesystem::remove(path);
+  arguments.insert(arguments.begin(), "bench");
+  arguments.insert(arguments.end(), {"--json", path, "--rounds", "2"});
+  Measured measured;
+  measured.result = dermis(arguments);
+  std::ifstream file(path);
+  if (file) measured.json = nlohmann::json::parse(file, nullptr, false);
+  if (measured.json.is_object()) {
+    for (const nlohmann::json& row : measured.json["rows"])
+      measured.rows[row["name"].get<std::string>()] = row;
+  }
+  return measured;
+}
+
+std::vector<std::string> cpuRows() {
+  const std::string most = std::to_string(std::max(std::thread::hardware_concurrency(), 1u));
+  return {"cpu/dual_quaternion/1", "cpu/linear/1", "cpu/dual_quaternion/" + most,
+          "cpu/linear/" + most};
+}
+
+TEST(BenchTest, MeasuresMethodsFormatsAndInstancesBesidePlainKernels) {
+  const std::string picture = outFile("bench.png");
+  std::filesystem::remove(picture);
+  const Measured measured = bench({"--instances", "30", "-o", picture});
+  ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
+  std::vector<std::string> expected{"gpu/dual_quaternion/float32x3",
+                                    "gpu/linear/float32x3",
+                                    "gpu/dual_quaternion/float16x4+octahedral16x2",
+                                    "gpu/dual_quaternion/float32x3/bounds",
+                                    "gpu/dual_quaternion/float32x3/1_instance",
+                                    "gpu/dual_quaternion/float32x3/10_instances",
+                                    "gpu/plain/dual_quaternion",
+                                    "gpu/plain/linear",
+                                    "gpu/copy"};
+  for (const std::string& row : cpuRows()) expected.push_back(row);
+  for (const std::string& name : expected) {
+    ASSERT_TRUE(measured.rows.contains(name)) << name;
+    const nlohmann::json& row = measured.rows.at(name);
+    const double vertices = 10'000 * row["instances"].get<double>();
+    const double rate = row["million_vertices_per_second"].get<double>();
+    EXPECT_GT(rate, 0) << name;
+    EXPECT_NEAR(rate * 1e6 * row["best_seconds"].get<double>(), vertices, vertices * 1e-6) << name;
+    EXPECT_NE(measured.result.output.find(name + " "), std::string::npos) << name;
+  }
+  EXPECT_EQ(measured.rows.at("gpu/dual_quaternion/float32x3/1_instance")["instances"], 1);
+  EXPECT_EQ(measured.rows.at("gpu/copy")["instances"], 30);
+  EXPECT_EQ(measured.json["vertices"], 10'000);
+  EXPECT_GT(std::filesystem::file_size(picture), 10'000u);
+}
+
+TEST(BenchTest, MeasuresAModel) {
+  const std::string figure = std::string(sampleModels) + "/figure.glb";
+  const Measured measured = bench({figure, "--instances", "4"});
+  ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
+  EXPECT_EQ(measured.json["vertices"], 9918);
+  EXPECT_EQ(measured.json["joints"], 26);
+  EXPECT_TRUE(measured.rows.contains("gpu/plain/linear"));
+}
+
+TEST(BenchTest, TheCpuNeedsNoVulkan) {
+  const Measured measured = bench({"--instances", "20", "--device", "cpu"});
+  ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
+  for (const std::string& row : cpuRows()) EXPECT_TRUE(measured.rows.contains(row)) << row;
+  for (const auto& [name, row] : measured.rows) EXPECT_EQ(name.substr(0, 4), "cpu/");
+}
+
+TEST(BenchTest, WhatMakesNoSenseIsRefused) {
+  const auto expectStatus = [](std::vector<std::string> arguments, int status,
+                               const std::string& text) {
+    arguments.insert(arguments.begin(), "bench");
+    const CommandResult result = dermis(arguments);
+    EXPECT_EQ(result.status, status) << text;
+    EXPECT_NE(result.errors.find(text), std::string::npos) << result.errors;
+  };
+  expectStatus({"--rounds", "0"}, 2, "--rounds");
+  expectStatus({"--instances", "0"}, 2, "--instances");
+  expectStatus({"--instances", "100001"}, 2, "--instances");
+  expectStatus({"--device", "reference"}, 2, "reference");
+  expectStatus({"-o", "bars.jpg"}, 2, ".png");
+  expectStatus({"-o", "bars%03d.png"}, 2, "one picture");
+  const std::string copy = outFile("figure.glb");
+  std::filesystem::copy_file(std::string(sampleModels) + "/figure.glb", copy,
+                             std::filesystem::copy_options::overwrite_existing);
+  const std::uintmax_t size = std::filesystem::file_size(copy);
+  expectStatus({copy, "--json", copy}, 2, "figure.glb");
+  EXPECT_EQ(std::filesystem::file_size(copy), size);
+  expectStatus({"no-such-file.glb"}, 3, "no-such-file.glb");
+}
+
+}  // namespace
+}  // namespace dermis::test
