@@ -232,15 +232,15 @@ struct ExtensionRecord {
   uint morphCount;
   uint previousMorphs;
   uint previousMorphCount;
-  uint result;  // number of its result
   uint reserved;
+  uint reserved1;
   float centreX;  // of the box of snorm16 positions
   float centreY;
   float centreZ;
   float inverseX;  // 1 / half its size
   float inverseY;
   float inverseZ;
-  uint reserved1;
+  uint result;  // number of its result; read with the box
   uint reserved2;
 };
 DERMIS_CONSTANT EXTENSION_WORDS = 16u;

@@ -42,36 +42,20 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 
-// Of an attribute of so many bytes that begins at byte `begin` of a record, what stands in the record's word `word`. All but the
-// value is constant: what is left is a move, or a shift.
-uint partOfWord(uvec4 value, uint size, uint begin, uint word) {
-  int from = int(word * 4u) - int(begin);  // the byte of the attribute that the word begins with
-  if (from <= -4 || from >= int(size)) return 0u;
-  if (from < 0) {
-    uint first = size < 4u ? value.x & ((1u << (size * 8u)) - 1u) : value.x;
-    return first << uint(-from * 8);
-  }
-  uint left = size - uint(from);  // bytes from there on
-  uint index = uint(from) / 4u;
-  uint shift = uint(from) % 4u * 8u;
-  uint part = value[index];
-  if (shift != 0u) part = part >> shift | (index < 3u ? value[index + 1u] << (32u - shift) : 0u);
-  return left < 4u ? part & ((1u << (left * 8u)) - 1u) : part;
-}
-
-uint wordOfRecord(uvec4 position, uvec4 normal, uvec4 tangent, uint word) {
+// All attributes of a vertex, which stand one behind the other, by one store of RECORD bytes. Drivers that store lane by lane take
+// less time for it. Sizes are whole words, or 6 bytes and 2. They are constants: all of it is moves.
+void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
+  uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
   uint positions = formatBytes(POSITION_FORMAT);
   uint normals = formatBytes(NORMAL_FORMAT);
-  return partOfWord(position, positions, 0u, word) | partOfWord(normal, normals, positions, word) |
-         partOfWord(tangent, formatBytes(TANGENT_FORMAT), positions + normals, word);
-}
-
-// All attributes of a vertex, which stand one behind the other, by one store of RECORD bytes. Drivers that store lane by lane take
-// less time for it.
-void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
-#define RECORD_WORD(word) wordOfRecord(position, normal, tangent, word)
-  uvec4 low = uvec4(RECORD_WORD(0u), RECORD_WORD(1u), RECORD_WORD(2u), RECORD_WORD(3u));
-  uvec4 high = uvec4(RECORD_WORD(4u), RECORD_WORD(5u), RECORD_WORD(6u), RECORD_WORD(7u));
+  if (positions == 6u) {
+    words[1] = (position.y & 0xffffu) | normal.x << 16u;
+  } else {
+    for (uint i = 0u; i < 4u; ++i) words[positions / 4u + i] = normal[i];
+  }
+  for (uint i = 0u; i < 4u; ++i) words[(positions + normals) / 4u + i] = tangent[i];
+  uvec4 low = uvec4(words[0], words[1], words[2], words[3]);
+  uvec4 high = uvec4(words[4], words[5], words[6], words[7]);
   switch (RECORD) {
     case 8u:
       positionsVectors2[place / 8u] = low.xy;

@@ -47,7 +47,7 @@ InstanceRecord loadInstance(uint word) {
 ExtensionRecord loadExtension(uint word) {
   uvec4 a = tableUnit(word);
   uvec4 b = tableUnit(word + 4u);
-  vec4 c = uintBitsToFloat(tableUnit(word + 8u));
+  vec4 c = uintBitsToFloat(tableUnit(word + 8u));  // all that snorm16 positions need is in this one and the next
   uvec4 d = tableUnit(word + 12u);
   return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, uintBitsToFloat(d.x), uintBitsToFloat(d.y),
                          d.z, d.w);

@@ -116,8 +116,14 @@ std::uint32_t recordSize(const Job& job) {
          formatSize(job.tangents.format);
 }
 
-bool isRecordSize(std::uint32_t bytes) {
-  return bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32;
+/// Whether there is a store of all of a vertex: of words, or of 6 bytes and 2 first.
+bool isRecord(const Job& job) {
+  const std::uint32_t bytes = recordSize(job), positions = formatSize(job.positions.format),
+                      normals = formatSize(job.normals.format);
+  const bool isOfWords =
+      (positions % 4 == 0 && normals % 4 == 0) || (positions == 6 && normals == 2);
+  return isOfWords && formatSize(job.tangents.format) % 4 == 0 &&
+         (bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32);
 }
 
 /// Bytes that one store writes where kernels may store up to 16.
@@ -152,7 +158,7 @@ bool storesWholeWords(const Variant& variant) {
 Variant withWideStores(const Job& job, const Variant& variant) {
   Variant wide = variant;
   const std::uint32_t size = recordSize(job);
-  if (isRecordSize(size) && standsTogether(job) && job.positions.offset % size == 0 &&
+  if (isRecord(job) && standsTogether(job) && job.positions.offset % size == 0 &&
       job.positions.stride % size == 0)
     wide.recordBytes = static_cast<std::uint8_t>(size);
   const OutputStreams streams = outputStreams(job);
