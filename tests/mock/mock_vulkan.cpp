@@ -103,6 +103,7 @@ void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
   *properties = {};
   properties->apiVersion = VK_API_VERSION_1_1;
   properties->limits = mock->limits;
+  properties->deviceType = mock->deviceType;
 }
 
 void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline pipeline) {

@@ -48,6 +48,7 @@ struct MockVulkan {
   int failAfter = 0;              ///< … after succeeding so many times
   VkResult failure = VK_ERROR_OUT_OF_DEVICE_MEMORY;
   VkPhysicalDeviceLimits limits{};
+  VkPhysicalDeviceType deviceType = VK_PHYSICAL_DEVICE_TYPE_OTHER;
   std::vector<const char*> extensions;
   const VkAllocationCallbacks* allocator = nullptr;
 

@@ -467,7 +467,7 @@ struct KnownLayouts {
       if (!promises.noMorphTargets && below(2) == 0)
         job.morphs = owned.keep({{below(3), static_cast<float>(below(2))}});
       owned.jobs.push_back(job);
-      owned.outputSize += std::uint64_t{1} << 20;
+      owned.outputSize += std::uint64_t{96} << 14;  // as `everyVariant` wants it
     }
     result.makePlan(limits);
     return result;
@@ -490,12 +490,14 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     VkPhysicalDeviceVulkan12Features bytes{};
     bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     bytes.storageBuffer8BitAccess = VK_TRUE;
+    bytes.scalarBlockLayout = seed % 8 < 4 ? VK_TRUE : VK_FALSE;
     bytes.pNext = &integers;
     halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
     halves.storageBuffer16BitAccess = VK_TRUE;
     halves.pNext = &bytes;
     vulkan::DeviceDescription description = mock.description();
     description.enabledFeatures = &halves;
+    description.texelBuffers = true;
     if (seed % 3 == 1)
       description.promises = {static_cast<std::uint8_t>(seed % 4 == 0 ? 1 : 4), seed % 5 == 0,
                               seed % 7 < 3};

@@ -91,6 +91,42 @@ TEST_F(TexelTest, LayoutsHaveTexelBuffersWhereTheDeviceReadsThem) {
   }
 }
 
+// Measured on lavapipe; that GPUs do without is a guess.
+TEST_F(TexelTest, CpuDevicesReadThroughTexelBuffersUnlessTheEngineSaysOtherwise) {
+  for (const VkPhysicalDeviceType type :
+       {VK_PHYSICAL_DEVICE_TYPE_OTHER, VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU,
+        VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU, VK_PHYSICAL_DEVICE_TYPE_CPU}) {
+    mock.deviceType = type;
+    const bool isCpu = type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+    vulkan::DeviceDescription description = mock.description();
+    const auto reads = [&] { return vulkan::Context::create(description)->limits().texelBuffers; };
+    EXPECT_EQ(reads(), isCpu);
+    EXPECT_EQ(vulkan::Context::create(description)->tuning().instancesPerInvocation,
+              isCpu ? 24u : 4u);
+    for (const bool asked : {false, true}) {
+      description.texelBuffers = asked;
+      EXPECT_EQ(reads(), asked);
+    }
+  }
+}
+
+TEST_F(TexelTest, ScalarBlockLayoutIsReadFromBothOfItsStructures) {
+  VkPhysicalDeviceScalarBlockLayoutFeatures own{};
+  own.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
+  VkPhysicalDeviceVulkan12Features vulkan12{};
+  vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+  vulkan12.pNext = &own;
+  vulkan::DeviceDescription description = mock.description();
+  description.enabledFeatures = &vulkan12;
+  const auto has = [&] { return vulkan::Context::create(description)->limits().scalarBlockLayout; };
+  EXPECT_FALSE(has());
+  own.scalarBlockLayout = VK_TRUE;
+  EXPECT_TRUE(has());
+  own.scalarBlockLayout = VK_FALSE;
+  vulkan12.scalarBlockLayout = VK_TRUE;
+  EXPECT_TRUE(has());
+}
+
 TEST_F(TexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
   ASSERT_NO_FATAL_FAILURE(create(false, false));
   EXPECT_FALSE(context->limits().texelBuffers);
@@ -227,6 +263,7 @@ TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   features.features.shaderInt64 = VK_TRUE;
   vulkan::DeviceDescription description = mock.description();
   description.enabledFeatures = &features;
+  description.texelBuffers = true;
   Result<vulkan::Context> made = vulkan::Context::create(description);
   ASSERT_TRUE(made.ok());
   context.emplace(std::move(*made));

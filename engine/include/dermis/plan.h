@@ -243,7 +243,9 @@ bool hasResults(const Variant& variant);
 /// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
 /// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for exactly
 /// 4; for 4 with joints that scale; for any number; and for any number with morph targets. Some
-/// methods need fewer. `Promises` reduce the number further.
+/// methods need fewer. `Promises` reduce the number further. With `scalarBlockLayout` and
+/// `texelBuffers`, what can be stored at once depends on where the output begins: this is for jobs
+/// whose offsets differ from those of this one by multiples of 96 bytes.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// What pipelines depend on, known while loading.
@@ -254,7 +256,8 @@ struct PipelineNeeds {
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
 };
 
-/// All variants for instances with these needs; with `culledOnGpu`, the visibility kernel too.
+/// All variants for instances with these needs, wherever `placeVertices` places them; with
+/// `culledOnGpu`, the visibility kernel too.
 /// Fails as `placeVertices`.
 Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
                                           const Tuning& tuning);

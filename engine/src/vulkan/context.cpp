@@ -151,11 +151,12 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
   state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
   // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
-  if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU)
-    state.tuning.instancesPerInvocation = 24;
+  const bool isCpu = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  if (isCpu) state.tuning.instancesPerInvocation = 24;
   state.limits.promises = description.promises;
   state.limits.texelBuffers =
-      description.texelBuffers && state.limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
+      description.texelBuffers.value_or(isCpu) &&
+      state.limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
       state.limits.maxStorageBufferRange / 4 <= properties.limits.maxTexelBufferElements;
   if (state.limits.texelBuffers) {
     state.limits.minStorageBufferOffsetAlignment =

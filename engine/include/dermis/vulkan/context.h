@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include <vulkan/vulkan_core.h>
@@ -37,10 +38,11 @@ struct DeviceDescription {
   /// VkPhysicalDeviceVulkan12Features.
   /// Only `create` reads the chain.
   const void* enabledFeatures = nullptr;
-  /// Whether the engine's buffers have the usage that `Plan::buffer` returns, which includes
-  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT if kernels read through texel buffers. Set it to
-  /// false for buffers that are storage buffers only.
-  bool texelBuffers = true;
+  /// Whether kernels read tables, meshes and palettes through uniform texel buffers, where the
+  /// device can. `Plan::buffer` then asks for VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT. Results are
+  /// the same to the bit. Not set: on CPU devices (measured on lavapipe: half the time), not on
+  /// others (a guess).
+  std::optional<bool> texelBuffers;
   /// What the engine promises about its meshes and poses, to need fewer pipelines.
   Promises promises;
   /// Optional. Every pipeline is created with it. The engine stores and loads it.
