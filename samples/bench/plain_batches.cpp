@@ -89,15 +89,12 @@ Result<void> PlainBatches::make(const Crowd& crowd) {
       instancesTogether(maxRange_, std::uint64_t{crowd.vertexCount()} * outputStride);
   const std::uint64_t dispatches = (crowd.instanceCount() + step - 1) / step;
   if (Result<void> made = makeLayouts(static_cast<std::uint32_t>(dispatches)); !made) return made;
-  const auto make = [this](VkPipeline& pipeline, std::span<const std::uint32_t> spirv) {
-    return makePipeline(pipeline, spirv);
-  };
-  if (Result<void> made = make(palettePipeline_, plain_kernels::plain_palette_spirv); !made)
+  if (Result<void> made = makePipeline(palettePipeline_, plain_kernels::plain_palette_spirv); !made)
     return made;
   const std::array spirv{plain_kernels::plain_skin_spirv, plain_kernels::plain_linear_spirv,
                          plain_kernels::plain_copy_spirv};
   for (std::size_t kernel = 0; kernel < plainKernelCount; ++kernel) {
-    if (Result<void> made = make(pipelines_[kernel], spirv[kernel]); !made) return made;
+    if (Result<void> made = makePipeline(pipelines_[kernel], spirv[kernel]); !made) return made;
     if (Result<void> recorded = record(crowd, static_cast<PlainKernel>(kernel)); !recorded)
       return recorded;
     const Result<double> first = skin(static_cast<PlainKernel>(kernel));
