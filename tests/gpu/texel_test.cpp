@@ -179,7 +179,7 @@ TEST_F(TexelTest, EvenlySpacedInstancesGetTheSameBits) {
           ASSERT_TRUE(alone.ok());
           EXPECT_EQ(together->instances[i].streams, alone->instances[0].streams) << i;
         }
-        // Every second one again, in an order without a step.
+        // Some of them again, in an order without an even step.
         std::vector<samples::SkinRequest> mixed;
         std::vector<std::size_t> order{3, 0, 7, 7, 20, 1, 2, 4, 23, 22, 5};
         for (const std::size_t i : order) mixed.push_back(even.requests[i]);

@@ -95,8 +95,8 @@ struct PoseDescription {
   /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
   /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
   /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`.
-  /// `Method::linear` applies them all the same; its normals and tangents then need scales between
-  /// 2^-30 and 2^30.
+  /// `Method::linear` still applies scale and shear. Its normals and tangents are then right only
+  /// for scales between 2^-30 and 2^30.
   bool mayScale = true;
   /// The engine's own shaders read the palette, by dermis_skin.glsl: it is converted to dual
   /// quaternions even if no job reads it. It stands at `Plan::paletteOffset`.

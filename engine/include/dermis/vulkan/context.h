@@ -40,7 +40,7 @@ struct DeviceDescription {
   const void* enabledFeatures = nullptr;
   /// Whether kernels read tables, meshes and palettes through uniform texel buffers, where the
   /// device can. `Plan::buffer` then asks for VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT. Results are
-  /// the same to the bit. Not set: on CPU devices (measured on lavapipe: half the time), not on
+  /// the same to the bit. Not set: on CPU devices (measured on lavapipe), not on
   /// others (a guess).
   std::optional<bool> texelBuffers;
   /// What the engine promises about its meshes and poses, to need fewer pipelines.
