@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -87,24 +88,23 @@ template <>
 class [[nodiscard]] Result<void> {
  public:
   Result() = default;
-  Result(Error error) : error_(std::move(error)), ok_(false) {}
+  Result(Error error) : error_(std::move(error)) {}
 
-  bool ok() const { return ok_; }
-  explicit operator bool() const { return ok_; }
+  bool ok() const { return !error_; }
+  explicit operator bool() const { return ok(); }
 
   /// The error; only where not `ok()`, otherwise the program is stopped.
   const Error& error() const& {
-    if (ok_) std::abort();
-    return error_;
+    if (ok()) std::abort();
+    return *error_;
   }
   Error error() && {
-    if (ok_) std::abort();
-    return std::move(error_);
+    if (ok()) std::abort();
+    return *std::move(error_);
   }
 
  private:
-  Error error_;
-  bool ok_ = true;
+  std::optional<Error> error_;
 };
 
 }  // namespace dermis

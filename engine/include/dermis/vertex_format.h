@@ -45,7 +45,30 @@ inline constexpr std::array<VertexFormat, 10> allVertexFormats{
     VertexFormat::octahedral8x2};
 
 /// Bytes of one element; 0 for `none`.
-std::uint32_t formatSize(VertexFormat format);
+constexpr std::uint32_t formatSize(VertexFormat format) {
+  switch (format) {
+    case VertexFormat::none:
+      break;
+    case VertexFormat::float32x3:
+      return 12;
+    case VertexFormat::float32x4:
+      return 16;
+    case VertexFormat::float16x3:
+    case VertexFormat::snorm16x3:
+      return 6;
+    case VertexFormat::float16x4:
+    case VertexFormat::snorm16x4:
+      return 8;
+    case VertexFormat::snorm8x3:
+      return 3;
+    case VertexFormat::snorm8x4:
+    case VertexFormat::octahedral16x2:
+      return 4;
+    case VertexFormat::octahedral8x2:
+      return 2;
+  }
+  return 0;
+}
 
 /// Bytes of one component: vertex fetch requires attributes to begin at multiples of them. 1 for
 /// `none`.
@@ -54,13 +77,26 @@ std::uint32_t formatAlignment(VertexFormat format);
 /// The format's name in reports: "snorm16x4".
 std::string_view formatName(VertexFormat format);
 
+/// Whether positions in this format are relative to a box.
+constexpr bool isSnormPosition(VertexFormat format) {
+  return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
+}
+
 /// Whether skinned positions, normals, tangents may be stored so: positions as float32, float16 or
 /// snorm16; normals as anything; tangents as anything with four components, or octahedral.
-bool isPositionFormat(VertexFormat format);
-bool isNormalFormat(VertexFormat format);
-bool isTangentFormat(VertexFormat format);
-/// Whether positions in this format are relative to a box.
-bool isSnormPosition(VertexFormat format);
+constexpr bool isPositionFormat(VertexFormat format) {
+  return format == VertexFormat::float32x3 || format == VertexFormat::float32x4 ||
+         format == VertexFormat::float16x3 || format == VertexFormat::float16x4 ||
+         isSnormPosition(format);
+}
+constexpr bool isNormalFormat(VertexFormat format) {
+  return formatSize(format) != 0;
+}
+constexpr bool isTangentFormat(VertexFormat format) {
+  return format == VertexFormat::float32x4 || format == VertexFormat::float16x4 ||
+         format == VertexFormat::snorm16x4 || format == VertexFormat::snorm8x4 ||
+         format == VertexFormat::octahedral16x2 || format == VertexFormat::octahedral8x2;
+}
 
 /// What stands at `data`, in double precision: by the formulas above, for tests and tools. A
 /// direction that was stored octahedral is of unit length, any other as long as it was stored.

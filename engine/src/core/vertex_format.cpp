@@ -13,7 +13,6 @@ enum class Storage : std::uint8_t { nothing, float32, float16, snorm16, snorm8 }
 
 struct Layout {
   Storage storage;
-  std::uint32_t components;
   bool octahedral;
   std::string_view name;
 };
@@ -23,27 +22,27 @@ Layout layoutOf(VertexFormat format) {
     case VertexFormat::none:
       break;
     case VertexFormat::float32x3:
-      return {Storage::float32, 3, false, "float32x3"};
+      return {Storage::float32, false, "float32x3"};
     case VertexFormat::float32x4:
-      return {Storage::float32, 4, false, "float32x4"};
+      return {Storage::float32, false, "float32x4"};
     case VertexFormat::float16x3:
-      return {Storage::float16, 3, false, "float16x3"};
+      return {Storage::float16, false, "float16x3"};
     case VertexFormat::float16x4:
-      return {Storage::float16, 4, false, "float16x4"};
+      return {Storage::float16, false, "float16x4"};
     case VertexFormat::snorm16x3:
-      return {Storage::snorm16, 3, false, "snorm16x3"};
+      return {Storage::snorm16, false, "snorm16x3"};
     case VertexFormat::snorm16x4:
-      return {Storage::snorm16, 4, false, "snorm16x4"};
+      return {Storage::snorm16, false, "snorm16x4"};
     case VertexFormat::snorm8x3:
-      return {Storage::snorm8, 3, false, "snorm8x3"};
+      return {Storage::snorm8, false, "snorm8x3"};
     case VertexFormat::snorm8x4:
-      return {Storage::snorm8, 4, false, "snorm8x4"};
+      return {Storage::snorm8, false, "snorm8x4"};
     case VertexFormat::octahedral16x2:
-      return {Storage::snorm16, 2, true, "octahedral16x2"};
+      return {Storage::snorm16, true, "octahedral16x2"};
     case VertexFormat::octahedral8x2:
-      return {Storage::snorm8, 2, true, "octahedral8x2"};
+      return {Storage::snorm8, true, "octahedral8x2"};
   }
-  return {Storage::nothing, 0, false, "none"};
+  return {Storage::nothing, false, "none"};
 }
 
 std::uint32_t bytesOf(Storage storage) {
@@ -137,35 +136,12 @@ std::array<double, 3> loadVector(const Layout& layout, const void* data) {
 
 }  // namespace
 
-std::uint32_t formatSize(VertexFormat format) {
-  const Layout layout = layoutOf(format);
-  return layout.components * bytesOf(layout.storage);
-}
-
 std::uint32_t formatAlignment(VertexFormat format) {
   return std::max(bytesOf(layoutOf(format).storage), 1u);
 }
 
 std::string_view formatName(VertexFormat format) {
   return layoutOf(format).name;
-}
-
-bool isPositionFormat(VertexFormat format) {
-  const Layout layout = layoutOf(format);
-  return layout.components >= 3 && layout.storage != Storage::snorm8;
-}
-
-bool isNormalFormat(VertexFormat format) {
-  return layoutOf(format).components > 0;
-}
-
-bool isTangentFormat(VertexFormat format) {
-  const Layout layout = layoutOf(format);
-  return layout.components == 4 || layout.octahedral;
-}
-
-bool isSnormPosition(VertexFormat format) {
-  return isPositionFormat(format) && layoutOf(format).storage == Storage::snorm16;
 }
 
 std::array<double, 3> decodePosition(VertexFormat format, const void* data, const Box& box) {
