@@ -44,11 +44,16 @@ inline constexpr std::array<Method, 9> allMethods{
     Method::blended,   Method::centerOfRotation, Method::bulgeControlled};
 
 /// Whether meshes need `MeshView::centersOfRotation` for it.
-bool needsCentersOfRotation(Method method);
+constexpr bool needsCentersOfRotation(Method method) {
+  return method == Method::centerOfRotation || method == Method::bulgeControlled;
+}
 
 /// Whether it is there to be compared with, not for every day: its kernels may have been left out
 /// of the library (`DERMIS_COMPARISON_METHODS`).
-bool isForComparison(Method method);
+constexpr bool isForComparison(Method method) {
+  return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
+         method == Method::sphericalBlend || method == Method::quaternionTranslation;
+}
 
 /// The method's name on the command line and in reports: "linear", "dual_quaternion",
 /// "dual_quaternion_iterative", "log_matrix", "spherical_blend", "quaternion_translation",

@@ -26,15 +26,6 @@ std::string_view methodName(Method method) {
   return "unknown";
 }
 
-bool needsCentersOfRotation(Method method) {
-  return method == Method::centerOfRotation || method == Method::bulgeControlled;
-}
-
-bool isForComparison(Method method) {
-  return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
-         method == Method::sphericalBlend || method == Method::quaternionTranslation;
-}
-
 std::optional<Method> methodFromName(std::string_view name) {
   for (const Method method : allMethods) {
     if (methodName(method) == name) return method;

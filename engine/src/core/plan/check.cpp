@@ -10,64 +10,50 @@ namespace {
 
 constexpr std::uint64_t matrixAlignment = 16;
 
-Result<void> checkFormat(bool isAllowed, VertexFormat format, const char* name,
-                         const Subject& subject) {
-  if (isAllowed) return {};
+Error wrongFormat(VertexFormat format, const char* name, const Subject& subject) {
   return invalid(subject.name() + ": its " + name + " cannot be stored as " +
                  std::string(formatName(format)));
 }
 
 Result<void> checkFormats(const Job& job, const Subject& subject) {
-  if (Result<void> good = checkFormat(isPositionFormat(job.positions.format), job.positions.format,
-                                      "positions", subject);
-      !good)
-    return good;
-  if (Result<void> good = checkFormat(
-          job.normals.format == VertexFormat::none || isNormalFormat(job.normals.format),
-          job.normals.format, "normals", subject);
-      !good)
-    return good;
-  return checkFormat(
-      job.tangents.format == VertexFormat::none || isTangentFormat(job.tangents.format),
-      job.tangents.format, "tangents", subject);
+  const VertexFormat positions = job.positions.format, normals = job.normals.format,
+                     tangents = job.tangents.format;
+  if (!isPositionFormat(positions)) return wrongFormat(positions, "positions", subject);
+  if (normals != VertexFormat::none && !isNormalFormat(normals))
+    return wrongFormat(normals, "normals", subject);
+  if (tangents != VertexFormat::none && !isTangentFormat(tangents))
+    return wrongFormat(tangents, "tangents", subject);
+  return {};
 }
 
-Result<void> checkStream(const OutputStream& stream, const char* name, std::uint32_t vertexCount,
-                         std::uint64_t bufferSize, const Subject& subject,
-                         const DeviceLimits& limits) {
-  // Only where something is wrong: every job of every plan comes by.
-  const auto place = [&] {
-    return subject.name() + ": the offset " + std::to_string(stream.offset) + ", stride " +
-           std::to_string(stream.stride) + " and size " + std::to_string(stream.size) + " of its " +
-           name;
-  };
-  if (stream.stride < stream.size) {
-    return invalid(place() + ": the stride must be at least the size");
+std::string nameOf(const OutputStream& stream, const char* name, const Subject& subject) {
+  return subject.name() + ": the offset " + std::to_string(stream.offset) + ", stride " +
+         std::to_string(stream.stride) + " and size " + std::to_string(stream.size) + " of its " +
+         name;
+}
+
+/// Whether kernels may store 1 or 2 bytes.
+Result<void> checkSmallUnit(const OutputStream& stream, const char* name, const Subject& subject,
+                            const DeviceLimits& limits) {
+  if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+    return Error{ErrorCode::missingFeature,
+                 nameOf(stream, name, subject) + " must be multiples of 4 on a device with " +
+                     std::to_string(limits.maxStorageBuffersPerStage) +
+                     " storage buffers a stage"};
   }
-  const std::uint8_t unit = storeUnit(stream);
-  if (unit != 4 && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
-    return Error{ErrorCode::missingFeature, place() + " must be multiples of 4 on a device with " +
-                                                std::to_string(limits.maxStorageBuffersPerStage) +
-                                                " storage buffers a stage"};
-  }
-  if (unit == 2 && !limits.storage16Bit) {
+  if (storeUnit(stream) == 2 && !limits.storage16Bit) {
     return Error{
         ErrorCode::missingFeature,
-        place() +
+        nameOf(stream, name, subject) +
             " must be multiples of 4, or storageBuffer16BitAccess enabled, and Dermis built "
             "with DERMIS_SUBWORD_STORES"};
   }
-  if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
+  if (storeUnit(stream) == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
     return Error{
         ErrorCode::missingFeature,
-        place() +
+        nameOf(stream, name, subject) +
             " must be multiples of 4, or storageBuffer8BitAccess and "
             "storageBuffer16BitAccess enabled, and Dermis built with DERMIS_SUBWORD_STORES"};
-  }
-  const std::uint64_t length = std::uint64_t{vertexCount - 1} * stream.stride + stream.size;
-  if (stream.offset > bufferSize || length > bufferSize - stream.offset) {
-    return invalid(subject.name() + ": its " + name + " end outside their output buffer of " +
-                   std::to_string(bufferSize) + " bytes");
   }
   return {};
 }
@@ -76,12 +62,22 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& sub
                           const DeviceLimits& limits) {
   const OutputStreams streams = outputStreams(job);
   const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0) continue;
-    if (Result<void> good = checkStream(streams[stream], streamName(stream), job.mesh.vertexCount,
-                                        sizes[stream], subject, limits);
-        !good)
-      return good;
+  for (std::size_t index = 0; index < streamCount; ++index) {
+    const OutputStream& stream = streams[index];
+    if (stream.size == 0) continue;
+    const char* name = streamName(index);
+    if (stream.stride < stream.size) {
+      return invalid(nameOf(stream, name, subject) + ": the stride must be at least the size");
+    }
+    if (storeUnit(stream) != 4) {
+      if (Result<void> good = checkSmallUnit(stream, name, subject, limits); !good) return good;
+    }
+    const std::uint64_t length =
+        std::uint64_t{job.mesh.vertexCount - 1} * stream.stride + stream.size;
+    if (stream.offset > sizes[index] || length > sizes[index] - stream.offset) {
+      return invalid(subject.name() + ": its " + name + " end outside their output buffer of " +
+                     std::to_string(sizes[index]) + " bytes");
+    }
   }
   return {};
 }
@@ -198,7 +194,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
   if (Result<void> good = checkPoseOf(batch, job, job.pose, subject); !good) return good;
-  if (methodName(job.method) == "unknown")
+  if (job.method > allMethods.back())
     return invalid(subject.name() + ": its method is not one of Method");
   if (isForComparison(job.method) && !limits.comparisonMethods) {
     return Error{ErrorCode::missingFeature,

@@ -6,38 +6,14 @@
 
 namespace dermis {
 
-OutputStreams outputStreams(const Job& job) {
-  const auto stream = [](const OutputAttribute& attribute, VertexFormat format) {
-    if (format == VertexFormat::none) return OutputStream{};
-    return OutputStream{attribute.offset, attribute.stride, formatSize(format)};
-  };
-  return {stream(job.positions, job.positions.format), stream(job.normals, job.normals.format),
-          stream(job.tangents, job.tangents.format),
-          stream(job.previousPositions,
-                 job.motion == Motion::none ? VertexFormat::none : job.positions.format)};
-}
-
-std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes) {
-  return {sizes.positions, sizes.normals, sizes.tangents, sizes.previousPositions};
-}
-
 const char* streamName(std::size_t stream) {
   static constexpr std::array<const char*, streamCount> names{"positions", "normals", "tangents",
                                                               "previous positions"};
   return names[stream];
 }
 
-std::uint8_t storeUnit(const OutputStream& stream) {
-  const std::uint64_t bits = stream.offset | stream.stride | stream.size;
-  return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
-}
-
 bool hasResults(const Variant& variant) {
   return variant.bounds || isSnormPosition(variant.positions);
-}
-
-bool hasResult(const Job& job) {
-  return job.bounds || isSnormPosition(job.positions.format);
 }
 
 namespace {

@@ -23,17 +23,36 @@ struct OutputStream {
 
 using OutputStreams = std::array<OutputStream, streamCount>;
 
-OutputStreams outputStreams(const Job& job);
+inline OutputStream outputStream(const OutputAttribute& attribute, VertexFormat format) {
+  if (format == VertexFormat::none) return {};
+  return {attribute.offset, attribute.stride, formatSize(format)};
+}
 
-std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes);
+inline OutputStreams outputStreams(const Job& job) {
+  const bool hasMotion = job.motion != Motion::none;
+  return {outputStream(job.positions, job.positions.format),
+          outputStream(job.normals, job.normals.format),
+          outputStream(job.tangents, job.tangents.format),
+          outputStream(job.previousPositions,
+                       hasMotion ? job.positions.format : VertexFormat::none)};
+}
+
+inline std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes) {
+  return {sizes.positions, sizes.normals, sizes.tangents, sizes.previousPositions};
+}
 
 const char* streamName(std::size_t stream);
 
 /// Bytes that one store may write on every device that can: 4, 2 or 1.
-std::uint8_t storeUnit(const OutputStream& stream);
+inline std::uint8_t storeUnit(const OutputStream& stream) {
+  const std::uint64_t bits = stream.offset | stream.stride | stream.size;
+  return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
+}
 
 /// Whether the kernel finds something out about the instance.
-bool hasResult(const Job& job);
+inline bool hasResult(const Job& job) {
+  return job.bounds || isSnormPosition(job.positions.format);
+}
 
 // -- Variants.
 
