@@ -87,7 +87,7 @@ class [[nodiscard]] Result {
 template <>
 class [[nodiscard]] Result<void> {
  public:
-  Result() = default;
+  Result() : error_(std::nullopt) {}
   Result(Error error) : error_(std::move(error)) {}
 
   bool ok() const { return !error_; }

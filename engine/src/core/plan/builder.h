@@ -9,7 +9,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "abi.h"
@@ -58,21 +57,6 @@ struct GroupKey {
   friend bool operator==(const GroupKey&, const GroupKey&) = default;
 };
 
-struct GroupKeyHash {
-  std::size_t operator()(const GroupKey& key) const {
-    std::uint64_t hash = key.mesh;
-    const auto add = [&hash](std::uint64_t part) {
-      hash = (std::rotl(hash, 29) ^ part) * 0x9e3779b97f4a7c15u;
-    };
-    add(key.variant);
-    for (std::size_t stream = 0; stream < streamCount; ++stream)
-      add(std::uint64_t{key.windows[stream]} << 32 | key.strides[stream]);
-    add(std::uint64_t{key.firstVertex} << 32 | key.vertexEnd);
-    add(key.isCulled ? 1 : 0);
-    return static_cast<std::size_t>(hash ^ (hash >> 32));
-  }
-};
-
 struct Group {
   GroupKey key;
   Variant variant;  ///< of its dispatch
@@ -91,7 +75,7 @@ struct PlacedRun {
 /// What decides on an instance's place besides its job.
 struct Placing {
   Subject subject;
-  OutputSizes outputs;
+  OutputWindows windows;
   std::uint32_t jointCount = 0;  ///< of its palette
   bool mayScale = false;         ///< a palette that it reads may
   bool isCulled = false;         ///< the GPU chooses whether it is skinned
@@ -103,8 +87,9 @@ class Groups {
   /// Appends a run for each output range that the vertices of a job lie in, and takes part in their
   /// groups. Fails with `limitExceeded` where a kernel cannot see all windows of a run, or the GPU
   /// would choose more than one; nothing is appended then.
-  Result<void> place(const Job& job, const Placing& placing, const DeviceLimits& limits,
-                     const Tuning& tuning, std::vector<PlacedRun>& runs);
+  Result<void> place(const Job& job, const OutputStreams& streams, const Placing& placing,
+                     const DeviceLimits& limits, const Tuning& tuning,
+                     std::vector<PlacedRun>& runs);
   void release(std::uint32_t group);
   void clear();
 
@@ -113,18 +98,25 @@ class Groups {
   struct Entry {
     Group group;
     std::uint32_t users = 0;
-    std::uint64_t plan = 0;       ///< the last one that it was used in …
-    std::uint32_t planGroup = 0;  ///< … and its number there
+    std::uint32_t next = notUsed;  ///< of those with the same head
+    std::uint64_t plan = 0;        ///< the last one that it was used in …
+    std::uint32_t planGroup = 0;   ///< … and its number there
   };
+  void chooseVariant(const Job& job, const OutputStreams& streams, bool mayScale,
+                     const DeviceLimits& limits, const Tuning& tuning);
   std::uint32_t acquire(const GroupKey& key, const Variant& variant);
+  std::uint32_t findOrAdd(const GroupKey& key, const Variant& variant);
+  std::uint32_t& headOf(const GroupKey& key);
+  void growHeads();
 
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
-  std::unordered_map<GroupKey, std::uint32_t, GroupKeyHash> find_;
-  std::uint32_t last_ = notUsed;  ///< that was acquired: neighbours mostly belong together
-  VariantNeeds lastNeeds_;        ///< of the job that was placed last …
-  Variant lastVariant_;           ///< … its variant …
-  std::uint64_t lastKey_ = 0;     ///< … and the key of that; 0: there is none
+  std::vector<std::uint32_t> heads_;  ///< a hash table: a power of two of lists of entries
+  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbours mostly belong together
+  LayoutNeeds lastLayout_;            ///< of the job that was placed last …
+  FormNeeds lastForm_;
+  Variant lastVariant_;        ///< … its variant …
+  std::uint64_t lastKey_ = 0;  ///< … and the key of that; 0: there is none
   std::vector<VertexRun> vertexRuns_;
 };
 

@@ -58,9 +58,8 @@ Result<void> checkSmallUnit(const OutputStream& stream, const char* name, const 
   return {};
 }
 
-Result<void> checkStreams(const Batch& batch, const Job& job, const Subject& subject,
-                          const DeviceLimits& limits) {
-  const OutputStreams streams = outputStreams(job);
+Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStreams& streams,
+                          const Subject& subject, const DeviceLimits& limits) {
   const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
   for (std::size_t index = 0; index < streamCount; ++index) {
     const OutputStream& stream = streams[index];
@@ -183,8 +182,8 @@ std::string Subject::name() const {
   return text;
 }
 
-Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
-                      const DeviceLimits& limits) {
+Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
+                      const Subject& subject, const DeviceLimits& limits) {
   if (job.mesh.vertexCount == 0) return invalid(subject.name() + " has no mesh");
   if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
       job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
@@ -226,19 +225,18 @@ Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject
                      " storage buffers a stage there are none"};
   }
   if (Result<void> good = checkTogether(batch, job, subject); !good) return good;
-  return checkStreams(batch, job, subject, limits);
+  return checkStreams(batch, job, streams, subject, limits);
 }
 
-Result<void> checkWindows(const OutputStreams& streams,
-                          const std::array<std::uint32_t, streamCount>& windows,
-                          const std::array<std::uint64_t, streamCount>& sizes,
-                          const Subject& subject, const DeviceLimits& limits) {
+Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
+                          const OutputWindows& windows, const Subject& subject,
+                          const DeviceLimits& limits) {
   const bool hasFewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (!hasFewBuffers && limits.separateRanges) return {};
   std::optional<std::uint32_t> common;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || sizes[stream] <= limits.maxStorageBufferRange) continue;
-    if (common.value_or(windows[stream]) != windows[stream]) {
+    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
+    if (common.value_or(run.windows[stream]) != run.windows[stream]) {
       return Error{ErrorCode::limitExceeded,
                    subject.name() + ": its " + streamName(stream) +
                        " lie too far from the attribute before for a device " +
@@ -247,7 +245,7 @@ Result<void> checkWindows(const OutputStreams& streams,
                                       : "that cannot bind another range of the output for each "
                                         "attribute (DeviceLimits::separateRanges)")};
     }
-    common = windows[stream];
+    common = run.windows[stream];
   }
   return {};
 }

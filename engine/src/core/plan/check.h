@@ -34,8 +34,13 @@ Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Su
 Result<void> checkTuning(const Tuning& tuning);
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
                        const Promises& promises);
-Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
-                      const DeviceLimits& limits);
+/// `streams`: those of the job.
+Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
+                      const Subject& subject, const DeviceLimits& limits);
+inline Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
+                             const DeviceLimits& limits) {
+  return checkJob(batch, job, outputStreams(job), subject, limits);
+}
 /// Whether positions in snorm16 can be relative to it.
 bool isBox(const Box& box);
 /// What positions in snorm16 are made of: less the centre, times 1 / half the size.
@@ -45,10 +50,9 @@ struct BoxScale {
 BoxScale boxScale(const Box& box);
 Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
                          const Subject& subject);
-/// Whether a kernel can see all windows that a run is written to. `sizes`: of the outputs.
-Result<void> checkWindows(const OutputStreams& streams,
-                          const std::array<std::uint32_t, streamCount>& windows,
-                          const std::array<std::uint64_t, streamCount>& sizes,
-                          const Subject& subject, const DeviceLimits& limits);
+/// Whether a kernel can see all windows that a run is written to.
+Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
+                          const OutputWindows& windows, const Subject& subject,
+                          const DeviceLimits& limits);
 
 }  // namespace dermis

@@ -14,10 +14,14 @@ class PlanMaker {
                     PlanData& plan);
 
  private:
+  Result<void> placeJobs(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                         Result<void>& placed);
+  Result<void> checkPoses(const Batch& batch, const DeviceLimits& limits) const;
+  void markPalettes(const Job& job);
+  void placePalettes(const Batch& batch);
   Result<void> checkSizes(const Batch& batch, const DeviceLimits& limits) const;
-  void placePoses(const Batch& batch);
-  Result<void> placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
-                        const Tuning& tuning);
+  void addPalettes(const Batch& batch);
+  void addJobs(const Batch& batch);
   std::uint32_t paletteOf(const Batch& batch, Method method, std::uint32_t palette) const;
   const InstanceExtras* extrasOf(const Batch& batch, std::size_t index);
 
@@ -25,6 +29,7 @@ class PlanMaker {
   std::uint64_t palettesSize_ = 0;
   std::vector<std::uint32_t> results_;  ///< each job's number among them, or notUsed
   std::uint32_t resultCount_ = 0;
+  std::uint64_t vertexCount_ = 0;
   PlanBuilder builder_;
   Groups groups_;
   std::vector<PlacedRun> runs_;
@@ -33,19 +38,28 @@ class PlanMaker {
   std::size_t extrasUsed_ = 0;
 };
 
-/// Marks the forms that jobs read, and finds a place for each.
-void PlanMaker::placePoses(const Batch& batch) {
-  for (std::vector<std::uint32_t>& units : paletteUnits_) units.assign(batch.poses.size(), notUsed);
+Result<void> PlanMaker::checkPoses(const Batch& batch, const DeviceLimits& limits) const {
+  for (std::size_t index = 0; index < batch.poses.size(); ++index) {
+    if (Result<void> good = checkPose(batch, batch.poses[index], index, limits.promises); !good)
+      return good;
+  }
+  return {};
+}
+
+/// Marks the form that a job reads.
+void PlanMaker::markPalettes(const Job& job) {
+  const PaletteForm form = paletteForm(job.method);
+  if (form == PaletteForm::matrices) return;
+  std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
+  units[job.pose] = 0;
+  if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
+}
+
+/// Finds a place for each form that is marked, or that the engine reads.
+void PlanMaker::placePalettes(const Batch& batch) {
   for (std::size_t index = 0; index < batch.poses.size(); ++index) {
     if (batch.poses[index].isReadByShaders)
       paletteUnits_[static_cast<std::size_t>(PaletteForm::dualQuaternions)][index] = 0;
-  }
-  for (const Job& job : batch.jobs) {
-    const PaletteForm form = paletteForm(job.method);
-    if (form == PaletteForm::matrices) continue;
-    std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
-    units[job.pose] = 0;
-    if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
   }
   std::uint64_t end = 0;
   for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
@@ -68,6 +82,39 @@ Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limit
                                              " bytes; a batch of fewer of them would fit"};
 }
 
+/// Checks all jobs and marks the palettes that they read. Returns the first error in a job; in
+/// `placed`, the first in a place, which counts after those in poses.
+Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits,
+                                  const Tuning& tuning, Result<void>& placed) {
+  for (std::vector<std::uint32_t>& units : paletteUnits_) units.assign(batch.poses.size(), notUsed);
+  resultCount_ = 0;
+  vertexCount_ = 0;
+  results_.resize(batch.jobs.size());
+  groups_.clear();
+  runs_.clear();
+  firstRuns_.clear();
+  Placing placing;
+  placing.windows = {batch.outputs, limits};
+  for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
+    const Job& job = batch.jobs[index];
+    const OutputStreams streams = outputStreams(job);
+    placing.subject.index = index;
+    if (Result<void> good = checkJob(batch, job, streams, placing.subject, limits); !good)
+      return good;
+    results_[index] = hasResult(job) ? resultCount_++ : notUsed;
+    vertexCount_ += job.mesh.vertexCount;
+    markPalettes(job);
+    firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
+    const PoseDescription& pose = batch.poses[job.pose];
+    placing.jointCount = pose.jointCount;
+    placing.mayScale = pose.mayScale || (job.motion == Motion::reskinned &&
+                                         batch.poses[job.previousPose].mayScale);
+    if (placed) placed = groups_.place(job, streams, placing, limits, tuning, runs_);
+  }
+  firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
+  return {};
+}
+
 std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint32_t palette) const {
   const PaletteForm form = paletteForm(method);
   if (form != PaletteForm::matrices) return paletteUnits_[static_cast<std::size_t>(form)][palette];
@@ -77,13 +124,15 @@ std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint3
 /// Null if the job needs none. `extras_` has room for those of all jobs, so that none moves.
 const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index) {
   const Job& job = batch.jobs[index];
+  const bool hasPrevious = job.motion == Motion::reskinned;
+  if (job.morphs.empty() && results_[index] == notUsed && !hasPrevious) return nullptr;  // mostly
   InstanceExtras& extras = extras_[extrasUsed_];
   assignActive(job.morphs, extras.morphs);
   extras.result = results_[index];
   extras.hasBox = isSnormPosition(job.positions.format);
   extras.box = job.box;
-  extras.hasPrevious = job.motion == Motion::reskinned;
-  if (extras.hasPrevious) {
+  extras.hasPrevious = hasPrevious;
+  if (hasPrevious) {
     extras.previousPalette = paletteOf(batch, job.method, job.previousPose);
     extras.previousJoints = batch.poses[job.previousPose].jointCount;
     assignActive(job.previousMorphs, extras.previousMorphs);
@@ -93,57 +142,7 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
   return &extras;
 }
 
-Result<void> PlanMaker::placeJob(const Batch& batch, std::size_t index, const DeviceLimits& limits,
-                                 const Tuning& tuning) {
-  const Job& job = batch.jobs[index];
-  const PoseDescription& pose = batch.poses[job.pose];
-  Placing placing;
-  placing.subject = {"job", index};
-  placing.outputs = batch.outputs;
-  placing.jointCount = pose.jointCount;
-  placing.mayScale =
-      pose.mayScale || (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale);
-  return groups_.place(job, placing, limits, tuning, runs_);
-}
-
-Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
-                             PlanData& plan) {
-  if (Result<void> good = checkLimits(limits); !good) return good;
-  if (Result<void> good = checkTuning(tuning); !good) return good;
-  const std::size_t count = batch.jobs.size();
-  if (count > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
-  resultCount_ = 0;
-  results_.resize(count);
-  std::uint64_t vertexCount = 0;
-  for (std::size_t index = 0; index < count; ++index) {
-    const Job& job = batch.jobs[index];
-    if (Result<void> good = checkJob(batch, job, {"job", index}, limits); !good) return good;
-    results_[index] = hasResult(job) ? resultCount_++ : notUsed;
-    vertexCount += job.mesh.vertexCount;
-  }
-  for (std::size_t index = 0; index < batch.poses.size(); ++index) {
-    if (Result<void> good = checkPose(batch, batch.poses[index], index, limits.promises); !good)
-      return good;
-  }
-  placePoses(batch);
-  if (Result<void> good = checkSizes(batch, limits); !good) return good;
-
-  groups_.clear();
-  runs_.clear();
-  firstRuns_.clear();
-  for (std::size_t index = 0; index < count; ++index) {
-    firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
-    if (Result<void> good = placeJob(batch, index, limits, tuning); !good) return good;
-  }
-  firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
-
-  PlanSizes sizes;
-  sizes.meshes = batch.meshesSize;
-  sizes.poses = batch.posesSize;
-  sizes.palettes = palettesSize_;
-  sizes.results = resultCount_;
-  sizes.outputs = batch.outputs;
-  builder_.begin(plan, groups_, limits, tuning, sizes);
+void PlanMaker::addPalettes(const Batch& batch) {
   for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
     const std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
     for (std::size_t index = 0; index < units.size(); ++index) {
@@ -153,10 +152,12 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
                           pose.jointCount, form, pose.mayScale);
     }
   }
-  for (std::uint32_t result = 0; result < resultCount_; ++result) builder_.clearResult(result);
+}
+
+void PlanMaker::addJobs(const Batch& batch) {
   extrasUsed_ = 0;
-  extras_.resize(std::max(extras_.size(), count));
-  for (std::size_t index = 0; index < count; ++index) {
+  extras_.resize(std::max(extras_.size(), batch.jobs.size()));
+  for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
     const Job& job = batch.jobs[index];
     const std::uint32_t palette = paletteOf(batch, job.method, job.pose);
     const std::uint32_t flags = (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
@@ -165,11 +166,35 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
     for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
       builder_.add(runs_[run], palette, flags, extras);
   }
+}
+
+Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
+                             PlanData& plan) {
+  if (Result<void> good = checkLimits(limits); !good) return good;
+  if (Result<void> good = checkTuning(tuning); !good) return good;
+  if (batch.jobs.size() > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
+  Result<void> placed;
+  if (Result<void> good = placeJobs(batch, limits, tuning, placed); !good) return good;
+  if (Result<void> good = checkPoses(batch, limits); !good) return good;
+  placePalettes(batch);
+  if (Result<void> good = checkSizes(batch, limits); !good) return good;
+  if (!placed) return placed;
+
+  PlanSizes sizes;
+  sizes.meshes = batch.meshesSize;
+  sizes.poses = batch.posesSize;
+  sizes.palettes = palettesSize_;
+  sizes.results = resultCount_;
+  sizes.outputs = batch.outputs;
+  builder_.begin(plan, groups_, limits, tuning, sizes);
+  addPalettes(batch);
+  for (std::uint32_t result = 0; result < resultCount_; ++result) builder_.clearResult(result);
+  addJobs(batch);
   if (Result<void> good = builder_.finish(); !good) return good;
   plan.paletteUnits = paletteUnits_;
   plan.results = results_;
-  plan.instanceCount = static_cast<std::uint32_t>(count);
-  plan.vertexCount = vertexCount;
+  plan.instanceCount = static_cast<std::uint32_t>(batch.jobs.size());
+  plan.vertexCount = vertexCount_;
   return {};
 }
 

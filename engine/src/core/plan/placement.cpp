@@ -43,20 +43,14 @@ Variant outputVariant(const Job& job) {
 // (docs/performance.md). Anything else about the instances of a group is a branch in the kernel.
 namespace {
 
-/// What decides on the form besides the method.
-struct Needs {
-  std::uint32_t influences;  ///< of a vertex, at most
-  bool full;                 ///< every vertex has as many
-  bool scales;
-  bool morphs;
-};
-
 /// Fewer influences pay off where blending is most of the work.
 bool hasFormsForFewInfluences(Method method) {
   return method == Method::linear || method == Method::dualQuaternion;
 }
 
-void chooseForm(const Needs& needs, const Promises& promises, Variant& variant) {
+}  // namespace
+
+void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& variant) {
   const std::uint8_t any = promises.maxInfluences;
   variant.scales = needs.scales;
   variant.morphs = needs.morphs;
@@ -74,8 +68,6 @@ void chooseForm(const Needs& needs, const Promises& promises, Variant& variant) 
     variant.fullInfluences = needs.full && needs.influences == 4;
   }
 }
-
-}  // namespace
 
 bool standsInPairs(const Job& job) {
   return job.positions.format == VertexFormat::float32x3 &&
@@ -147,7 +139,8 @@ Variant withWideStores(const Job& job, const Variant& variant) {
   return storesWholeWords(wide) ? wide : variant;
 }
 
-/// The skin kernel for a job, but for its form.
+}  // namespace
+
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = outputVariant(job);
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
@@ -162,42 +155,27 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
   return variant;
 }
 
-}  // namespace
-
-Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
-                    const Tuning& tuning) {
-  Variant variant = layoutVariant(job, limits, tuning);
+FormNeeds formNeeds(const Job& job, bool mayScale) {
   const bool morphs =
       hasActive(job.morphs) || (job.motion == Motion::reskinned && hasActive(job.previousMorphs));
   const bool full = job.mesh.minInfluences == job.mesh.maxInfluences;
-  chooseForm({job.mesh.maxInfluences, full, mayScale, morphs}, limits.promises, variant);
-  return variant;
+  return {job.mesh.maxInfluences, full, mayScale, morphs};
 }
 
-VariantNeeds::VariantNeeds(const Job& job, bool mayScale)
+LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
     : choices{static_cast<std::uint8_t>(job.method),
+              static_cast<std::uint8_t>(job.motion),
+              static_cast<std::uint8_t>(job.bounds),
               static_cast<std::uint8_t>(job.positions.format),
               static_cast<std::uint8_t>(job.normals.format),
               static_cast<std::uint8_t>(job.tangents.format),
-              static_cast<std::uint8_t>(job.motion),
-              static_cast<std::uint8_t>(job.bounds),
-              static_cast<std::uint8_t>(mayScale),
-              static_cast<std::uint8_t>(hasActive(job.morphs) || (job.motion == Motion::reskinned &&
-                                                                  hasActive(job.previousMorphs)))},
-      minInfluences(job.mesh.minInfluences),
-      maxInfluences(job.mesh.maxInfluences),
-      strides{job.positions.stride, job.normals.stride, job.tangents.stride,
-              job.previousPositions.stride},
-      toNormals(job.normals.format != VertexFormat::none ? job.normals.offset - job.positions.offset
-                                                         : 0),
-      toTangents(job.tangents.format != VertexFormat::none
-                     ? job.tangents.offset - job.positions.offset
-                     : 0) {
+              static_cast<std::uint8_t>(standsTogether(job)),
+              static_cast<std::uint8_t>(standsInPairs(job))} {
   constexpr std::uint64_t stores = 96;  // a multiple of all that one store may write
-  residues = {static_cast<std::uint32_t>(job.positions.offset % stores),
-              static_cast<std::uint32_t>(job.normals.offset % stores),
-              static_cast<std::uint32_t>(job.tangents.offset % stores),
-              static_cast<std::uint32_t>(job.previousPositions.offset % stores)};
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    strides[stream] = streams[stream].stride;
+    residues[stream] = static_cast<std::uint32_t>(streams[stream].offset % stores);
+  }
 }
 
 namespace {
@@ -284,40 +262,35 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
 namespace {
 
 /// What two neighbouring windows share.
-std::uint64_t windowOverlap(const DeviceLimits& limits) {
-  return limits.maxStorageBufferRange / 16;
+std::uint64_t windowOverlap(std::uint64_t range) {
+  return range / 16;
 }
 
 /// Half of what windows share: runs that begin in a window end in it, and so do those of attributes
 /// that begin up to as much later.
-std::uint64_t longestRun(const DeviceLimits& limits) {
-  return windowOverlap(limits) / 2;
+std::uint64_t longestRun(std::uint64_t range) {
+  return windowOverlap(range) / 2;
 }
 
-using Oversized = std::array<bool, streamCount>;
-
 /// Returns whether the run lies in the windows that it begins in.
-bool chooseWindows(const OutputStreams& streams, const Oversized& oversized,
-                   const DeviceLimits& limits, VertexRun& run) {
-  const std::uint64_t step = outputWindowStep(limits);
+bool chooseWindows(const OutputStreams& streams, const OutputWindows& windows, VertexRun& run) {
   std::uint64_t common = std::numeric_limits<std::uint64_t>::max();
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (!oversized[stream]) continue;
-    const std::uint64_t window = streams[stream].begin(run.firstVertex) / step;
+    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
+    const std::uint64_t window = streams[stream].begin(run.firstVertex) / windows.step;
     run.windows[stream] = static_cast<std::uint32_t>(window);
     common = std::min(common, window);
   }
   bool isInCommon = true;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (oversized[stream] &&
-        streams[stream].end(run.vertexEnd) > common * step + limits.maxStorageBufferRange)
+    if (streams[stream].size != 0 && windows.oversized[stream] &&
+        streams[stream].end(run.vertexEnd) > common * windows.step + windows.range)
       isInCommon = false;
   }
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (!oversized[stream]) continue;
+    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
     if (isInCommon) run.windows[stream] = static_cast<std::uint32_t>(common);
-    if (streams[stream].end(run.vertexEnd) >
-        run.windows[stream] * step + limits.maxStorageBufferRange)
+    if (streams[stream].end(run.vertexEnd) > run.windows[stream] * windows.step + windows.range)
       return false;
   }
   return true;
@@ -326,38 +299,42 @@ bool chooseWindows(const OutputStreams& streams, const Oversized& oversized,
 }  // namespace
 
 std::uint64_t outputWindowStep(const DeviceLimits& limits) {
-  const std::uint64_t step = limits.maxStorageBufferRange - windowOverlap(limits);
+  const std::uint64_t step = limits.maxStorageBufferRange - windowOverlap(limits.maxStorageBufferRange);
   // A multiple of everything that one store may write.
   return step - step % (3 * std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 32));
 }
 
-void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
-                 const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
-                 std::vector<VertexRun>& runs) {
-  runs.clear();
-  const std::uint64_t largest = *std::ranges::max_element(sizes);
-  if (largest <= limits.maxStorageBufferRange) {  // mostly
-    runs.push_back({0, vertexCount, {}});
-    return;
-  }
-  Oversized oversized{};
-  std::uint64_t longest = vertexCount;
+OutputWindows::OutputWindows(const OutputSizes& sizes, const DeviceLimits& limits)
+    : range(limits.maxStorageBufferRange), step(outputWindowStep(limits)) {
+  const std::array<std::uint64_t, streamCount> bytes = outputSizes(sizes);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || sizes[stream] <= limits.maxStorageBufferRange) continue;
-    oversized[stream] = true;
-    longest =
-        std::min(longest, (longestRun(limits) - streams[stream].size) / streams[stream].stride +
-                              std::uint64_t{1});
+    oversized[stream] = bytes[stream] > range;
+    isAnyOversized = isAnyOversized || oversized[stream];
   }
+}
+
+void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
+                 const OutputWindows& windows, std::vector<VertexRun>& runs) {
+  runs.clear();
   VertexRun whole;
   whole.vertexEnd = vertexCount;
-  if (chooseWindows(streams, oversized, limits, whole)) longest = vertexCount;
+  if (!windows.isAnyOversized || chooseWindows(streams, windows, whole)) {
+    runs.push_back(whole);
+    return;
+  }
+  std::uint64_t longest = vertexCount;
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
+    longest = std::min(longest,
+                       (longestRun(windows.range) - streams[stream].size) / streams[stream].stride +
+                           std::uint64_t{1});
+  }
   for (std::uint64_t vertex = 0; vertex < vertexCount; vertex += longest) {
     VertexRun run;
     run.firstVertex = static_cast<std::uint32_t>(vertex);
     run.vertexEnd =
         static_cast<std::uint32_t>(std::min<std::uint64_t>(vertex + longest, vertexCount));
-    chooseWindows(streams, oversized, limits, run);
+    chooseWindows(streams, windows, run);
     runs.push_back(run);
   }
 }

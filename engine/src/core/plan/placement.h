@@ -59,23 +59,35 @@ inline bool hasResult(const Job& job) {
 Variant paletteVariant(const Tuning& tuning);
 Variant visibilityVariant(const Tuning& tuning);
 
-/// The skin kernel for a job. It depends on nothing else in the batch. `mayScale`: whether a
-/// palette that it reads may.
-Variant skinVariant(const Job& job, bool mayScale, const DeviceLimits& limits,
-                    const Tuning& tuning);
+/// The skin kernel for a job, but for its form. It depends on nothing else in the batch.
+Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
-/// All that `skinVariant` looks at, on one device with one tuning: neighbours mostly have the same.
-struct VariantNeeds {
-  VariantNeeds() = default;
-  VariantNeeds(const Job& job, bool mayScale);
+/// All that `layoutVariant` looks at, on one device with one tuning: neighbours mostly have the
+/// same.
+struct LayoutNeeds {
+  LayoutNeeds() = default;
+  LayoutNeeds(const Job& job, const OutputStreams& streams);
 
-  std::array<std::uint8_t, 8> choices{};  ///< method, formats, motion, and what may be or not
-  std::uint32_t minInfluences = 0, maxInfluences = 0;
+  /// Method, motion, bounds, formats, and how attributes stand together.
+  std::array<std::uint8_t, 8> choices{};
   std::array<std::uint32_t, streamCount> strides{}, residues{};
-  std::uint64_t toNormals = 0, toTangents = 0;  ///< from positions
 
-  friend bool operator==(const VariantNeeds&, const VariantNeeds&) = default;
+  friend bool operator==(const LayoutNeeds&, const LayoutNeeds&) = default;
 };
+
+/// What decides on the form of a skin kernel besides the method.
+struct FormNeeds {
+  std::uint32_t influences = 0;  ///< of a vertex, at most
+  bool full = false;             ///< every vertex has as many
+  bool scales = false;           ///< a palette that it reads may
+  bool morphs = false;           ///< any is active
+
+  friend bool operator==(const FormNeeds&, const FormNeeds&) = default;
+};
+
+FormNeeds formNeeds(const Job& job, bool mayScale);
+/// Sets all members of the variant that depend on its form.
+void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& variant);
 
 /// Whether kernels on the device may store an attribute, or all of a vertex, at once.
 inline bool storesWidely(const DeviceLimits& limits) {
@@ -94,6 +106,17 @@ bool standsTogether(const Job& job);
 // -- Windows: output that is larger than a storage buffer range may be is written through several
 // ranges.
 
+/// What windows of the outputs depend on besides jobs.
+struct OutputWindows {
+  OutputWindows() = default;
+  OutputWindows(const OutputSizes& sizes, const DeviceLimits& limits);
+
+  std::uint64_t range = 0;                    ///< bytes of the largest window
+  std::uint64_t step = 0;                     ///< `outputWindowStep`
+  std::array<bool, streamCount> oversized{};  ///< output is larger than a window …
+  bool isAnyOversized = false;                ///< … mostly none is
+};
+
 /// Vertices of one job of which each attribute lies in one window of its buffer.
 struct VertexRun {
   std::uint32_t firstVertex = 0;
@@ -104,7 +127,6 @@ struct VertexRun {
 /// Cuts a job's vertices into runs: one where all of an attribute lies in one window. Attributes
 /// that lie near to each other get windows of one number.
 void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
-                 const std::array<std::uint64_t, streamCount>& sizes, const DeviceLimits& limits,
-                 std::vector<VertexRun>& runs);
+                 const OutputWindows& windows, std::vector<VertexRun>& runs);
 
 }  // namespace dermis

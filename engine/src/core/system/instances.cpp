@@ -133,13 +133,14 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   }
   Placing placing;
   placing.subject = theInstance;
-  placing.outputs = OutputSizes::oneBuffer(outputStore_.ranges.capacity());
+  placing.windows = {OutputSizes::oneBuffer(outputStore_.ranges.capacity()), description_.limits};
   placing.jointCount = pose.jointCount;
   placing.mayScale = pose.mayScale;
   placing.isCulled = isCulled;
   runsScratch_.clear();
-  if (Result<void> placed = groups_.place(jobOf(instance, mesh, *laidOut), placing,
-                                          description_.limits, description_.tuning, runsScratch_);
+  const Job job = jobOf(instance, mesh, *laidOut);
+  if (Result<void> placed = groups_.place(job, outputStreams(job), placing, description_.limits,
+                                          description_.tuning, runsScratch_);
       !placed)
     return placed;
   instance.run = runsScratch_.front();
