@@ -426,14 +426,17 @@ namespace {
 /// Whether each word of the records rises by the same from one to the next.
 bool areEvenlySpaced(const std::uint32_t* records, std::uint32_t count) {
   constexpr std::size_t words = abi::INSTANCE_WORDS;
-  for (std::uint32_t record = 2; record < count; ++record) {
-    const std::uint32_t* last = records + (record - 1) * words;
-    std::uint32_t differences = 0;
-    for (std::size_t word = 0; word < words; ++word)
-      differences |= (last[words + word] - last[word]) ^ (records[words + word] - records[word]);
-    if (differences != 0) return false;
+  if (count < 2) return false;
+  std::array<std::uint32_t, words> expected, step;
+  for (std::size_t word = 0; word < words; ++word) {
+    expected[word] = records[words + word];
+    step[word] = records[words + word] - records[word];
   }
-  return count > 1;
+  for (std::uint32_t record = 2; record < count; ++record) {
+    for (std::size_t word = 0; word < words; ++word) expected[word] += step[word];
+    if (std::memcmp(expected.data(), records + record * words, sizeof(expected)) != 0) return false;
+  }
+  return true;
 }
 
 }  // namespace

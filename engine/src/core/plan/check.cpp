@@ -26,32 +26,34 @@ Result<void> checkFormats(const Job& job, const Subject& subject) {
   return {};
 }
 
-std::string nameOf(const OutputStream& stream, const char* name, const Subject& subject) {
+std::string placeOf(const OutputStreams& streams, std::size_t index, const Subject& subject) {
+  const OutputStream& stream = streams[index];
   return subject.name() + ": the offset " + std::to_string(stream.offset) + ", stride " +
          std::to_string(stream.stride) + " and size " + std::to_string(stream.size) + " of its " +
-         name;
+         streamName(index);
 }
 
 /// Whether kernels may store 1 or 2 bytes.
-Result<void> checkSmallUnit(const OutputStream& stream, const char* name, const Subject& subject,
-                            const DeviceLimits& limits) {
+Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index,
+                            const Subject& subject, const DeviceLimits& limits) {
+  const std::uint8_t unit = storeUnit(streams[index]);
   if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
     return Error{ErrorCode::missingFeature,
-                 nameOf(stream, name, subject) + " must be multiples of 4 on a device with " +
+                 placeOf(streams, index, subject) + " must be multiples of 4 on a device with " +
                      std::to_string(limits.maxStorageBuffersPerStage) +
                      " storage buffers a stage"};
   }
-  if (storeUnit(stream) == 2 && !limits.storage16Bit) {
+  if (unit == 2 && !limits.storage16Bit) {
     return Error{
         ErrorCode::missingFeature,
-        nameOf(stream, name, subject) +
+        placeOf(streams, index, subject) +
             " must be multiples of 4, or storageBuffer16BitAccess enabled, and Dermis built "
             "with DERMIS_SUBWORD_STORES"};
   }
-  if (storeUnit(stream) == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
+  if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
     return Error{
         ErrorCode::missingFeature,
-        nameOf(stream, name, subject) +
+        placeOf(streams, index, subject) +
             " must be multiples of 4, or storageBuffer8BitAccess and "
             "storageBuffer16BitAccess enabled, and Dermis built with DERMIS_SUBWORD_STORES"};
   }
@@ -64,29 +66,29 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStream
   for (std::size_t index = 0; index < streamCount; ++index) {
     const OutputStream& stream = streams[index];
     if (stream.size == 0) continue;
-    const char* name = streamName(index);
     if (stream.stride < stream.size) {
-      return invalid(nameOf(stream, name, subject) + ": the stride must be at least the size");
+      return invalid(placeOf(streams, index, subject) + ": the stride must be at least the size");
     }
     if (storeUnit(stream) != 4) {
-      if (Result<void> good = checkSmallUnit(stream, name, subject, limits); !good) return good;
+      if (Result<void> good = checkSmallUnit(streams, index, subject, limits); !good) return good;
     }
     const std::uint64_t length =
         std::uint64_t{job.mesh.vertexCount - 1} * stream.stride + stream.size;
     if (stream.offset > sizes[index] || length > sizes[index] - stream.offset) {
-      return invalid(subject.name() + ": its " + name + " end outside their output buffer of " +
+      return invalid(subject.name() + ": its " + streamName(index) + " end outside their output buffer of " +
                      std::to_string(sizes[index]) + " bytes");
     }
   }
   return {};
 }
 
-Result<void> checkTogether(const Batch& batch, const Job& job, const Subject& subject) {
+Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStreams& streams,
+                           const Subject& subject) {
   const auto name = [&] {
     return subject.name() + ": its attributes stand one right behind the other, with a stride of " +
            std::to_string(job.positions.stride);
   };
-  if (!batch.outputs.isOneBuffer && standsTogether(job))
+  if (!batch.outputs.isOneBuffer && standsTogether(streams))
     return invalid(name() + ": all must go to one buffer (OutputSizes::isOneBuffer)");
   if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
     return invalid(name() + ": they must begin at a multiple of 8, not at " +
@@ -144,17 +146,51 @@ bool isBox(const Box& box) {
 
 namespace {
 
+Error tooManyInfluences(const MeshInfo& mesh, const Promises& promises, const Subject& subject) {
+  return invalid(subject.name() + ": a vertex has " + std::to_string(mesh.maxInfluences) +
+                 " influences, Promises::maxInfluences is " +
+                 std::to_string(promises.maxInfluences));
+}
+
+Error breaksPromise(const char* what, const char* promise, const Subject& subject) {
+  return invalid(subject.name() + what + ", despite Promises::" + promise);
+}
+
+}  // namespace
+
+Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
+                               const Subject& subject) {
+  if (promises.maxInfluences != 0 && mesh.maxInfluences > promises.maxInfluences)
+    return tooManyInfluences(mesh, promises, subject);
+  if (promises.noMorphTargets && mesh.morphTargetCount != 0)
+    return breaksPromise(" has morph targets", "noMorphTargets", subject);
+  return {};
+}
+
+Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject) {
+  if (mayScale && promises.noScale) return breaksPromise(" may scale", "noScale", subject);
+  return {};
+}
+
+namespace {
+
+Error noSuchPose(const Batch& batch, std::uint32_t pose, const Subject& subject) {
+  return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
+                 std::to_string(batch.poses.size()));
+}
+
+Error tooFewJoints(const Batch& batch, const Job& job, std::uint32_t pose,
+                   const Subject& subject) {
+  return invalid(subject.name() + ": its mesh needs a pose of " +
+                 std::to_string(job.mesh.requiredJoints) + " joints, pose " +
+                 std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
+}
+
 Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
                          const Subject& subject) {
-  if (pose >= batch.poses.size()) {
-    return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
-                   std::to_string(batch.poses.size()));
-  }
-  if (batch.poses[pose].jointCount < job.mesh.requiredJoints) {
-    return invalid(subject.name() + ": its mesh needs a pose of " +
-                   std::to_string(job.mesh.requiredJoints) + " joints, pose " +
-                   std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
-  }
+  if (pose >= batch.poses.size()) return noSuchPose(batch, pose, subject);
+  if (batch.poses[pose].jointCount < job.mesh.requiredJoints)
+    return tooFewJoints(batch, job, pose, subject);
   return {};
 }
 
@@ -212,8 +248,10 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
     return invalid(subject.name() + " wants tangents, its mesh has none");
   if (Result<void> good = checkMotion(batch, job, subject); !good) return good;
-  if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
-    return good;
+  if (!job.morphs.empty()) {
+    if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
+      return good;
+  }
   if (isSnormPosition(job.positions.format) && !isBox(job.box)) {
     return invalid(subject.name() +
                    ": the box of its snorm16 positions must be finite, each side longer than 0");
@@ -224,7 +262,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
                      std::to_string(limits.maxStorageBuffersPerStage) +
                      " storage buffers a stage there are none"};
   }
-  if (Result<void> good = checkTogether(batch, job, subject); !good) return good;
+  if (Result<void> good = checkTogether(batch, job, streams, subject); !good) return good;
   return checkStreams(batch, job, streams, subject, limits);
 }
 
@@ -272,23 +310,6 @@ Result<void> checkPromises(const Promises& promises) {
   if (influences == 0 || influences == 1 || influences == 2 || influences == 4) return {};
   return invalid("Promises::maxInfluences is 1, 2, 4, or 0 for no promise, not " +
                  std::to_string(influences));
-}
-
-Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
-                               const Subject& subject) {
-  if (promises.maxInfluences != 0 && mesh.maxInfluences > promises.maxInfluences) {
-    return invalid(subject.name() + ": a vertex has " + std::to_string(mesh.maxInfluences) +
-                   " influences, Promises::maxInfluences is " +
-                   std::to_string(promises.maxInfluences));
-  }
-  if (promises.noMorphTargets && mesh.morphTargetCount != 0)
-    return invalid(subject.name() + " has morph targets, despite Promises::noMorphTargets");
-  return {};
-}
-
-Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject) {
-  if (!mayScale || !promises.noScale) return {};
-  return invalid(subject.name() + " may scale, despite Promises::noScale");
 }
 
 Result<void> checkLimits(const DeviceLimits& limits) {

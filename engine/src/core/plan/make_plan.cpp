@@ -121,18 +121,17 @@ std::uint32_t PlanMaker::paletteOf(const Batch& batch, Method method, std::uint3
   return static_cast<std::uint32_t>(batch.poses[palette].matrixOffset / unitBytes);
 }
 
-/// Null if the job needs none. `extras_` has room for those of all jobs, so that none moves.
+/// Null if all its morph targets are inactive and it needs nothing else. `extras_` has room for
+/// those of all jobs, so that none moves.
 const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index) {
   const Job& job = batch.jobs[index];
-  const bool hasPrevious = job.motion == Motion::reskinned;
-  if (job.morphs.empty() && results_[index] == notUsed && !hasPrevious) return nullptr;  // mostly
   InstanceExtras& extras = extras_[extrasUsed_];
   assignActive(job.morphs, extras.morphs);
   extras.result = results_[index];
   extras.hasBox = isSnormPosition(job.positions.format);
   extras.box = job.box;
-  extras.hasPrevious = hasPrevious;
-  if (hasPrevious) {
+  extras.hasPrevious = job.motion == Motion::reskinned;
+  if (extras.hasPrevious) {
     extras.previousPalette = paletteOf(batch, job.method, job.previousPose);
     extras.previousJoints = batch.poses[job.previousPose].jointCount;
     assignActive(job.previousMorphs, extras.previousMorphs);
@@ -162,7 +161,9 @@ void PlanMaker::addJobs(const Batch& batch) {
     const std::uint32_t palette = paletteOf(batch, job.method, job.pose);
     const std::uint32_t flags = (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
                                 (job.settles ? abi::INSTANCE_SETTLES : 0u);
-    const InstanceExtras* extras = extrasOf(batch, index);
+    const bool mayHaveExtras =
+        !job.morphs.empty() || results_[index] != notUsed || job.motion == Motion::reskinned;
+    const InstanceExtras* extras = mayHaveExtras ? extrasOf(batch, index) : nullptr;
     for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
       builder_.add(runs_[run], palette, flags, extras);
   }

@@ -69,13 +69,6 @@ void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& varia
   }
 }
 
-bool standsInPairs(const Job& job) {
-  return job.positions.format == VertexFormat::float32x3 &&
-         job.normals.format == VertexFormat::float32x3 &&
-         job.normals.offset == job.positions.offset + 12 &&
-         job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
-}
-
 namespace {
 
 /// Of positions, normals and tangents together.
@@ -101,22 +94,6 @@ std::uint8_t wideUnit(const OutputStream& stream) {
   return static_cast<std::uint8_t>(stream.size);
 }
 
-}  // namespace
-
-bool standsTogether(const Job& job) {
-  std::uint64_t end = job.positions.offset + formatSize(job.positions.format);
-  bool together =
-      job.normals.format != VertexFormat::none || job.tangents.format != VertexFormat::none;
-  for (const OutputAttribute* attribute : {&job.normals, &job.tangents}) {
-    if (attribute->format == VertexFormat::none) continue;
-    together = together && attribute->offset == end && attribute->stride == job.positions.stride;
-    end += formatSize(attribute->format);
-  }
-  return together;
-}
-
-namespace {
-
 bool storesWholeWords(const Variant& variant) {
   return std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit >= 4; });
 }
@@ -125,11 +102,11 @@ bool storesWholeWords(const Variant& variant) {
 /// something else is stored by less.
 Variant withWideStores(const Job& job, const Variant& variant) {
   Variant wide = variant;
+  const OutputStreams streams = outputStreams(job);
   const std::uint32_t size = recordSize(job);
-  if (isRecord(job) && standsTogether(job) && job.positions.offset % size == 0 &&
+  if (isRecord(job) && standsTogether(streams) && job.positions.offset % size == 0 &&
       job.positions.stride % size == 0)
     wide.recordBytes = static_cast<std::uint8_t>(size);
-  const OutputStreams streams = outputStreams(job);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     const bool isOfRecord = wide.recordBytes != 0 && stream + 1 < streamCount;
     const bool isWhole = isOfRecord || wide.units[stream] == 4;
@@ -169,7 +146,7 @@ LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
               static_cast<std::uint8_t>(job.positions.format),
               static_cast<std::uint8_t>(job.normals.format),
               static_cast<std::uint8_t>(job.tangents.format),
-              static_cast<std::uint8_t>(standsTogether(job)),
+              static_cast<std::uint8_t>(standsTogether(streams)),
               static_cast<std::uint8_t>(standsInPairs(job))} {
   constexpr std::uint64_t stores = 96;  // a multiple of all that one store may write
   for (std::size_t stream = 0; stream < streamCount; ++stream) {

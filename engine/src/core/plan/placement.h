@@ -97,11 +97,24 @@ inline bool storesWidely(const DeviceLimits& limits) {
 
 /// Whether positions and normals of a job are float32x3 that stand together, with a stride that
 /// lets a kernel store them 8 bytes at a time.
-bool standsInPairs(const Job& job);
+inline bool standsInPairs(const Job& job) {
+  return job.positions.format == VertexFormat::float32x3 &&
+         job.normals.format == VertexFormat::float32x3 &&
+         job.normals.offset == job.positions.offset + 12 &&
+         job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
+}
 
 /// Whether what a job has of normals and tangents stands right behind its positions, so that a
 /// kernel may store all of a vertex together.
-bool standsTogether(const Job& job);
+inline bool standsTogether(const OutputStreams& streams) {
+  const auto& [positions, normals, tangents, previous] = streams;
+  const std::uint64_t end = positions.offset + positions.size;
+  const auto standsAt = [&](const OutputStream& stream, std::uint64_t offset) {
+    return stream.size == 0 || (stream.offset == offset && stream.stride == positions.stride);
+  };
+  return normals.size + tangents.size != 0 && standsAt(normals, end) &&
+         standsAt(tangents, end + normals.size);
+}
 
 // -- Windows: output that is larger than a storage buffer range may be is written through several
 // ranges.
