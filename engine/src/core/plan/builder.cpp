@@ -51,15 +51,16 @@ void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>&
 /// Sets `lastVariant_` and `lastKey_`.
 void Groups::chooseVariant(const Job& job, const OutputStreams& streams, bool mayScale,
                            const DeviceLimits& limits, const Tuning& tuning) {
-  const LayoutNeeds layout(job, streams);
   const FormNeeds form = formNeeds(job, mayScale);
-  const bool hasLayout = lastKey_ != 0 && layout == lastLayout_;
+  const bool hasLayout = lastKey_ != 0 && lastLayout_.areThoseOf(job, streams);
   if (hasLayout && form == lastForm_) return;
-  if (!hasLayout) lastVariant_ = layoutVariant(job, limits, tuning);
+  if (!hasLayout) {
+    lastVariant_ = layoutVariant(job, limits, tuning);
+    lastLayout_ = LayoutNeeds(job, streams);
+  }
   chooseForm(form, limits.promises, lastVariant_);
-  lastKey_ = lastVariant_.key();
-  lastLayout_ = layout;
   lastForm_ = form;
+  lastKey_ = lastVariant_.key();
 }
 
 Result<void> Groups::place(const Job& job, const OutputStreams& streams, const Placing& placing,
@@ -409,10 +410,17 @@ void PlanBuilder::writeInstances() {
     const Entry& entry = entries_[number];
     Group& group = planGroups_[groups_->entries_[entry.run->group].planGroup];
     const std::uint32_t place = group.firstInstance + group.filled++;
-    abi::InstanceRecord record = entry.run->record;
-    record.palette = entry.palette;
-    record.flags = entry.flags;
-    record.extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
+    const std::uint32_t extension =
+        entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
+    const abi::InstanceRecord& run = entry.run->record;
+    const abi::InstanceRecord record{.palette = entry.palette,
+                                     .positions = run.positions,
+                                     .normals = run.normals,
+                                     .tangents = run.tangents,
+                                     .previousPositions = run.previousPositions,
+                                     .jointCount = run.jointCount,
+                                     .flags = entry.flags,
+                                     .extension = extension};
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
     if (candidate != candidates_.end() && candidate->entry == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;

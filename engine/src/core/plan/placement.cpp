@@ -139,20 +139,50 @@ FormNeeds formNeeds(const Job& job, bool mayScale) {
   return {job.mesh.maxInfluences, full, mayScale, morphs};
 }
 
+namespace {
+
+/// Of an offset: a multiple of all that one store may write.
+std::uint32_t residueOf(std::uint64_t offset) {
+  return static_cast<std::uint32_t>(offset % 96);
+}
+
+bool normalsFollowIn(const OutputStreams& streams) {
+  return streams[1].offset == streams[0].offset + streams[0].size;
+}
+bool tangentsFollowIn(const OutputStreams& streams) {
+  return streams[2].offset == streams[0].offset + streams[0].size + streams[1].size;
+}
+
+}  // namespace
+
 LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
-    : choices{static_cast<std::uint8_t>(job.method),
-              static_cast<std::uint8_t>(job.motion),
-              static_cast<std::uint8_t>(job.bounds),
-              static_cast<std::uint8_t>(job.positions.format),
-              static_cast<std::uint8_t>(job.normals.format),
-              static_cast<std::uint8_t>(job.tangents.format),
-              static_cast<std::uint8_t>(standsTogether(streams)),
-              static_cast<std::uint8_t>(standsInPairs(job))} {
-  constexpr std::uint64_t stores = 96;  // a multiple of all that one store may write
+    : method(job.method),
+      motion(job.motion),
+      bounds(job.bounds),
+      positions(job.positions.format),
+      normals(job.normals.format),
+      tangents(job.tangents.format),
+      normalsFollow(normalsFollowIn(streams)),
+      tangentsFollow(tangentsFollowIn(streams)) {
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     strides[stream] = streams[stream].stride;
-    residues[stream] = static_cast<std::uint32_t>(streams[stream].offset % stores);
+    residues[stream] = residueOf(streams[stream].offset);
   }
+}
+
+/// As if a LayoutNeeds were made of the job and compared, which would wait for its bytes to be
+/// stored.
+bool LayoutNeeds::areThoseOf(const Job& job, const OutputStreams& streams) const {
+  if (job.method != method || job.motion != motion || job.bounds != bounds ||
+      job.positions.format != positions || job.normals.format != normals ||
+      job.tangents.format != tangents)
+    return false;
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (streams[stream].stride != strides[stream] ||
+        residueOf(streams[stream].offset) != residues[stream])
+      return false;
+  }
+  return normalsFollowIn(streams) == normalsFollow && tangentsFollowIn(streams) == tangentsFollow;
 }
 
 namespace {
@@ -293,12 +323,10 @@ OutputWindows::OutputWindows(const OutputSizes& sizes, const DeviceLimits& limit
 void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
                  const OutputWindows& windows, std::vector<VertexRun>& runs) {
   runs.clear();
-  VertexRun whole;
+  VertexRun& whole = runs.emplace_back();
   whole.vertexEnd = vertexCount;
-  if (!windows.isAnyOversized || chooseWindows(streams, windows, whole)) {
-    runs.push_back(whole);
-    return;
-  }
+  if (!windows.isAnyOversized || chooseWindows(streams, windows, whole)) return;
+  runs.clear();
   std::uint64_t longest = vertexCount;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (streams[stream].size == 0 || !windows.oversized[stream]) continue;

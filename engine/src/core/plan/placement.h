@@ -67,12 +67,15 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
 struct LayoutNeeds {
   LayoutNeeds() = default;
   LayoutNeeds(const Job& job, const OutputStreams& streams);
+  bool areThoseOf(const Job& job, const OutputStreams& streams) const;
 
-  /// Method, motion, bounds, formats, and how attributes stand together.
-  std::array<std::uint8_t, 8> choices{};
+  Method method = Method::dualQuaternion;
+  Motion motion = Motion::none;
+  bool bounds = false;
+  VertexFormat positions = VertexFormat::none, normals = VertexFormat::none,
+               tangents = VertexFormat::none;
+  bool normalsFollow = false, tangentsFollow = false;  ///< each right behind the attribute before
   std::array<std::uint32_t, streamCount> strides{}, residues{};
-
-  friend bool operator==(const LayoutNeeds&, const LayoutNeeds&) = default;
 };
 
 /// What decides on the form of a skin kernel besides the method.
