@@ -410,8 +410,7 @@ void PlanBuilder::writeInstances() {
     const Entry& entry = entries_[number];
     Group& group = planGroups_[groups_->entries_[entry.run->group].planGroup];
     const std::uint32_t place = group.firstInstance + group.filled++;
-    const std::uint32_t extension =
-        entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
+    const std::uint32_t extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
     const abi::InstanceRecord& run = entry.run->record;
     const abi::InstanceRecord record{.palette = entry.palette,
                                      .positions = run.positions,

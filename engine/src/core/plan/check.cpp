@@ -34,14 +34,13 @@ std::string placeOf(const OutputStreams& streams, std::size_t index, const Subje
 }
 
 /// Whether kernels may store 1 or 2 bytes.
-Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index,
-                            const Subject& subject, const DeviceLimits& limits) {
+Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index, const Subject& subject,
+                            const DeviceLimits& limits) {
   const std::uint8_t unit = storeUnit(streams[index]);
   if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
     return Error{ErrorCode::missingFeature,
                  placeOf(streams, index, subject) + " must be multiples of 4 on a device with " +
-                     std::to_string(limits.maxStorageBuffersPerStage) +
-                     " storage buffers a stage"};
+                     std::to_string(limits.maxStorageBuffersPerStage) + " storage buffers a stage"};
   }
   if (unit == 2 && !limits.storage16Bit) {
     return Error{
@@ -75,8 +74,9 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStream
     const std::uint64_t length =
         std::uint64_t{job.mesh.vertexCount - 1} * stream.stride + stream.size;
     if (stream.offset > sizes[index] || length > sizes[index] - stream.offset) {
-      return invalid(subject.name() + ": its " + streamName(index) + " end outside their output buffer of " +
-                     std::to_string(sizes[index]) + " bytes");
+      return invalid(subject.name() + ": its " + streamName(index) +
+                     " end outside their output buffer of " + std::to_string(sizes[index]) +
+                     " bytes");
     }
   }
   return {};
@@ -174,23 +174,17 @@ Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Su
 
 namespace {
 
-Error noSuchPose(const Batch& batch, std::uint32_t pose, const Subject& subject) {
-  return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
-                 std::to_string(batch.poses.size()));
-}
-
-Error tooFewJoints(const Batch& batch, const Job& job, std::uint32_t pose,
-                   const Subject& subject) {
-  return invalid(subject.name() + ": its mesh needs a pose of " +
-                 std::to_string(job.mesh.requiredJoints) + " joints, pose " +
-                 std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
-}
-
 Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
                          const Subject& subject) {
-  if (pose >= batch.poses.size()) return noSuchPose(batch, pose, subject);
-  if (batch.poses[pose].jointCount < job.mesh.requiredJoints)
-    return tooFewJoints(batch, job, pose, subject);
+  if (pose >= batch.poses.size()) {
+    return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
+                   std::to_string(batch.poses.size()));
+  }
+  if (batch.poses[pose].jointCount < job.mesh.requiredJoints) {
+    return invalid(subject.name() + ": its mesh needs a pose of " +
+                   std::to_string(job.mesh.requiredJoints) + " joints, pose " +
+                   std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
+  }
   return {};
 }
 

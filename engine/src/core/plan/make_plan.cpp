@@ -107,8 +107,8 @@ Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits
     firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
     const PoseDescription& pose = batch.poses[job.pose];
     placing.jointCount = pose.jointCount;
-    placing.mayScale = pose.mayScale || (job.motion == Motion::reskinned &&
-                                         batch.poses[job.previousPose].mayScale);
+    placing.mayScale = pose.mayScale ||
+                       (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale);
     if (placed) placed = groups_.place(job, streams, placing, limits, tuning, runs_);
   }
   firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));

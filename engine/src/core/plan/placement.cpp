@@ -306,7 +306,8 @@ bool chooseWindows(const OutputStreams& streams, const OutputWindows& windows, V
 }  // namespace
 
 std::uint64_t outputWindowStep(const DeviceLimits& limits) {
-  const std::uint64_t step = limits.maxStorageBufferRange - windowOverlap(limits.maxStorageBufferRange);
+  const std::uint64_t step =
+      limits.maxStorageBufferRange - windowOverlap(limits.maxStorageBufferRange);
   // A multiple of everything that one store may write.
   return step - step % (3 * std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 32));
 }

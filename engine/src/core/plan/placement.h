@@ -30,11 +30,11 @@ inline OutputStream outputStream(const OutputAttribute& attribute, VertexFormat 
 
 inline OutputStreams outputStreams(const Job& job) {
   const bool hasMotion = job.motion != Motion::none;
-  return {outputStream(job.positions, job.positions.format),
-          outputStream(job.normals, job.normals.format),
-          outputStream(job.tangents, job.tangents.format),
-          outputStream(job.previousPositions,
-                       hasMotion ? job.positions.format : VertexFormat::none)};
+  return {
+      outputStream(job.positions, job.positions.format),
+      outputStream(job.normals, job.normals.format),
+      outputStream(job.tangents, job.tangents.format),
+      outputStream(job.previousPositions, hasMotion ? job.positions.format : VertexFormat::none)};
 }
 
 inline std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes) {
