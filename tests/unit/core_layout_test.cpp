@@ -103,7 +103,14 @@ TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
             job.place(*placeVertices(needs.layout, 7, place * alignment));
             for (OutputAttribute* attribute : {&job.positions, &job.normals})
               attribute->offset -= attribute->format != VertexFormat::none ? outputOffset : 0;
-            for (const Variant& variant : everyVariant(job, limits, {})) {
+            job.mesh.byteSize = 16;
+            job.mesh.vertexCount = 7;
+            job.mesh.hasNormals = true;
+            const PoseDescription pose{1};
+            const Batch batch{{&pose, 1}, {&job, 1}, 16, 48, OutputSizes::oneBuffer(1 << 16)};
+            Plan plan;
+            ASSERT_TRUE(makePlan(batch, limits, {}, plan).ok());
+            for (const Variant& variant : plan.variants()) {
               EXPECT_TRUE(std::ranges::find(foreseen, variant) != foreseen.end())
                   << stride << " bytes, at " << place * alignment << " of " << outputOffset;
             }

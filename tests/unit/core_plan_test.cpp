@@ -270,6 +270,48 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   }
 }
 
+// Jobs that an engine places by hand need no other pipelines than one placed elsewhere.
+TEST(Plan, EveryVariantIsForAnyOffset) {
+  DeviceLimits limits = richLimits();
+  limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
+  const auto keysOf = [](std::span<const Variant> variants) {
+    std::set<std::uint64_t> keys;
+    for (const Variant& variant : variants) keys.insert(variant.key());
+    return keys;
+  };
+  std::size_t wide = 0, narrow = 0;
+  for (std::uint32_t seed = 0; seed < 10; ++seed) {
+    OwnedBatch batch = randomRichBatch(seed, 20, false);
+    batch.outputSize += 96;
+    for (const Job& job : batch.jobs) {
+      const std::vector<Variant> all = everyVariant(job, limits, {});
+      for (std::uint64_t moved = 0; moved < 96; moved += 8) {
+        Job elsewhere = job;
+        for (OutputAttribute* attribute : {&elsewhere.positions, &elsewhere.normals,
+                                           &elsewhere.tangents, &elsewhere.previousPositions})
+          attribute->offset += moved;
+        EXPECT_EQ(keysOf(everyVariant(elsewhere, limits, {})), keysOf(all));
+        Batch alone = batch.batch();
+        alone.jobs = {&elsewhere, 1};
+        Plan plan;
+        ASSERT_TRUE(makePlan(alone, limits, {}, plan).ok());
+        const Variant& variant = plan.variants().back();
+        EXPECT_TRUE(keysOf(all).contains(variant.key()));
+        const std::array<OutputAttribute, streamCount> attributes = attributesOf(elsewhere);
+        const std::uint64_t record = std::max<std::uint64_t>(variant.recordBytes, 1);
+        EXPECT_EQ(attributes[0].offset % record, 0u);
+        for (std::size_t stream = 0; stream < streamCount; ++stream) {
+          if (attributes[stream].format == VertexFormat::none) continue;
+          EXPECT_EQ(attributes[stream].offset % variant.units[stream], 0u);
+        }
+        ++(variant.recordBytes > 8 || variant.units[0] > 4 ? wide : narrow);
+      }
+    }
+  }
+  EXPECT_GT(wide, 100u);
+  EXPECT_GT(narrow, 100u);
+}
+
 // With every promise one pipeline is left.
 TEST(Plan, EachPromiseLeavesPipelinesOut) {
   Job job;

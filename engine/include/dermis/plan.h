@@ -244,8 +244,10 @@ bool hasResults(const Variant& variant);
 /// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for exactly
 /// 4; for 4 with joints that scale; for any number; and for any number with morph targets. Some
 /// methods need fewer. `Promises` reduce the number further. With `scalarBlockLayout` and
-/// `texelBuffers`, what can be stored at once depends on where the output begins: this is for jobs
-/// whose offsets differ from those of this one by multiples of 96 bytes.
+/// `texelBuffers` each skin kernel may come twice: with stores of up to 32 bytes, for jobs of which
+/// each attribute begins at a multiple of what one store writes, and with narrower stores, for all
+/// others. This is for jobs whose offsets differ from those of this one by multiples of 4 bytes,
+/// all of an interleaved vertex alike.
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// What pipelines depend on, known while loading.

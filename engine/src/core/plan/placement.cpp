@@ -87,42 +87,61 @@ bool isRecord(const Job& job) {
          (bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32);
 }
 
-/// Bytes that one store writes where kernels may store up to 16.
-std::uint8_t wideUnit(const OutputStream& stream) {
+/// Bytes from the beginning of a vertex to an attribute that stands in it; 0 for others.
+std::uint64_t placeInVertex(const OutputStreams& streams, std::size_t stream) {
+  const std::uint64_t place = streams[stream].offset - streams[0].offset;
+  return place < streams[0].stride ? place : 0;
+}
+
+/// Bytes that one store writes where kernels may store up to 16, if vertices begin at multiples of
+/// that.
+std::uint8_t wideUnit(const OutputStreams& streams, std::size_t index) {
+  const OutputStream& stream = streams[index];
   const bool isVector = stream.size == 8 || stream.size == 12 || stream.size == 16;
-  if (!isVector || stream.offset % stream.size != 0 || stream.stride % stream.size != 0) return 4;
-  return static_cast<std::uint8_t>(stream.size);
+  const bool fits = isVector && stream.stride % stream.size == 0 &&
+                    placeInVertex(streams, index) % stream.size == 0;
+  return fits ? static_cast<std::uint8_t>(stream.size) : 4;
 }
 
 bool storesWholeWords(const Variant& variant) {
   return std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit >= 4; });
 }
 
-/// Where all of a vertex is stored together, attributes may be smaller than a word. Unchanged where
-/// something else is stored by less.
+/// The widest stores that strides and formats permit. Where all of a vertex is stored together,
+/// attributes may be smaller than a word. Unchanged where something else is stored by less.
 Variant withWideStores(const Job& job, const Variant& variant) {
   Variant wide = variant;
   const OutputStreams streams = outputStreams(job);
   const std::uint32_t size = recordSize(job);
-  if (isRecord(job) && standsTogether(streams) && job.positions.offset % size == 0 &&
-      job.positions.stride % size == 0)
+  if (isRecord(job) && standsTogether(streams) && job.positions.stride % size == 0)
     wide.recordBytes = static_cast<std::uint8_t>(size);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     const bool isOfRecord = wide.recordBytes != 0 && stream + 1 < streamCount;
     const bool isWhole = isOfRecord || wide.units[stream] == 4;
-    if (streams[stream].size != 0 && isWhole) wide.units[stream] = wideUnit(streams[stream]);
+    if (streams[stream].size != 0 && isWhole) wide.units[stream] = wideUnit(streams, stream);
   }
-  wide.wideStores = true;
   return storesWholeWords(wide) ? wide : variant;
 }
 
-}  // namespace
+/// Whether each attribute begins at a multiple of what one store writes.
+bool isAligned(const OutputStreams& streams, const Variant& variant) {
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (variant.units[stream] > 4 && streams[stream].offset % variant.units[stream] != 0)
+      return false;
+  }
+  return variant.recordBytes == 0 || streams[0].offset % variant.recordBytes == 0;
+}
 
-Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning) {
+/// The skin kernel for a job but for its form, if it `isAligned` for wide stores or not.
+Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning,
+                      bool areAligned) {
   Variant variant = outputVariant(job);
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
-  if (storesWidely(limits)) variant = withWideStores(job, variant);
+  if (storesWidely(limits)) {
+    if (areAligned) variant = withWideStores(job, variant);
+    variant.wideStores = storesWholeWords(variant);
+  }
   variant.texels = limits.texelBuffers &&
                    limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
                    storesWholeWords(variant);
@@ -130,6 +149,14 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
   variant.pairs = variant.texels && limits.shaderInt64 && variant.recordBytes == 0 &&
                   (isPlain || variant.wideStores) && standsInPairs(job);
   return variant;
+}
+
+}  // namespace
+
+Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning) {
+  const Variant aligned = layoutVariant(job, limits, tuning, true);
+  return isAligned(outputStreams(job), aligned) ? aligned
+                                                : layoutVariant(job, limits, tuning, false);
 }
 
 FormNeeds formNeeds(const Job& job, bool mayScale) {
@@ -146,11 +173,18 @@ std::uint32_t residueOf(std::uint64_t offset) {
   return static_cast<std::uint32_t>(offset % 96);
 }
 
-bool normalsFollowIn(const OutputStreams& streams) {
-  return streams[1].offset == streams[0].offset + streams[0].size;
-}
-bool tangentsFollowIn(const OutputStreams& streams) {
-  return streams[2].offset == streams[0].offset + streams[0].size + streams[1].size;
+/// How attributes stand to each other: a bit for each right behind the one before, and for each
+/// that stands in the vertex.
+std::uint32_t relationsIn(const OutputStreams& streams) {
+  std::uint64_t end = streams[0].offset;
+  std::uint32_t relations = 0;
+  for (std::size_t stream = 1; stream < streamCount; ++stream) {
+    end += streams[stream - 1].size;
+    const bool follows = streams[stream].offset == end;
+    const bool isInVertex = streams[stream].offset - streams[0].offset < streams[0].stride;
+    relations = relations << 2 | (follows ? 2u : 0u) | (isInVertex ? 1u : 0u);
+  }
+  return relations;
 }
 
 }  // namespace
@@ -162,8 +196,7 @@ LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
       positions(job.positions.format),
       normals(job.normals.format),
       tangents(job.tangents.format),
-      normalsFollow(normalsFollowIn(streams)),
-      tangentsFollow(tangentsFollowIn(streams)) {
+      relations(relationsIn(streams)) {
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     strides[stream] = streams[stream].stride;
     residues[stream] = residueOf(streams[stream].offset);
@@ -182,7 +215,7 @@ bool LayoutNeeds::areThoseOf(const Job& job, const OutputStreams& streams) const
         residueOf(streams[stream].offset) != residues[stream])
       return false;
   }
-  return normalsFollowIn(streams) == normalsFollow && tangentsFollowIn(streams) == tangentsFollow;
+  return relationsIn(streams) == relations;
 }
 
 namespace {
@@ -230,11 +263,10 @@ std::uint64_t Variant::key() const {
   return key;
 }
 
-std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
-                                  const Tuning& tuning) {
-  std::vector<Variant> variants{paletteVariant(tuning)};
-  const Promises& promises = limits.promises;
-  Variant variant = layoutVariant(job, limits, tuning);
+namespace {
+
+/// All forms of a kernel.
+void appendForms(Variant variant, const Promises& promises, std::vector<Variant>& variants) {
   for (const std::uint32_t influences : {1u, 2u, 4u, 5u}) {
     if (promises.maxInfluences != 0 && influences > promises.maxInfluences) continue;
     for (const bool scales : {false, true}) {
@@ -248,6 +280,15 @@ std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
       }
     }
   }
+}
+
+}  // namespace
+
+std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
+                                  const Tuning& tuning) {
+  std::vector<Variant> variants{paletteVariant(tuning)};
+  for (const bool areAligned : {false, true})
+    appendForms(layoutVariant(job, limits, tuning, areAligned), limits.promises, variants);
   return variants;
 }
 
@@ -259,7 +300,9 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
   job.method = needs.method;
   job.bounds = needs.bounds;
   job.place(*places);
-  std::vector<Variant> variants = everyVariant(job, limits, tuning);
+  std::vector<Variant> variants{paletteVariant(tuning)};
+  // `placeVertices` aligns what it places.
+  appendForms(layoutVariant(job, limits, tuning), limits.promises, variants);
   if (needs.culledOnGpu) variants.push_back(visibilityVariant(tuning));
   return variants;
 }

@@ -74,7 +74,7 @@ struct LayoutNeeds {
   bool bounds = false;
   VertexFormat positions = VertexFormat::none, normals = VertexFormat::none,
                tangents = VertexFormat::none;
-  bool normalsFollow = false, tangentsFollow = false;  ///< each right behind the attribute before
+  std::uint32_t relations = 0;
   std::array<std::uint32_t, streamCount> strides{}, residues{};
 };
 
