@@ -4,6 +4,7 @@
 #include "attribute.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

@@ -10,6 +10,7 @@
 #include "attribute.h"
 #include "dermis/text.h"
 #include "dermis/types.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstring>
 
+#include "strict_floating_point.h"
+
 namespace dermis {
 namespace {
 

@@ -13,6 +13,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "cpu/kernels.cpp"
+#include "strict_floating_point.h"
+
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"

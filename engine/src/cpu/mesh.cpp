@@ -10,6 +10,7 @@
 #include "abi.h"
 #include "cpu/mesh_data.h"
 #include "cpu/morph.h"
+#include "strict_floating_point.h"
 
 namespace dermis::cpu {
 namespace {

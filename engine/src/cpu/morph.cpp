@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abi.h"
+#include "strict_floating_point.h"
 
 namespace dermis::cpu {
 

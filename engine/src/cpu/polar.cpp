@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "strict_floating_point.h"
+
 namespace dermis::cpu {
 namespace {
 

@@ -8,6 +8,7 @@
 
 #include "cpu/task.h"
 #include "plan/check.h"
+#include "strict_floating_point.h"
 
 namespace dermis::cpu {
 namespace {

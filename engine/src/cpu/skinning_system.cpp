@@ -16,6 +16,7 @@
 #include "cpu/task.h"
 #include "dermis/cpu/skin.h"
 #include "plan/builder.h"
+#include "strict_floating_point.h"
 
 namespace dermis::cpu {
 

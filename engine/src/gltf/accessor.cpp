@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gltf/failure.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

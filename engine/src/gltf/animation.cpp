@@ -6,6 +6,7 @@
 
 #include "gltf/failure.h"
 #include "gltf/reader.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {
@@ -257,13 +258,15 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
               Tally& tally) {
   Clip clip;
   clip.name = animation.name;
-  std::map<std::pair<std::uint32_t, ChannelPath>, int> samplers;  // by target
+  // By node and path. An enumeration is never hidden, so a map of it would be exported.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> samplers;
   for (std::size_t i = 0; i < animation.channels.size(); ++i) {
     const std::string where = join("animation ", index, " channel ", i);
     auto channel = readChannel(source, animation, animation.channels[i], where, tally);
     if (!channel) continue;
     const int sampler = animation.channels[i].sampler;
-    const auto [first, isNew] = samplers.emplace(std::pair(channel->node, channel->path), sampler);
+    const std::pair target(channel->node, static_cast<std::uint32_t>(channel->path));
+    const auto [first, isNew] = samplers.emplace(target, sampler);
     if (!isNew) {
       const std::string sentence =
           join(where, ": it moves what another channel moves, the ",

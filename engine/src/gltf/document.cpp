@@ -9,6 +9,7 @@
 #include "gltf/failure.h"
 #include "gltf/images.h"
 #include "gltf/notes.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

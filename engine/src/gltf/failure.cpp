@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "strict_floating_point.h"
+
 namespace dermis::gltf {
 
 std::string textOf(double number) {

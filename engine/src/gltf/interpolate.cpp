@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gltf/reader.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

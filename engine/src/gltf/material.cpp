@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "gltf/reader.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

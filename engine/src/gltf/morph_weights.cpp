@@ -4,6 +4,7 @@
 
 #include "dermis/gltf.h"
 #include "gltf/interpolate.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

@@ -1,5 +1,7 @@
 #include "dermis/gltf.h"
 
+#include "strict_floating_point.h"
+
 namespace dermis::gltf {
 namespace {
 

@@ -23,6 +23,7 @@
 #include "gltf/document.h"
 #include "gltf/failure.h"
 #include "gltf/notes.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

@@ -1,5 +1,6 @@
 #include "dermis/gltf.h"
 #include "gltf/interpolate.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

@@ -2,6 +2,7 @@
 
 #include "gltf/failure.h"
 #include "gltf/reader.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "dermis/text.h"
+#include "strict_floating_point.h"
 
 namespace dermis::reference {
 namespace {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "dermis/verify/accuracy.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dermis/verify/accuracy.h"
+#include "strict_floating_point.h"
 
 namespace dermis::reference {
 namespace {

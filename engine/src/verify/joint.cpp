@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "strict_floating_point.h"
 #include "verify/joint.h"
 
 namespace dermis::reference {

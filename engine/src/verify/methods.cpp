@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "strict_floating_point.h"
 #include "verify/joint.h"
 #include "verify/methods.h"
 

@@ -4,6 +4,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "strict_floating_point.h"
+
 namespace dermis::reference {
 namespace {
 

@@ -12,6 +12,7 @@
 
 #include "dermis/text.h"
 #include "dermis/validate.h"
+#include "strict_floating_point.h"
 #include "verify/bind_vertex.h"
 #include "verify/conditioning.h"
 #include "verify/methods.h"

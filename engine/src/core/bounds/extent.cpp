@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "strict_floating_point.h"
+
 namespace dermis::bounds {
 namespace {
 

@@ -14,6 +14,7 @@
 #include "dermis/bounds.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

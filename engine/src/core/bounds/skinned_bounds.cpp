@@ -11,6 +11,7 @@
 
 #include "bounds/extent.h"
 #include "dermis/bounds.h"
+#include "strict_floating_point.h"
 
 namespace dermis::bounds {
 namespace {

@@ -13,6 +13,7 @@
 #include "dermis/bounds.h"
 #include "dermis/types.h"
 #include "pack/check.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

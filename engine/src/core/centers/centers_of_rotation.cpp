@@ -21,6 +21,7 @@
 #include "dermis/validate.h"
 #include "linear_algebra.h"
 #include "pack/influences.h"
+#include "strict_floating_point.h"
 
 namespace dermis::centers {
 namespace {

@@ -3,6 +3,8 @@
 #include <bit>
 #include <utility>
 
+#include "strict_floating_point.h"
+
 namespace dermis::centers {
 namespace {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "attribute.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

@@ -13,6 +13,7 @@
 #include "dermis/validate.h"
 #include "pack/check.h"
 #include "pack/influences.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

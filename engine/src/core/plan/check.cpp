@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "strict_floating_point.h"
+
 namespace dermis {
 namespace {
 

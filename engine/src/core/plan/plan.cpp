@@ -6,6 +6,7 @@
 #include <string>
 
 #include "plan/builder.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {
