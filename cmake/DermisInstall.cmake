@@ -1,4 +1,5 @@
-# cmake --install: the libraries that were built, their headers, the kernels' sources, and the CMake package `dermis`.
+# cmake --install: the libraries that were built, their headers, the kernels' sources, the CMake package `dermis`, and files for
+# pkg-config. The build folder is a CMake package, too, for an engine that uses Dermis from there. cpack makes a Debian package.
 #
 # Each library is a component of the package with an export file of its own, dermis_NAME_targets.cmake, so that a consumer
 # of dermis::core needs none of what the others are linked with.
@@ -22,9 +23,12 @@ foreach(library IN LISTS dermisLibraries)
   list(APPEND dermisComponents ${component})
   install(TARGETS ${library} EXPORT dermis_${component}
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis
+          RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dermis
           INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(EXPORT dermis_${component} NAMESPACE dermis:: DESTINATION ${dermisPackageDir}
           FILE dermis_${component}_targets.cmake COMPONENT dermis)
+  export(EXPORT dermis_${component} NAMESPACE dermis:: FILE ${PROJECT_BINARY_DIR}/dermis_${component}_targets.cmake)
 endforeach()
 
 set(excluded)
@@ -56,10 +60,63 @@ foreach(sample IN ITEMS minimal allocator gpu_poses)
 endforeach()
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/dermisConfig.cmake
+  ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake
   INSTALL_DESTINATION ${dermisPackageDir} PATH_VARS dermisShaderDir NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+set(installedShaderDir ${dermisShaderDir})
+set(dermisShaderDir shaders/include)
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/dermisConfig.cmake INSTALL_PREFIX ${PROJECT_BINARY_DIR}
+  INSTALL_DESTINATION ${PROJECT_BINARY_DIR} PATH_VARS dermisShaderDir NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+set(dermisShaderDir ${installedShaderDir})
 # While the version is 0.x, a minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
   VERSION ${PROJECT_VERSION} COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
+install(FILES ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
         DESTINATION ${dermisPackageDir} COMPONENT dermis)
+
+# pkg-config: dermis is core and vulkan, dermis_NAME each of the libraries but shader_compiler. Paths count from the file.
+file(RELATIVE_PATH pkgConfigPrefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+set(pkgConfigFlags)
+if(BUILD_SHARED_LIBS)
+  set(pkgConfigFlags " -DDERMIS_SHARED")
+endif()
+set(pkgConfigRequires_cpu "dermis_core libhwy")
+set(pkgConfigRequires_verify dermis_core)
+set(pkgConfigRequires_vulkan dermis_core)
+set(pkgConfigRequires_gltf dermis_core)
+set(pkgConfigAll dermis)
+# dermis_pkg_config(NAME REQUIRES LIBRARY): LIBRARY may be empty.
+function(dermis_pkg_config name requires library)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/dermis.pc.in ${PROJECT_BINARY_DIR}/install/${name}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/install/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dermis)
+endfunction()
+set(required)
+foreach(component IN LISTS dermisComponents)
+  if(NOT component STREQUAL "shader_compiler")
+    dermis_pkg_config(dermis_${component} "${pkgConfigRequires_${component}}" "-L\${libdir} -ldermis_${component}")
+  endif()
+  if(component MATCHES "^(core|vulkan)$")
+    string(APPEND required "dermis_${component} ")
+  endif()
+endforeach()
+string(STRIP "${required}" required)
+dermis_pkg_config(dermis "${required}" "")
+
+# cpack -G DEB
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME libdermis-dev)
+set(CPACK_PACKAGE_VENDOR Dermis)
+set(CPACK_PACKAGE_CONTACT "The authors of Dermis <dermis@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS libvulkan-dev)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS libhwy-dev)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "glslang-dev, spirv-tools")
+if(BUILD_SHARED_LIBS)
+  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+endif()
+set(CPACK_COMPONENTS_ALL dermis)
+include(CPack)

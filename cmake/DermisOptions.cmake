@@ -1,12 +1,31 @@
 # Every option of Dermis, with defaults that suit both a checkout of its own and an engine's add_subdirectory.
 
+# The source package has the kernels compiled, in shaders/embedded.
+set(embeddedShaders)
+if(EXISTS ${PROJECT_SOURCE_DIR}/shaders/embedded/dermis_kernels.cpp)
+  set(embeddedShaders ${PROJECT_SOURCE_DIR}/shaders/embedded)
+endif()
+set(DERMIS_EMBEDDED_SHADERS "${embeddedShaders}" CACHE PATH
+    "Folder of dermis_kernels.h and dermis_kernels.cpp, the compiled kernels; empty: the build compiles them, with glslang")
+set(dermisIsDeveloped ${PROJECT_IS_TOP_LEVEL})
+if(DERMIS_EMBEDDED_SHADERS)
+  set(dermisIsDeveloped OFF)
+endif()
+
 option(DERMIS_BUILD_VULKAN "Build dermis::vulkan, the Vulkan compute back end" ON)
+option(DERMIS_BUILD_SHADER_COMPILER "Build dermis::shader_compiler, GLSL to SPIR-V at run time; needs glslang and SPIRV-Tools"
+       ${dermisIsDeveloped})
 option(DERMIS_BUILD_CPU "Build dermis::cpu, skinning by SIMD instructions of the CPU; needs Highway" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy contract" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
-option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${PROJECT_IS_TOP_LEVEL})
+option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${dermisIsDeveloped})
 option(DERMIS_BUILD_VIEWER "Build the viewer, one of the samples; needs SDL 2 and Dear ImGui" ON)
-option(DERMIS_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
+# The tests look inside: a shared library hides what they look at.
+set(dermisTestsByDefault ${dermisIsDeveloped})
+if(BUILD_SHARED_LIBS)
+  set(dermisTestsByDefault OFF)
+endif()
+option(DERMIS_BUILD_TESTS "Build the tests" ${dermisTestsByDefault})
 option(DERMIS_BUILD_FUZZERS "Build the libFuzzer programs; needs Clang, and instruments everything" OFF)
 # An engine that wants a small library leaves these kernels out; what needs them fails with missingFeature.
 option(DERMIS_COMPARISON_METHODS "Kernels of the methods that are there for comparison: iterative, log_matrix, spherical_blend, quaternion_translation" ON)
@@ -24,8 +43,11 @@ endif()
 if(DERMIS_BUILD_SAMPLES AND NOT (DERMIS_COMPARISON_METHODS AND DERMIS_SUBWORD_STORES))
   message(FATAL_ERROR "DERMIS_BUILD_SAMPLES needs DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES")
 endif()
-if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_CPU)
-  message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_CPU")
+if(DERMIS_BUILD_TESTS AND BUILD_SHARED_LIBS)
+  message(FATAL_ERROR "DERMIS_BUILD_TESTS needs static libraries: BUILD_SHARED_LIBS=OFF")
+endif()
+if(DERMIS_BUILD_TESTS AND NOT (DERMIS_BUILD_CPU AND DERMIS_BUILD_SHADER_COMPILER))
+  message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_CPU and DERMIS_BUILD_SHADER_COMPILER")
 endif()
 if(DERMIS_BUILD_TESTS AND NOT DERMIS_BUILD_SAMPLES)
   message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_SAMPLES: the tests use its device and its models")
@@ -38,3 +60,13 @@ endif()
 if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
+
+# An engine may have brought its own glslang and SPIRV-Tools. Debian's packages would define some of these names again.
+set(DERMIS_ENGINE_HAS_GLSLANG OFF)
+foreach(target IN ITEMS glslang glslang::glslang SPIRV glslang::SPIRV OSDependent glslang::OSDependent MachineIndependent
+    GenericCodeGen OGLCompiler glslang-default-resource-limits glslang::glslang-default-resource-limits
+    SPIRV-Tools SPIRV-Tools-static SPIRV-Tools-opt SPIRV-Tools-link)
+  if(TARGET ${target})
+    set(DERMIS_ENGINE_HAS_GLSLANG ON)
+  endif()
+endforeach()

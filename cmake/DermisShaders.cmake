@@ -1,7 +1,68 @@
-# Kernels as part of a library: compiled, checked and embedded by the build.
+# Kernels as part of a library: compiled, checked and embedded by the build, or taken from DERMIS_EMBEDDED_SHADERS.
 
-find_program(DERMIS_SPIRV_VAL spirv-val REQUIRED DOC "SPIRV-Tools' validator, run on each kernel")
-mark_as_advanced(DERMIS_SPIRV_VAL)
+# dermis_shader_tool(COMMAND DEPENDS): the program that compiles and embeds kernels, and what it depends on.
+#
+# It is a target of this build, unless this build cannot run it (it is for another system) or an engine has targets of its own
+# with the names that glslang's and SPIRV-Tools' packages would make. Then the host's compiler builds it, in a build of its own.
+function(dermis_shader_tool command depends)
+  find_program(DERMIS_SPIRV_VAL spirv-val DOC "SPIRV-Tools' validator, run on each kernel")
+  mark_as_advanced(DERMIS_SPIRV_VAL)
+  if(NOT DERMIS_SPIRV_VAL)
+    message(FATAL_ERROR "Compiling kernels needs spirv-val, SPIRV-Tools and glslang (Debian: spirv-tools, glslang-dev). "
+                        "The source package of Dermis needs none of them: its kernels are compiled")
+  endif()
+  get_property(isBuiltApart GLOBAL PROPERTY DERMIS_SHADER_TOOL_IS_BUILT_APART)
+  if(TARGET dermis_embed_shaders OR isBuiltApart)
+    # made before
+  elseif(CMAKE_CROSSCOMPILING OR (NOT DERMIS_BUILD_SHADER_COMPILER AND DERMIS_ENGINE_HAS_GLSLANG))
+    dermis_build_shader_tool_apart()
+  else()
+    add_subdirectory(${PROJECT_SOURCE_DIR}/engine/src/shader_compiler ${PROJECT_BINARY_DIR}/engine/src/shader_compiler)
+  endif()
+  if(TARGET dermis_embed_shaders)
+    set(${command} dermis_embed_shaders PARENT_SCOPE)
+    set(${depends} dermis_embed_shaders PARENT_SCOPE)
+  else()
+    set(${command} ${PROJECT_BINARY_DIR}/shader_tool/engine/src/shader_compiler/dermis_embed_shaders${CMAKE_HOST_EXECUTABLE_SUFFIX} PARENT_SCOPE)
+    set(${depends} dermis_shader_tool PARENT_SCOPE)
+  endif()
+endfunction()
+
+# The target dermis_shader_tool: Dermis' shader compiler, configured again with nothing of this build but its generator.
+function(dermis_build_shader_tool_apart)
+  include(ExternalProject)
+  set(DERMIS_HOST_CXX "" CACHE STRING "The compiler that builds programs for this machine, in a cross build; empty: c++")
+  mark_as_advanced(DERMIS_HOST_CXX)
+  set(hostCompiler ${DERMIS_HOST_CXX})
+  if(NOT hostCompiler AND CMAKE_CROSSCOMPILING)
+    find_program(hostCompiler NAMES c++ g++ clang++ NO_CACHE NO_CMAKE_FIND_ROOT_PATH REQUIRED)
+  elseif(NOT hostCompiler)
+    set(hostCompiler ${CMAKE_CXX_COMPILER})
+  endif()
+  set(folder ${PROJECT_BINARY_DIR}/shader_tool)
+  set(options)
+  foreach(part IN ITEMS VULKAN CPU VERIFY GLTF SAMPLES TESTS)
+    list(APPEND options -DDERMIS_BUILD_${part}=OFF)
+  endforeach()
+  set(program ${folder}/engine/src/shader_compiler/dermis_embed_shaders${CMAKE_HOST_EXECUTABLE_SUFFIX})
+  # What a cross build sets for the other system in the environment is not for this one.
+  set(clean ${CMAKE_COMMAND} -E env --unset=CXX --unset=CXXFLAGS --unset=LDFLAGS --unset=PKG_CONFIG_LIBDIR)
+  ExternalProject_Add(dermis_shader_tool
+    SOURCE_DIR ${PROJECT_SOURCE_DIR}
+    PREFIX ${folder}.state
+    BINARY_DIR ${folder}
+    DOWNLOAD_COMMAND ""
+    CONFIGURE_COMMAND ${clean} ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} -B ${folder} -G ${CMAKE_GENERATOR}
+      -DCMAKE_MAKE_PROGRAM=${CMAKE_MAKE_PROGRAM} -DCMAKE_CXX_COMPILER=${hostCompiler}
+      -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER} -DCMAKE_BUILD_TYPE=Release
+      -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_INSTALL=OFF ${options}
+    BUILD_COMMAND ${clean} ${CMAKE_COMMAND} --build ${folder} --target dermis_embed_shaders
+    INSTALL_COMMAND ""
+    BUILD_ALWAYS ON
+    BUILD_BYPRODUCTS ${program}
+    EXCLUDE_FROM_ALL ON)
+  set_property(GLOBAL PROPERTY DERMIS_SHADER_TOOL_IS_BUILT_APART ON)
+endfunction()
 
 # dermis_embed_shaders(TARGET name
 #                      [NAMESPACE dermis::kernels]       # C++ namespace of the symbols
@@ -9,7 +70,8 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 #                      KERNELS "skin.comp TEXELS" ...    # a file, relative to the current source folder (or .vert,
 #                                                        # .frag), and the macros that this module is compiled with;
 #                                                        # --scalar-block-layout among them: blocks may have that layout,
-#                                                        # which devices must have enabled
+#                                                        # which devices must have enabled; --unless=MACRO: C++ that
+#                                                        # has the macro leaves the module out
 #                      [INCLUDES abi.h ...]              # shown in an IDE; dependencies are found
 #                      [INCLUDE_FOLDERS folder ...]      # where #include is looked up as well
 #                      [DEFINES NAME=VALUE ...])
@@ -22,6 +84,8 @@ mark_as_advanced(DERMIS_SPIRV_VAL)
 # one name), and a look-up by name for all of them:
 #
 #     std::span<const std::uint32_t> dermis::kernels::find(std::string_view name);   // "skin_texels"; empty: there is none
+#
+# Where DERMIS_EMBEDDED_SHADERS has name.h and name.cpp, nothing is compiled: they are taken.
 #
 # A kernel is compiled again when it or a file that it includes changes. It has to pass the compiler,
 # the check that all arithmetic is decorated NoContraction, and spirv-val for Vulkan 1.1.
@@ -38,6 +102,14 @@ function(dermis_embed_shaders)
     set(arg_NAMESPACE dermis::kernels)
   endif()
 
+  if(DERMIS_EMBEDDED_SHADERS AND EXISTS ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.cpp)
+    add_library(${arg_TARGET} OBJECT ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.cpp ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.h)
+    dermis_configure_target(${arg_TARGET})
+    target_include_directories(${arg_TARGET} INTERFACE ${DERMIS_EMBEDDED_SHADERS})
+    return()
+  endif()
+
+  dermis_shader_tool(tool toolDepends)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/${arg_TARGET})
   file(MAKE_DIRECTORY ${folder})
   set(flags)
@@ -65,6 +137,10 @@ function(dermis_embed_shaders)
       list(REMOVE_ITEM macros "--scalar-block-layout")
       set(layoutFlags --scalar-block-layout)
     endif()
+    set(unless ${macros})
+    list(FILTER unless INCLUDE REGEX "^--unless=")
+    list(FILTER macros EXCLUDE REGEX "^--unless=")
+    list(TRANSFORM unless REPLACE "^--unless=" "")
     foreach(macro IN LISTS macros)
       list(APPEND ownFlags --define ${macro})
     endforeach()
@@ -84,25 +160,28 @@ function(dermis_embed_shaders)
     set(unchecked ${folder}/${name}.unchecked.spv)
     add_custom_command(
       OUTPUT ${module}
-      COMMAND dermis_embed_shaders compile --input ${kernel} --output ${unchecked} ${ownFlags} ${layoutFlags}
+      COMMAND ${tool} compile --input ${kernel} --output ${unchecked} ${ownFlags} ${layoutFlags}
               --depfile ${module}.d --depfile-target ${module}
       COMMAND ${DERMIS_SPIRV_VAL} ${layoutFlags} --target-env vulkan1.1 ${unchecked}
       COMMAND ${CMAKE_COMMAND} -E rename ${unchecked} ${module}
-      DEPENDS dermis_embed_shaders ${kernel}
+      DEPENDS ${toolDepends} ${kernel}
       DEPFILE ${module}.d
       COMMENT "Compiling kernel ${name}"
       VERBATIM)
     list(APPEND modules ${module})
     list(APPEND moduleFlags --module ${name}=${module})
+    foreach(macro IN LISTS unless)
+      list(APPEND moduleFlags --unless ${macro})
+    endforeach()
   endforeach()
 
   set(header ${folder}/${arg_TARGET}.h)
   set(source ${folder}/${arg_TARGET}.cpp)
   add_custom_command(
     OUTPUT ${header} ${source}
-    COMMAND dermis_embed_shaders embed --namespace ${arg_NAMESPACE} --header ${header}
+    COMMAND ${tool} embed --namespace ${arg_NAMESPACE} --header ${header}
             --source ${source} ${moduleFlags}
-    DEPENDS dermis_embed_shaders ${modules}
+    DEPENDS ${toolDepends} ${modules}
     COMMENT "Embedding the kernels of ${arg_TARGET}"
     VERBATIM)
 

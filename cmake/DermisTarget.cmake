@@ -1,15 +1,38 @@
 # How a target of Dermis is compiled. What is set here stays inside: nothing reaches a target that links Dermis.
 
-add_library(dermis_build_flags INTERFACE)
-target_compile_options(dermis_build_flags INTERFACE
+# GCC and Clang, MinGW among them.
+set(dermisGnuFlags
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Wold-style-cast
   -Wimplicit-fallthrough -Wundef
   # One rounding an operation, on every machine: the reference and the packing must not depend on fused operations.
   -ffp-contract=off
-  # Position-independent code may be inlined too: nobody replaces a function of Dermis while a program is loaded.
-  -fno-semantic-interposition)
+  # NaN and infinities are looked for, and signs of zeros matter, whatever flags an engine compiles with. GCC keeps
+  # what was set by an option of its own when -fno-fast-math comes, so each is named.
+  -fno-fast-math -fno-finite-math-only -fsigned-zeros -fno-associative-math -fno-reciprocal-math -fno-unsafe-math-optimizations)
+# cl. Exceptions stay on: its standard library is not meant to be without.
+set(dermisMsvcFlags /W4 /permissive- /utf-8 /Zc:__cplusplus /Zc:preprocessor /fp:precise)
+# clang-cl ignores Clang's options without "/clang:", and has no /Zc:preprocessor.
+set(dermisClangClFlags /W4 /permissive- /utf-8 /Zc:__cplusplus /fp:precise /clang:-ffp-contract=off /clang:-fno-fast-math
+  /clang:-fno-finite-math-only /clang:-fsigned-zeros /clang:-fno-associative-math /clang:-fno-reciprocal-math)
+
+# Their flags, as properties of a target: not linked, so that what is exported names only targets that are.
+add_library(dermis_build_flags INTERFACE)
+if(NOT MSVC)
+  target_compile_options(dermis_build_flags INTERFACE ${dermisGnuFlags})
+  if(NOT WIN32 AND NOT APPLE)
+    # Position-independent code may be inlined too: nobody replaces a function of Dermis while a program is loaded.
+    target_compile_options(dermis_build_flags INTERFACE -fno-semantic-interposition)
+  endif()
+elseif(CMAKE_CXX_COMPILER_ID STREQUAL "MSVC")
+  target_compile_options(dermis_build_flags INTERFACE ${dermisMsvcFlags})
+else()
+  target_compile_options(dermis_build_flags INTERFACE ${dermisClangClFlags})
+endif()
+if(MSVC)
+  target_compile_definitions(dermis_build_flags INTERFACE _CRT_SECURE_NO_WARNINGS)
+endif()
 if(DERMIS_WARNINGS_AS_ERRORS)
-  target_compile_options(dermis_build_flags INTERFACE -Werror)
+  target_compile_options(dermis_build_flags INTERFACE $<IF:$<BOOL:${MSVC}>,/WX,-Werror>)
 endif()
 if(DERMIS_BUILD_FUZZERS)
   target_compile_options(dermis_build_flags INTERFACE -fsanitize=fuzzer-no-link)
@@ -25,27 +48,57 @@ elseif(DERMIS_SANITIZE)
   message(FATAL_ERROR "DERMIS_SANITIZE is '${DERMIS_SANITIZE}': it may be address, thread or empty")
 endif()
 
+# dermis_use_privately(TARGET USED): compiles TARGET with what USED hands on, and lets nobody know: for libraries that are
+# headers only.
+function(dermis_use_privately target used)
+  target_compile_options(${target} PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_COMPILE_OPTIONS>)
+  target_compile_definitions(${target} PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_COMPILE_DEFINITIONS>)
+  target_include_directories(${target} SYSTEM PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_INCLUDE_DIRECTORIES>)
+endfunction()
+
 # dermis_configure_target(TARGET): the language level and the private flags of every target.
 function(dermis_configure_target target)
   target_compile_features(${target} PUBLIC cxx_std_20)
-  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
-  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:dermis_build_flags>)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
+    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  dermis_use_privately(${target} dermis_build_flags)
+  target_link_options(${target} PRIVATE $<TARGET_PROPERTY:dermis_build_flags,INTERFACE_LINK_OPTIONS>)
 endfunction()
 
-# dermis_add_library(NAME SOURCES...): a static library dermis_NAME with the alias dermis::NAME, public headers from
-# engine/include, installed with the package.
+# dermis_add_library(NAME SOURCES...): a library dermis_NAME with the alias dermis::NAME, public headers from
+# engine/include, installed with the package: static, or shared with BUILD_SHARED_LIBS.
 function(dermis_add_library name)
-  add_library(dermis_${name} STATIC ${ARGN})
+  set(type STATIC)
+  if(BUILD_SHARED_LIBS)
+    set(type SHARED)
+  endif()
+  add_library(dermis_${name} ${type} ${ARGN})
   add_library(dermis::${name} ALIAS dermis_${name})
   set_target_properties(dermis_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(dermis_${name}
     PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/engine/include>
     PRIVATE ${PROJECT_SOURCE_DIR}/engine/src)
   dermis_configure_target(dermis_${name})
-  set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})
+  string(TOUPPER ${name} upperName)
+  if(BUILD_SHARED_LIBS)
+    target_compile_definitions(dermis_${name} PUBLIC DERMIS_SHARED)
+    # While the version is 0.x, a minor version may change the interface. Libraries find each other where they lie.
+    set(soversion ${PROJECT_VERSION_MAJOR})
+    if(soversion EQUAL 0)
+      set(soversion 0.${PROJECT_VERSION_MINOR})
+    endif()
+    set_target_properties(dermis_${name} PROPERTIES DEFINE_SYMBOL DERMIS_BUILDS_${upperName}
+      VERSION ${PROJECT_VERSION} SOVERSION ${soversion} INSTALL_RPATH "$<IF:$<BOOL:${APPLE}>,@loader_path,$ORIGIN>")
+    if(NOT WIN32 AND NOT APPLE AND NOT DERMIS_SANITIZE)
+      target_link_options(dermis_${name} PRIVATE -Wl,--no-undefined)
+    endif()
+  endif()
+  if(name STREQUAL "core" OR DERMIS_BUILD_${upperName})  # and not only as a tool of the build
+    set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})
+  endif()
 endfunction()
 
 # Code on the engine's side of the interface: no exception leaves it, so none is compiled in.
 function(dermis_without_exceptions target)
-  target_compile_options(${target} PRIVATE -fno-exceptions -fno-rtti)
+  target_compile_options(${target} PRIVATE $<IF:$<BOOL:${MSVC}>,/GR-,-fno-exceptions;-fno-rtti>)
 endfunction()

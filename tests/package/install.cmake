@@ -13,6 +13,9 @@ foreach(component IN ITEMS core cpu gltf shader_compiler verify vulkan)
   list(APPEND expected ${libFolder}/libdermis_${component}.a
        ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
 endforeach()
+foreach(name IN ITEMS dermis dermis_core dermis_cpu dermis_gltf dermis_verify dermis_vulkan)
+  list(APPEND expected ${libFolder}/pkgconfig/${name}.pc)
+endforeach()
 list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/cmake/dermis/dermisConfigVersion.cmake
      ${dataFolder}/doc/dermis/LICENSE ${dataFolder}/doc/dermis/README.md ${dataFolder}/doc/dermis/CHANGELOG.md
      ${dataFolder}/doc/dermis/engine/README.md)
@@ -40,8 +43,8 @@ if(NOT installed STREQUAL expected)
   wrong("missing: ${missing}\nnot expected: ${installed}")
 endif()
 
-say("Look for paths of this machine in the package's CMake files")
-file(GLOB_RECURSE files "${prefix}/*.cmake")
+say("Look for paths of this machine in what CMake and pkg-config read")
+file(GLOB_RECURSE files "${prefix}/*.cmake" "${prefix}/*.pc")
 foreach(file IN LISTS files)
   file(READ "${file}" text)
   foreach(path IN ITEMS "${sourceFolder}" "${buildFolder}" "${staging}")

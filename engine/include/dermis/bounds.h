@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/result.h"
@@ -67,10 +68,10 @@ struct JointBounds {
   std::uint32_t requiredJoints = 0;  ///< minimum joints of a pose: the largest index + 1
 
   /// To be stored: little-endian words with a version and a checksum.
-  std::vector<std::byte> bytes() const;
+  DERMIS_CORE_API std::vector<std::byte> bytes() const;
   /// Reads them back, checked so that `skinnedBounds` is safe with the result. Fails with
   /// `invalidData` (damaged), or `unsupportedVersion`.
-  static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
+  DERMIS_CORE_API static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
 };
 
 /// The weights that a morph target is given, whatever the pose.
@@ -86,8 +87,8 @@ struct MorphRange {
 /// would refuse the mesh, or a morph target does not fit it, and with `invalidArgument` for a
 /// `jointCount` of 0 or above `maxPoseJoints`, or for ranges that are not finite, not in order
 /// or not one a target.
-Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
-                                std::span<const MorphRange> morphRanges = {});
+DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
+                                                std::span<const MorphRange> morphRanges = {});
 
 /// A box that holds every position that a kernel or the reference makes of the mesh in this pose,
 /// rounding included, in the pose's space. `pose` is what the mesh is skinned with: joint
@@ -103,6 +104,7 @@ Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
 ///
 /// O(joints + pairs + trios); allocates only above 128 joints that move vertices, and needs
 /// 32 KiB of stack. Any thread.
-Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose, Method method);
+DERMIS_CORE_API Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose,
+                                  Method method);
 
 }  // namespace dermis

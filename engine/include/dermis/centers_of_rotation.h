@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 
@@ -42,7 +43,7 @@ namespace dermis {
 ///
 /// Owns what it needs: the memory of mesh and triangles may be released. Movable, not copyable. A
 /// moved-from solver may only be destroyed or assigned to.
-class CenterOfRotationSolver {
+class DERMIS_CORE_API CenterOfRotationSolver {
  public:
   /// Sorts the triangles by the pairs of joints that move them: O(triangles × joints²), with the
   /// joints of one triangle. Takes 20 bytes of memory for each pair of each triangle, which has 6

@@ -19,6 +19,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/memory_budget.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
@@ -128,7 +129,7 @@ struct Primitive {
 
 /// A primitive as `validate`, `pack` and `reference::skin` take it, with all its sets and morph
 /// targets. It points into the primitive, which must outlive it, neither moved nor changed.
-class PrimitiveView {
+class DERMIS_GLTF_API PrimitiveView {
  public:
   explicit PrimitiveView(const Primitive& primitive);
   explicit PrimitiveView(const Primitive&& primitive) = delete;
@@ -227,15 +228,18 @@ struct LoadOptions {
 /// - `unsupportedFeature`: a required extension that is not known (mesh compression, for one), or
 ///   glTF 1.0;
 /// - `limitExceeded`: it asks for more memory than a file of its size justifies (memory_budget.h).
-Result<Model> load(const std::filesystem::path& path, const LoadOptions& options = {});
+DERMIS_GLTF_API Result<Model> load(const std::filesystem::path& path,
+                                   const LoadOptions& options = {});
 
 /// The same from memory; `folder` is where the file's relative URIs are looked up, empty for
 /// nowhere. Nothing refers to `bytes` afterwards.
-Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder,
-                             const LoadOptions& options = {});
+DERMIS_GLTF_API Result<Model> loadFromMemory(std::span<const std::byte> bytes,
+                                             const std::filesystem::path& folder,
+                                             const LoadOptions& options = {});
 
 /// The clip of that number or, where there is none of that number, the first of that name.
-std::optional<std::uint32_t> findClip(const Model& model, std::string_view numberOrName);
+DERMIS_GLTF_API std::optional<std::uint32_t> findClip(const Model& model,
+                                                      std::string_view numberOrName);
 
 /// Row-major 3×4 in double precision: `[row][column]`, column 3 the translation.
 using GlobalTransform = std::array<std::array<double, 4>, 3>;
@@ -245,24 +249,25 @@ using GlobalTransform = std::array<std::array<double, 4>, 3>;
 /// between keys as glTF 2.0, appendix C, says: slerp along the shorter arc for LINEAR rotations,
 /// tangents scaled by the key distance for CUBICSPLINE. Rotations are normalised after
 /// interpolation. A time that is not a number counts as one before the first key.
-std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time);
+DERMIS_GLTF_API std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
+                                                         double time);
 
 /// The pose of one skin: joint global transform × inverse bind matrix for each joint, computed
 /// in double precision and rounded once to float32. The skinned node's own transform has no effect
 /// (glTF 2.0, 3.7.3.3). `globals` is what `nodeGlobals` returned: work that several skins share.
 /// Empty where the skin does not exist or `globals` is too short.
-std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
-                              std::span<const GlobalTransform> globals);
+DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
+                                              std::span<const GlobalTransform> globals);
 
 /// Both in one, for a model with one skin.
-std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin, std::uint32_t clip,
-                              double time);
+DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
+                                              std::uint32_t clip, double time);
 
 /// The weight of every morph target of a node's mesh at a time in seconds: the clip's, sampled as
 /// in `nodeGlobals`, where it moves the weights of that node; otherwise the node's own, otherwise
 /// its mesh's, otherwise zeros. `clip` is as for `nodeGlobals`. As many as the mesh has targets;
 /// empty where it has none, where the node has no mesh, and where there is no such node.
-std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uint32_t clip,
-                                double time);
+DERMIS_GLTF_API std::vector<float> morphWeights(const Model& model, std::uint32_t node,
+                                                std::uint32_t clip, double time);
 
 }  // namespace dermis::gltf

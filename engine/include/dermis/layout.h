@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "dermis/export.h"
 #include "dermis/result.h"
 #include "dermis/vertex_format.h"
 
@@ -75,7 +76,8 @@ struct VertexPlaces {
 /// Places vertices from byte `offset` of a buffer on. Fails with `invalidArgument` if positions are
 /// not `isPositionFormat`, if the stride is too small or the layout is planar and has one, and if
 /// the offset is not a multiple of `VertexPlaces::alignment`.
-Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t vertexCount,
-                                   std::uint64_t offset = 0);
+DERMIS_CORE_API Result<VertexPlaces> placeVertices(const VertexLayout& layout,
+                                                   std::uint32_t vertexCount,
+                                                   std::uint64_t offset = 0);
 
 }  // namespace dermis

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string_view>
 
+#include "dermis/export.h"
+
 namespace dermis {
 
 /// All take the same mesh and pose. Those that blend rotations do it in two phases where joints
@@ -58,9 +60,9 @@ constexpr bool isForComparison(Method method) {
 /// The method's name on the command line and in reports: "linear", "dual_quaternion",
 /// "dual_quaternion_iterative", "log_matrix", "spherical_blend", "quaternion_translation",
 /// "blended", "center_of_rotation", "bulge_controlled".
-std::string_view methodName(Method method);
+DERMIS_CORE_API std::string_view methodName(Method method);
 
 /// The method of that name, or nothing.
-std::optional<Method> methodFromName(std::string_view name);
+DERMIS_CORE_API std::optional<Method> methodFromName(std::string_view name);
 
 }  // namespace dermis

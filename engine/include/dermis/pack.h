@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 
@@ -34,7 +35,7 @@ struct MeshInfo {
 /// the mesh.
 ///
 /// The same bytes go into the mesh buffer on the GPU, at a multiple of `packedMeshAlignment`.
-class PackedMesh {
+class DERMIS_CORE_API PackedMesh {
  public:
   /// A packed mesh from stored bytes, which are copied. O(bytes): checks the length, the version,
   /// the checksum and every index, so that no stored blob can make a kernel read outside its mesh
@@ -48,7 +49,7 @@ class PackedMesh {
   std::uint32_t vertexCount() const { return info().vertexCount; }
 
  private:
-  friend Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
+  friend DERMIS_CORE_API Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
   PackedMesh() = default;
   std::vector<std::uint32_t> words_;
 };
@@ -62,6 +63,6 @@ class PackedMesh {
 /// O(vertices × influences + displacements).
 /// Fails with `invalidMesh` where `validate` reports a problem that is `refusedByPack`, with that
 /// finding's sentence, and with `limitExceeded` above 2^32 words.
-Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
+DERMIS_CORE_API Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount);
 
 }  // namespace dermis

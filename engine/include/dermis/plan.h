@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
@@ -141,7 +142,7 @@ struct Job {
   bool bounds = false;
 
   /// Sets where the attributes are written, and `motion`.
-  void place(const VertexPlaces& places);
+  DERMIS_CORE_API void place(const VertexPlaces& places);
 };
 
 /// What the skin kernel writes to the results buffer for a job with `bounds` or snorm16 positions.
@@ -157,7 +158,7 @@ struct InstanceResult {
 
   /// The exact box of the skinned float32 positions, before conversion to their format, without
   /// NaNs. Nothing if all are NaN, if `Job::bounds` is false, or if the job settles.
-  std::optional<Box> box() const;
+  DERMIS_CORE_API std::optional<Box> box() const;
 };
 static_assert(sizeof(InstanceResult) == 32);
 
@@ -233,11 +234,11 @@ struct Variant {
 
   friend bool operator==(const Variant&, const Variant&) = default;
   /// A number that differs between any two variants.
-  std::uint64_t key() const;
+  DERMIS_CORE_API std::uint64_t key() const;
 };
 
 /// Whether the kernel writes `InstanceResult`: for bounds, and positions in snorm16.
-bool hasResults(const Variant& variant);
+DERMIS_CORE_API bool hasResults(const Variant& variant);
 
 /// All variants that jobs with the method, outputs, motion and bounds of this job can need,
 /// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
@@ -248,7 +249,8 @@ bool hasResults(const Variant& variant);
 /// each attribute begins at a multiple of what one store writes, and with narrower stores, for all
 /// others. This is for jobs whose offsets differ from those of this one by multiples of 4 bytes,
 /// all of an interleaved vertex alike.
-std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
+DERMIS_CORE_API std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
+                                                  const Tuning& tuning);
 
 /// What pipelines depend on, known while loading.
 struct PipelineNeeds {
@@ -261,8 +263,9 @@ struct PipelineNeeds {
 /// All variants for instances with these needs, wherever `placeVertices` places them; with
 /// `culledOnGpu`, the visibility kernel too.
 /// Fails as `placeVertices`.
-Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
-                                          const Tuning& tuning);
+DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs,
+                                                          const DeviceLimits& limits,
+                                                          const Tuning& tuning);
 
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
@@ -364,7 +367,7 @@ using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, Barrier
 /// Bytes from the beginning of one output window to the next. A window is at most
 /// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
 /// instance, lies in one window.
-std::uint64_t outputWindowStep(const DeviceLimits& limits);
+DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
 /// What the palette kernel writes about one pose to the palettes buffer; the engine may read it.
 struct PoseStatus {
@@ -379,7 +382,7 @@ struct PlanData;
 /// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. Not
 /// thread-safe while `makePlan` or `Scene::plan` fills it, immutable afterwards. A plan that was
 /// moved from may only be filled, assigned to or destroyed.
-class Plan {
+class DERMIS_CORE_API Plan {
  public:
   Plan();
   ~Plan();
@@ -434,12 +437,12 @@ class Plan {
 /// meshes, poses, palettes or tables are larger than the device's storage buffer range, a dispatch
 /// has too many workgroups, or the device has too few storage buffers for the job. The plan is then
 /// empty.
-Result<void> makePlan(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
-                      Plan& out);
+DERMIS_CORE_API Result<void> makePlan(const Batch& batch, const DeviceLimits& limits,
+                                      const Tuning& tuning, Plan& out);
 
 /// Writes the tables that the kernels read, `buffer(BufferRole::tables).size` bytes. `bytes` may be
 /// mapped memory: it is written once, front to back, and never read. Fails with `invalidArgument`
 /// if `bytes` is too small.
-Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes);
+DERMIS_CORE_API Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes);
 
 }  // namespace dermis

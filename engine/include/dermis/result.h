@@ -9,6 +9,8 @@
 #include <utility>
 #include <variant>
 
+#include "dermis/export.h"
+
 namespace dermis {
 
 /// What kind of thing went wrong. The sentence in `Error::message` says which thing it was.
@@ -28,7 +30,7 @@ enum class ErrorCode : std::uint8_t {
 };
 
 /// The name of a code, as written above: for logs.
-std::string_view errorCodeName(ErrorCode code);
+DERMIS_CORE_API std::string_view errorCodeName(ErrorCode code);
 
 struct Error {
   ErrorCode code = ErrorCode::invalidArgument;

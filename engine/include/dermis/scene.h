@@ -22,6 +22,7 @@
 #include <optional>
 #include <span>
 
+#include "dermis/export.h"
 #include "dermis/handle.h"
 #include "dermis/layout.h"
 #include "dermis/method.h"
@@ -224,7 +225,7 @@ struct PosePlace {
 class SceneBooks;
 
 /// Not thread-safe.
-class Scene {
+class DERMIS_CORE_API Scene {
  public:
   /// Fails with `invalidArgument` if a field makes no sense, and with `limitExceeded` if an initial
   /// capacity needs a buffer larger than a storage buffer range.

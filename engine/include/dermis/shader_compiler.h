@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/result.h"
 
 namespace dermis {
@@ -49,7 +50,7 @@ struct ShaderSource {
 ///
 /// Not thread-safe: one object a thread. Objects share glslang's tables, which the first `compile`
 /// makes and the last object's destructor frees; a cache hit does not need them.
-class ShaderCompiler {
+class DERMIS_SHADER_COMPILER_API ShaderCompiler {
  public:
   explicit ShaderCompiler(ShaderCompilerOptions options = {}) : options_(std::move(options)) {}
 

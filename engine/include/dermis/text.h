@@ -6,17 +6,19 @@
 #include <string>
 #include <string_view>
 
+#include "dermis/export.h"
+
 namespace dermis {
 
 /// The text on one line, nothing in it that a terminal obeys: controls (C0, DEL, C1), line and
 /// paragraph separators and the marks of bidirectional text become `\n`, `\u001b`, `\u202e` and so
 /// on; bytes that are not UTF-8 become `\xff`. Nothing else changes.
-std::string oneLine(std::string_view text);
+DERMIS_CORE_API std::string oneLine(std::string_view text);
 
 /// The first characters of a name on one line, "..." behind them if there are more.
-std::string shortName(std::string_view name, std::size_t mostCharacters = 80);
+DERMIS_CORE_API std::string shortName(std::string_view name, std::size_t mostCharacters = 80);
 
 /// `shortName` in single quotation marks.
-std::string inQuotes(std::string_view name);
+DERMIS_CORE_API std::string inQuotes(std::string_view name);
 
 }  // namespace dermis

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 
@@ -49,29 +50,29 @@ struct MeshReport {
   std::vector<MeshFinding> findings;  ///< At most one a kind, in the order of `MeshProblem`.
 
   /// Whether `pack` takes the mesh.
-  bool packable() const;
+  DERMIS_CORE_API bool packable() const;
   /// Whether the views make sense, so that `repair` can mend what is wrong.
-  bool repairable() const;
-  const MeshFinding* find(MeshProblem problem) const;
+  DERMIS_CORE_API bool repairable() const;
+  DERMIS_CORE_API const MeshFinding* find(MeshProblem problem) const;
   /// What `pack` says: fails with `invalidMesh` unless `packable()`. The sentence is that of the
   /// first finding that is refused, and names `repair` if that can mend the mesh.
-  Result<void> accepted() const;
+  DERMIS_CORE_API Result<void> accepted() const;
 };
 
 /// True for the kinds that make `pack` refuse the mesh.
-bool refusedByPack(MeshProblem problem);
+DERMIS_CORE_API bool refusedByPack(MeshProblem problem);
 
 /// A short name for a kind, as in reports: "joint out of range".
-const char* meshProblemName(MeshProblem problem);
+DERMIS_CORE_API const char* meshProblemName(MeshProblem problem);
 
 /// Looks at every vertex: O(vertices × influences + displacements). `jointCount` is the number of
 /// joints of the poses that the mesh will be skinned with, at most `maxPoseJoints`. Sums of
 /// weights count as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of
 /// the official glTF validator), or when the stored integers sum to 255 or 65535 exactly.
-MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
+DERMIS_CORE_API MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
 /// A copy of a mesh with its bad values mended. Owns its memory; movable, not copyable.
-class RepairedMesh {
+class DERMIS_CORE_API RepairedMesh {
  public:
   RepairedMesh(RepairedMesh&&) = default;
   RepairedMesh& operator=(RepairedMesh&&) = default;
@@ -87,7 +88,8 @@ class RepairedMesh {
 
  private:
   RepairedMesh() = default;
-  friend Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
+  friend DERMIS_CORE_API Result<RepairedMesh> repair(const MeshView& mesh,
+                                                     std::uint32_t jointCount);
 
   std::string name_;
   std::uint32_t vertexCount_ = 0;
@@ -109,6 +111,6 @@ class RepairedMesh {
 /// outside the pose, are dropped (weights are normalised by `pack`); a position, normal,
 /// tangent, displacement or centre of rotation that is not finite becomes 0; dual-quaternion
 /// weights and bulge strengths are clamped. Fails with `invalidMesh` where the views make no sense.
-Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
+DERMIS_CORE_API Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
 
 }  // namespace dermis

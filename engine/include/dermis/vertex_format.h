@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "dermis/export.h"
 #include "dermis/types.h"
 
 namespace dermis {
@@ -72,10 +73,10 @@ constexpr std::uint32_t formatSize(VertexFormat format) {
 
 /// Bytes of one component: vertex fetch requires attributes to begin at multiples of them. 1 for
 /// `none`.
-std::uint32_t formatAlignment(VertexFormat format);
+DERMIS_CORE_API std::uint32_t formatAlignment(VertexFormat format);
 
 /// The format's name in reports: "snorm16x4".
-std::string_view formatName(VertexFormat format);
+DERMIS_CORE_API std::string_view formatName(VertexFormat format);
 
 /// Whether positions in this format are relative to a box.
 constexpr bool isSnormPosition(VertexFormat format) {
@@ -103,9 +104,10 @@ constexpr bool isTangentFormat(VertexFormat format) {
 /// `box` matters for snorm16 only; along an axis where it has no extent every value stands for its
 /// one coordinate. `data` needs no alignment, and holds `formatSize` bytes. A format that the
 /// attribute may not have gives zeros.
-std::array<double, 3> decodePosition(VertexFormat format, const void* data, const Box& box);
-std::array<double, 3> decodeNormal(VertexFormat format, const void* data);
+DERMIS_CORE_API std::array<double, 3> decodePosition(VertexFormat format, const void* data,
+                                                     const Box& box);
+DERMIS_CORE_API std::array<double, 3> decodeNormal(VertexFormat format, const void* data);
 /// x y z and the handedness.
-std::array<double, 4> decodeTangent(VertexFormat format, const void* data);
+DERMIS_CORE_API std::array<double, 4> decodeTangent(VertexFormat format, const void* data);
 
 }  // namespace dermis

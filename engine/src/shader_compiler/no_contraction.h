@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/result.h"
 
 namespace dermis {
@@ -29,10 +30,12 @@ struct ContractableInstruction {
 ///
 /// Decorations through OpGroupDecorate, which no GLSL compiler writes, are not seen. Fails with
 /// `invalidData` if the words are no SPIR-V module in the machine's byte order.
-Result<std::vector<ContractableInstruction>> findContractable(std::span<const std::uint32_t> words);
+DERMIS_SHADER_COMPILER_API Result<std::vector<ContractableInstruction>> findContractable(
+    std::span<const std::uint32_t> words);
 
 /// "FILE:LINE: OpFMul in 'blend(vf4;' is not decorated NoContraction", with what is known of it;
 /// `name` is the source's.
-std::string describe(const ContractableInstruction& instruction, const std::string& name);
+DERMIS_SHADER_COMPILER_API std::string describe(const ContractableInstruction& instruction,
+                                                const std::string& name);
 
 }  // namespace dermis

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "dermis/export.h"
 #include "dermis/pack.h"
 #include "dermis/result.h"
 
@@ -15,7 +16,7 @@ struct MeshData;
 /// owns its memory: about 80 bytes a vertex with normals, 32 more with tangents, and 8 for each
 /// influence of the vertex of eight neighbours that has most; with morph targets a copy of the
 /// packed mesh too. One that was moved from may only be assigned to or destroyed.
-class Mesh {
+class DERMIS_CPU_API Mesh {
  public:
   /// O(vertices × influences). Fails with `limitExceeded` if a vertex has more than 1,000
   /// influences.

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "dermis/cpu/mesh.h"
+#include "dermis/export.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
@@ -85,24 +86,25 @@ struct Job {
 ///
 /// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
 /// then.
-Result<void> skin(const Job& job);
+DERMIS_CPU_API Result<void> skin(const Job& job);
 
 /// Where some vertices of an instance are, without skinning the others: for picking, and for things
 /// that hang on a vertex. `positions` gets three floats for each of `vertices`, which may stand in
 /// any order: of finite poses the same values that `skin` writes as float32x3. O(vertices ×
 /// influences); it allocates. Of the instance, pose, `mayScale` and morph targets count. Fails as
 /// `skin`, and with `invalidArgument` for a vertex that the mesh does not have.
-Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
-                          std::span<const std::uint32_t> vertices, std::span<float> positions);
+DERMIS_CPU_API Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
+                                         std::span<const std::uint32_t> vertices,
+                                         std::span<float> positions);
 
 /// Adds to the result of some vertices of an instance that of others.
-void addResult(InstanceResult& result, const InstanceResult& other);
+DERMIS_CPU_API void addResult(InstanceResult& result, const InstanceResult& other);
 
 /// The names of the instruction sets that `skin` was compiled for and that this processor has, the
 /// best one first: "AVX3", "AVX2", "SSE4", "EMU128" (none), "NEON".
-std::vector<std::string_view> targetNames();
+DERMIS_CPU_API std::vector<std::string_view> targetNames();
 /// Has `skin` use one of them from now on, in the whole process, to test or measure it. Fails with
 /// `invalidArgument` for a name that is not in `targetNames`. Empty: the best one again.
-Result<void> setTarget(std::string_view name);
+DERMIS_CPU_API Result<void> setTarget(std::string_view name);
 
 }  // namespace dermis::cpu

@@ -18,6 +18,7 @@
 #include <span>
 
 #include "dermis/cpu/mesh.h"
+#include "dermis/export.h"
 #include "dermis/handle.h"
 #include "dermis/pack.h"
 #include "dermis/result.h"
@@ -37,13 +38,13 @@ class PlannedJob {
 
  private:
   friend class SkinningSystem;
-  friend void skin(const PlannedJob& job);
+  friend DERMIS_CPU_API void skin(const PlannedJob& job);
   const PlannedTask* task_ = nullptr;
   std::uint64_t vertexCount_ = 0;
 };
 
 /// Does the job. Jobs of a frame may be done by any threads, in any order and at the same time.
-void skin(const PlannedJob& job);
+DERMIS_CPU_API void skin(const PlannedJob& job);
 
 struct SkinningSystemDescription {
   /// The capacities of `SceneDescription`. What grows is copied at once.
@@ -59,7 +60,7 @@ struct SkinningSystemDescription {
 /// One thread at a time may call a member function. From `jobs` until its jobs are done, only these
 /// may be called: `output`, `outputBytes`, `statistics`, and those that list instances. If none of
 /// them is ever done, anything may be called, and `abandonFrame` before the next `beginFrame`.
-class SkinningSystem {
+class DERMIS_CPU_API SkinningSystem {
  public:
   /// Fails as `Scene::create`, and with `invalidArgument` for an output of less than 4 bytes.
   static Result<SkinningSystem> create(const SkinningSystemDescription& description = {});

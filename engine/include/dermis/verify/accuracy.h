@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 #include "dermis/verify/reference.h"
@@ -20,18 +21,19 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 /// number, 2^-25 for each component c. snorm16, along each axis of `box`, centre c and half its
 /// size h: half a step, h / 32767 / 2, and the roundings of (p − c) / h in float32, 4 u |c| + 8 u
 /// h; for what lies inside the box.
-double positionFormatBound(VertexFormat format, const reference::Double3& position, const Box& box);
+DERMIS_VERIFY_API double positionFormatBound(VertexFormat format,
+                                             const reference::Double3& position, const Box& box);
 
 /// The same for unit normals. float16: 2^-11. snorm, L = 127 or 32767 its largest integer: √3 times
 /// half a step and a rounding, ½ / L + u. Octahedral: √18 δ, δ = ½ / L + 12 u. A step of δ in both
 /// components moves the point on the octahedron by (δ, δ, 2δ), of length √6 δ, and no point of it
 /// is nearer to the origin than 1 / √3, which divides the step where it is projected onto the
 /// sphere.
-double normalFormatBound(VertexFormat format);
+DERMIS_VERIFY_API double normalFormatBound(VertexFormat format);
 
 /// The same for tangents. Where they are octahedral, the second component has half as many steps:
 /// (δ, η, δ + η) with η = 1 / (L − 1) + 12 u, times √3.
-double tangentFormatBound(VertexFormat format);
+DERMIS_VERIFY_API double tangentFormatBound(VertexFormat format);
 
 /// The number of vertices that have no bound. The caller of `compareWithReference` states it; a
 /// comparison with any other number fails.
@@ -44,7 +46,7 @@ struct Exemptions {
 
 /// The exemptions that the reference reports. Use it for poses from outside; a test that makes its
 /// own pose should state the numbers.
-Exemptions exemptionsOf(const reference::SkinnedMesh& expected);
+DERMIS_VERIFY_API Exemptions exemptionsOf(const reference::SkinnedMesh& expected);
 
 /// What a comparison found. An error is counted against its vertex' own bound: 1 is the bound.
 struct Comparison {
@@ -99,8 +101,8 @@ struct SkinnedView {
 ///
 /// Fails with `invalidArgument` where the counts disagree, a format does not fit its attribute, a
 /// stride is less than its element, or the box of snorm16 is not finite or upside down.
-Result<Comparison> compareWithReference(const reference::SkinnedMesh& expected,
-                                        const SkinnedView& actual,
-                                        const Exemptions& exemptions = {});
+DERMIS_VERIFY_API Result<Comparison> compareWithReference(const reference::SkinnedMesh& expected,
+                                                          const SkinnedView& actual,
+                                                          const Exemptions& exemptions = {});
 
 }  // namespace dermis

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
 #include "dermis/result.h"
@@ -56,7 +57,7 @@ struct SkinnedMesh {
 /// determinant. Fails with `invalidMesh` where the mesh, with that many joints, would be refused by
 /// `pack`, and with `invalidArgument` for a morph target that the mesh does not have, and for a
 /// method that needs centres of rotation which it lacks.
-Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
-                         std::span<const MorphWeight> morphs = {});
+DERMIS_VERIFY_API Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose,
+                                           Method method, std::span<const MorphWeight> morphs = {});
 
 }  // namespace dermis::reference

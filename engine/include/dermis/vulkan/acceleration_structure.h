@@ -22,6 +22,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/types.h"
@@ -42,7 +43,7 @@ inline constexpr VkBufferUsageFlags buildInputUsage =
 /// float32x3, float32x4, float16x4 and snorm16x4 can be read; the fourth component is not looked
 /// at. float16x3 and snorm16x3 cannot: an engine may ask its device for them
 /// (VK_FORMAT_FEATURE_ACCELERATION_STRUCTURE_VERTEX_BUFFER_BIT_KHR).
-VkFormat buildInputFormat(VertexFormat positions);
+DERMIS_VULKAN_API VkFormat buildInputFormat(VertexFormat positions);
 
 /// Skinned positions as the vertices of a geometry: `vertexFormat`, `vertexData`, `vertexStride`
 /// and `maxVertex`. No indices (VK_INDEX_TYPE_NONE_KHR, every three vertices are a triangle) and no
@@ -58,9 +59,8 @@ VkFormat buildInputFormat(VertexFormat positions);
 /// (VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03711,
 /// VUID-VkAccelerationStructureGeometryTrianglesDataKHR-vertexStride-03735). `makePlan` demands as
 /// much unless the device stores less than a word.
-Result<VkAccelerationStructureGeometryTrianglesDataKHR> buildInput(const OutputAttribute& positions,
-                                                                   std::uint32_t vertexCount,
-                                                                   VkDeviceAddress outputAddress);
+DERMIS_VULKAN_API Result<VkAccelerationStructureGeometryTrianglesDataKHR> buildInput(
+    const OutputAttribute& positions, std::uint32_t vertexCount, VkDeviceAddress outputAddress);
 
 /// From positions in snorm16 to the mesh's space: centre + half the size · c. As the geometry's
 /// transform it stands in a buffer with `buildInputUsage`, at an address that is a multiple of 16;
@@ -69,6 +69,6 @@ Result<VkAccelerationStructureGeometryTrianglesDataKHR> buildInput(const OutputA
 ///
 /// Fails with `invalidArgument` where the box is not finite or a side is not longer than 0: the
 /// matrix must be invertible (VUID-VkTransformMatrixKHR-matrix-03799).
-Result<VkTransformMatrixKHR> boxTransform(const Box& box);
+DERMIS_VULKAN_API Result<VkTransformMatrixKHR> boxTransform(const Box& box);
 
 }  // namespace dermis::vulkan

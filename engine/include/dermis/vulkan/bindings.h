@@ -6,6 +6,8 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
+
 namespace dermis::vulkan {
 
 /// A part of a VkBuffer. The offset is a multiple of
@@ -49,7 +51,7 @@ struct BindingsState;
 /// Descriptor sets and buffer views for one set of buffers, created by `Context::createBindings`.
 /// It must live until the GPU has completed all commands that `record` recorded with it. Destroy it
 /// before the Context. Any number of threads may `record` with it at the same time.
-class Bindings {
+class DERMIS_VULKAN_API Bindings {
  public:
   Bindings();
   ~Bindings();

@@ -8,6 +8,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/vulkan/bindings.h"
@@ -58,7 +59,7 @@ struct ContextState;
 /// device, when the GPU has completed all commands that it recorded.
 ///
 /// Nothing here submits, waits, maps, or allocates device memory.
-class Context {
+class DERMIS_VULKAN_API Context {
  public:
   /// Gets entry points and limits, and creates layouts. Creates no shader module or pipeline.
   /// Fails with `invalidArgument` (a handle is missing, a promise makes no sense),

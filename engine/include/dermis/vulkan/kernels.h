@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <span>
 
+#include "dermis/export.h"
 #include "dermis/plan.h"
 
 namespace dermis::vulkan {
@@ -30,7 +31,8 @@ namespace dermis::vulkan {
 /// word requires `storage16Bit` or `storage8Bit` of `DeviceLimits`, one that stores more
 /// `shaderInt64` and perhaps `scalarBlockLayout`. Empty if this build of Dermis does not contain
 /// the module.
-std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits);
+DERMIS_VULKAN_API std::span<const std::uint32_t> kernelSpirv(const Variant& variant,
+                                                             const DeviceLimits& limits);
 
 /// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
 /// 1, 4 bytes each.
@@ -39,6 +41,6 @@ struct SpecializationConstants {
   std::uint32_t count = 0;
 };
 
-SpecializationConstants specializationConstants(const Variant& variant);
+DERMIS_VULKAN_API SpecializationConstants specializationConstants(const Variant& variant);
 
 }  // namespace dermis::vulkan

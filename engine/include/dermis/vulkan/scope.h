@@ -10,6 +10,8 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
+
 namespace dermis::vulkan {
 
 /// One side of a dependency.
@@ -81,31 +83,32 @@ enum class Writer : std::uint8_t {
 enum class QueueTransfer : std::uint8_t { none, release, acquire };
 
 /// The barrier before `record`, for a buffer with this last use.
-Dependency inputScope(PreviousUse use);
+DERMIS_VULKAN_API Dependency inputScope(PreviousUse use);
 
 /// The barrier before the engine overwrites poses, visibility words or meshes that an earlier
 /// `record` reads. After its writes comes `inputScope(PreviousUse::computeWrite)` or
 /// `inputScope(PreviousUse::transferWrite)`.
-Dependency overwriteScope(Writer writer);
+DERMIS_VULKAN_API Dependency overwriteScope(Writer writer);
 
 /// The barrier after `record`, for the output buffer.
-Dependency outputScope(Consumer consumer, QueueTransfer transfer = QueueTransfer::none);
+DERMIS_VULKAN_API Dependency outputScope(Consumer consumer,
+                                         QueueTransfer transfer = QueueTransfer::none);
 
 /// A dependency as a structure for vkCmdPipelineBarrier. Its stages are those of the two scopes.
-VkMemoryBarrier memoryBarrier(const Dependency& dependency);
+DERMIS_VULKAN_API VkMemoryBarrier memoryBarrier(const Dependency& dependency);
 
 /// The same for a part of one buffer. If the families differ, it is one half of a queue-family
 /// transfer.
-VkBufferMemoryBarrier bufferBarrier(const Dependency& dependency, VkBuffer buffer,
-                                    VkDeviceSize offset, VkDeviceSize size,
-                                    std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
-                                    std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
+DERMIS_VULKAN_API VkBufferMemoryBarrier
+bufferBarrier(const Dependency& dependency, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize size,
+              std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
+              std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
 
 /// The same two for vkCmdPipelineBarrier2 (Vulkan 1.3, VK_KHR_synchronization2).
-VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency);
-VkBufferMemoryBarrier2 bufferBarrier2(const Dependency& dependency, VkBuffer buffer,
-                                      VkDeviceSize offset, VkDeviceSize size,
-                                      std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
-                                      std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
+DERMIS_VULKAN_API VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency);
+DERMIS_VULKAN_API VkBufferMemoryBarrier2
+bufferBarrier2(const Dependency& dependency, VkBuffer buffer, VkDeviceSize offset,
+               VkDeviceSize size, std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
+               std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
 
 }  // namespace dermis::vulkan

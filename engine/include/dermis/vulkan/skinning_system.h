@@ -20,6 +20,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
 #include "dermis/handle.h"
 #include "dermis/mesh.h"
 #include "dermis/pack.h"
@@ -113,7 +114,7 @@ struct SystemStatistics {
 /// All frames are recorded for queues that execute them one after the other, in the order of
 /// `record`: usually one queue. Palettes of a system cannot be read by the engine's own shaders:
 /// use tier 1 for that.
-class SkinningSystem {
+class DERMIS_VULKAN_API SkinningSystem {
  public:
   /// Creates the buffers with their initial capacities. Fails with `invalidArgument` or
   /// `limitExceeded` as `Scene::create`, with `missingEntryPoint`, `vulkanError`, or what

@@ -7,6 +7,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/export.h"
 #include "dermis/layout.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
@@ -21,7 +22,7 @@ namespace dermis::vulkan {
 ///
 /// Positions in snorm16x4 and octahedral directions still have to be decoded in the shader:
 /// dermis_decode.glsl.
-VkFormat vertexInputFormat(VertexFormat format);
+DERMIS_VULKAN_API VkFormat vertexInputFormat(VertexFormat format);
 
 /// The numbers that the engine's shaders and pipelines use.
 struct VertexInputNumbers {
@@ -43,14 +44,15 @@ struct VertexInput {
 
 /// Fails with `invalidArgument` as `placeVertices`, if an attribute's format has no
 /// `vertexInputFormat`, and if the layout's stride is no multiple of an attribute's component.
-Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNumbers& numbers = {});
+DERMIS_VULKAN_API Result<VertexInput> vertexInput(const VertexLayout& layout,
+                                                  const VertexInputNumbers& numbers = {});
 
 /// The offsets for vkCmdBindVertexBuffers: as many as `VertexInput::bindingCount`, each into the
 /// output buffer. The buffer handle is the same for all of them. Drawing with offset 0 instead is
 /// possible for interleaved layouts: `firstVertex` is `InstanceOutput::offset` / stride then.
-std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                const InstanceOutput& output);
-std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                const VertexPlaces& places);
+DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
+                                                                  const InstanceOutput& output);
+DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
+                                                                  const VertexPlaces& places);
 
 }  // namespace dermis::vulkan

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "dermis/export.h"
 #include "dermis/plan.h"
 #include "plan/check.h"
 #include "plan/placement.h"
@@ -191,8 +192,8 @@ struct FrameWork {
 };
 
 struct PlanData {
-  PlanData();
-  ~PlanData();
+  DERMIS_CORE_API PlanData();
+  DERMIS_CORE_API ~PlanData();
   /// Made again where the plan was moved from.
   static PlanData& of(Plan& plan) {
     if (plan.data_ == nullptr) plan.data_ = std::make_unique<PlanData>();

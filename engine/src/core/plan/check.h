@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "dermis/export.h"
 #include "dermis/plan.h"
 #include "plan/placement.h"
 
@@ -20,13 +21,13 @@ struct Subject {
   const char* kind = "job";
   std::size_t index = noIndex;
 
-  std::string name() const;
+  DERMIS_CORE_API std::string name() const;
 };
 
 Result<void> checkLimits(const DeviceLimits& limits);
 
 /// Whether the values are allowed.
-Result<void> checkPromises(const Promises& promises);
+DERMIS_CORE_API Result<void> checkPromises(const Promises& promises);
 /// Whether a mesh or a pose keeps the promises.
 Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
                                const Subject& subject);
@@ -35,21 +36,22 @@ Result<void> checkTuning(const Tuning& tuning);
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
                        const Promises& promises);
 /// `streams`: those of the job.
-Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
-                      const Subject& subject, const DeviceLimits& limits);
+DERMIS_CORE_API Result<void> checkJob(const Batch& batch, const Job& job,
+                                      const OutputStreams& streams, const Subject& subject,
+                                      const DeviceLimits& limits);
 inline Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
                              const DeviceLimits& limits) {
   return checkJob(batch, job, outputStreams(job), subject, limits);
 }
 /// Whether positions in snorm16 can be relative to it.
-bool isBox(const Box& box);
+DERMIS_CORE_API bool isBox(const Box& box);
 /// What positions in snorm16 are made of: less the centre, times 1 / half the size.
 struct BoxScale {
   float centre[3], inverse[3];
 };
-BoxScale boxScale(const Box& box);
-Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targetCount,
-                         const Subject& subject);
+DERMIS_CORE_API BoxScale boxScale(const Box& box);
+DERMIS_CORE_API Result<void> checkMorphs(std::span<const MorphWeight> morphs,
+                                         std::uint32_t targetCount, const Subject& subject);
 /// Whether a kernel can see all windows that a run is written to.
 Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
                           const OutputWindows& windows, const Subject& subject,

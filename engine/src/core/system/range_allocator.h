@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "dermis/export.h"
+
 namespace dermis {
 
 /// A part of a buffer, in whatever unit the allocator counts.
@@ -20,7 +22,7 @@ struct Range {
 
 /// Gives out ranges of [0, capacity), which may grow. O(log of the number of gaps), but where an
 /// alignment makes gaps unfit.
-class RangeAllocator {
+class DERMIS_CORE_API RangeAllocator {
  public:
   /// Alignments count from so many units before the first one.
   explicit RangeAllocator(std::uint64_t capacity = 0, std::uint64_t base = 0);

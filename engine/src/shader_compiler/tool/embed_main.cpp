@@ -23,9 +23,14 @@ constexpr std::string_view usage =
     "           [--include FOLDER]... [--define NAME[=VALUE]]... [--require-no-contraction]\n"
     "           [--scalar-block-layout] [--depfile FILE --depfile-target FILE]\n"
     "       dermis_embed_shaders embed --namespace NAME --header FILE --source FILE\n"
-    "           [--module NAME=FILE.spv]...\n";
+    "           [--module NAME=FILE.spv [--unless MACRO]...]...\n";
 
 using Pair = std::pair<std::string, std::string>;
+
+struct Module {
+  std::string name, path;
+  std::vector<std::string> unless;
+};
 
 struct Arguments {
   std::string command;
@@ -38,7 +43,7 @@ struct Arguments {
   std::string source;
   std::vector<std::filesystem::path> includeFolders;
   std::vector<Pair> defines;
-  std::vector<Pair> modules;
+  std::vector<Module> modules;
   bool requireNoContraction = false;
   bool scalarBlockLayout = false;
 };
@@ -71,7 +76,10 @@ bool store(Arguments& arguments, std::string_view option, const std::string& val
   } else if (option == "--define") {
     arguments.defines.push_back(splitAtEquals(value));
   } else if (option == "--module") {
-    arguments.modules.push_back(splitAtEquals(value));
+    auto [name, path] = splitAtEquals(value);
+    arguments.modules.push_back({std::move(name), std::move(path), {}});
+  } else if (option == "--unless" && !arguments.modules.empty()) {
+    arguments.modules.back().unless.push_back(value);
   } else {
     return false;
   }
@@ -183,19 +191,21 @@ int compile(const Arguments& arguments) {
   return listed ? 0 : fail(listed.error().message);
 }
 
-std::optional<EmbeddedModule> readModule(const std::string& name, const std::string& path) {
-  const std::optional<std::string> bytes = readFile(path);
+std::optional<EmbeddedModule> readModule(const Module& source) {
+  const std::optional<std::string> bytes = readFile(source.path);
   if (!bytes || bytes->empty() || bytes->size() % sizeof(std::uint32_t) != 0) return std::nullopt;
-  EmbeddedModule module{name, std::vector<std::uint32_t>(bytes->size() / sizeof(std::uint32_t))};
+  EmbeddedModule module{source.name,
+                        std::vector<std::uint32_t>(bytes->size() / sizeof(std::uint32_t)),
+                        source.unless};
   std::memcpy(module.words.data(), bytes->data(), bytes->size());
   return module;
 }
 
 int embed(const Arguments& arguments) {
   std::vector<EmbeddedModule> modules;
-  for (const auto& [name, path] : arguments.modules) {
-    std::optional<EmbeddedModule> module = readModule(name, path);
-    if (!module) return fail("cannot read SPIR-V from '" + path + "'");
+  for (const Module& source : arguments.modules) {
+    std::optional<EmbeddedModule> module = readModule(source);
+    if (!module) return fail("cannot read SPIR-V from '" + source.path + "'");
     modules.push_back(*std::move(module));
   }
   const std::string headerName = std::filesystem::path(arguments.header).filename().string();

@@ -1,0 +1,48 @@
+// What a shared library of Dermis exports. With DERMIS_SHARED defined, which the CMake targets and
+// dermis.pc of a shared build do, what is marked with the macro of its library is exported while
+// that library is compiled, and imported elsewhere. All else is hidden. In a static build the
+// macros are empty: a plugin that links Dermis exports none of it.
+#pragma once
+
+#if !defined(DERMIS_SHARED)
+#define DERMIS_EXPORTED
+#define DERMIS_IMPORTED
+#elif defined(_WIN32)
+#define DERMIS_EXPORTED __declspec(dllexport)
+#define DERMIS_IMPORTED __declspec(dllimport)
+#else
+#define DERMIS_EXPORTED __attribute__((visibility("default")))
+#define DERMIS_IMPORTED __attribute__((visibility("default")))
+#endif
+
+// DERMIS_BUILDS_NAME is defined while the sources of that library are compiled.
+#if defined(DERMIS_BUILDS_CORE)
+#define DERMIS_CORE_API DERMIS_EXPORTED
+#else
+#define DERMIS_CORE_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_CPU)
+#define DERMIS_CPU_API DERMIS_EXPORTED
+#else
+#define DERMIS_CPU_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_VERIFY)
+#define DERMIS_VERIFY_API DERMIS_EXPORTED
+#else
+#define DERMIS_VERIFY_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_VULKAN)
+#define DERMIS_VULKAN_API DERMIS_EXPORTED
+#else
+#define DERMIS_VULKAN_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_SHADER_COMPILER)
+#define DERMIS_SHADER_COMPILER_API DERMIS_EXPORTED
+#else
+#define DERMIS_SHADER_COMPILER_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_GLTF)
+#define DERMIS_GLTF_API DERMIS_EXPORTED
+#else
+#define DERMIS_GLTF_API DERMIS_IMPORTED
+#endif

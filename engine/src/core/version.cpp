@@ -1,0 +1,9 @@
+#include "dermis/version.h"
+
+namespace dermis {
+
+Version libraryVersion() {
+  return headerVersion;
+}
+
+}  // namespace dermis
