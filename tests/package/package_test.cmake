@@ -30,7 +30,7 @@ function(build_consumer source)
   file(REMOVE_RECURSE "${build}")
   run(configured "Configure ${source} with ${COMPILER}" ${CMAKE_COMMAND} -S "${source}"
     -B "${build}" -G "${generator}" "-DCMAKE_MAKE_PROGRAM=${makeProgram}" "-DCMAKE_CXX_COMPILER=${COMPILER}"
-    "-DCMAKE_CXX_FLAGS=${consumerFlags}" "-DCMAKE_PREFIX_PATH=${prefix}" "-DDERMIS_VERSION=${version}"
+    "-DCMAKE_CXX_COMPILER_LAUNCHER=${compilerLauncher}" "-DCMAKE_CXX_FLAGS=${consumerFlags}" "-DCMAKE_PREFIX_PATH=${prefix}" "-DDERMIS_VERSION=${version}"
     "-DDERMIS_INCLUDE_FOLDER=${prefix}/${includeFolder}" --no-warn-unused-cli ${ARGN})
   if(configured MATCHES "CMake (Deprecation )?Warning")
     wrong("CMake warns:\n${configured}")
@@ -40,4 +40,15 @@ function(build_consumer source)
     wrong("the compiler warns:\n${built}")
   endif()
   set(BUILD "${build}" PARENT_SCOPE)
+endfunction()
+
+# build_with_pkg_config(PREFIX PROGRAM FLAGS...): compiles the program of consumers/vulkan with what pkg-config says of the package in
+# PREFIX, and nothing else. FLAGS come first.
+function(build_with_pkg_config prefix program)
+  set(ENV{PKG_CONFIG_PATH} "${prefix}/${libFolder}/pkgconfig")
+  run(flags "Ask pkg-config in ${prefix}" "${pkgConfig}" --cflags --libs dermis)
+  separate_arguments(flags UNIX_COMMAND "${flags}")
+  separate_arguments(own UNIX_COMMAND "${consumerFlags}")
+  run(ignored "Compile ${program}" "${ownCompiler}" -std=c++20 ${own} ${ARGN} "${scriptFolder}/consumers/vulkan/main.cpp" -o "${program}"
+      ${flags})
 endfunction()

@@ -1,5 +1,8 @@
-// Calls what dermis::vulkan can do without a device.
+// Calls what dermis::core and dermis::vulkan can do without a device, and prints a hash of the
+// kernels.
 
+#include <bit>
+#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -63,9 +66,54 @@ bool hasChosenKernels() {
          vulkan::kernelSpirv(halves, limits).empty() == isLeftOut;
 }
 
+/// FNV-1a of the modules for every method, with and without what needs modules of its own.
+std::uint64_t hashOfKernels() {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  for (std::uint32_t method = 0; method < 9; ++method) {
+    for (const std::uint32_t unit : {4u, 2u, 1u}) {
+      Variant variant;
+      variant.kernel = Kernel::skin;
+      variant.method = static_cast<Method>(method);
+      variant.units[0] = static_cast<std::uint8_t>(unit);
+      for (const std::uint32_t word : vulkan::kernelSpirv(variant, limits))
+        hash = (hash ^ word) * 0x100000001b3u;
+    }
+  }
+  return hash;
+}
+
+/// A triangle of one joint, with `value` for a coordinate.
+bool isPackable(float value) {
+  const float positions[9] = {value, 0, 0, 1, 0, 0, 0, 1, 0};
+  const float weights[3] = {1, 1, 1};
+  const std::uint8_t joints[3] = {};
+  InfluenceSet influences;
+  influences.joints = {joints, 3, 1, ComponentType::uint8, 1};
+  influences.weights = floatAttribute(weights, 3, 1);
+  MeshView mesh;
+  mesh.name = "triangle";
+  mesh.vertexCount = 3;
+  mesh.positions = floatAttribute(positions, 3, 3);
+  mesh.influenceSets = {&influences, 1};
+  return pack(mesh, 1).ok();
+}
+
 }  // namespace
 
 int main() {
+  if (!libraryFitsHeaders()) {
+    std::printf("the library is not of the headers' version\n");
+    return 6;
+  }
+  if (libraryVersion() != headerVersion) return 7;
+  // However this program is compiled, the library sees it.
+  if (!isPackable(0) || isPackable(std::bit_cast<float>(0x7fc00000u))) {
+    std::printf("pack accepts NaN\n");
+    return 8;
+  }
+  std::printf("kernels %016llx\n", static_cast<unsigned long long>(hashOfKernels()));
   if (!hasKernels()) return 1;
   if (!hasChosenKernels()) return 5;
   if (vulkan::outputScope(vulkan::Consumer::vertexInput).destination.accesses !=

@@ -1,0 +1,1 @@
+// Nothing: for what only the flags decide.

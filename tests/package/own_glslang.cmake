@@ -1,0 +1,15 @@
+# A subproject of an engine that has glslang, SPIRV-Tools, GLM and Vulkan-Headers of its own, and defines only some of the names
+# that their packages do: it configures. tests/run.sh nightly arm64 builds with a tool that is built apart, as here.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+foreach(compiler IN ITEMS OFF ON)
+  set(build "${testFolder}/${NAME}")
+  file(REMOVE_RECURSE "${build}")
+  run(configured "Configure with DERMIS_BUILD_SHADER_COMPILER=${compiler}" ${CMAKE_COMMAND} -S "${scriptFolder}/consumers/own_glslang" -B "${build}"
+      -G "${generator}" "-DCMAKE_MAKE_PROGRAM=${makeProgram}" "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DDERMIS_SOURCE=${sourceFolder}"
+      --no-warn-unused-cli "-DGLM_FOLDERS=${glmFolders}" -DDERMIS_BUILD_SHADER_COMPILER=${compiler} -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE
+      -DCMAKE_DISABLE_FIND_PACKAGE_VulkanHeaders=TRUE)
+  if(configured MATCHES "CMake (Deprecation )?Warning")
+    wrong("CMake warns:\n${configured}")
+  endif()
+endforeach()

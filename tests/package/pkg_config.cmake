@@ -1,0 +1,15 @@
+# A program that is compiled with what pkg-config says, from the installed package.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+build_with_pkg_config("${prefix}" "${testFolder}/${NAME}.program")
+run(printed "Run it" "${testFolder}/${NAME}.program")
+say("${printed}")
+foreach(name IN ITEMS core cpu verify vulkan gltf)
+  run(printed "Ask pkg-config for dermis_${name}" "${pkgConfig}" --cflags --libs dermis_${name})
+  say("${printed}")
+endforeach()
+run(folder "Ask pkg-config for the shaders" "${pkgConfig}" --variable=shaderdir dermis)
+string(STRIP "${folder}" folder)
+if(NOT EXISTS "${folder}/abi.h")
+  wrong("shaderdir is '${folder}'")
+endif()

@@ -1,0 +1,28 @@
+# A plugin that links Dermis whole exports none of it: the engine, or another plugin, may have another version.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+set(plugin "${testFolder}/${NAME}.so")
+set(libraries)
+foreach(component IN ITEMS vulkan gltf cpu verify core)
+  list(APPEND libraries "${prefix}/${libFolder}/libdermis_${component}.a")
+endforeach()
+run(ignored "Link the plugin" "${ownCompiler}" -std=c++20 -shared -fPIC -fvisibility=hidden -I "${prefix}/${includeFolder}" -o "${plugin}"
+    "${scriptFolder}/consumers/plugin/main.cpp" -Wl,--whole-archive ${libraries} -Wl,--no-whole-archive -lhwy)
+run(symbols "List what it exports" "${nm}" -D -C --defined-only "${plugin}")
+string(REGEX MATCHALL "[^\n]+" lines "${symbols}")
+set(exported)
+set(found FALSE)
+foreach(line IN LISTS lines)
+  if(line MATCHES "dermisPluginMain")
+    set(found TRUE)
+  # Templates of the standard library, and what Highway's headers leave, are exported by whoever uses them.
+  elseif(NOT line MATCHES " [VWu] (std::|typeinfo|vtable for std|void std::|guard variable for std|hwy::|__gnu_cxx::|operator|bool std|[a-z ]+ std::)" OR line MATCHES "dermis")
+    string(APPEND exported "\n  ${line}")
+  endif()
+endforeach()
+if(NOT found)
+  wrong("the plugin does not export its own function:\n${symbols}")
+endif()
+if(exported)
+  wrong("the plugin exports:${exported}")
+endif()
