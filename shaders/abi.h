@@ -15,11 +15,11 @@ using uint = std::uint32_t;
 #define DERMIS_CONSTANT const uint
 #endif
 
-// Bindings of descriptor set 0: storage buffers. The palette kernel reads MATRICES, writes PALETTES
-// and clears RESULTS; the skin kernel reads MESHES and, as the palette, PALETTES (dual quaternions)
-// or the joint matrices (linear), writes one buffer for each attribute, and RESULTS. A device with
-// only the four storage buffers a stage that Vulkan guarantees has the first BINDING_COUNT_LEAST:
-// all attributes go to POSITIONS there, and there are no results.
+// Bindings of descriptor set 0: storage buffers. The palette kernel reads MATRICES and writes
+// PALETTES, the clear kernel clears RESULTS; the skin kernel reads MESHES and, as the palette,
+// PALETTES (dual quaternions) or the joint matrices (linear), writes one buffer for each attribute,
+// and RESULTS. A device with only the four storage buffers a stage that Vulkan guarantees has the
+// first BINDING_COUNT_LEAST: all attributes go to POSITIONS there, and there are no results.
 DERMIS_CONSTANT BINDING_TABLES = 0u;
 DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
 DERMIS_CONSTANT BINDING_PALETTES =
@@ -169,15 +169,13 @@ struct PaletteRecord {
   uint matrices;  // the first joint matrix: 3 units each
   uint place;     // of the palette: a status, the joints, 2 more units a joint where it may scale
   uint jointCount;
-  uint flags;
+  uint reserved;
 };
 DERMIS_CONSTANT PALETTE_WORDS = 4u;
-DERMIS_CONSTANT PALETTE_MAY_SCALE = 1u;
-DERMIS_CONSTANT PALETTE_LOGARITHMS = 2u;  // joints are logarithms instead of dual quaternions
-DERMIS_CONSTANT PALETTE_MATRICES = 4u;    // joints are the matrices as they are
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
+DERMIS_CONSTANT UNITS_OF_SCALE_SHEAR = 2u;
 
 // The unit at the beginning of a palette, as PoseStatus has it.
 struct StatusRecord {
@@ -212,28 +210,30 @@ struct InstanceRecord {
   uint normals;
   uint tangents;
   uint previousPositions;
-  uint jointCount;  // of the palette
-  uint flags;
-  uint extension;  // word offset of its extension in the tables, where it has one
+  uint joints;           // their number in the palette, plus INSTANCE_*
+  uint previousPalette;  // reskinned: as `palette`
+  uint extension;        // word offset of its extension in the tables, where it has one
 };
 DERMIS_CONSTANT INSTANCE_WORDS = 8u;
-DERMIS_CONSTANT INSTANCE_RESTARTS = 1u;  // previous positions are the current ones
-DERMIS_CONSTANT INSTANCE_SETTLES = 2u;   // not skinned; previous positions become the current ones
+DERMIS_CONSTANT INSTANCE_JOINTS = 0xfffffu;     // of `joints`, those bits that are the number
+DERMIS_CONSTANT INSTANCE_RESTARTS = 0x100000u;  // previous positions are the current ones
+DERMIS_CONSTANT INSTANCE_SETTLES =
+    0x200000u;  // not skinned; previous positions become the current ones
 // Of instances that the GPU chooses:
-DERMIS_CONSTANT INSTANCE_HAS_MOTION = 4u;  // it has previous positions
+DERMIS_CONSTANT INSTANCE_HAS_MOTION = 0x400000u;  // it has previous positions
 DERMIS_CONSTANT INSTANCE_HAS_RESULT =
-    8u;  // its extension names one, to be cleared when it is skinned
+    0x800000u;  // its extension names one, to be cleared when it is skinned
 
 // What only some instances have.
 struct ExtensionRecord {
-  uint previousPalette;  // as InstanceRecord::palette
-  uint previousJointCount;
-  uint morphs;  // word offset of the active morph targets in the tables
+  uint previousJointCount;  // of the previous palette
+  uint morphs;              // word offset of the active morph targets in the tables
   uint morphCount;
   uint previousMorphs;
   uint previousMorphCount;
   uint reserved;
   uint reserved1;
+  uint reserved2;
   float centreX;  // of the box of snorm16 positions
   float centreY;
   float centreZ;
@@ -241,7 +241,7 @@ struct ExtensionRecord {
   float inverseY;
   float inverseZ;
   uint result;  // number of its result; read with the box
-  uint reserved2;
+  uint reserved3;
 };
 DERMIS_CONSTANT EXTENSION_WORDS = 16u;
 
@@ -313,10 +313,13 @@ DERMIS_CONSTANT BINDING_COUNTERS = 3u;
 // ---- Push constants, of each kernel its own. Word offsets count from the beginning of the tables.
 
 struct PalettePush {
-  uint palettes;  // word offset of the palette records
-  uint paletteCount;
-  uint workgroupCount;  // before folding into y
-  uint resultCount;     // to clear; their numbers follow the palette records
+  uint palettes;  // PaletteRecord
+  uint workgroupCount;
+};
+struct ClearPush {
+  uint results;  // numbers of results
+  uint resultCount;
+  uint workgroupCount;
 };
 struct SkinPush {
   uint groups;  // word offset of the group records

@@ -32,16 +32,22 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
     default:
       return skinIterative(vertex, influences, pose, withNormal, withTangent);
 #else
-    case METHOD_LINEAR:
-      return skinLinear(vertex, influences, pose, withNormal, withTangent);
+#if defined(BULGE) || defined(DERMIS_SKIN_GLSL)
     case METHOD_BLENDED:
       return skinBlended(vertex, influences, pose, inputs.share, withNormal, withTangent);
     case METHOD_CENTER_OF_ROTATION:
       return skinCenterOfRotation(vertex, influences, pose, inputs.center, withNormal, withTangent);
     case METHOD_BULGE_CONTROLLED:
       return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.share, withNormal, withTangent);
-    default:
+#endif
+#ifndef BULGE
+    case METHOD_LINEAR:
+      return skinLinear(vertex, influences, pose, withNormal, withTangent);
+    case METHOD_DUAL_QUATERNION:
       return skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
+#endif
+    default:
+      return vertex;  // no other method has this module
 #endif
   }
 }

@@ -4,7 +4,7 @@
 
 #include "exact.glsl"
 #include "quaternion.glsl"
-#include "polar.glsl"
+#include "scale_shear.glsl"
 #include "direction_map.glsl"
 #include "mesh_access.glsl"
 #include "palette_access.glsl"

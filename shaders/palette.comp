@@ -1,18 +1,21 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
-// Joint matrices (3×4) to unit dual quaternions, or the logarithms of the rigid parts, and, where a joint is not rigid, its
-// scale/shear part; or copied as they are: one workgroup a palette, so that what is said of the whole palette needs no second
-// pass. The workgroups behind those clear the results that the skin kernel adds to. With ONE_OUTPUT there are no results (4
-// storage buffers in all).
+// Joint matrices (3×4) to unit dual quaternions and, where poses may scale, the scale/shear parts of joints that are not rigid. One
+// workgroup a palette, so that what is said of the whole palette needs no second pass.
+//   LOGARITHMS      the logarithms of the rigid parts instead of dual quaternions
 
 #include "abi.h"
 #include "exact.glsl"
 #include "quaternion.glsl"
 #include "polar.glsl"
+#ifdef LOGARITHMS
 #include "dual_exponential.glsl"
+#endif
 #include "tables.glsl"
-#include "results.glsl"
+
+layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
@@ -39,45 +42,31 @@ bool isRigid(vec3 r0, vec3 r1, vec3 r2) {
   return determinant > 0.0 && largestComponent(rowSums) <= 8e-6;
 }
 
-void writeScaleShear(uint unit, ScaleShear part) {
-  palettes[unit] = floatBitsToUint(vec4(part.diagonal, part.mixed.x));
-  palettes[unit + 1u] = floatBitsToUint(vec4(part.mixed.yz, 0.0, 0.0));
-}
+#ifdef LOGARITHMS
+const uint UNITS_OF_JOINT = UNITS_OF_LOGARITHM;
 
 // The logarithm of a rigid transform, the short way round: rows of [ω]× | v, twice its screw.
-void writeLogarithm(uint unit, vec4 rotation, vec4 dual) {
-  Screw screw = rotation.w < 0.0 ? screwOf(-rotation, -dual) : screwOf(rotation, dual);
+vec4 jointUnit(Screw screw, uint number) {
   precise vec3 turn = 2.0 * screw.real;
   precise vec3 shift = 2.0 * screw.dual;
-  palettes[unit] = floatBitsToUint(vec4(0.0, -turn.z, turn.y, shift.x));
-  palettes[unit + 1u] = floatBitsToUint(vec4(turn.z, 0.0, -turn.x, shift.y));
-  palettes[unit + 2u] = floatBitsToUint(vec4(-turn.y, turn.x, 0.0, shift.z));
+  vec4 row = vec4(-turn.y, turn.x, 0.0, shift.z);
+  if (number == 0u) row = vec4(0.0, -turn.z, turn.y, shift.x);
+  if (number == 1u) row = vec4(turn.z, 0.0, -turn.x, shift.y);
+  return row;
+}
+#else
+const uint UNITS_OF_JOINT = UNITS_OF_DUAL_QUATERNION;
+#endif
+
+vec4 scaleShearUnit(ScaleShear part, uint number) {
+  return number == 0u ? vec4(part.diagonal, part.mixed.x) : vec4(part.mixed.yz, 0.0, 0.0);
 }
 
-// For linear blending, which is to read the memory of the device, not that which the CPU writes.
-void copyMatrices(PaletteRecord palette) {
-  uint units = palette.jointCount * UNITS_OF_MATRIX;
-  for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x)
-    palettes[palette.place + unit] = floatBitsToUint(matrices[palette.matrices + unit]);
-}
-
+// lavapipe compiles each load and each store into a loop over the lanes, which is most of a cold start: hence one of each, in loops.
 void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
-  if (number >= push.paletteCount) {
-    uint cleared = (number - push.paletteCount) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-    if (cleared < push.resultCount) clearResult(tables[push.palettes + push.paletteCount * PALETTE_WORDS + cleared]);
-    return;
-  }
   PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
-  if ((palette.flags & PALETTE_MATRICES) != 0u) {
-    copyMatrices(palette);
-    return;
-  }
-  bool mayScale = (palette.flags & PALETTE_MAY_SCALE) != 0u;
-  bool logarithms = (palette.flags & PALETTE_LOGARITHMS) != 0u;
-  uint unitsOfJoint = logarithms ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
-
   if (gl_LocalInvocationID.x == 0u) {
     nonRigidJoints = 0u;
     nonFiniteJoints = 0u;
@@ -87,9 +76,15 @@ void main() {
   // The loop tests at its end: if the test comes first, lavapipe executes the rest of the body once more with all lanes off.
   uint joint = gl_LocalInvocationID.x;
   if (joint < palette.jointCount) do {
-    vec4 r0 = matrices[palette.matrices + joint * 3u];
-    vec4 r1 = matrices[palette.matrices + joint * 3u + 1u];
-    vec4 r2 = matrices[palette.matrices + joint * 3u + 2u];
+    vec4 r0, r1, r2 = vec4(0.0);
+    uint from = palette.matrices + joint * UNITS_OF_MATRIX;
+    uint end = from + UNITS_OF_MATRIX;
+    [[dont_unroll]] do {
+      r0 = r1;
+      r1 = r2;
+      r2 = matrices[from];
+    } while (++from != end);
+
     vec4 rotation;
     ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
     if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
@@ -102,22 +97,32 @@ void main() {
       polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
-    uint unit = palette.place + 1u + joint * unitsOfJoint;
-    if (logarithms) {
-      writeLogarithm(unit, rotation, dual);
-    } else {
-      palettes[unit] = floatBitsToUint(rotation);
-      palettes[unit + 1u] = floatBitsToUint(dual);
-    }
-    if (mayScale) writeScaleShear(palette.place + 1u + palette.jointCount * unitsOfJoint + joint * 2u, scaleShear);
+#ifdef LOGARITHMS
+    Screw screw = rotation.w < 0.0 ? screwOf(-rotation, -dual) : screwOf(rotation, dual);
+#endif
+
+    uint first = palette.place + 1u;
+    uint unit = 0u;
+    [[dont_unroll]] do {
+      uint place = first + joint * UNITS_OF_JOINT + unit;
+#ifdef LOGARITHMS
+      vec4 value = jointUnit(screw, unit);
+#else
+      vec4 value = unit == 0u ? rotation : dual;
+#endif
+      if (SCALES && unit >= UNITS_OF_JOINT) {
+        place = first + palette.jointCount * UNITS_OF_JOINT + joint * UNITS_OF_SCALE_SHEAR + (unit - UNITS_OF_JOINT);
+        value = scaleShearUnit(scaleShear, unit - UNITS_OF_JOINT);
+      }
+      palettes[place] = floatBitsToUint(value);
+    } while (++unit < UNITS_OF_JOINT + (SCALES ? UNITS_OF_SCALE_SHEAR : 0u));
     joint += gl_WorkGroupSize.x;
   } while (joint < palette.jointCount);
   barrier();
 
   if (gl_LocalInvocationID.x == 0u) {
     uint nonRigid = nonRigidJoints;
-    StatusRecord status =
-        StatusRecord(mayScale && nonRigid != 0u ? 1u : 0u, nonRigid, mayScale ? 0u : nonRigid, nonFiniteJoints);
+    StatusRecord status = StatusRecord(SCALES && nonRigid != 0u ? 1u : 0u, nonRigid, SCALES ? 0u : nonRigid, nonFiniteJoints);
     palettes[palette.place] =
         uvec4(status.twoPhase, status.nonRigidJoints, status.undeclaredScale, status.nonFiniteJoints);
   }

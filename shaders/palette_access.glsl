@@ -4,7 +4,7 @@
 #define DERMIS_PALETTE_ACCESS_GLSL
 
 #include "abi.h"
-#include "polar.glsl"
+#include "scale_shear.glsl"
 
 #if defined(DERMIS_SKIN_GLSL)
 // skin_include.glsl says how.

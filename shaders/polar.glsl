@@ -1,9 +1,10 @@
-// Polar decomposition of a 3×3 matrix.
+// Polar decomposition of a 3×3 matrix. Needs GL_EXT_control_flow_attributes.
 #ifndef DERMIS_POLAR_GLSL
 #define DERMIS_POLAR_GLSL
 
 #include "exact.glsl"
 #include "quaternion.glsl"
+#include "scale_shear.glsl"
 
 // One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are
 // the other two indices, vp and vq the eigenvectors so far. In scalars, since drivers keep an array
@@ -52,30 +53,37 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   vec4 vz = vec4(0.0, 0.0, 1.0, 0.0);
   vec4 vw = vec4(0.0, 0.0, 0.0, 1.0);
 
-  // It converges quadratically: four or five sweeps, and few matrices take more.
-  for (uint sweep = 0u; sweep < 8u; ++sweep) {
+  // Three turns of two pairs are a sweep: xy and zw, then y, z and w change places. It converges quadratically: four or five
+  // sweeps, and few matrices take more.
+  [[dont_unroll]] for (uint turn = 0u; turn < 24u; ++turn) {
     precise float outside = abs(xy) + abs(xz) + abs(xw) + abs(yz) + abs(yw) + abs(zw);
     precise float inside = abs(xx) + abs(yy) + abs(zz) + abs(ww);
     precise float negligible = 1e-12 * inside;
     if (outside <= negligible) break;
     turnJacobi(xx, yy, xy, xz, yz, xw, yw, vx, vy);
-    turnJacobi(xx, zz, xz, xy, yz, xw, zw, vx, vz);
-    turnJacobi(xx, ww, xw, xy, yw, xz, zw, vx, vw);
-    turnJacobi(yy, zz, yz, xy, xz, yw, zw, vy, vz);
-    turnJacobi(yy, ww, yw, xy, xw, yz, zw, vy, vw);
     turnJacobi(zz, ww, zw, xz, xw, yz, yw, vz, vw);
+    vec3 diagonal = vec3(zz, ww, yy);
+    vec3 ofX = vec3(xz, xw, xy);
+    vec3 others = vec3(zw, yz, yw);
+    vec4 first = vy;
+    yy = diagonal.x;
+    zz = diagonal.y;
+    ww = diagonal.z;
+    xy = ofX.x;
+    xz = ofX.y;
+    xw = ofX.z;
+    yz = others.x;
+    yw = others.y;
+    zw = others.z;
+    vy = vz;
+    vz = vw;
+    vw = first;
   }
 
   float largest = max(max(xx, yy), max(zz, ww));
   vec4 q = xx == largest ? vx : (yy == largest ? vy : (zz == largest ? vz : vw));
   return unitQuaternion(q);
 }
-
-// A scale/shear part: the symmetric matrix S of C = R S.
-struct ScaleShear {
-  vec3 diagonal;  // xx yy zz
-  vec3 mixed;     // xy xz yz
-};
 
 // Adds a b to a sum of two floats each, without a rounding: the product is taken apart as Dekker
 // does (1971, "A floating-point technique for extending the available precision"), the sum as Knuth
@@ -103,15 +111,19 @@ void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
 vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 sum = vec4(0.0);
   vec4 rest = vec4(0.0);
-  addExactly(sum, rest, r0.x, vec4(q.x, -q.y, -q.z, q.w));
-  addExactly(sum, rest, r1.y, vec4(-q.x, q.y, -q.z, q.w));
-  addExactly(sum, rest, r2.z, vec4(-q.x, -q.y, q.z, q.w));
-  addExactly(sum, rest, r0.y, vec4(q.y, q.x, -q.w, -q.z));
-  addExactly(sum, rest, r1.x, vec4(q.y, q.x, q.w, q.z));
-  addExactly(sum, rest, r0.z, vec4(q.z, q.w, q.x, q.y));
-  addExactly(sum, rest, r2.x, vec4(q.z, -q.w, q.x, -q.y));
-  addExactly(sum, rest, r1.z, vec4(-q.w, q.z, q.y, -q.x));
-  addExactly(sum, rest, r2.y, vec4(q.w, q.z, q.y, q.x));
+  // What a row adds is what the first one does, with x, y and z in turn in the place of x.
+  [[dont_unroll]] for (uint axis = 0u; axis < 3u; ++axis) {
+    addExactly(sum, rest, r0.x, vec4(q.x, -q.y, -q.z, q.w));
+    addExactly(sum, rest, r0.y, vec4(q.y, q.x, -q.w, -q.z));
+    addExactly(sum, rest, r0.z, vec4(q.z, q.w, q.x, q.y));
+    vec3 row = r0.yzx;
+    r0 = r1.yzx;
+    r1 = r2.yzx;
+    r2 = row;
+    q = q.yzxw;
+    sum = sum.yzxw;
+    rest = rest.yzxw;
+  }
   addExactly(sum, rest, -dot4(q, sum), q);
   precise vec4 residual = sum + rest;
   return residual;
@@ -129,15 +141,18 @@ ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
 }
 
-// Newton's method for the polar decomposition. Rᵀ C is symmetric for the right R; for R' = R (1 −
-// [ω]×) it is not, by a vector that is (tr S − S) ω. The residual, turned back, has that vector.
-// Without this the rotation would be known only to a few roundings times σ₁ / (σ₂ + σ₃), its
-// condition, and for vertices that are also moved by other joints that counts.
-vec4 refineRotation(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
-  for (uint step = 0u; step < 3u; ++step) {
+// Newton's method for the polar decomposition: makes q better and finds S. Rᵀ C is symmetric for the right R; for R' = R (1 −
+// [ω]×) it is not, by a vector that is (tr S − S) ω. The residual, turned back, has that vector. Without this the rotation would
+// be known only to a few roundings times σ₁ / (σ₂ + σ₃), its condition, and for vertices that are also moved by other joints that
+// counts.
+ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
+  ScaleShear s;
+  uint left = 3u;
+  [[dont_unroll]] for (;;) {
+    s = scaleShearOf(q, r0, r1, r2);
+    if (left == 0u) break;
     vec4 residual = eigenvectorResidual(q, r0, r1, r2);
     vec3 asymmetry = quaternionProduct(vec4(-q.xyz, q.w), residual).xyz;
-    ScaleShear s = scaleShearOf(q, r0, r1, r2);
     precise float trace = s.diagonal.x + s.diagonal.y + s.diagonal.z;
     vec3 h0 = vec3(s.diagonal.y + s.diagonal.z, -s.mixed.x, -s.mixed.y);
     vec3 h1 = vec3(-s.mixed.x, s.diagonal.x + s.diagonal.z, -s.mixed.z);
@@ -153,9 +168,9 @@ vec4 refineRotation(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
     if (square > 0.01) break;
     precise vec3 halfTurn = 0.5 * turn;
     q = unitQuaternion(quaternionProduct(q, vec4(halfTurn, 1.0)));
-    if (square <= 1e-9) break;
+    left = square <= 1e-9 ? 0u : left - 1u;
   }
-  return q;
+  return s;
 }
 
 // The determinant of a matrix given by its rows, and how large it would be if no product in it
@@ -184,10 +199,9 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
   float magnitude;
   float determinant = determinantOf(n0, n1, n2, magnitude);
   float side = determinant < -1.43e-6 * magnitude ? -1.0 : 1.0;
-  vec4 nearest = nearestRotation(side * n0, side * n1, side * n2);
-  rotation = refineRotation(nearest, side * n0, side * n1, side * n2);
-  ScaleShear scaled = scaleShearOf(rotation, n0, n1, n2);
-  float back = inversePowerScale(largest);
+  rotation = nearestRotation(side * n0, side * n1, side * n2);
+  ScaleShear scaled = refineRotation(rotation, side * n0, side * n1, side * n2);
+  float back = side * inversePowerScale(largest);
   precise vec3 diagonal = scaled.diagonal * back;
   precise vec3 mixed = scaled.mixed * back;
   scaleShear = ScaleShear(diagonal, mixed);

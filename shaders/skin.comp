@@ -7,7 +7,9 @@
 //   HALVES, BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
 //   EXTRAS          previous positions and results; kept out of other modules, since layers and drivers take what a module names
 //                   for used, whatever its constants say
-//   COMPARISON      the methods that are there for comparison, instead of those for every day
+//   BULGE           the methods against the bulge (blended, centre of rotation, bulge-controlled), instead of linear and dual
+//                   quaternions
+//   COMPARISON      the methods that are there for comparison
 //   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
 //   PAIRS           positions and normals, float32x3 each, are stored together, 8 bytes at a time (needs 64-bit integers)
 //   WIDE            an attribute, or all of a vertex, by one store (needs scalar block layout and 64-bit integers)
@@ -34,6 +36,8 @@
 
 #ifdef COMPARISON
 layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION_ITERATIVE;
+#elif defined(BULGE)
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_BULGE_CONTROLLED;
 #else
 layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
 #endif
@@ -69,7 +73,6 @@ const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 
 #include "exact.glsl"
 #include "quaternion.glsl"
-#include "polar.glsl"
 #include "tables.glsl"
 #include "vertex.glsl"
 #include "mesh_access.glsl"
@@ -146,16 +149,16 @@ Instance readInstance(uint word, uvec4 offsets) {
 Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   InstanceRecord step = a;
   step.palette = b.palette - a.palette;
-  step.jointCount = b.jointCount - a.jointCount;
-  step.flags = b.flags - a.flags;
+  step.joints = b.joints - a.joints;
+  step.previousPalette = b.previousPalette - a.previousPalette;
   step.extension = b.extension - a.extension;
   return Instance(step, placesOf(b) - placesOf(a));
 }
 
 void advance(inout Instance instance, Instance by) {
   instance.record.palette += by.record.palette;
-  instance.record.jointCount += by.record.jointCount;
-  instance.record.flags += by.record.flags;
+  instance.record.joints += by.record.joints;
+  instance.record.previousPalette += by.record.previousPalette;
   instance.record.extension += by.record.extension;
   instance.places += by.places;
 }
@@ -171,14 +174,14 @@ struct Work {
 
 #ifdef HAS_MOTION
 uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
-  if ((instance.record.flags & INSTANCE_RESTARTS) != 0u) return current;
+  if ((instance.record.joints & INSTANCE_RESTARTS) != 0u) return current;
   if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
   ExtensionRecord extension = loadExtension(instance.record.extension);
   Vertex before = work.bind;
   if (MORPHS) {
     morphVertex(before, work.mesh, work.vertex, extension.previousMorphs, extension.previousMorphCount, false, false);
   }
-  uint palette = extension.previousPalette;
+  uint palette = instance.record.previousPalette;
   Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
   before = skinVertex(before, work.influences, work.inputs, pose, false, false);
   return encodePosition(before.position, instance.record.extension, false);
@@ -187,7 +190,7 @@ uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
 
 void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef HAS_MOTION
-  if (MOTION != MOTION_NONE && (instance.record.flags & INSTANCE_SETTLES) != 0u) {
+  if (MOTION != MOTION_NONE && (instance.record.joints & INSTANCE_SETTLES) != 0u) {
     uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     return;
@@ -200,7 +203,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
     morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount, NORMALS, TANGENTS);
     makeDirectionsUnit(morphed, NORMALS, TANGENTS);
   }
-  Pose pose = Pose(instance.record.palette, instance.record.jointCount, scales);
+  Pose pose = Pose(instance.record.palette, instance.record.joints & INSTANCE_JOINTS, scales);
   Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
   if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
   uvec4 position = encodePosition(skinned.position, instance.record.extension, true);

@@ -69,7 +69,7 @@ void storeGroup(uint word, GroupRecord r) {
 
 void storeInstance(uint word, InstanceRecord r) {
   tableUnits[word / 4u] = uvec4(r.palette, r.positions, r.normals, r.tangents);
-  tableUnits[word / 4u + 1u] = uvec4(r.previousPositions, r.jointCount, r.flags, r.extension);
+  tableUnits[word / 4u + 1u] = uvec4(r.previousPositions, r.joints, r.previousPalette, r.extension);
 }
 
 void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(r.x, r.y, r.z, r.reserved); }

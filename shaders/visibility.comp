@@ -31,7 +31,7 @@ void barrierOfBuffers() {
 
 uint wordOfInstance(uint number) { return push.instances + number * INSTANCE_WORDS; }
 
-// Whether an instance has to be looked at by the skin kernel, and how: `instance.flags`.
+// Whether an instance has to be looked at by the skin kernel, and how: `instance.joints`.
 //
 // The history of a slot that another instance had before does no harm: no two instances share a version, so that what is new is
 // skinned; and a new instance restarts its motion in the first frame that asks for it here. Where it is not visible in that frame,
@@ -45,18 +45,18 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
   if (history[slot].version != candidate.version) {
     history[slot].version = candidate.version;
     atomicAdd(counters.skinned, 1u);
-    if ((instance.flags & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
+    if ((instance.joints & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
     // What an instance showed before it was out of view is no motion.
-    if (!wasVisible && (instance.flags & INSTANCE_HAS_MOTION) != 0u) instance.flags |= INSTANCE_RESTARTS;
+    if (!wasVisible && (instance.joints & INSTANCE_HAS_MOTION) != 0u) instance.joints |= INSTANCE_RESTARTS;
     // Where motion restarts nothing is left to settle.
-    history[slot].moves = (instance.flags & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
+    history[slot].moves = (instance.joints & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
     return true;
   }
   // It rests where it was, in view or since it was: its previous positions become the current ones, once.
   if (history[slot].moves == 0u) return false;
   history[slot].moves = 0u;
   atomicAdd(counters.settled, 1u);
-  instance.flags |= INSTANCE_SETTLES;
+  instance.joints |= INSTANCE_SETTLES;
   return true;
 }
 

@@ -158,7 +158,7 @@ int main() {
   figure.mesh = must(scene.addMesh(must(pack(mesh, 2))));
   figure.pose = must(scene.addPose(2));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-  must(scene.prepare(pipelineNeeds(figure)));
+  must(scene.prepare(figure));
   const InstanceHandle instance = must(scene.addInstance(figure));
 
   // -- Each frame.

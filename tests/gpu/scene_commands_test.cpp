@@ -182,7 +182,7 @@ class Rhi {
   static std::array<BufferRole, storageBuffersWanted> rolesOf(const DispatchCommand& dispatch) {
     constexpr BufferRole out = BufferRole::positions, tables = BufferRole::tables;
     const Variant& variant = dispatch.variant;
-    if (variant.kernel == Kernel::palette)
+    if (variant.kernel == Kernel::palette || variant.kernel == Kernel::clear)
       return {tables, dispatch.joints,    BufferRole::palettes, out, out, out,
               out,    BufferRole::results};
     if (variant.kernel == Kernel::visibility)

@@ -54,7 +54,7 @@ class ModelSteps {
 
   /// An engine without anything, of which everything has to grow.
   virtual void makeEngine() = 0;
-  virtual void prepare(const PipelineNeeds& needs) = 0;
+  virtual void prepare(const InstanceDescription& instance) = 0;
   virtual void submit() = 0;
   virtual void abandon() = 0;
   /// Counts up when the output grows.
@@ -178,7 +178,7 @@ void ModelSteps<Engine>::addInstance() {
   description.layout = someLayouts()[below(3)];
   description.culledOnGpu = hasGpu && chance(25);
   if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
-  prepare(pipelineNeeds(description));
+  prepare(description);
   const Result<InstanceHandle> added = system().addInstance(description);
   if (!added) {
     expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
@@ -212,6 +212,7 @@ void ModelSteps<Engine>::setMesh(ModelInstance& instance) {
   }
   instance.mesh = mesh->first;
   instance.description.mesh = mesh->second.handle;
+  prepare(instance.description);
   instance.vertexCount = vertexCount;
   instance.isChanged = instance.changesMesh = true;
 }
@@ -263,7 +264,7 @@ void ModelSteps<Engine>::changeSeveral() {
     }
     if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
     if (change.pose || change.method) {
-      prepare(pipelineNeeds(instance.description));
+      prepare(instance.description);
       instance.isChanged = instance.isUrgent = true;
       instance.waitedFrames = 0;
     }
@@ -463,7 +464,7 @@ class GpuModelTest : public SystemTest,
     engine_.emplace(device(), small);
     engine_->recordsSecondary = GetParam() % 2 == 0;
   }
-  void prepare(const PipelineNeeds& needs) override { must(system().prepare(needs)); }
+  void prepare(const InstanceDescription& instance) override { must(system().prepare(instance)); }
   samples::MappedBuffer& nextWords() { return words_[submittedFrames_ % framesInFlight]; }
   void showSome() {
     const std::span<std::byte> words = nextWords().bytes();
@@ -515,7 +516,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     output_ = engine_->system().outputBytes().data();
     generation_ = 0;
   }
-  void prepare(const PipelineNeeds&) override {}
+  void prepare(const InstanceDescription&) override {}
   void submit() override {
     engine_->submit();
     const std::byte* const now = system().outputBytes().data();

@@ -126,7 +126,7 @@ TEST(ContextTest, EveryObjectUsesTheEnginesAllocatorAndIsDestroyed) {
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
     ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
     ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-    EXPECT_EQ(mock.alive["Pipeline"], 1 + static_cast<int>(allMethods.size()))
+    EXPECT_EQ(mock.alive["Pipeline"], 2 + static_cast<int>(allMethods.size()))
         << "what exists is not built again";
     vulkan::Context moved = std::move(*context);
     const Result<vulkan::Bindings> bindings = moved.createBindings(batch.buffers());
@@ -173,7 +173,7 @@ TEST(ContextTest, AFailureWhileBindingIsAnErrorAndLeaksNothing) {
 
 // What was built before the failure stays built, and the next attempt builds the rest.
 TEST(ContextTest, AFailureWhilePreparingIsAnErrorAndLeaksNothing) {
-  const int pipelines = 1 + static_cast<int>(allMethods.size());
+  const int pipelines = 2 + static_cast<int>(allMethods.size());
   for (const char* function : {"vkCreateShaderModule", "vkCreateComputePipelines"}) {
     for (int built = 0; built < pipelines; ++built) {
       FailingContext failing(function, built);
@@ -201,7 +201,7 @@ TEST(ContextTest, EveryPipelineIsBuiltWithTheEnginesCache) {
     Result<vulkan::Context> context = vulkan::Context::create(description);
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
     ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-    const std::vector<VkPipelineCache> expected(1 + allMethods.size(), cache);
+    const std::vector<VkPipelineCache> expected(2 + allMethods.size(), cache);
     EXPECT_EQ(mock.cachesOfPipelines, expected);
   }
 }
@@ -377,7 +377,7 @@ TEST(KernelsTest, SpirvIsThereWithoutADevice) {
   for (const std::uint32_t storageBuffers : {4u, 8u}) {
     DeviceLimits limits = richLimits();
     limits.maxStorageBuffersPerStage = storageBuffers;
-    for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
+    for (const Kernel kernel : {Kernel::palette, Kernel::clear, Kernel::skin}) {
       for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{1, 2, 4}) {
         Variant variant;
         variant.kernel = kernel;
@@ -390,7 +390,7 @@ TEST(KernelsTest, SpirvIsThereWithoutADevice) {
       }
     }
   }
-  EXPECT_EQ(modules.size(), 6u) << "two of palettes, words, halves, bytes, one output";
+  EXPECT_EQ(modules.size(), 6u) << "palettes, results, words, halves, bytes, one output";
 }
 
 TEST(KernelsTest, TheSmallestUnitChoosesTheModule) {

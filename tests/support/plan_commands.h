@@ -13,6 +13,7 @@ struct PlannedDispatch : DispatchCommand {
   bool isAfterBarrier = false;  ///< a barrier of the plan stands before it
 
   abi::PalettePush palettePush() const { return abi::load<abi::PalettePush>(constants, 0); }
+  abi::ClearPush clearPush() const { return abi::load<abi::ClearPush>(constants, 0); }
   abi::SkinPush skinPush() const { return abi::load<abi::SkinPush>(constants, 0); }
 };
 

@@ -67,15 +67,18 @@ class Simulation {
       if (std::find(used.begin(), used.end(), dispatch.variant) == used.end())
         used.push_back(dispatch.variant);
       if (dispatch.variant.kernel == Kernel::palette) {
-        ASSERT_FALSE(palettesDone_) << "one dispatch for all palettes";
-        palettesDone_ = true;
         ASSERT_FALSE(dispatch.isAfterBarrier);
         ASSERT_NO_FATAL_FAILURE(runPalettes(dispatch));
+      } else if (dispatch.variant.kernel == Kernel::clear) {
+        ASSERT_FALSE(dispatch.isAfterBarrier);
+        ASSERT_NO_FATAL_FAILURE(runClear(dispatch));
       } else {
         ASSERT_NO_FATAL_FAILURE(runSkin(dispatch));
       }
     }
     ASSERT_NO_FATAL_FAILURE(checkAllWritten());
+    ASSERT_NO_FATAL_FAILURE(checkPalettes());
+    ASSERT_EQ(cleared_.size(), resultCount_);
     ASSERT_NO_FATAL_FAILURE(checkStatuses());
     ASSERT_TRUE(std::ranges::equal(plan_.variants(), used));
   }
@@ -130,8 +133,6 @@ class Simulation {
     ASSERT_GE(dispatch.groupCountX, 1u);
     ASSERT_LE(dispatch.groupCountX, limits_.maxWorkgroupCountX);
     ASSERT_LE(dispatch.groupCountY, limits_.maxWorkgroupCountY);
-    ASSERT_EQ(dispatch.skinPush().workgroupCount, dispatch.workgroupCount);
-    ASSERT_EQ(dispatch.palettePush().workgroupCount, dispatch.workgroupCount);
     ASSERT_GE(groups, dispatch.workgroupCount);
     // Hardly any workgroup is started in vain.
     ASSERT_LT(groups, std::uint64_t{dispatch.workgroupCount} + dispatch.groupCountY);
@@ -146,20 +147,25 @@ class Simulation {
     }
   }
 
+  void runClear(const PlannedDispatch& dispatch) {
+    const abi::ClearPush push = dispatch.clearPush();
+    ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
+    ASSERT_EQ(push.workgroupCount, divideUp(push.resultCount, tuning_.workgroupSize));
+    for (std::uint32_t number = 0; number < push.resultCount; ++number) {
+      const std::uint32_t result = word(push.results + number);
+      ASSERT_LT(result, resultCount_);
+      ASSERT_TRUE(cleared_.insert(result).second) << "cleared twice";
+    }
+  }
+
   void runPalettes(const PlannedDispatch& dispatch) {
     const abi::PalettePush push = dispatch.palettePush();
-    std::set<PaletteInForm> wanted;
-    for (const Job& job : batch_.jobs) {
-      if (job.method == Method::linear) continue;
-      wanted.insert({job.pose, wantsLogarithms(job.method)});
-      if (job.motion == Motion::reskinned)
-        wanted.insert({job.previousPose, wantsLogarithms(job.method)});
-    }
-    ASSERT_EQ(push.paletteCount, wanted.size());
-    ASSERT_EQ(push.resultCount, resultCount_);
-    ASSERT_EQ(push.workgroupCount, wanted.size() + divideUp(resultCount_, tuning_.workgroupSize));
-    std::uint64_t end = 0;
-    for (std::uint32_t number = 0; number < push.paletteCount; ++number) {
+    const bool logarithms = wantsLogarithms(dispatch.variant.method);
+    ASSERT_TRUE(logarithms || dispatch.variant.method == Method::dualQuaternion);
+    ASSERT_TRUE(paletteDispatches_.insert({logarithms, dispatch.variant.scales}).second)
+        << "one dispatch for all palettes of a form";
+    ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
+    for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       const auto record = at<abi::PaletteRecord>(push.palettes + number * abi::PALETTE_WORDS);
       const std::uint64_t status = std::uint64_t{record.place} * 16;
       // No two palettes of a batch begin at the same matrix.
@@ -169,23 +175,34 @@ class Simulation {
           [&](const PoseDescription& palette) { return palette.matrixOffset == matrices; });
       ASSERT_NE(found, batch_.poses.end());
       const PoseDescription& palette = *found;
-      const std::uint32_t flags = record.flags;
-      const bool logarithms = (flags & abi::PALETTE_LOGARITHMS) != 0;
       const PaletteInForm form{static_cast<std::uint32_t>(found - batch_.poses.begin()),
                                logarithms};
-      ASSERT_EQ(wanted.erase(form), 1u) << "a palette that nobody reads, or twice in a form";
+      ASSERT_TRUE(statuses_.emplace(form, status).second) << "twice in a form";
       ASSERT_EQ(record.jointCount, palette.jointCount);
-      ASSERT_EQ(flags, (palette.mayScale ? abi::PALETTE_MAY_SCALE : 0u) |
-                           (logarithms ? abi::PALETTE_LOGARITHMS : 0u));
-      ASSERT_GE(status, end) << "palettes overlap";
+      ASSERT_EQ(dispatch.variant.scales, palette.mayScale);
       // A joint: 8 floats of a dual quaternion, 12 of a logarithm, 8 of scale and shear.
-      end = status + 16 +
-            std::uint64_t{palette.jointCount} *
-                ((logarithms ? 48u : 32u) + (palette.mayScale ? 32u : 0u));
-      ASSERT_LE(end, plan_.buffer(BufferRole::palettes).size);
-      statuses_[form] = status;
+      paletteEnds_[status] = status + 16 +
+                             std::uint64_t{palette.jointCount} *
+                                 ((logarithms ? 48u : 32u) + (palette.mayScale ? 32u : 0u));
     }
-    ASSERT_TRUE(wanted.empty());
+  }
+
+  /// Those that are read, and no others, one behind the other.
+  void checkPalettes() {
+    std::set<PaletteInForm> wanted;
+    for (const Job& job : batch_.jobs) {
+      if (job.method == Method::linear) continue;
+      wanted.insert({job.pose, wantsLogarithms(job.method)});
+      if (job.motion == Motion::reskinned)
+        wanted.insert({job.previousPose, wantsLogarithms(job.method)});
+    }
+    ASSERT_EQ(statuses_.size(), wanted.size());
+    for (const PaletteInForm& form : wanted) ASSERT_TRUE(statuses_.contains(form));
+    std::uint64_t end = 0;
+    for (const auto& [status, paletteEnd] : paletteEnds_) {
+      ASSERT_EQ(status, end) << "palettes overlap, or leave room";
+      end = paletteEnd;
+    }
     ASSERT_EQ(end, plan_.buffer(BufferRole::palettes).size);
   }
 
@@ -207,6 +224,7 @@ class Simulation {
 
   void runSkin(const PlannedDispatch& dispatch) {
     const abi::SkinPush push = dispatch.skinPush();
+    ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
     ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
     for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       // The first group whose end lies behind the workgroup's number.
@@ -313,8 +331,9 @@ class Simulation {
     // that may see results.
     const bool reads = job.method != Method::linear || wantsResult(job);
     const bool maySee = reads || job.motion != Motion::none;
-    ASSERT_TRUE(dispatch.isAfterBarrier || !(maySee && palettesDone_));
-    ASSERT_TRUE(palettesDone_ || !reads);
+    const bool anyBefore = !paletteDispatches_.empty() || !cleared_.empty();
+    ASSERT_TRUE(dispatch.isAfterBarrier || !(maySee && anyBefore));
+    ASSERT_TRUE(anyBefore || !reads);
   }
 
   bool mayScale(const Job& job) const {
@@ -330,10 +349,11 @@ class Simulation {
   void checkRecord(std::uint32_t group, std::uint64_t record, std::uint32_t index) {
     const Job& job = batch_.jobs[index];
     ASSERT_EQ(std::uint64_t{groupAt(group).mesh} * 4, job.meshOffset);
-    ASSERT_EQ(instanceAt(record).jointCount, batch_.poses[job.pose].jointCount);
+    ASSERT_EQ(instanceAt(record).joints & abi::INSTANCE_JOINTS, batch_.poses[job.pose].jointCount);
     ASSERT_EQ(std::uint64_t{instanceAt(record).palette} * 16, paletteBytes(job.method, job.pose));
-    ASSERT_EQ(instanceAt(record).flags, (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
-                                            (job.settles ? abi::INSTANCE_SETTLES : 0u));
+    ASSERT_EQ(instanceAt(record).joints & ~abi::INSTANCE_JOINTS,
+              (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
+                  (job.settles ? abi::INSTANCE_SETTLES : 0u));
   }
 
   void checkMorphs(std::uint64_t first, std::uint32_t count, std::span<const MorphWeight> morphs) {
@@ -358,7 +378,7 @@ class Simulation {
     const auto extension = at<abi::ExtensionRecord>(place);
     ASSERT_NO_FATAL_FAILURE(checkMorphs(extension.morphs, extension.morphCount, job.morphs));
     if (job.motion == Motion::reskinned) {
-      ASSERT_EQ(std::uint64_t{extension.previousPalette} * 16,
+      ASSERT_EQ(std::uint64_t{instanceAt(record).previousPalette} * 16,
                 paletteBytes(job.method, job.previousPose));
       ASSERT_EQ(extension.previousJointCount, batch_.poses[job.previousPose].jointCount);
       ASSERT_NO_FATAL_FAILURE(
@@ -420,10 +440,12 @@ class Simulation {
   std::vector<std::uint32_t> tables_;
   std::array<std::uint64_t, streamCount> sizes_{};
   std::vector<std::pair<std::uint64_t, std::uint32_t>> begins_;  ///< of positions, and the job
-  std::vector<std::vector<std::uint8_t>> written_;   ///< by job and vertex: a bit a stream
-  std::map<PaletteInForm, std::uint64_t> statuses_;  ///< bytes into the palettes
+  std::vector<std::vector<std::uint8_t>> written_;      ///< by job and vertex: a bit a stream
+  std::map<PaletteInForm, std::uint64_t> statuses_;     ///< bytes into the palettes
+  std::map<std::uint64_t, std::uint64_t> paletteEnds_;  ///< by where they begin
+  std::set<std::pair<bool, bool>> paletteDispatches_;   ///< logarithms, scales
+  std::set<std::uint32_t> cleared_;
   std::uint64_t resultCount_ = 0;
-  bool palettesDone_ = false;
 };
 
 }  // namespace

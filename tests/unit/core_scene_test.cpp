@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dermis/scene.h"
@@ -76,6 +79,7 @@ std::vector<std::string> namesOf(const Plan& plan) {
       names.push_back(std::string(dispatch->indirectOffset ? "indirect " : "") +
                       (kernel == Kernel::palette ? "palette"
                        : kernel == Kernel::skin  ? "skin"
+                       : kernel == Kernel::clear ? "clear"
                                                  : "visibility"));
     } else if (const auto* copy = std::get_if<CopyCommand>(&command)) {
       names.push_back(std::string(roleName(copy->from)) + " to " + roleName(copy->to));
@@ -92,9 +96,81 @@ TEST(Scene, AFrameUploadsConvertsSkinsAndReadsBack) {
   OneInstance one;
   ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
   ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(namesOf(one.plan), (std::vector<std::string>{"barrier", "upload to tables", "barrier",
-                                                         "palette", "barrier", "skin", "barrier",
-                                                         "results to read-back", "barrier"}));
+  EXPECT_EQ(
+      namesOf(one.plan),
+      (std::vector<std::string>{"barrier", "upload to tables", "barrier", "palette", "clear",
+                                "barrier", "skin", "barrier", "results to read-back", "barrier"}));
+}
+
+/// Every variant that the plans of one instance use, with and without active morph targets.
+std::set<std::uint64_t> variantsOf(Scene& scene, InstanceHandle instance, std::uint32_t targets) {
+  std::set<std::uint64_t> used;
+  Plan plan;
+  std::uint64_t frame = 0;
+  for (const float weight : {0.f, 1.f}) {
+    const MorphWeight morph{0, weight};
+    InstanceChange change{.instance = instance, .teleports = true};
+    if (targets != 0) change.morphs = std::span(&morph, 1);
+    EXPECT_TRUE(scene.change(change).ok());
+    ++frame;
+    EXPECT_TRUE(scene.beginFrame(frame, frame - 1).ok());
+    EXPECT_TRUE(scene.plan(plan).ok());
+    for (const Variant& variant : plan.variants()) used.insert(variant.key());
+    EXPECT_TRUE(scene.commit().ok());
+  }
+  return used;
+}
+
+// What is prepared for one instance is what its frames use, and no more.
+TEST(Scene, TellsThePipelinesOfOneInstance) {
+  SceneDescription description = smallScene();
+  description.limits.texelBuffers = description.limits.shaderInt64 = true;
+  description.limits.scalarBlockLayout = true;
+  for (const Method method : allMethods) {
+    for (const auto& [fewest, most] : {std::pair{0u, 0u},
+                                       {1u, 1u},
+                                       {1u, 2u},
+                                       {2u, 3u},
+                                       {3u, 3u},
+                                       {1u, 4u},
+                                       {4u, 4u},
+                                       {2u, 9u}}) {
+      for (std::uint32_t targets = 0; targets < 2; ++targets) {
+        for (int choices = 0; choices < 8; ++choices) {
+          Scene scene = *Scene::create(description);
+          MeshInfo info;
+          info.vertexCount = 100;
+          info.requiredJoints = 4;
+          info.minInfluences = fewest;
+          info.maxInfluences = most;
+          info.morphTargetCount = targets;
+          info.hasCentersOfRotation = true;
+          info.byteSize = 4096;
+          InstanceDescription figure;
+          figure.mesh = *scene.addMesh(info);
+          figure.pose = *scene.addPose(4, {.mayScale = choices % 2 != 0});
+          figure.method = method;
+          figure.bounds = choices / 2 % 2 != 0;
+          figure.culledOnGpu = choices / 4 != 0;
+          const PipelineNeeds needs = *scene.pipelineNeeds(figure);
+          std::set<std::uint64_t> foreseen;
+          for (const Variant& variant : *everyVariant(needs, description.limits, {})) {
+            // Palettes of dual quaternions may be for the engine's shaders alone.
+            const bool isForShaders = (method == Method::linear || method == Method::logMatrix) &&
+                                      variant.kernel == Kernel::palette &&
+                                      variant.method == Method::dualQuaternion;
+            if (!isForShaders) foreseen.insert(variant.key());
+          }
+          const InstanceHandle instance = *scene.addInstance(figure);
+          EXPECT_EQ(variantsOf(scene, instance, targets), foreseen)
+              << methodName(method) << ", " << fewest << " to " << most << " influences, "
+              << targets << " targets, choices " << choices;
+        }
+      }
+    }
+  }
+  const Scene empty = *Scene::create(description);
+  EXPECT_FALSE(empty.pipelineNeeds({}).ok());
 }
 
 TEST(Scene, TheGpuChoosesBeforeItSkins) {
@@ -109,6 +185,7 @@ TEST(Scene, TheGpuChoosesBeforeItSkins) {
                                        "visibility",
                                        "barrier",
                                        "palette",
+                                       "clear",
                                        "barrier",
                                        "indirect skin",
                                        "barrier",

@@ -187,9 +187,10 @@ struct Batch {
 };
 
 enum class Kernel : std::uint8_t {
-  palette,     ///< converts poses to palettes, and clears results
+  palette,     ///< converts poses to palettes
   skin,        ///< skins instances
   visibility,  ///< of a scene: chooses instances that are culled on the GPU
+  clear,       ///< clears the results of instances that are skinned
 };
 
 /// The four attributes of an output, in the order of the arrays below.
@@ -197,7 +198,9 @@ enum class Stream : std::uint8_t { positions, normals, tangents, previousPositio
 inline constexpr std::size_t streamCount = 4;
 
 /// One specialisation of a kernel, from which a pipeline is built. All members but `kernel` and
-/// `workgroupSize` apply to the skin kernel only.
+/// `workgroupSize` apply to the skin kernel only, but for two of the palette kernel: `method` is
+/// what joints become (dualQuaternion; logMatrix: logarithms; linear: matrices, as they are), and
+/// `scales` is `PoseDescription::mayScale`.
 struct Variant {
   Kernel kernel = Kernel::skin;
   Method method = Method::dualQuaternion;
@@ -242,7 +245,8 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 
 /// All variants that jobs with the method, outputs, motion and bounds of this job can need,
 /// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
-/// They are the palette kernel, and the skin kernel for at most 1, 2 and 4 influences; for exactly
+/// They are the palette kernel with and without scale, the clear kernel for bounds and snorm16
+/// positions, and the skin kernel for at most 1, 2 and 4 influences; for exactly
 /// 4; for 4 with joints that scale; for any number; and for any number with morph targets. Some
 /// methods need fewer. `Promises` reduce the number further. With `scalarBlockLayout` and
 /// `texelBuffers` each skin kernel may come twice: with stores of up to 32 bytes, for jobs of which
@@ -258,6 +262,11 @@ struct PipelineNeeds {
   VertexLayout layout = {};
   bool bounds = false;       ///< `Job::bounds`
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
+  // -- What is the same for all instances, if anything is: each leaves pipelines out. Instances for
+  // which it is not so may not be prepared then.
+  /// A mesh with the most and the fewest influences of them all, and morph targets if any has some.
+  std::optional<MeshInfo> mesh = {};
+  std::optional<bool> mayScale = {};  ///< that of their poses
 };
 
 /// All variants for instances with these needs, wherever `placeVertices` places them; with
@@ -317,8 +326,8 @@ struct DispatchCommand {
   std::uint32_t workgroupCount = 0;
   /// Byte offset of a VkDispatchIndirectCommand in the tables, if indirect.
   std::optional<std::uint64_t> indirectOffset;
-  /// Push constants from offset 0, the first `constantCount` words: PalettePush, SkinPush or
-  /// VisibilityPush of shaders/abi.h.
+  /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
+  /// SkinPush or VisibilityPush of shaders/abi.h.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
   std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel

@@ -159,9 +159,13 @@ struct InstanceVisibility {
   std::uint32_t updateInterval = 1;
 };
 
-/// What `prepare` must be given before such an instance is recorded.
+/// What `prepare` must be given before such an instance is recorded, whatever its mesh and pose.
+/// `Scene::pipelineNeeds` is for those that it has.
 inline PipelineNeeds pipelineNeeds(const InstanceDescription& description) {
-  return {description.method, description.layout, description.bounds, description.culledOnGpu};
+  return {.method = description.method,
+          .layout = description.layout,
+          .bounds = description.bounds,
+          .culledOnGpu = description.culledOnGpu};
 }
 
 /// Where the vertices of an instance stand in the output buffer.
@@ -284,6 +288,11 @@ class DERMIS_CORE_API Scene {
   /// `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with `limitExceeded`
   /// if there is no room for it; nothing changes then. `compact` may make room in the output.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
+  /// What such an instance needs as long as its mesh, pose and method stay: with the same layout,
+  /// `everyVariant` lists two kernels for most instances, instead of ten. Another mesh with as many
+  /// influences, or another pose with the same `mayScale`, needs nothing more. Fails with
+  /// `invalidArgument` for a stale handle.
+  Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
   Result<void> removeInstance(InstanceHandle instance);
 
   // -- What changes.

@@ -281,7 +281,7 @@ Result<std::span<const PlannedJob>> SkinningSystem::jobs(std::uint32_t verticesP
     if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
       if (dispatch->variant.kernel == Kernel::palette) {
         state.namePalettes(*dispatch);
-      } else {
+      } else if (dispatch->variant.kernel == Kernel::skin) {
         state.addDispatch(*dispatch, std::max(verticesPerJob, 1u));
       }
     } else if (const auto* copy = std::get_if<CopyCommand>(&command);
@@ -307,17 +307,15 @@ Result<void> SkinningSystem::abandonFrame() {
 /// A palette that is written ends those that it overwrites.
 void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
   const auto push = abi::load<abi::PalettePush>(dispatch.constants, 0);
-  for (std::uint32_t number = 0; number < push.paletteCount; ++number) {
+  for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
     const auto record =
         abi::load<abi::PaletteRecord>(tables, push.palettes + number * abi::PALETTE_WORDS);
     PaletteSource source;
-    source.mayScale = (record.flags & abi::PALETTE_MAY_SCALE) != 0;
+    source.mayScale = dispatch.variant.scales;
     source.pose =
         std::span<const JointMatrix>(poseBuffers[dispatch.poseBuffer])
             .subspan(record.matrices * unitBytes / sizeof(JointMatrix), record.jointCount);
-    const PaletteForm form = (record.flags & abi::PALETTE_MATRICES) != 0
-                                 ? PaletteForm::matrices
-                                 : PaletteForm::dualQuaternions;
+    const PaletteForm form = paletteForm(dispatch.variant.method);
     source.end = record.place + paletteSize(form, record.jointCount, source.mayScale);
     auto first = palettes.lower_bound(record.place);
     if (first != palettes.begin() && std::prev(first)->second.end > record.place) --first;
@@ -349,8 +347,8 @@ TaskInstance SkinningSystem::State::taskInstance(const abi::InstanceRecord& reco
   const PaletteSource& palette = paletteAt(record.palette);
   instance.pose = palette.pose;
   instance.mayScale = palette.mayScale;
-  instance.restartsMotion = (record.flags & abi::INSTANCE_RESTARTS) != 0;
-  instance.settles = (record.flags & abi::INSTANCE_SETTLES) != 0;
+  instance.restartsMotion = (record.joints & abi::INSTANCE_RESTARTS) != 0;
+  instance.settles = (record.joints & abi::INSTANCE_SETTLES) != 0;
   if (record.extension == 0) return instance;
   const auto extension = abi::load<abi::ExtensionRecord>(tables, record.extension);
   static_assert(sizeof(MorphWeight) == sizeof(abi::ActiveMorph));

@@ -69,14 +69,26 @@ static_assert(sizeof(PoseStatus) == sizeof(abi::StatusRecord) &&
 
 namespace {
 
+/// Methods of modules of their own: with them all others would take drivers twice as long.
+bool isAgainstBulge(Method method) {
+  return method == Method::blended || method == Method::centerOfRotation ||
+         method == Method::bulgeControlled;
+}
+
 /// The name that shaders/CMakeLists.txt gives the module for a variant.
 std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
-  if (variant.kernel == Kernel::palette) return oneOutput ? "palette_one_output" : "palette";
+  if (variant.kernel == Kernel::palette) {
+    return variant.method == Method::linear      ? "palette_matrices"
+           : variant.method == Method::logMatrix ? "palette_logarithms"
+                                                 : "palette";
+  }
+  if (variant.kernel == Kernel::clear) return "clear";
   if (variant.kernel == Kernel::visibility)
     return oneOutput ? "visibility_one_output" : "visibility";
   std::string name = "skin";
   if (isForComparison(variant.method)) name += "_comparison";
+  if (isAgainstBulge(variant.method)) name += "_bulge";
   if (oneOutput) return name + "_one_output";
   if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
   if (variant.texels)

@@ -88,10 +88,11 @@ Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout la
       result != VK_SUCCESS) {
     return vulkanError("vkCreateComputePipelines", result);
   }
-  const std::string name = variant.kernel == Kernel::palette ? std::string("dermis palette")
-                           : variant.kernel == Kernel::visibility
-                               ? std::string("dermis visibility")
-                               : "dermis skin " + std::string(methodName(variant.method));
+  static constexpr std::array<const char*, 4> names{"dermis palette ", "dermis skin ",
+                                                    "dermis visibility", "dermis clear"};
+  std::string name = names[static_cast<std::size_t>(variant.kernel)];
+  if (variant.kernel == Kernel::palette || variant.kernel == Kernel::skin)
+    name += methodName(variant.method);
   nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
   return pipeline;
 }

@@ -23,7 +23,14 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
 }
 
 std::string describe(const Variant& variant) {
-  if (variant.kernel == Kernel::palette) return "the palette kernel";
+  if (variant.kernel == Kernel::palette) {
+    return std::string("the palette kernel for ") +
+           (variant.method == Method::linear      ? "matrices"
+            : variant.method == Method::logMatrix ? "logarithms"
+                                                  : "dual quaternions") +
+           (variant.scales ? " of joints that scale" : "");
+  }
+  if (variant.kernel == Kernel::clear) return "the clear kernel";
   if (variant.kernel == Kernel::visibility)
     return "the visibility kernel, for instances that are culled on the GPU,";
   std::string text = "the variant of " + std::string(methodName(variant.method)) +
@@ -213,7 +220,7 @@ class Recorder {
   }
 
   BoundBuffers buffersOf(const DispatchCommand& dispatch) const {
-    if (dispatch.variant.kernel == Kernel::palette)
+    if (dispatch.variant.kernel == Kernel::palette || dispatch.variant.kernel == Kernel::clear)
       return bound_.paletteKernel(dispatch.poseBuffer);
     if (dispatch.variant.kernel == Kernel::visibility) return bound_.visibilityKernel(*frame_);
     Windows windows;
@@ -239,7 +246,8 @@ class Recorder {
         table_.updateDescriptorSets(context_.device, writes.count(), writes.data(), 0, nullptr);
       }
       visibilityIsWritten_ = true;
-    } else if (dispatch.variant.kernel == Kernel::palette) {
+    } else if (dispatch.variant.kernel == Kernel::palette ||
+               dispatch.variant.kernel == Kernel::clear) {
       set = bound_.sets[dispatch.poseBuffer];
     } else {
       set = bound_.sets[bound_.skinSet(dispatch.joints, bound_.commonWindow(dispatch))];

@@ -4,7 +4,8 @@
 // Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers, or the first four on
 // a device that has fewer per stage:
 //
-// - palette kernel: 0 tables, 1 poses, 2 palettes, 7 results;
+// - palette kernel: 0 tables, 1 poses, 2 palettes;
+// - clear kernel: 0 tables, 7 results;
 // - skin kernel: 0 tables, 1 meshes, 2 palettes (linear: poses), 3 positions, 4 normals, 5
 // tangents,
 //   6 previous positions, 7 results;

@@ -108,7 +108,8 @@ struct SystemStatistics {
   std::uint64_t deviceMemory = 0;
 };
 
-/// One thread at a time may call a member function, except `prepare`. Any thread may write the
+/// One thread at a time may call a member function, except
+/// `prepare` with `PipelineNeeds`. Any thread may write the
 /// memory that `writePose` returns, until `record`. Nothing here submits, waits or touches a queue.
 ///
 /// All frames are recorded for queues that execute them one after the other, in the order of
@@ -156,6 +157,9 @@ class DERMIS_VULKAN_API SkinningSystem {
 
   /// As `Context::prepare`, with the system's tuning. May be called by any thread at any time.
   Result<void> prepare(const PipelineNeeds& needs) const;
+  /// Only what `Scene::pipelineNeeds` tells for this instance: the fastest start. Fails as that,
+  /// too. Reads the scene: not while another thread changes it.
+  Result<void> prepare(const InstanceDescription& instance) const;
 
   // -- What changes: as `Scene`.
 

@@ -97,7 +97,7 @@ Result<void> Groups::place(const Job& job, const OutputStreams& streams, const P
     };
     PlacedRun& placed = runs.emplace_back();
     placed.group = acquire(key, lastVariant_);
-    placed.record.jointCount = placing.jointCount;
+    placed.record.joints = placing.jointCount;
     placed.record.positions = place(0);
     placed.record.normals = place(1);
     placed.record.tangents = place(2);
@@ -194,7 +194,11 @@ void PlanBuilder::begin(PlanData& plan, Groups& groups, const DeviceLimits& limi
   plan.sizes = sizes;
   ++number_;
   paletteCount_ = 0;
-  for (PaletteList& list : palettes_) list.records.clear();
+  for (PaletteLists& lists : palettes_) {
+    for (auto& ofForm : lists.records) {
+      for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
+    }
+  }
   cleared_.clear();
   entries_.clear();
   candidates_.clear();
@@ -210,6 +214,7 @@ void PlanBuilder::startGroup(Groups::Entry& entry) {
 
 Result<void> PlanBuilder::finish(const FrameWork* frame) {
   if (Result<void> good = addPaletteDispatches(); !good) return good;
+  if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
   writeInstances();
   if (!candidates_.empty()) {
@@ -269,39 +274,47 @@ Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t work
   return {};
 }
 
-/// One for each pose buffer. The first clears the results too.
 Result<void> PlanBuilder::addPaletteDispatches() {
-  std::span<const std::uint32_t> cleared = cleared_;
   for (std::uint32_t buffer = 0; buffer < palettes_.size(); ++buffer) {
-    if (palettes_[buffer].records.empty()) continue;
-    if (Result<void> good = addPaletteDispatch(palettes_[buffer], buffer, cleared); !good)
-      return good;
-    cleared = {};
+    const PaletteLists& lists = palettes_[buffer];
+    for (std::size_t form = 0; form < paletteFormCount; ++form) {
+      for (const bool mayScale : {false, true}) {
+        const std::span<const abi::PaletteRecord> records = lists.records[form][mayScale];
+        if (records.empty()) continue;
+        const Variant variant = paletteVariant(static_cast<PaletteForm>(form), mayScale, tuning_);
+        if (Result<void> good = addPaletteDispatch(variant, records, lists.joints, buffer); !good)
+          return good;
+      }
+    }
   }
-  return cleared.empty() ? Result<void>() : addPaletteDispatch({}, 0, cleared);
+  return {};
 }
 
-Result<void> PlanBuilder::addPaletteDispatch(const PaletteList& list, std::uint32_t buffer,
-                                             std::span<const std::uint32_t> cleared) {
+/// A workgroup a palette.
+Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
+                                             std::span<const abi::PaletteRecord> records,
+                                             BufferRole joints, std::uint32_t buffer) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
-  const auto count = static_cast<std::uint32_t>(list.records.size());
-  tables.resize(tables.size() + std::size_t{count} * abi::PALETTE_WORDS);
-  if (count != 0) {
-    std::memcpy(&tables[first], list.records.data(), std::size_t{count} * abi::PALETTE_WORDS * 4);
-  }
-  tables.insert(tables.end(), cleared.begin(), cleared.end());
-  alignToUnit(tables);
-  // Behind the workgroups of the palettes come those that clear the results.
-  if (Result<void> good = addDispatch(
-          paletteVariant(tuning_), count + divideUp(cleared.size(), tuning_.workgroupSize),
-          abi::PalettePush{first, count, 0, static_cast<std::uint32_t>(cleared.size())});
-      !good)
+  tables.resize(first + records.size() * abi::PALETTE_WORDS);
+  std::memcpy(&tables[first], records.data(), records.size_bytes());
+  if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0}); !good)
     return good;
   DispatchCommand& dispatch = dispatches_.back().command;
-  dispatch.joints = list.joints;
+  dispatch.joints = joints;
   dispatch.poseBuffer = buffer;
   return {};
+}
+
+/// An invocation a result.
+Result<void> PlanBuilder::addClearDispatch() {
+  if (cleared_.empty()) return {};
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::uint32_t first = wordsOf(tables);
+  tables.insert(tables.end(), cleared_.begin(), cleared_.end());
+  alignToUnit(tables);
+  return addDispatch(clearVariant(tuning_), divideUp(cleared_.size(), tuning_.workgroupSize),
+                     abi::ClearPush{first, static_cast<std::uint32_t>(cleared_.size()), 0});
 }
 
 /// A record for each group, and a dispatch for groups of one variant and output range.
@@ -389,7 +402,6 @@ std::uint32_t PlanBuilder::appendExtension(const InstanceExtras& extras) {
   extension.morphs = appendMorphs(extras.morphs);
   extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
   if (extras.hasPrevious) {
-    extension.previousPalette = extras.previousPalette;
     extension.previousJointCount = extras.previousJoints;
     extension.previousMorphs = appendMorphs(extras.previousMorphs);
     extension.previousMorphCount = static_cast<std::uint32_t>(extras.previousMorphs.size());
@@ -412,14 +424,17 @@ void PlanBuilder::writeInstances() {
     const std::uint32_t place = group.firstInstance + group.filled++;
     const std::uint32_t extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
     const abi::InstanceRecord& run = entry.run->record;
-    const abi::InstanceRecord record{.palette = entry.palette,
-                                     .positions = run.positions,
-                                     .normals = run.normals,
-                                     .tangents = run.tangents,
-                                     .previousPositions = run.previousPositions,
-                                     .jointCount = run.jointCount,
-                                     .flags = entry.flags,
-                                     .extension = extension};
+    const abi::InstanceRecord record{
+        .palette = entry.palette,
+        .positions = run.positions,
+        .normals = run.normals,
+        .tangents = run.tangents,
+        .previousPositions = run.previousPositions,
+        .joints = run.joints | entry.flags,
+        .previousPalette = entry.extras != nullptr && entry.extras->hasPrevious
+                               ? entry.extras->previousPalette
+                               : 0,
+        .extension = extension};
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
     if (candidate != candidates_.end() && candidate->entry == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;

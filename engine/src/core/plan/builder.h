@@ -24,17 +24,6 @@ inline constexpr std::uint32_t notUsed = 0xffffffffu;
 
 // -- Palettes.
 
-/// What stands in the palettes buffer for a joint.
-enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
-inline constexpr std::size_t paletteFormCount = 3;
-
-/// What a method reads. In a batch the matrices are not copied to the palettes buffer: they are
-/// read where they stand.
-inline PaletteForm paletteForm(Method method) {
-  if (method == Method::linear) return PaletteForm::matrices;
-  return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
-}
-
 /// Units of a palette: its status, its joints, and their scale/shear parts; or its matrices alone.
 inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
   if (form == PaletteForm::matrices) return std::uint64_t{jointCount} * abi::UNITS_OF_MATRIX;
@@ -67,7 +56,7 @@ struct Group {
 };
 
 /// A run of an instance's vertices: the group it belongs to, and its record in the tables but for
-/// the palette, the flags and the extension.
+/// the palettes, the flags and the extension.
 struct PlacedRun {
   std::uint32_t group = notUsed;
   abi::InstanceRecord record{};
@@ -229,13 +218,11 @@ class PlanBuilder {
   /// `finish`, in any order with the rest.
   void addPalette(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
                   PaletteForm form, bool mayScale) {
-    std::uint32_t flags = mayScale ? abi::PALETTE_MAY_SCALE : 0u;
-    if (form == PaletteForm::logarithms) flags |= abi::PALETTE_LOGARITHMS;
-    if (form == PaletteForm::matrices) flags |= abi::PALETTE_MATRICES;
     while (palettes_.size() <= source.buffer) palettes_.emplace_back();
-    PaletteList& list = palettes_[source.buffer];
-    list.joints = source.role;
-    list.records.push_back({source.unit, outputUnit, joints, flags});
+    PaletteLists& lists = palettes_[source.buffer];
+    lists.joints = source.role;
+    lists.records[static_cast<std::size_t>(form)][mayScale].push_back(
+        {source.unit, outputUnit, joints, 0});
     ++paletteCount_;
   }
 
@@ -270,14 +257,14 @@ class PlanBuilder {
     std::uint32_t entry;
     Candidate candidate;
   };
-  /// Of one pose buffer: a dispatch.
-  struct PaletteList {
+  /// Of one pose buffer: a dispatch for each form, with and without scale.
+  struct PaletteLists {
     BufferRole joints = BufferRole::poses;
-    std::vector<abi::PaletteRecord> records;
+    std::array<std::array<std::vector<abi::PaletteRecord>, 2>, paletteFormCount> records;
   };
   struct Dispatch {
     DispatchCommand command;
-    /// It reads what the palette kernel writes, or adds to results that the palette kernel clears.
+    /// It reads what the palette kernel writes, or adds to results that the clear kernel clears.
     bool isAfterPalettes = false;
   };
 
@@ -288,8 +275,10 @@ class PlanBuilder {
   }
   void startGroup(Groups::Entry& entry);
   Result<void> addPaletteDispatches();
-  Result<void> addPaletteDispatch(const PaletteList& list, std::uint32_t buffer,
-                                  std::span<const std::uint32_t> cleared);
+  Result<void> addPaletteDispatch(const Variant& variant,
+                                  std::span<const abi::PaletteRecord> records, BufferRole joints,
+                                  std::uint32_t buffer);
+  Result<void> addClearDispatch();
   Result<void> addDispatches();
   template <typename Push>
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
@@ -309,7 +298,7 @@ class PlanBuilder {
   Tuning tuning_;
   std::uint64_t number_ = 0;  ///< of the plan, among those of this builder
   std::uint32_t paletteCount_ = 0;
-  std::vector<PaletteList> palettes_;  ///< by pose buffer
+  std::vector<PaletteLists> palettes_;  ///< by pose buffer
   std::vector<std::uint32_t> cleared_;
   std::vector<Entry> entries_;
   std::vector<CulledEntry> candidates_;

@@ -229,8 +229,17 @@ Variant variantOf(Kernel kernel, const Tuning& tuning) {
 
 }  // namespace
 
-Variant paletteVariant(const Tuning& tuning) {
-  return variantOf(Kernel::palette, tuning);
+Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning) {
+  Variant variant = variantOf(Kernel::palette, tuning);
+  variant.method = form == PaletteForm::matrices     ? Method::linear
+                   : form == PaletteForm::logarithms ? Method::logMatrix
+                                                     : Method::dualQuaternion;
+  variant.scales = mayScale && form != PaletteForm::matrices;
+  return variant;
+}
+
+Variant clearVariant(const Tuning& tuning) {
+  return variantOf(Kernel::clear, tuning);
 }
 
 Variant visibilityVariant(const Tuning& tuning) {
@@ -265,15 +274,43 @@ std::uint64_t Variant::key() const {
 
 namespace {
 
+/// What is known of all instances, or every value that it may have.
+struct FormRanges {
+  FormRanges(const std::optional<MeshInfo>& mesh, std::optional<bool> mayScale,
+             const Promises& promises) {
+    if (mesh) influences = {mesh->maxInfluences};
+    if (mesh) full = {mesh->minInfluences == mesh->maxInfluences};
+    if ((mesh && mesh->morphTargetCount == 0) || promises.noMorphTargets) morphs = {false};
+    if (mayScale) scales = {*mayScale};
+    if (promises.noScale) scales = {false};
+    std::erase_if(influences, [&](std::uint32_t most) {
+      return promises.maxInfluences != 0 && most > promises.maxInfluences;
+    });
+  }
+
+  std::vector<std::uint32_t> influences{1, 2, 4, 5};
+  std::vector<bool> full{false, true}, morphs{false, true}, scales{false, true};
+};
+
+/// The kernels before the skin kernel. An engine's shaders may read any pose as dual quaternions.
+std::vector<Variant> everyHelper(const Job& job, const FormRanges& ranges, const Tuning& tuning) {
+  std::vector<Variant> variants;
+  for (const bool mayScale : ranges.scales) {
+    variants.push_back(paletteVariant(PaletteForm::dualQuaternions, mayScale, tuning));
+    if (paletteForm(job.method) == PaletteForm::logarithms)
+      variants.push_back(paletteVariant(PaletteForm::logarithms, mayScale, tuning));
+  }
+  if (hasResult(job)) variants.push_back(clearVariant(tuning));
+  return variants;
+}
+
 /// All forms of a kernel.
-void appendForms(Variant variant, const Promises& promises, std::vector<Variant>& variants) {
-  for (const std::uint32_t influences : {1u, 2u, 4u, 5u}) {
-    if (promises.maxInfluences != 0 && influences > promises.maxInfluences) continue;
-    for (const bool scales : {false, true}) {
-      if (scales && promises.noScale) continue;
-      for (const bool morphs : {false, true}) {
-        if (morphs && promises.noMorphTargets) continue;
-        for (const bool full : {false, true}) {
+void appendForms(Variant variant, const FormRanges& ranges, const Promises& promises,
+                 std::vector<Variant>& variants) {
+  for (const std::uint32_t influences : ranges.influences) {
+    for (const bool scales : ranges.scales) {
+      for (const bool morphs : ranges.morphs) {
+        for (const bool full : ranges.full) {
           chooseForm({influences, full, scales, morphs}, promises, variant);
           if (std::ranges::find(variants, variant) == variants.end()) variants.push_back(variant);
         }
@@ -286,9 +323,10 @@ void appendForms(Variant variant, const Promises& promises, std::vector<Variant>
 
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
                                   const Tuning& tuning) {
-  std::vector<Variant> variants{paletteVariant(tuning)};
+  const FormRanges ranges({}, {}, limits.promises);
+  std::vector<Variant> variants = everyHelper(job, ranges, tuning);
   for (const bool areAligned : {false, true})
-    appendForms(layoutVariant(job, limits, tuning, areAligned), limits.promises, variants);
+    appendForms(layoutVariant(job, limits, tuning, areAligned), ranges, limits.promises, variants);
   return variants;
 }
 
@@ -300,9 +338,12 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
   job.method = needs.method;
   job.bounds = needs.bounds;
   job.place(*places);
-  std::vector<Variant> variants{paletteVariant(tuning)};
+  const FormRanges ranges(needs.mesh, needs.mayScale, limits.promises);
+  std::vector<Variant> variants = everyHelper(job, ranges, tuning);
+  if (needs.method == Method::linear)  // a scene copies them
+    variants.push_back(paletteVariant(PaletteForm::matrices, false, tuning));
   // `placeVertices` aligns what it places.
-  appendForms(layoutVariant(job, limits, tuning), limits.promises, variants);
+  appendForms(layoutVariant(job, limits, tuning), ranges, limits.promises, variants);
   if (needs.culledOnGpu) variants.push_back(visibilityVariant(tuning));
   return variants;
 }

@@ -54,9 +54,22 @@ inline bool hasResult(const Job& job) {
   return job.bounds || isSnormPosition(job.positions.format);
 }
 
-// -- Variants.
+// -- Palettes, and variants.
 
-Variant paletteVariant(const Tuning& tuning);
+/// What stands in the palettes buffer for a joint.
+enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
+inline constexpr std::size_t paletteFormCount = 3;
+
+/// What a method reads. In a batch the matrices are not copied to the palettes buffer: they are
+/// read where they stand.
+inline PaletteForm paletteForm(Method method) {
+  if (method == Method::linear) return PaletteForm::matrices;
+  return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
+}
+
+/// Matrices are copied, whether they scale or not.
+Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning);
+Variant clearVariant(const Tuning& tuning);
 Variant visibilityVariant(const Tuning& tuning);
 
 /// The skin kernel for a job, but for its form. It depends on nothing else in the batch.

@@ -143,6 +143,16 @@ Result<PosePlace> Scene::posePlace(PoseHandle handle) const {
 Result<void> Scene::removePose(PoseHandle pose) {
   return change().removePose(pose);
 }
+Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& description) const {
+  const SceneMesh* mesh = books_->meshes().find(description.mesh);
+  if (mesh == nullptr) return unknownHandle("mesh", description.mesh);
+  const ScenePose* pose = books_->poses().find(description.pose);
+  if (pose == nullptr) return unknownHandle("pose", description.pose);
+  PipelineNeeds needs = dermis::pipelineNeeds(description);
+  needs.mesh = mesh->info;
+  needs.mayScale = pose->mayScale;
+  return needs;
+}
 Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
   return change().addInstance(description);
 }

@@ -201,6 +201,10 @@ Result<void> SkinningSystem::removeInstance(InstanceHandle instance) {
 Result<void> SkinningSystem::prepare(const PipelineNeeds& needs) const {
   return state_->context->prepare(needs, state_->scene.description().tuning);
 }
+Result<void> SkinningSystem::prepare(const InstanceDescription& instance) const {
+  const Result<PipelineNeeds> needs = state_->scene.pipelineNeeds(instance);
+  return needs ? prepare(*needs) : Result<void>(needs.error());
+}
 
 // -- What changes.
 
