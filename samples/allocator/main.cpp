@@ -136,7 +136,7 @@ Result<vulkan::CreatedBuffer> createForDermis(void* user, const vulkan::BufferRe
   vulkan::CreatedBuffer created;
   auto* allocation = new Allocation;
   const VkMemoryPropertyFlags wanted = request.use == vulkan::BufferUse::device ? 0 : mappedMemory;
-  const VkResult result = static_cast<Allocator*>(user)->createBuffer(request.info, wanted,
+  const VkResult result = static_cast<Allocator*>(user)->createBuffer(*request.info, wanted,
                                                                       created.buffer, *allocation);
   created.mapped = allocation->mapped;
   created.allocation = allocation;

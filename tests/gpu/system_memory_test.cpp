@@ -35,10 +35,11 @@ class CountingMemory {
     if (self.allocations == self.failsAt)
       return Error{ErrorCode::ioError, "the engine's allocator has had enough", 7};
     const bool isMapped = request.use != BufferUse::device;
-    auto* own = new samples::MappedBuffer(must(samples::MappedBuffer::create(
-        self.device_, request.info.size, request.info.usage, request.use == BufferUse::readBack)));
+    auto* own = new samples::MappedBuffer(
+        must(samples::MappedBuffer::create(self.device_, request.info->size, request.info->usage,
+                                           request.use == BufferUse::readBack)));
     ++self.allocations;
-    self.bytes += request.info.size;
+    self.bytes += request.info->size;
     self.uses.insert(request.use);
     self.names.insert(request.name);
     return CreatedBuffer{own->handle(), isMapped ? own->bytes().data() : nullptr, own};

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <vulkan/vulkan_core.h>
+
 #include "dermis/vulkan/context.h"
 
 namespace dermis::test {

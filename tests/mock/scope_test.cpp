@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include <vulkan/vulkan_core.h>
+
 #include "dermis/vulkan/scope.h"
 
 namespace dermis::test {

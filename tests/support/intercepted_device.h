@@ -6,6 +6,8 @@
 #include <map>
 #include <string>
 
+#include <vulkan/vulkan_core.h>
+
 #include "dermis/vulkan/context.h"
 
 namespace dermis::test {

@@ -1,5 +1,7 @@
 #include "dermis/vulkan/scope.h"
 
+#include <vulkan/vulkan_core.h>
+
 #include "dermis/vulkan/bindings.h"
 
 namespace dermis::vulkan {

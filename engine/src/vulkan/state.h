@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <vulkan/vulkan_core.h>
+
 #include "abi.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"

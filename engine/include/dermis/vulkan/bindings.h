@@ -4,16 +4,15 @@
 #include <cstdint>
 #include <memory>
 
-#include <vulkan/vulkan_core.h>
-
 #include "dermis/export.h"
+#include "dermis/vulkan/handles.h"
 
 namespace dermis::vulkan {
 
 /// A part of a VkBuffer. The offset is a multiple of
 /// `DeviceLimits::minStorageBufferOffsetAlignment`, the size of 4.
 struct BufferRange {
-  VkBuffer buffer = VK_NULL_HANDLE;
+  VkBuffer buffer{};
   VkDeviceSize offset = 0;
   VkDeviceSize size = 0;  ///< bytes; VK_WHOLE_SIZE is not allowed here
 };

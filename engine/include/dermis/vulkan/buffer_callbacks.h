@@ -3,9 +3,8 @@
 
 #include <cstdint>
 
-#include <vulkan/vulkan_core.h>
-
 #include "dermis/result.h"
+#include "dermis/vulkan/handles.h"
 
 namespace dermis::vulkan {
 
@@ -19,17 +18,17 @@ enum class BufferUse : std::uint8_t {
 };
 
 struct BufferRequest {
-  /// Size and usage; exclusive to a queue family, nothing in pNext. With
-  /// VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT the memory must be allocated with
+  /// Size and usage; exclusive to a queue family, nothing in pNext. It lives as long as the call.
+  /// With VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT the memory must be allocated with
   /// VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
-  VkBufferCreateInfo info{};
+  const VkBufferCreateInfo* info = nullptr;
   BufferUse use = BufferUse::device;
   const char* name = "";  ///< "dermis output": the same for all buffers of a kind; a constant
 };
 
 /// A buffer with its memory.
 struct CreatedBuffer {
-  VkBuffer buffer = VK_NULL_HANDLE;
+  VkBuffer buffer{};
   void* mapped = nullptr;      ///< upload, readBack: the address of its first byte; stays mapped
   void* allocation = nullptr;  ///< for the allocator; `destroy` gets it back
 };

@@ -6,26 +6,25 @@
 #include <optional>
 #include <span>
 
-#include <vulkan/vulkan_core.h>
-
 #include "dermis/export.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/handles.h"
 
 namespace dermis::vulkan {
 
 /// The engine's device and what is enabled on it. Dermis uses only what this structure names. The
 /// engine owns all of it.
 struct DeviceDescription {
-  VkInstance instance = VK_NULL_HANDLE;
-  VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
-  VkDevice device = VK_NULL_HANDLE;
+  VkInstance instance{};
+  VkPhysicalDevice physicalDevice{};
+  VkDevice device{};
   /// The entry point of the loader or of a layer. Dermis gets all other functions through it, and
   /// links no loader.
   PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
   /// The API version of the instance or of the device, whichever is lower. Minimum: Vulkan 1.1.
-  std::uint32_t apiVersion = VK_API_VERSION_1_1;
+  std::uint32_t apiVersion = apiVersion11;
   /// Names of the enabled device extensions. Dermis uses VK_KHR_push_descriptor if it is among
   /// them. The instance extension VK_EXT_debug_utils may be named too; Dermis then names its
   /// objects and labels its commands.
@@ -47,7 +46,7 @@ struct DeviceDescription {
   /// What the engine promises about its meshes and poses, to need fewer pipelines.
   Promises promises;
   /// Optional. Every pipeline is created with it. The engine stores and loads it.
-  VkPipelineCache pipelineCache = VK_NULL_HANDLE;
+  VkPipelineCache pipelineCache{};
   /// Optional. Used for every object that Dermis creates. It must outlive the Context.
   const VkAllocationCallbacks* allocator = nullptr;
 };

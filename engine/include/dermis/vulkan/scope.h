@@ -8,9 +8,8 @@
 
 #include <cstdint>
 
-#include <vulkan/vulkan_core.h>
-
 #include "dermis/export.h"
+#include "dermis/vulkan/handles.h"
 
 namespace dermis::vulkan {
 
@@ -101,14 +100,14 @@ DERMIS_VULKAN_API VkMemoryBarrier memoryBarrier(const Dependency& dependency);
 /// transfer.
 DERMIS_VULKAN_API VkBufferMemoryBarrier
 bufferBarrier(const Dependency& dependency, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize size,
-              std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
-              std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
+              std::uint32_t sourceFamily = queueFamilyIgnored,
+              std::uint32_t destinationFamily = queueFamilyIgnored);
 
 /// The same two for vkCmdPipelineBarrier2 (Vulkan 1.3, VK_KHR_synchronization2).
 DERMIS_VULKAN_API VkMemoryBarrier2 memoryBarrier2(const Dependency& dependency);
 DERMIS_VULKAN_API VkBufferMemoryBarrier2
 bufferBarrier2(const Dependency& dependency, VkBuffer buffer, VkDeviceSize offset,
-               VkDeviceSize size, std::uint32_t sourceFamily = VK_QUEUE_FAMILY_IGNORED,
-               std::uint32_t destinationFamily = VK_QUEUE_FAMILY_IGNORED);
+               VkDeviceSize size, std::uint32_t sourceFamily = queueFamilyIgnored,
+               std::uint32_t destinationFamily = queueFamilyIgnored);
 
 }  // namespace dermis::vulkan

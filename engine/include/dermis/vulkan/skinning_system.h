@@ -18,8 +18,6 @@
 #include <span>
 #include <vector>
 
-#include <vulkan/vulkan_core.h>
-
 #include "dermis/export.h"
 #include "dermis/handle.h"
 #include "dermis/mesh.h"
@@ -31,6 +29,7 @@
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/buffer_callbacks.h"
 #include "dermis/vulkan/context.h"
+#include "dermis/vulkan/handles.h"
 
 namespace dermis::vulkan {
 
@@ -63,7 +62,7 @@ struct SkinningSystemDescription {
   BufferRange output;
   /// How the engine uses the output buffer if the system creates it:
   /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and `buildInputUsage`.
-  VkBufferUsageFlags outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
+  VkBufferUsageFlags outputUsage = vertexBufferUsage;
 
   /// How all other buffers are created: by `create`, by what is added, and by `record` (tables, and
   /// what is copied to and from them, until a frame needs no more than those before it). Both
@@ -81,7 +80,7 @@ struct FrameDescription {
   /// if it is visible. The engine's culling writes it on the GPU, before `record`, with a barrier
   /// `inputScope(PreviousUse::computeWrite)`. `visibilityOffset` is a multiple of the device's
   /// minStorageBufferOffsetAlignment, which is not checked.
-  VkBuffer visibility = VK_NULL_HANDLE;
+  VkBuffer visibility{};
   VkDeviceSize visibilityOffset = 0;
 };
 

@@ -1,11 +1,12 @@
-// All of dermis::vulkan.
+// All of dermis::vulkan that does without Vulkan's own header: not vertex_input.h and
+// acceleration_structure.h, which include vulkan_core.h. An engine that uses volk includes volk.h
+// before those two, or defines VK_NO_PROTOTYPES.
 #pragma once
 
-#include "dermis/vulkan/acceleration_structure.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/buffer_callbacks.h"
 #include "dermis/vulkan/context.h"
+#include "dermis/vulkan/handles.h"
 #include "dermis/vulkan/kernels.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
-#include "dermis/vulkan/vertex_input.h"

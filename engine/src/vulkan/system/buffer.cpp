@@ -6,11 +6,13 @@
 namespace dermis::vulkan {
 
 Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Description& description) {
+  VkBufferCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+  info.size = description.size;
+  info.usage = description.usage;
+  info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
   BufferRequest request;
-  request.info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
-  request.info.size = description.size;
-  request.info.usage = description.usage;
-  request.info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
+  request.info = &info;
   request.use = description.use;
   request.name = description.name;
   const Result<CreatedBuffer> created = source.callbacks.create(source.callbacks.user, request);

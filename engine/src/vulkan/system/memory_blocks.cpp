@@ -68,14 +68,14 @@ BufferCallbacks MemoryBlocks::callbacks() {
 
 Result<CreatedBuffer> MemoryBlocks::create(const BufferRequest& request) {
   CreatedBuffer buffer;
-  if (const VkResult result = functions_.createBuffer(context_.device, &request.info,
+  if (const VkResult result = functions_.createBuffer(context_.device, request.info,
                                                       context_.allocator, &buffer.buffer);
       result != VK_SUCCESS)
     return vulkanError("vkCreateBuffer", result);
   Need need;
   functions_.getBufferMemoryRequirements(context_.device, buffer.buffer, &need.requirements);
   need.use = request.use;
-  need.hasAddress = (request.info.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+  need.hasAddress = (request.info->usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
   const Result<Part> part = allocate(need, request.name);
   if (!part) {
     functions_.destroyBuffer(context_.device, buffer.buffer, context_.allocator);

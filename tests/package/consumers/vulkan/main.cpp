@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <vulkan/vulkan_core.h>
+
 #include "dermis/dermis.h"
 #include "dermis/vulkan/vulkan.h"
 

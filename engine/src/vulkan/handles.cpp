@@ -1,0 +1,12 @@
+// handles.h declares what vulkan_core.h declares: this file compiles only if both agree.
+#include "dermis/vulkan/handles.h"
+
+#include <vulkan/vulkan_core.h>
+
+namespace dermis::vulkan {
+
+static_assert(apiVersion11 == VK_API_VERSION_1_1);
+static_assert(queueFamilyIgnored == VK_QUEUE_FAMILY_IGNORED);
+static_assert(vertexBufferUsage == VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,37 @@
+# Dermis' headers before and after those of others. Programs are only compiled.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+set(core dermis/dermis.h dermis/cpu/skinning_system.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
+    dermis/shader_compiler.h)
+set(vulkan dermis/vulkan/vulkan.h)
+set(loaders dermis/vulkan/vertex_input.h dermis/vulkan/acceleration_structure.h)
+set(create "int main() { return static_cast<int>(vkCreateInstance(nullptr, nullptr, nullptr)); }")
+
+# compiles(WHAT BODY HEADERS...): "-DX" among the headers is a definition.
+function(compiles what body)
+  set(text)
+  set(flags)
+  foreach(header IN LISTS ARGN)
+    if(header MATCHES "^-D")
+      list(APPEND flags ${header})
+    else()
+      string(APPEND text "#include <${header}>\n")
+    endif()
+  endforeach()
+  file(WRITE "${testFolder}/${NAME}.cpp" "${text}${body}\n")
+  run(ignored "${what}" "${ownCompiler}" -std=c++20 -fsyntax-only -Wall -Wextra -Werror ${flags} -I "${prefix}/${includeFolder}"
+      -I "${scriptFolder}/consumers/headers" "${testFolder}/${NAME}.cpp")
+endfunction()
+
+compiles("volk first" "${create}" volk.h ${vulkan} ${loaders})
+compiles("volk last" "${create}" ${vulkan} volk.h)
+compiles("volk last, VK_NO_PROTOTYPES" "${create}" -DVK_NO_PROTOTYPES ${vulkan} ${loaders} volk.h)
+compiles("vulkan.h first" "${create}" vulkan/vulkan.h ${vulkan} ${loaders})
+compiles("vulkan.h last" "${create}" ${vulkan} vulkan/vulkan.h)
+compiles("vulkan.h after all that is Dermis'" "${create}" ${vulkan} ${loaders} vulkan/vulkan.h)
+compiles("VK_NO_PROTOTYPES, no Vulkan header" "" -DVK_NO_PROTOTYPES ${vulkan} ${loaders})
+compiles("Xlib first" "" X11/Xlib.h X11/Xutil.h ${core} ${vulkan} ${loaders})
+compiles("Xlib last" "" ${core} ${vulkan} ${loaders} X11/Xlib.h)
+# After the standard library's, which do not bear them.
+compiles("macros of windows.h" "" algorithm array bit cmath cstddef cstdint filesystem functional limits memory optional span string
+         string_view utility variant vector vulkan/vulkan.h windows_macros.h ${core} ${vulkan} ${loaders})
