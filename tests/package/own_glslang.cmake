@@ -1,5 +1,5 @@
 # A subproject of an engine that has glslang, SPIRV-Tools, GLM and Vulkan-Headers of its own, and defines only some of the names
-# that their packages do: it configures. tests/run.sh nightly arm64 builds with a tool that is built apart, as here.
+# that their packages do: it configures.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 foreach(compiler IN ITEMS OFF ON)
