@@ -317,6 +317,26 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
   EXPECT_GT(narrow, 100u);
 }
 
+// Two jobs that differ in nothing but the distance between their attributes, by what all stores
+// divide.
+TEST(Plan, AttributesThatStandApartAreNotStoredTogether) {
+  DeviceLimits limits = richLimits();
+  limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
+  OwnedBatch batch;
+  addMeshes(batch);
+  addPoses(batch);
+  const Job together = batch.addJob(0, 0, Method::dualQuaternion, true);
+  Job apart = together;
+  apart.positions.offset += 96 * 1000;
+  apart.normals.offset += 96 * 2000;
+  batch.jobs.push_back(apart);
+  batch.outputSize = 96 * 4000;
+  Plan plan;
+  ASSERT_TRUE(makePlan(batch.batch(), limits, {}, plan).ok());
+  ASSERT_EQ(plan.variants().size(), 3u);  // the first is the palette kernel
+  EXPECT_NE(plan.variants()[1].recordBytes, plan.variants()[2].recordBytes);
+}
+
 // With every promise one pipeline is left.
 TEST(Plan, EachPromiseLeavesPipelinesOut) {
   Job job;
