@@ -5,9 +5,12 @@
 #include <filesystem>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "commands.h"
 #include "open_device.h"
@@ -22,6 +25,7 @@ struct VerifyOptions {
   std::string device = "auto";
   std::string json;
   std::string junit;
+  std::optional<std::uint32_t> threads;
   bool random = false;
   bool strict = false;
 };
@@ -37,17 +41,17 @@ bool isSkinned(const Scene& scene) {
 class Verifier {
  public:
   /// `reports` are refused for a model that they would damage.
-  Verifier(samples::BatchTarget& target, bool strict,
+  Verifier(samples::TargetPool& pool, bool strict,
            std::span<const samples::RequestedOutput> reports)
-      : target_(target), outputs_(outputsToVerify(target)), reports_(reports) {
+      : pool_(pool), reports_(reports) {
     preparation_.strict = strict;
     preparation_.centersOfRotation = true;
   }
 
   void verifyRandom() {
-    const std::vector<samples::RandomCase> cases = samples::randomCases(target_);
+    const std::vector<samples::RandomCase> cases = samples::randomCases(pool_.first());
     samples::Progress progress("random meshes", cases.size());
-    add("random meshes", verifyRandomMeshes(target_, cases, [&progress] { progress.step(); }));
+    add("random meshes", verifyRandomMeshes(pool_, cases, [&progress] { progress.step(); }));
   }
 
   void verify(const std::string& model) {
@@ -80,8 +84,9 @@ class Verifier {
           fmt::format("{}: it has no skinned mesh with joints and weights in its scene", model));
     }
     const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
-    samples::Progress progress(model, poses.size());
-    add(model, verifyScene(target_, *scene, poses, outputs_, [&progress] { progress.step(); }));
+    const SceneCases cases = casesOf(*scene, pool_.first(), poses.size());
+    samples::Progress progress(model, cases.batches.size());
+    add(model, verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); }));
   }
 
   void add(const std::string& model, Cases cases) {
@@ -108,8 +113,7 @@ class Verifier {
 
   void worsen(ExitStatus status) { status_ = std::max(status_, status); }
 
-  samples::BatchTarget& target_;
-  std::vector<OutputToVerify> outputs_;
+  samples::TargetPool& pool_;
   std::span<const samples::RequestedOutput> reports_;
   std::string overwrites_;
   MeshPreparation preparation_;
@@ -139,15 +143,16 @@ std::string notCovered(const samples::BatchTarget& target) {
   return methods;
 }
 
-ExitStatus verifyOn(samples::BatchTarget& target, const VerifyOptions& options,
+ExitStatus verifyOn(samples::TargetPool pool, const VerifyOptions& options,
                     std::span<const samples::RequestedOutput> outputFiles) {
-  Verifier verifier(target, options.strict, outputFiles);
+  Verifier verifier(pool, options.strict, outputFiles);
   if (options.random || options.models.empty()) verifier.verifyRandom();
   for (const std::string& model : options.models) {
     verifier.verify(model);
     if (!verifier.overwrites().empty()) return reportWrongUsage(verifier.overwrites());
   }
   // Files first: standard output may be closed.
+  const samples::BatchTarget& target = pool.first();
   const ExitStatus written = writeReports(options, target.name(), verifier.models());
   fmt::print("device  {}\n", target.name());
   printReport(verifier.models());
@@ -157,26 +162,45 @@ ExitStatus verifyOn(samples::BatchTarget& target, const VerifyOptions& options,
   return written == ExitStatus::done ? verifier.status() : written;
 }
 
+/// A device, and what skins on it.
+struct DeviceWithTarget {
+  explicit DeviceWithTarget(samples::OpenDevice opened)
+      : open(std::move(opened)), target(*open.device, open.context) {}
+
+  samples::OpenDevice open;
+  samples::VulkanTarget target;
+};
+
+Result<std::shared_ptr<samples::BatchTarget>> openTarget(const std::string& name) {
+  samples::DeviceOptions options;
+  options.device = name;
+  Result<samples::OpenDevice> open = samples::openDevice(options);
+  if (!open) return open.error();
+  const auto device = std::make_shared<DeviceWithTarget>(std::move(*open));
+  return std::shared_ptr<samples::BatchTarget>(device, &device->target);
+}
+
 ExitStatus verify(const VerifyOptions& options) {
   if (options.device == "reference") {
     return reportWrongUsage(
         "--device reference would be compared with itself; name cpu or a Vulkan device");
   }
+  if (options.threads == 0u) return reportWrongUsage("--threads must be at least 1");
   const std::array<samples::RequestedOutput, 2> outputFiles{
       {{"--json", options.json}, {"--junit", options.junit}}};
   const std::vector<std::filesystem::path> inputs(options.models.begin(), options.models.end());
   if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
     return reportWrongUsage(kept.error().message);
-  if (options.device == "cpu") {
-    samples::CpuTarget target;
-    return verifyOn(target, options, outputFiles);
-  }
-  samples::DeviceOptions deviceOptions;
-  deviceOptions.device = options.device;
-  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
-  if (!open) return reportDeviceError(open.error());
-  samples::VulkanTarget target(*open->device, open->context);
-  return verifyOn(target, options, outputFiles);
+  const auto makeTarget = [&options]() -> Result<std::shared_ptr<samples::BatchTarget>> {
+    if (options.device == "cpu")
+      return std::shared_ptr<samples::BatchTarget>(std::make_shared<samples::CpuTarget>());
+    return openTarget(options.device);
+  };
+  Result<std::shared_ptr<samples::BatchTarget>> first = makeTarget();
+  if (!first) return reportDeviceError(first.error());
+  const std::uint32_t threads =
+      options.threads.value_or(std::max(std::thread::hardware_concurrency(), 1u));
+  return verifyOn({std::move(*first), makeTarget, threads}, options, outputFiles);
 }
 
 }  // namespace
@@ -195,6 +219,8 @@ Run addVerify(CLI::App& app) {
       "auto, cpu (SIMD on the CPU), a number of 'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write every case with its errors");
   command->add_option("--junit", options->junit, "Write the same as JUnit XML, for CI");
+  command->add_option("--threads", options->threads,
+                      "Verify in this many threads, each with a device of its own [all cores]");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return verify(*options); };
 }

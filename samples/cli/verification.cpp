@@ -5,19 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "dermis/text.h"
 #include "method_rotation.h"
 
 namespace dermis::cli {
 namespace {
-
-/// A part with one of the methods that it allows.
-struct Figure {
-  std::size_t part;
-  Method method;
-};
 
 std::vector<Figure> figuresOf(const Scene& scene, std::span<const Method> methods) {
   std::vector<Figure> figures;
@@ -71,31 +68,36 @@ Result<void> checkReach(const ScenePart& part, const PoseToVerify& pose,
   return {};
 }
 
-Result<ReferencePose> skinReference(const Scene& scene, std::span<const Figure> figures,
-                                    const PoseToVerify& pose) {
+Result<ReferencePose> skinReference(samples::TargetPool& pool, const Scene& scene,
+                                    std::span<const Figure> figures, const PoseToVerify& pose) {
   ReferencePose skinned{scenePose(scene, pose.clip, pose.time), {}, {}};
-  for (const Figure& figure : figures) {
-    const ScenePart& part = scene.parts[figure.part];
-    Result<reference::SkinnedMesh> mesh =
-        reference::skin(part.mesh->view(), skinned.pose.pose(part), figure.method,
-                        skinned.pose.morphs[figure.part]);
-    if (!mesh) return mesh.error();
-    if (Result<void> checked = checkReach(part, pose, *mesh); !checked) return checked.error();
-    skinned.exemptions.push_back(exemptionsIn(skinned.pose.pose(part), *mesh));
-    skinned.figures.push_back(std::move(*mesh));
-  }
+  skinned.figures.resize(figures.size());
+  skinned.exemptions.resize(figures.size());
+  Result<void> done = pool.run(
+      {.tasks = figures.size()}, [&](std::size_t index, samples::BatchTarget&) -> Result<void> {
+        const Figure& figure = figures[index];
+        const ScenePart& part = scene.parts[figure.part];
+        Result<reference::SkinnedMesh> mesh =
+            reference::skin(part.mesh->view(), skinned.pose.pose(part), figure.method,
+                            skinned.pose.morphs[figure.part]);
+        if (!mesh) return mesh.error();
+        skinned.exemptions[index] = exemptionsIn(skinned.pose.pose(part), *mesh);
+        skinned.figures[index] = std::move(*mesh);
+        return checkReach(part, pose, skinned.figures[index]);
+      });
+  if (!done) return done.error();
   return skinned;
 }
 
-/// All figures in one pose, and from which pose they move.
-struct PoseBatch {
+/// All figures of a scene in one pose, and from which pose they move.
+struct PosedFigures {
   const PoseToVerify& pose;
   const std::vector<reference::SkinnedMesh>& expected;
   std::vector<samples::InstanceToVerify> instances;
   std::vector<const ScenePart*> parts;  ///< of the instances
 
-  PoseBatch(const Scene& scene, std::span<const Figure> figures, const PoseToVerify& name,
-            const ReferencePose& now, const ReferencePose& before)
+  PosedFigures(const Scene& scene, std::span<const Figure> figures, const PoseToVerify& name,
+               const ReferencePose& now, const ReferencePose& before)
       : pose(name), expected(now.figures) {
     for (std::size_t index = 0; index < figures.size(); ++index) {
       const auto& [part, method] = figures[index];
@@ -118,77 +120,131 @@ struct PoseBatch {
   }
 };
 
-/// Positions, normals and tangents as float32, however the work is cut up: not a bit may change.
-Result<void> verifyDivisions(samples::BatchTarget& target, const PoseBatch& batch,
-                             std::vector<VerifiedCase>& cases) {
-  std::vector<samples::SkinRequest> requests;
-  for (const samples::InstanceToVerify& instance : batch.instances) {
-    samples::SkinRequest& request = requests.emplace_back();
-    request.mesh = instance.packed;
-    request.pose = instance.pose;
-    request.method = instance.method;
-    request.morphs = instance.morphs;
+/// The batches of one pose. Whichever runs first, they come out in their order.
+class PoseVerifier {
+ public:
+  PoseVerifier(const SceneCases& cases, const PosedFigures& pose,
+               std::span<const SceneBatch> batches)
+      : cases_(cases), pose_(pose), batches_(batches), outcomes_(batches.size()) {}
+
+  Result<void> run(samples::TargetPool& pool, const std::function<void()>& done) {
+    const auto isDivision = [this](const SceneBatch& batch) { return divides(batch); };
+    const auto divisions = static_cast<std::size_t>(std::ranges::count_if(batches_, isDivision));
+    return pool.run({.tasks = batches_.size(), .settled = divisions, .done = done},
+                    [this](std::size_t index, samples::BatchTarget& target) {
+                      return divides(batches_[index]) ? divide(target, index)
+                                                      : store(target, index);
+                    });
   }
-  std::vector<samples::SkinnedVertices> first;
-  std::vector<Comparison> firstComparisons;
-  const std::vector<samples::Division> divisions = target.divisions();
-  for (const samples::Division& division : divisions) {
+
+  Result<void> addTo(std::vector<VerifiedCase>& cases) {
+    for (std::size_t index = 0; index < batches_.size(); ++index) {
+      if (divides(batches_[index])) {
+        if (Result<void> compared = compareDivision(index); !compared) return compared;
+      }
+      std::ranges::move(outcomes_[index].cases, std::back_inserter(cases));
+    }
+    return {};
+  }
+
+ private:
+  struct Outcome {
+    std::vector<samples::SkinnedVertices> divided;
+    std::vector<VerifiedCase> cases;
+  };
+  /// Of the first division.
+  struct First {
+    const samples::SkinnedVertices* skinned;
+    Comparison comparison;
+  };
+
+  bool divides(const SceneBatch& batch) const { return batch.way < cases_.divisions.size(); }
+
+  Result<void> divide(samples::BatchTarget& target, std::size_t index) {
+    const SceneBatch& batch = batches_[index];
+    std::vector<samples::SkinRequest> requests;
+    for (const std::size_t figure : batch.figures) {
+      const samples::InstanceToVerify& instance = pose_.instances[figure];
+      samples::SkinRequest& request = requests.emplace_back();
+      request.mesh = instance.packed;
+      request.pose = instance.pose;
+      request.method = instance.method;
+      request.morphs = instance.morphs;
+    }
+    const samples::Division& division = cases_.divisions[batch.way];
+    const samples::OutputCase output = divisionOutput(division);
     samples::RunOptions options;
-    options.tuning = division.tuning;
+    options.tuning = output.tuning;
     options.instructions = division.instructions;
-    options.output.tangents = VertexFormat::float32x4;
+    options.output = output.layout;
     options.countUntouched = false;
     Result<samples::BatchResult> result = target.run(requests, options);
     if (!result) return result.error();
-    for (std::size_t index = 0; index < requests.size(); ++index) {
-      const samples::SkinnedVertices& skinned = result->instances[index];
-      VerifiedCase verified = batch.newCase(index, division.name);
-      verified.status = skinned.status;
-      if (!first.empty() && skinned.streams == first[index].streams) {
-        verified.comparison = firstComparisons[index];
-      } else {
-        const Result<Comparison> comparison = compareWithReference(
-            batch.expected[index], skinned.view(), batch.instances[index].exemptions);
-        if (!comparison) return comparison.error();
-        verified.comparison = *comparison;
-        if (!first.empty())
-          verified.wrong = "the result is not to the bit that of " + divisions[0].name;
-      }
-      if (first.empty()) firstComparisons.push_back(verified.comparison);
-      cases.push_back(std::move(verified));
-    }
-    if (first.empty()) first = std::move(result->instances);
+    outcomes_[index].divided = std::move(result->instances);
+    return {};
   }
-  return {};
-}
 
-/// One way to store the result.
-Result<void> verifyOutput(samples::BatchTarget& target, const PoseBatch& batch,
-                          const OutputToVerify& output, std::vector<VerifiedCase>& cases) {
-  std::vector<samples::InstanceToVerify> instances;
-  std::vector<std::size_t> indices;
-  for (std::size_t index = 0; index < batch.instances.size(); ++index) {
-    if (std::ranges::count(output.methods, batch.instances[index].method) == 0) continue;
-    // Every other box of positions in snorm16 is too small, so that some are clamped.
-    for (std::size_t copy = 0; copy < (isSnormPosition(output.output.layout.positions) ? 2 : 1);
-         ++copy) {
-      instances.push_back(batch.instances[index]);
-      indices.push_back(index);
+  /// Not a bit may differ from the first division.
+  Result<void> compareDivision(std::size_t index) {
+    const SceneBatch& batch = batches_[index];
+    Outcome& outcome = outcomes_[index];
+    for (std::size_t place = 0; place < batch.figures.size(); ++place) {
+      const std::size_t figure = batch.figures[place];
+      const samples::SkinnedVertices& skinned = outcome.divided[place];
+      VerifiedCase& verified =
+          outcome.cases.emplace_back(pose_.newCase(figure, cases_.divisions[batch.way].name));
+      verified.status = skinned.status;
+      const auto first = firsts_.find(figure);
+      if (first != firsts_.end() && first->second.skinned->streams == skinned.streams) {
+        verified.comparison = first->second.comparison;
+        continue;
+      }
+      const Result<Comparison> comparison = compareWithReference(
+          pose_.expected[figure], skinned.view(), pose_.instances[figure].exemptions);
+      if (!comparison) return comparison.error();
+      verified.comparison = *comparison;
+      if (first == firsts_.end()) {
+        firsts_[figure] = {&skinned, *comparison};
+      } else {
+        verified.wrong = "the result is not to the bit that of " + cases_.divisions[0].name;
+      }
     }
+    return {};
   }
-  Result<std::vector<samples::VerifiedInstance>> verified =
-      samples::verifyBatch(target, instances, output.output);
-  if (!verified) return verified.error();
-  for (std::size_t place = 0; place < verified->size(); ++place) {
-    const bool clamps = isSnormPosition(output.output.layout.positions) && place % 2 == 1;
-    VerifiedCase& added = cases.emplace_back(
-        batch.newCase(indices[place], output.output.name() + (clamps ? ", in a small box" : "")));
-    added.comparison = (*verified)[place].comparison;
-    added.status = (*verified)[place].status;
-    added.wrong = std::move((*verified)[place].wrong);
+
+  Result<void> store(samples::BatchTarget& target, std::size_t index) {
+    const SceneBatch& batch = batches_[index];
+    const samples::OutputCase& output = cases_.outputs[batch.way - cases_.divisions.size()].output;
+    std::vector<samples::InstanceToVerify> instances;
+    std::vector<std::size_t> figures;
+    for (const std::size_t figure : batch.figures) {
+      // Every other box of positions in snorm16 is too small, so that some are clamped.
+      for (std::size_t copy = 0; copy < (isSnormPosition(output.layout.positions) ? 2 : 1);
+           ++copy) {
+        instances.push_back(pose_.instances[figure]);
+        figures.push_back(figure);
+      }
+    }
+    Result<std::vector<samples::VerifiedInstance>> verified =
+        samples::verifyBatch(target, instances, output);
+    if (!verified) return verified.error();
+    for (std::size_t place = 0; place < verified->size(); ++place) {
+      const bool clamps = isSnormPosition(output.layout.positions) && place % 2 == 1;
+      VerifiedCase& added = outcomes_[index].cases.emplace_back(
+          pose_.newCase(figures[place], output.name() + (clamps ? ", in a small box" : "")));
+      added.comparison = (*verified)[place].comparison;
+      added.status = (*verified)[place].status;
+      added.wrong = std::move((*verified)[place].wrong);
+    }
+    return {};
   }
-  return {};
-}
+
+  const SceneCases& cases_;
+  const PosedFigures& pose_;
+  std::span<const SceneBatch> batches_;
+  std::vector<Outcome> outcomes_;        ///< of the batches
+  std::map<std::size_t, First> firsts_;  ///< by figure
+};
 
 }  // namespace
 
@@ -238,52 +294,61 @@ std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target) 
   return outputs;
 }
 
-Result<std::vector<VerifiedCase>> verifyScene(samples::BatchTarget& target, const Scene& scene,
-                                              std::span<const PoseToVerify> poses,
-                                              std::span<const OutputToVerify> outputs,
-                                              const std::function<void()>& done) {
-  const std::vector<Figure> figures = figuresOf(scene, target.methods());
-  std::vector<VerifiedCase> cases;
-  Result<ReferencePose> before = skinReference(scene, figures, poses.back());
-  for (std::size_t index = 0; index < poses.size(); ++index) {
-    if (!before) return before.error();
-    Result<ReferencePose> now = skinReference(scene, figures, poses[index]);
-    if (!now) return now.error();
-    const PoseBatch batch(scene, figures, poses[index], *now, *before);
-    if (Result<void> verified = verifyDivisions(target, batch, cases); !verified)
-      return verified.error();
-    const std::size_t first = outputs.size() * index / poses.size();
-    const std::size_t end = outputs.size() * (index + 1) / poses.size();
-    for (const OutputToVerify& output : outputs.subspan(first, end - first)) {
-      if (Result<void> verified = verifyOutput(target, batch, output, cases); !verified)
-        return verified.error();
-    }
-    before = std::move(now);
-    done();
-  }
-  return cases;
+SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount) {
+  return sceneCases(figuresOf(scene, target.methods()), target.divisions(), outputsToVerify(target),
+                    poseCount);
 }
 
-Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::BatchTarget& target,
+Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,
+                                              std::span<const PoseToVerify> poses,
+                                              const SceneCases& cases,
+                                              const std::function<void()>& done) {
+  std::vector<VerifiedCase> verified;
+  Result<ReferencePose> before = skinReference(pool, scene, cases.figures, poses.back());
+  std::span<const SceneBatch> rest = cases.batches;
+  for (std::size_t index = 0; index < poses.size(); ++index) {
+    if (!before) return before.error();
+    Result<ReferencePose> now = skinReference(pool, scene, cases.figures, poses[index]);
+    if (!now) return now.error();
+    const PosedFigures pose(scene, cases.figures, poses[index], *now, *before);
+    const auto own = static_cast<std::size_t>(
+        std::ranges::find_if(rest, [&](const SceneBatch& batch) { return batch.pose != index; }) -
+        rest.begin());
+    PoseVerifier verifier(cases, pose, rest.first(own));
+    if (Result<void> ran = verifier.run(pool, done); !ran) return ran.error();
+    if (Result<void> added = verifier.addTo(verified); !added) return added.error();
+    rest = rest.subspan(own);
+    before = std::move(now);
+  }
+  return verified;
+}
+
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::TargetPool& pool,
                                                      std::span<const samples::RandomCase> cases,
                                                      const std::function<void()>& done) {
+  std::vector<std::vector<VerifiedCase>> byCase(cases.size());
+  Result<void> ran =
+      pool.run({.tasks = cases.size(), .done = done},
+               [&](std::size_t index, samples::BatchTarget& target) -> Result<void> {
+                 const samples::RandomCase& random = cases[index];
+                 Result<std::vector<samples::VerifiedInstance>> verified =
+                     samples::verifyRandomCase(target, random);
+                 if (!verified) return verified.error();
+                 for (std::size_t instance = 0; instance < verified->size(); ++instance) {
+                   VerifiedCase& added = byCase[index].emplace_back();
+                   added.part = random.inputName();
+                   added.method = methodName(random.method);
+                   added.pose = fmt::format("instance {}", instance);
+                   added.variant = random.output.name();
+                   added.comparison = (*verified)[instance].comparison;
+                   added.status = (*verified)[instance].status;
+                   added.wrong = std::move((*verified)[instance].wrong);
+                 }
+                 return {};
+               });
+  if (!ran) return ran.error();
   std::vector<VerifiedCase> all;
-  for (const samples::RandomCase& random : cases) {
-    Result<std::vector<samples::VerifiedInstance>> verified =
-        samples::verifyRandomCase(target, random);
-    if (!verified) return verified.error();
-    for (std::size_t index = 0; index < verified->size(); ++index) {
-      VerifiedCase& added = all.emplace_back();
-      added.part = random.inputName();
-      added.method = methodName(random.method);
-      added.pose = fmt::format("instance {}", index);
-      added.variant = random.output.name();
-      added.comparison = (*verified)[index].comparison;
-      added.status = (*verified)[index].status;
-      added.wrong = std::move((*verified)[index].wrong);
-    }
-    done();
-  }
+  for (std::vector<VerifiedCase>& added : byCase) std::ranges::move(added, std::back_inserter(all));
   return all;
 }
 

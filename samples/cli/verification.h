@@ -10,6 +10,8 @@
 #include "dermis/method.h"
 #include "dermis/verify/accuracy.h"
 #include "skinned_scene.h"
+#include "target_pool.h"
+#include "verification_cases.h"
 #include "verification_product.h"
 
 namespace dermis::cli {
@@ -40,27 +42,24 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, two times within, and its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// A way to store the result, and the methods to verify in it.
-struct OutputToVerify {
-  samples::OutputCase output;
-  std::vector<Method> methods;
-};
-
 /// The ways that a target has. Over all of them each of its methods meets every format.
 std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target);
 
-/// In each pose all parts with all methods, once for each way to cut up the work (which must not
-/// change a bit), and once for each of these ways to store the result, which are shared out among
-/// the poses. Motion goes from the pose before, in the first from the last. `done` is called after
-/// each pose. Fails with `invalidMesh` where a pose has positions that float32 cannot hold.
-Result<std::vector<VerifiedCase>> verifyScene(samples::BatchTarget& target, const Scene& scene,
+/// What is verified of a scene in so many poses.
+SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount);
+
+/// The cases of a scene, on all targets of the pool: the result is the same for any number of them.
+/// However the work is cut up, not a bit may change. Motion goes from the pose before, in the first
+/// from the last. `done` is called after each batch. Fails with `invalidMesh` where a pose has
+/// positions that float32 cannot hold.
+Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,
                                               std::span<const PoseToVerify> poses,
-                                              std::span<const OutputToVerify> outputs,
+                                              const SceneCases& cases,
                                               const std::function<void()>& done);
 
-/// The product of methods, inputs and outputs over random meshes, by pairs. `done` is called after
-/// each combination.
-Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::BatchTarget& target,
+/// The product of methods, inputs and outputs over random meshes, by pairs, on all targets of the
+/// pool. `done` is called after each case.
+Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::TargetPool& pool,
                                                      std::span<const samples::RandomCase> cases,
                                                      const std::function<void()>& done);
 

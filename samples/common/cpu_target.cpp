@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <mutex>
 
 #include "batch_runner.h"
 #include "dermis/cpu/skin.h"
@@ -104,6 +105,8 @@ std::vector<cpu::Job> CpuRunner::cutUp(std::span<const cpu::Instance> instances)
 }
 
 Result<BatchResult> CpuRunner::skin() {
+  static std::mutex instructionsMutex;  // they are chosen for the whole process
+  const std::lock_guard lock(instructionsMutex);
   if (Result<void> chosen = cpu::setTarget(options_.instructions); !chosen) return chosen.error();
   if (Result<void> made = makeMeshes(); !made) return made.error();
   makeOutputs();

@@ -71,6 +71,7 @@ TEST(CommandTest, WrongUsageEndsWithTwo) {
       {"skin", bar, "-o", outFile("usage%04d.ply"), "--frames", "2", "--fps", "0", "--device",
        "cpu"},
       {"verify", bar, "--device", "reference"},
+      {"verify", bar, "--threads", "0"},
       {"skin", bar, "-o", out, "--method", "log_matrix", "--device", "cpu"},
       {"info", bar, "--yaml"},
   };
@@ -468,7 +469,7 @@ TEST(CommandTest, VerifyAddsRandomMeshesToAModelWhereAsked) {
   for (const nlohmann::json& model : parsed.at("models")) EXPECT_FALSE(model.at("cases").empty());
   // Each counts its own steps, and leaves a clean line behind.
   EXPECT_GE(countOf(result.errors, "\rrandom meshes: "), 20u) << result.errors;
-  EXPECT_EQ(countOf(result.errors, "\r" + bar + ": "), 5u) << result.errors;
+  EXPECT_GE(countOf(result.errors, "\r" + bar + ": "), 20u) << result.errors;
   EXPECT_TRUE(result.errors.ends_with("\r\x1b[K")) << result.errors;
   EXPECT_EQ(countOf(result.output, "\r"), 0u) << "results have no progress in them";
 }

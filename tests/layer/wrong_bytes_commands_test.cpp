@@ -42,9 +42,9 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
   REQUIRE_DEVICE();
   const std::string bar = std::string(sampleModels) + "/bar.glb";
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
-  const CommandResult result =
-      runWithWrongBytes({dermisProgram, "verify", bar, "--json", json, "--junit", junit},
-                        "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
+  const CommandResult result = runWithWrongBytes(
+      {dermisProgram, "verify", bar, "--threads", "1", "--json", json, "--junit", junit},
+      "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
   EXPECT_EQ(result.status, 1) << result.errors;
   const std::string what = "1 vertices are outside their bound, the first is 0;";
   const std::string bits = "the result is not to the bit that of 64 invocations, 4 instances each";

@@ -1,0 +1,49 @@
+// Several targets of one kind, each with a thread of its own, for work that is many batches.
+//
+// Mesa's lavapipe compiles a kernel in the thread of the queue that first executes it: to compile
+// on all cores takes as many devices.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "batch_runner.h"
+#include "dermis/result.h"
+
+namespace dermis::samples {
+
+class TargetPool {
+ public:
+  /// Makes another target, on which everything comes out as on the first.
+  using MakeTarget = std::function<Result<std::shared_ptr<BatchTarget>>()>;
+  /// `first` is used as well. There are at most `threads` targets; others than the first are made
+  /// when there is work for them, and if one cannot be made, the pool does without.
+  TargetPool(std::shared_ptr<BatchTarget> first, MakeTarget makeTarget, std::size_t threads);
+
+  BatchTarget& first() { return *targets_.front(); }
+
+  using Task = std::function<Result<void>(std::size_t index, BatchTarget& target)>;
+  struct Work {
+    std::size_t tasks = 0;
+    /// Of as many first ones, each goes to the same target in every call, as long as the pool has
+    /// as many: it has the pipelines already.
+    std::size_t settled = 0;
+    /// Called after each task that succeeded, by one thread at a time.
+    std::function<void()> done = [] {};
+  };
+  /// Calls `task` for each index below `work.tasks` and returns when all have ended. Where some
+  /// fail: with the error of the lowest index, and without those above it that had not begun. What
+  /// a task throws is thrown again.
+  Result<void> run(const Work& work, const Task& task);
+
+ private:
+  void makeTargets(std::size_t count);
+
+  std::vector<std::shared_ptr<BatchTarget>> targets_;
+  MakeTarget makeTarget_;
+  std::size_t threads_;
+};
+
+}  // namespace dermis::samples

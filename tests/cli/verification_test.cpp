@@ -1,0 +1,125 @@
+// How `dermis verify` shares its cases out among threads.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "dermis_command.h"
+#include "target_pool.h"
+
+namespace dermis::test {
+namespace {
+
+const std::string bar = std::string(sampleModels) + "/bar.glb";
+
+std::shared_ptr<samples::BatchTarget> makeTarget() {
+  return std::make_shared<samples::CpuTarget>();
+}
+
+TEST(TargetPoolTest, EachTaskRunsOnceWithATargetOfItsThread) {
+  samples::TargetPool pool(makeTarget(), makeTarget, 3);
+  std::array<std::atomic<int>, 100> ran{};
+  std::array<std::atomic<samples::BatchTarget*>, 7> settled{};
+  std::size_t done = 0;
+  for (int round = 0; round < 4; ++round) {
+    const Result<void> result =
+        pool.run({.tasks = ran.size(), .settled = settled.size(), .done = [&done] { ++done; }},
+                 [&](std::size_t index, samples::BatchTarget& target) -> Result<void> {
+                   ++ran[index];
+                   if (index < settled.size()) {
+                     samples::BatchTarget* before = settled[index].exchange(&target);
+                     EXPECT_TRUE(before == nullptr || before == &target) << index;
+                   }
+                   return {};
+                 });
+    EXPECT_TRUE(result);
+  }
+  EXPECT_EQ(done, 4 * ran.size());
+  for (const std::atomic<int>& times : ran) EXPECT_EQ(times, 4);
+  const std::set<samples::BatchTarget*> used(settled.begin(), settled.end());
+  EXPECT_EQ(used.size(), 3u);
+}
+
+// What is reported does not depend on which thread was first.
+TEST(TargetPoolTest, TheFirstErrorInTheirOrderIsReported) {
+  samples::TargetPool pool(makeTarget(), makeTarget, 4);
+  for (int round = 0; round < 50; ++round) {
+    const Result<void> result = pool.run(
+        {.tasks = 40, .settled = 5}, [](std::size_t index, samples::BatchTarget&) -> Result<void> {
+          if (index == 9 || index == 10 || index > 20)
+            return Error{ErrorCode::invalidMesh, std::to_string(index)};
+          return {};
+        });
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().message, "9");
+  }
+}
+
+TEST(TargetPoolTest, WhatATaskThrowsIsThrownAgain) {
+  samples::TargetPool pool(makeTarget(), makeTarget, 2);
+  const auto fail = [](std::size_t, samples::BatchTarget&) -> Result<void> {
+    throw std::length_error("too long");
+  };
+  EXPECT_THROW((void)pool.run({.tasks = 8}, fail), std::length_error);
+}
+
+TEST(TargetPoolTest, DoesWithoutTargetsThatCannotBeMade) {
+  int asked = 0;
+  samples::TargetPool pool(
+      makeTarget(),
+      [&asked]() -> Result<std::shared_ptr<samples::BatchTarget>> {
+        if (++asked == 2) return Error{ErrorCode::vulkanError, "no more devices"};
+        return makeTarget();
+      },
+      8);
+  std::atomic<int> ran = 0;
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_TRUE(pool.run({.tasks = 20}, [&ran](std::size_t, samples::BatchTarget&) -> Result<void> {
+      ++ran;
+      return {};
+    }));
+  }
+  EXPECT_EQ(ran, 40);
+  EXPECT_EQ(asked, 2);
+}
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// With 1 and 3 threads the reports and the output are equal.
+void expectTheSameInThreads(std::vector<std::string> command) {
+  const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
+  command.insert(command.end(), {"--json", json, "--junit", junit, "--threads", "1"});
+  const CommandResult one = dermis(command);
+  const std::string jsonOfOne = readText(json), junitOfOne = readText(junit);
+  EXPECT_EQ(one.status, 0) << one.output << one.errors;
+  EXPECT_GT(jsonOfOne.size(), 1000u);
+  command.back() = "3";
+  const CommandResult three = dermis(command);
+  EXPECT_EQ(three.status, 0) << three.output << three.errors;
+  EXPECT_EQ(three.output, one.output);
+  EXPECT_EQ(readText(json), jsonOfOne);
+  EXPECT_EQ(readText(junit), junitOfOne);
+}
+
+TEST(VerificationTest, ThreadsChangeNothingOnADevice) {
+  REQUIRE_DEVICE();
+  expectTheSameInThreads({"verify", bar});
+}
+
+TEST(VerificationTest, ThreadsChangeNothingOnTheCpu) {
+  expectTheSameInThreads({"verify", bar, "--random", "--device", "cpu"});
+}
+
+}  // namespace
+}  // namespace dermis::test
