@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <memory>
 #include <tuple>
 #include <utility>
 
@@ -70,11 +71,11 @@ SkinParts targetSkinner(const Scene& scene, Method method, bool tangents,
   options.countUntouched = false;
   if (tangents) options.output.tangents = VertexFormat::float32x4;
   options.tuning = target.divisions().front().tuning;
-  return [&scene, method, options,
-          &target](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
+  const std::shared_ptr<samples::BatchRunner> runner = target.runner(options);
+  return [&scene, method, runner](const ScenePose& pose) -> Result<std::vector<SkinnedPart>> {
     std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
     for (samples::SkinRequest& request : requests) request.method = method;
-    Result<samples::BatchResult> result = target.run(requests, options);
+    Result<samples::BatchResult> result = runner->run(requests);
     if (!result) return result.error();
     std::vector<SkinnedPart> all;
     std::size_t next = 0;

@@ -54,7 +54,8 @@ struct BatchResult {
   std::string firstChanged;  ///< which is the first of them: "byte 12 of the positions' buffer"
 };
 
-/// Skins one batch after another into the same outputs, as an engine does frame by frame.
+/// Skins one batch after another into the same outputs, as an engine does frame by frame. Packed
+/// meshes must outlive it and not change.
 class BatchRunner {
  public:
   virtual ~BatchRunner() = default;

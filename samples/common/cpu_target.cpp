@@ -28,8 +28,9 @@ class CpuRunner : public BatchRunner {
   std::vector<cpu::Job> cutUp(std::span<const cpu::Instance> instances) const;
 
   std::array<std::vector<std::byte>, streamCount> outputs_;
-  /// By where the layout places them.
+  /// By where the layout places them; made once for as long as the batches have the same ones.
   std::map<std::uint64_t, cpu::Mesh> meshes_;
+  std::map<const PackedMesh*, std::uint64_t> made_;
 };
 
 void CpuRunner::makeOutputs() {
@@ -43,12 +44,15 @@ void CpuRunner::makeOutputs() {
 }
 
 Result<void> CpuRunner::makeMeshes() {
+  if (made_ == layout_.meshOffsets) return {};
+  made_.clear();
   meshes_.clear();
   for (const auto& [packed, offset] : layout_.meshOffsets) {
     Result<cpu::Mesh> mesh = cpu::Mesh::create(*packed);
     if (!mesh) return mesh.error();
     meshes_.emplace(offset, std::move(*mesh));
   }
+  made_ = layout_.meshOffsets;
   return {};
 }
 
