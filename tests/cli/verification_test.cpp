@@ -4,12 +4,14 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <memory>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "dermis_command.h"
@@ -50,17 +52,22 @@ TEST(TargetPoolTest, EachTaskRunsOnceWithATargetOfItsThread) {
 
 // What is reported does not depend on which thread was first.
 TEST(TargetPoolTest, TheFirstErrorInTheirOrderIsReported) {
-  samples::TargetPool pool(makeTarget(), makeTarget, 4);
-  for (int round = 0; round < 50; ++round) {
-    const Result<void> result = pool.run(
-        {.tasks = 40, .settled = 5}, [](std::size_t index, samples::BatchTarget&) -> Result<void> {
-          if (index == 9 || index == 10 || index > 20)
-            return Error{ErrorCode::invalidMesh, std::to_string(index)};
-          return {};
-        });
-    ASSERT_FALSE(result);
-    EXPECT_EQ(result.error().message, "9");
-  }
+  samples::TargetPool pool(makeTarget(), makeTarget, 2);
+  std::atomic<bool> tenRuns = false;
+  const Result<void> result = pool.run(
+      {.tasks = 40, .settled = 5}, [&](std::size_t index, samples::BatchTarget&) -> Result<void> {
+        if (index < 9) return {};
+        // 9 ends while 10 runs.
+        if (index == 9) tenRuns.wait(false);
+        if (index == 10) {
+          tenRuns = true;
+          tenRuns.notify_all();
+          std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+        return Error{ErrorCode::invalidMesh, std::to_string(index)};
+      });
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().message, "9");
 }
 
 TEST(TargetPoolTest, WhatATaskThrowsIsThrownAgain) {
