@@ -77,7 +77,7 @@ class KernelReads {
     const std::uint32_t* record = words_ + header_.positions + vertex * 4;
     const std::uint32_t first = record[3], end = record[7], padding = first % 2;
     const std::uint32_t count = (end / 2 - first / 2) * 2 - padding;
-    require(count <= info_.maxInfluences);
+    require(count >= info_.minInfluences && count <= info_.maxInfluences);
     // Two are read at a time.
     for (std::uint32_t influence = first / 2 * 2; influence < first / 2 * 2 + count + padding;
          ++influence) {
