@@ -123,7 +123,7 @@ inline bool standsInPairs(const Job& job) {
 /// Whether what a job has of normals and tangents stands right behind its positions, so that a
 /// kernel may store all of a vertex together.
 inline bool standsTogether(const OutputStreams& streams) {
-  const auto& [positions, normals, tangents, previous] = streams;
+  const OutputStream &positions = streams[0], &normals = streams[1], &tangents = streams[2];
   const std::uint64_t end = positions.offset + positions.size;
   const auto standsAt = [&](const OutputStream& stream, std::uint64_t offset) {
     return stream.size == 0 || (stream.offset == offset && stream.stride == positions.stride);
