@@ -76,7 +76,9 @@ void main() {
   // The loop tests at its end: if the test comes first, lavapipe executes the rest of the body once more with all lanes off.
   uint joint = gl_LocalInvocationID.x;
   if (joint < palette.jointCount) do {
-    vec4 r0, r1, r2 = vec4(0.0);
+    vec4 r0 = vec4(0.0);
+    vec4 r1 = vec4(0.0);
+    vec4 r2 = vec4(0.0);
     uint from = palette.matrices + joint * UNITS_OF_MATRIX;
     uint end = from + UNITS_OF_MATRIX;
     [[dont_unroll]] do {
