@@ -1,4 +1,5 @@
-// Macros that <windows.h> defines without NOMINMAX and WIN32_LEAN_AND_MEAN, and that Dermis' headers must bear.
+// Macros that <windows.h> defines without NOMINMAX and WIN32_LEAN_AND_MEAN, and that Dermis'
+// headers must bear.
 #pragma once
 
 #define min(a, b) (((a) < (b)) ? (a) : (b))
