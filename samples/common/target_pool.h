@@ -1,4 +1,4 @@
-// Several targets of one kind, each with a thread of its own, for work that is many batches.
+// Skins many batches in parallel: a thread for each target, all targets of the same kind.
 //
 // Mesa's lavapipe compiles a kernel in the thread of the queue that first executes it: to compile
 // on all cores takes as many devices.

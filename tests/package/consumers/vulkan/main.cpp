@@ -68,7 +68,7 @@ bool hasChosenKernels() {
          vulkan::kernelSpirv(halves, limits).empty() == isLeftOut;
 }
 
-/// FNV-1a of the modules for every method, with and without what needs modules of its own.
+/// A hash (FNV-1a) of the kernels for every method, with stores of 4, 2 and 1 bytes.
 std::uint64_t hashOfKernels() {
   std::uint64_t hash = 0xcbf29ce484222325u;
   DeviceLimits limits;
