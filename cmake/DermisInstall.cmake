@@ -1,5 +1,5 @@
 # cmake --install: the libraries that were built, their headers, the kernels' sources, the CMake package `dermis`, and files for
-# pkg-config. The build folder is a CMake package, too, for an engine that uses Dermis from there. cpack makes a Debian package.
+# pkg-config. The build folder is a CMake package, too, for an engine that uses Dermis from there.
 #
 # Each library is a component of the package with an export file of its own, dermis_NAME_targets.cmake, so that a consumer
 # of dermis::core needs none of what the others are linked with.
@@ -84,7 +84,6 @@ set(pkgConfigRequires_cpu "dermis_core libhwy")
 set(pkgConfigRequires_verify dermis_core)
 set(pkgConfigRequires_vulkan dermis_core)
 set(pkgConfigRequires_gltf dermis_core)
-set(pkgConfigAll dermis)
 # dermis_pkg_config(NAME REQUIRES LIBRARY): LIBRARY may be empty.
 function(dermis_pkg_config name requires library)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/dermis.pc.in ${PROJECT_BINARY_DIR}/install/${name}.pc @ONLY)
@@ -101,22 +100,3 @@ foreach(component IN LISTS dermisComponents)
 endforeach()
 string(STRIP "${required}" required)
 dermis_pkg_config(dermis "${required}" "")
-
-# cpack -G DEB
-set(CPACK_GENERATOR DEB)
-set(CPACK_PACKAGE_NAME libdermis-dev)
-set(CPACK_PACKAGE_VENDOR Dermis)
-set(CPACK_PACKAGE_CONTACT "The authors of Dermis <dermis@localhost>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
-set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_PACKAGE_DEPENDS libvulkan-dev)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS libhwy-dev)
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "glslang-dev, spirv-tools")
-if(BUILD_SHARED_LIBS)
-  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-endif()
-set(CPACK_COMPONENTS_ALL dermis)
-include(CPack)

@@ -293,7 +293,8 @@ struct FormRanges {
 };
 
 /// The kernels before the skin kernel. An engine's shaders may read any pose as dual quaternions.
-std::vector<Variant> everyHelper(const Job& job, const FormRanges& ranges, const Tuning& tuning) {
+std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
+                                     const Tuning& tuning) {
   std::vector<Variant> variants;
   for (const bool mayScale : ranges.scales) {
     variants.push_back(paletteVariant(PaletteForm::dualQuaternions, mayScale, tuning));
@@ -324,7 +325,7 @@ void appendForms(Variant variant, const FormRanges& ranges, const Promises& prom
 std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
                                   const Tuning& tuning) {
   const FormRanges ranges({}, {}, limits.promises);
-  std::vector<Variant> variants = everyHelper(job, ranges, tuning);
+  std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   for (const bool areAligned : {false, true})
     appendForms(layoutVariant(job, limits, tuning, areAligned), ranges, limits.promises, variants);
   return variants;
@@ -339,7 +340,7 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
   job.bounds = needs.bounds;
   job.place(*places);
   const FormRanges ranges(needs.mesh, needs.mayScale, limits.promises);
-  std::vector<Variant> variants = everyHelper(job, ranges, tuning);
+  std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   if (needs.method == Method::linear)  // a scene copies them
     variants.push_back(paletteVariant(PaletteForm::matrices, false, tuning));
   // `placeVertices` aligns what it places.
