@@ -43,7 +43,7 @@ DERMIS_CONSTANT TEXEL_BINDING_COUNT = 4u;
 DERMIS_CONSTANT CONSTANT_WORKGROUP_SIZE = 0u;
 DERMIS_CONSTANT CONSTANT_METHOD = 1u;
 DERMIS_CONSTANT CONSTANT_INFLUENCES = 2u;  // 1, 2, 4, or 0 for any number
-DERMIS_CONSTANT CONSTANT_INSTANCES = 3u;   // instances per invocation
+DERMIS_CONSTANT CONSTANT_INSTANCES = 3u;   // maximum instances per invocation
 DERMIS_CONSTANT CONSTANT_POSITION_FORMAT = 4u;
 DERMIS_CONSTANT CONSTANT_NORMAL_FORMAT = 5u;
 DERMIS_CONSTANT CONSTANT_TANGENT_FORMAT = 6u;
@@ -325,7 +325,8 @@ struct SkinPush {
   uint groups;  // word offset of the group records
   uint groupCount;
   uint workgroupCount;
-  uint instances;  // word offset of the instance records
+  uint instances;               // word offset of the instance records
+  uint instancesPerInvocation;  // 1 to CONSTANT_INSTANCES
 };
 struct VisibilityPush {
   uint pass;  // VISIBILITY_CHOOSES: a workgroup a group; VISIBILITY_COUNTS: a workgroup a dispatch

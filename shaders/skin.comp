@@ -280,7 +280,8 @@ void main() {
   // Shares of equal size but for the last: of workgroups that take as long as each other, no thread gets the short ones.
   uint share = INSTANCES;
   if (INSTANCES > 1u) {
-    uint shares = max((group.instanceCount + INSTANCES - 1u) / INSTANCES, 1u);
+    uint maxShare = push.instancesPerInvocation;
+    uint shares = max((group.instanceCount + maxShare - 1u) / maxShare, 1u);
     share = (group.instanceCount + shares - 1u) / shares;
   }
   uint firstInstance = (local / group.vertexGroups) * share;

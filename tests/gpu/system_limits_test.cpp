@@ -292,7 +292,7 @@ TEST_F(SystemLimitsTest, DescriptorsWithoutPushing) {
 }
 
 TEST_F(SystemLimitsTest, AnyTuningGivesTheSameBits) {
-  for (const Tuning tuning : {Tuning{8, 1}, Tuning{32, 5}, Tuning{128, 16}}) {
+  for (const Tuning tuning : {Tuning{8, 1}, Tuning{32, 5, 1000}, Tuning{128, 16}}) {
     vulkan::SkinningSystemDescription system = description();
     system.tuning = tuning;
     SystemEngine engine(device(), system);

@@ -28,7 +28,7 @@ using MockDescriptors = std::map<std::uint32_t, MockDescriptor>;  ///< by bindin
 struct MockDispatch {
   const std::uint32_t* code = nullptr;  ///< of the pipeline's module
   MockDescriptors descriptors;
-  std::array<std::uint32_t, 4> constants{};
+  std::array<std::uint32_t, 9> constants{};
   std::uint32_t groupCountX = 0, groupCountY = 0;
 };
 

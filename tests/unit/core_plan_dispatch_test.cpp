@@ -377,10 +377,11 @@ TEST_F(PlanFeatures, EnoughWorkgroupsClearTheResults) {
 
 // ---- Random batches
 
-class PlanTuning : public ::testing::TestWithParam<std::tuple<std::uint32_t, std::uint32_t>> {};
+class PlanTuning
+    : public ::testing::TestWithParam<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>> {};
 
 TEST_P(PlanTuning, EveryVertexOfEveryInstanceIsSkinnedOnce) {
-  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam())};
+  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam()), std::get<2>(GetParam())};
   Plan out;
   for (const std::uint32_t jobs : {1u, 2u, 17u, 60u}) {
     const OwnedBatch batch = randomBatch(jobs * 31 + tuning.workgroupSize, jobs);
@@ -395,7 +396,7 @@ TEST_P(PlanTuning, EveryVertexOfEveryInstanceIsSkinnedOnce) {
 }
 
 TEST_P(PlanTuning, SoItIsInEveryFormatWithMotionMorphTargetsAndBounds) {
-  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam())};
+  const Tuning tuning{std::get<0>(GetParam()), std::get<1>(GetParam()), std::get<2>(GetParam())};
   Plan out;
   for (const std::uint32_t jobs : {1u, 30u, 200u}) {
     for (const bool separate : {false, true}) {
@@ -407,7 +408,8 @@ TEST_P(PlanTuning, SoItIsInEveryFormatWithMotionMorphTargetsAndBounds) {
 
 INSTANTIATE_TEST_SUITE_P(Plan, PlanTuning,
                          ::testing::Combine(::testing::Values(8u, 16u, 64u, 128u),
-                                            ::testing::Values(1u, 2u, 3u, 4u, 16u)));
+                                            ::testing::Values(1u, 2u, 3u, 4u, 16u),
+                                            ::testing::Values(0u, 100u)));
 
 TEST(Plan, Truth20_TheOrderOfJobsChangesNothingForThem) {
   OwnedBatch batch = randomBatch(5, 40);

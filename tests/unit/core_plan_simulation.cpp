@@ -226,6 +226,7 @@ class Simulation {
     const abi::SkinPush push = dispatch.skinPush();
     ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
     ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
+    ASSERT_EQ(push.instancesPerInvocation, instancesWanted(push));
     for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       // The first group whose end lies behind the workgroup's number.
       std::uint32_t index = 0, begin = 0, end = 0;
@@ -239,6 +240,21 @@ class Simulation {
       ASSERT_NO_FATAL_FAILURE(
           runWorkgroup(dispatch, push.groups + index * abi::GROUP_WORDS, number - begin));
     }
+  }
+
+  /// By the rule of `Tuning::minWorkgroups`.
+  std::uint32_t instancesWanted(const abi::SkinPush& push) const {
+    std::uint32_t instances = tuning_.instancesPerInvocation;
+    const auto workgroups = [&] {
+      std::uint64_t count = 0;
+      for (std::uint32_t index = 0; index < push.groupCount; ++index) {
+        const auto group = groupAt(std::uint64_t{push.groups} + index * abi::GROUP_WORDS);
+        count += std::uint64_t{group.vertexGroups} * divideUp(group.instanceCount, instances);
+      }
+      return count;
+    };
+    while (instances > 1 && workgroups() < tuning_.minWorkgroups) instances = (instances + 1) / 2;
+    return instances;
   }
 
   /// The kernel steps from the first two records to all others where the group says so.
@@ -266,7 +282,7 @@ class Simulation {
     const std::uint32_t vertexGroups = groupAt(group).vertexGroups;
     const std::uint32_t firstVertex = groupAt(group).firstVertex;
     const std::uint32_t vertexEnd = groupAt(group).vertexEnd;
-    const std::uint32_t instancesEach = dispatch.variant.instancesPerInvocation;
+    const std::uint32_t instancesEach = dispatch.skinPush().instancesPerInvocation;
     const std::uint32_t firstInstance = local / vertexGroups * instancesEach;
     const std::uint32_t instanceCount = groupAt(group).instanceCount;
     ASSERT_LT(firstInstance, instanceCount) << "an idle workgroup";

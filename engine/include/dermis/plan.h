@@ -87,6 +87,10 @@ struct Tuning {
   std::uint32_t workgroupSize = 64;  ///< invocations; a power of two from 8 to 128
   /// Maximum instances for which one invocation skins its vertex, 1 to 32.
   std::uint32_t instancesPerInvocation = 4;
+  /// A dispatch with fewer workgroups than this uses fewer instances per invocation: half as many,
+  /// until it has enough workgroups or one instance per invocation. 0: always
+  /// `instancesPerInvocation`. Needs no other pipeline.
+  std::uint32_t minWorkgroups = 0;
 };
 
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.

@@ -152,7 +152,11 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
   // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
   const bool isCpu = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  if (isCpu) state.tuning.instancesPerInvocation = 24;
+  if (isCpu) {
+    state.tuning.instancesPerInvocation = 24;
+  } else {
+    state.tuning.minWorkgroups = 2048;  // a guess: a large GPU runs about as many at a time
+  }
   state.limits.promises = description.promises;
   state.limits.texelBuffers =
       description.texelBuffers.value_or(isCpu) &&

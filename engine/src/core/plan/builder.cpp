@@ -317,6 +317,24 @@ Result<void> PlanBuilder::addClearDispatch() {
                      abi::ClearPush{first, static_cast<std::uint32_t>(cleared_.size()), 0});
 }
 
+/// Workgroups that cover the vertices of a group once.
+std::uint64_t PlanBuilder::vertexGroupsOf(const Group& group) const {
+  return divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
+}
+
+/// Of one dispatch, given its groups: fewer than the tuning says if it has too few workgroups.
+std::uint32_t PlanBuilder::instancesPerInvocation(std::span<const std::uint32_t> groups) const {
+  std::uint32_t instances = tuning_.instancesPerInvocation;
+  for (; instances > 1 && tuning_.minWorkgroups > 0; instances = (instances + 1) / 2) {
+    std::uint64_t workgroups = 0;
+    for (const std::uint32_t group : groups)
+      workgroups +=
+          vertexGroupsOf(planGroups_[group]) * divideUp(planGroups_[group].instances, instances);
+    if (workgroups >= tuning_.minWorkgroups) break;
+  }
+  return instances;
+}
+
 /// A record for each group, and a dispatch for groups of one variant and output range.
 Result<void> PlanBuilder::addDispatches() {
   const auto dispatchOrder = [&](std::uint32_t index) {
@@ -340,15 +358,16 @@ Result<void> PlanBuilder::addDispatches() {
   std::uint32_t firstInstance = 0;
   for (std::size_t begin = 0; begin < order_.size();) {
     std::size_t end = begin;
+    while (end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin])) ++end;
+    const std::uint32_t instancesEach =
+        instancesPerInvocation(std::span(order_).subspan(begin, end - begin));
     std::uint64_t workgroups = 0;
-    for (; end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin]);
-         ++end) {
-      Group& group = planGroups_[order_[end]];
+    for (std::size_t index = begin; index < end; ++index) {
+      Group& group = planGroups_[order_[index]];
       group.firstInstance = firstInstance;
       firstInstance += group.instances;
-      const std::uint64_t vertexGroups =
-          divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
-      workgroups += vertexGroups * divideUp(group.instances, tuning_.instancesPerInvocation);
+      const std::uint64_t vertexGroups = vertexGroupsOf(group);
+      workgroups += vertexGroups * divideUp(group.instances, instancesEach);
       abi::GroupRecord record{};
       record.workgroupEnd =
           static_cast<std::uint32_t>(std::min<std::uint64_t>(workgroups, notUsed));
@@ -362,12 +381,13 @@ Result<void> PlanBuilder::addDispatches() {
       record.normalStride = group.key.strides[1];
       record.tangentStride = group.key.strides[2];
       record.previousStride = group.key.strides[3];
-      store(tables, groupRecords + end * abi::GROUP_WORDS, record);
+      store(tables, groupRecords + index * abi::GROUP_WORDS, record);
     }
     const Group& group = planGroups_[order_[begin]];
     const Variant& variant = group.variant;
     const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
-                             static_cast<std::uint32_t>(end - begin), 0, instanceRecords};
+                             static_cast<std::uint32_t>(end - begin), 0, instanceRecords,
+                             instancesEach};
     if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
     Dispatch& dispatch = dispatches_.back();
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
@@ -517,8 +537,7 @@ void PlanBuilder::appendCulledDispatches() {
     DispatchCommand& dispatch = dispatches_[first + index].command;
     abi::SkinPush push = pushOf(dispatches_[first + index]);
     store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
-          abi::CulledDispatchRecord{push.groups, push.groupCount,
-                                    dispatch.variant.instancesPerInvocation, 0});
+          abi::CulledDispatchRecord{push.groups, push.groupCount, push.instancesPerInvocation, 0});
     // Only the GPU will know how many there are. Those too many find no instance in the last group.
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);

@@ -279,6 +279,8 @@ class PlanBuilder {
                                   std::span<const abi::PaletteRecord> records, BufferRole joints,
                                   std::uint32_t buffer);
   Result<void> addClearDispatch();
+  std::uint64_t vertexGroupsOf(const Group& group) const;
+  std::uint32_t instancesPerInvocation(std::span<const std::uint32_t> groups) const;
   Result<void> addDispatches();
   template <typename Push>
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
