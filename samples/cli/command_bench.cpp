@@ -15,6 +15,7 @@
 #include "output_file.h"
 #include "picture_writer.h"
 #include "progress.h"
+#include "start_up.h"
 #include "throughput_report.h"
 
 namespace dermis::cli {
@@ -93,6 +94,12 @@ ExitStatus bench(const BenchOptions& options) {
     title.driver = samples::driverVersion(*open->device);
   }
   samples::OpenDevice* const device = open ? &*open : nullptr;
+  if (device != nullptr) {
+    // First of all: nothing is compiled yet.
+    const Result<samples::StartUp> startUp = samples::measureStartUp(*device, *crowd);
+    if (!startUp) return reportDeviceError(startUp.error());
+    title.startUp = *startUp;
+  }
   Result<std::unique_ptr<samples::Throughput>> throughput = [&] {
     samples::Progress progress("preparing", samples::Throughput::rowCount(device, *crowd));
     return samples::Throughput::create(device, *crowd, [&progress] { progress.step(); });

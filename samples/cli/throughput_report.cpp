@@ -64,6 +64,12 @@ SheetColor colorOf(ThroughputSection section) {
 void printThroughput(const ThroughputTitle& title, std::span<const ThroughputRow> rows) {
   fmt::print("device   {}\n", samples::plainLine(whereItWasMeasured(title)));
   fmt::print("model    {}\n", samples::plainLine(whatWasMeasured(title)));
+  if (title.startUp) {
+    fmt::print(
+        "start    {:.0f} ms from Context::create to the first frame, {:.0f} ms if no joint "
+        "scales\n",
+        title.startUp->seconds * 1e3, title.startUp->secondsWithoutScale * 1e3);
+  }
   const ThroughputRow* last = nullptr;
   for (const ThroughputRow& row : rows) {
     if (last == nullptr || last->section != row.section) {
@@ -91,6 +97,10 @@ Result<void> writeJsonThroughput(const std::filesystem::path& path, const Throug
   json["joints"] = title.joints;
   json["instances"] = title.instances;
   json["rounds"] = title.rounds;
+  if (title.startUp) {
+    json["start_up"] = {{"seconds", title.startUp->seconds},
+                        {"seconds_without_scale", title.startUp->secondsWithoutScale}};
+  }
   json["rows"] = Json::array();
   for (const ThroughputRow& row : rows) {
     json["rows"].push_back({{"name", row.name},

@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "render/picture.h"
+#include "start_up.h"
 #include "throughput.h"
 
 namespace dermis::cli {
@@ -15,6 +17,7 @@ struct ThroughputTitle {
   std::string device, driver;  ///< empty: only the CPU was measured
   std::string model;
   std::uint32_t vertices = 0, joints = 0, instances = 0, rounds = 0;
+  std::optional<samples::StartUp> startUp;  ///< of the device
 };
 
 /// A line for each row on standard output.

@@ -73,6 +73,9 @@ TEST(BenchTest, MeasuresMethodsFormatsAndInstancesBesidePlainKernels) {
   EXPECT_EQ(measured.rows.at("gpu/dual_quaternion/float32x3/1_instance")["instances"], 1);
   EXPECT_EQ(measured.rows.at("gpu/copy")["instances"], 30);
   EXPECT_EQ(measured.json["vertices"], 10'000);
+  EXPECT_GT(measured.json["start_up"]["seconds"].get<double>(), 0);
+  EXPECT_GT(measured.json["start_up"]["seconds_without_scale"].get<double>(), 0);
+  EXPECT_NE(measured.result.output.find("to the first frame"), std::string::npos);
   EXPECT_GT(std::filesystem::file_size(picture), 10'000u);
 }
 
@@ -90,6 +93,7 @@ TEST(BenchTest, TheCpuNeedsNoVulkan) {
   ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
   for (const std::string& row : cpuRows()) EXPECT_TRUE(measured.rows.contains(row)) << row;
   for (const auto& [name, row] : measured.rows) EXPECT_EQ(name.substr(0, 4), "cpu/");
+  EXPECT_FALSE(measured.json.contains("start_up"));
 }
 
 TEST(BenchTest, WhatMakesNoSenseIsRefused) {
