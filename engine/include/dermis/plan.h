@@ -50,15 +50,17 @@ struct DeviceLimits {
   /// of a job must go to one buffer, close to each other, at multiples of 4 bytes, and bounds and
   /// snorm16 positions are not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
-  /// Whether a dispatch may bind another range of the output buffer for each attribute. If not, and
-  /// an output buffer is larger than a storage buffer range, attributes of one job must not lie in
-  /// different ranges. False on devices without VK_KHR_push_descriptor, see `Context::limits`.
+  /// Whether one dispatch may bind a different range of the output buffer for each attribute. If
+  /// false, and the output buffer is larger than a storage buffer range, all attributes of a job
+  /// must lie in one range. `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is
+  /// not enabled.
   bool separateRanges = true;
-  /// Whether kernels may store 2 bytes and 1 byte (VkPhysicalDevice16BitStorageFeatures::
-  /// storageBuffer16BitAccess, VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess). If
-  /// not, attributes must stand at multiples of 4 bytes. Must be false if Dermis was built without
-  /// `DERMIS_SUBWORD_STORES`; `vulkan::Context::limits` sees to that.
+  /// Whether kernels may store 2 bytes at a time
+  /// (VkPhysicalDevice16BitStorageFeatures::storageBuffer16BitAccess). `OutputAttribute` says what
+  /// this permits. Must be false if Dermis was built without `DERMIS_SUBWORD_STORES`, as
+  /// `vulkan::Context::limits` then returns.
   bool storage16Bit = false;
+  /// The same for 1 byte (VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
   bool storage8Bit = false;
   /// Whether kernels read tables, meshes and palettes through uniform texel buffers, which is
   /// faster on lavapipe. Requires that a uniform texel buffer of 4-byte texels can hold a whole
@@ -74,12 +76,13 @@ struct DeviceLimits {
   bool scalarBlockLayout = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
-  Promises promises;
+  Promises promises;  ///< what the engine promises
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
 
-/// One each for tables, meshes, palettes, the four attributes, and results.
+/// Storage buffers that the skin kernel has on most devices: one each for tables, meshes, palettes,
+/// the four attributes, and results.
 inline constexpr std::uint32_t storageBuffersWanted = 8;
 
 /// How work is divided among invocations. It affects speed only: results are equal to the bit.
@@ -103,8 +106,9 @@ struct PoseDescription {
   /// `Method::linear` still applies scale and shear. Its normals and tangents are then right only
   /// for scales between 2^-30 and 2^30.
   bool mayScale = true;
-  /// The engine's own shaders read the palette, by dermis_skin.glsl: it is converted to dual
-  /// quaternions even if no job reads it. It stands at `Plan::paletteOffset`.
+  /// Whether the engine's own shaders read the palette, by dermis_skin.glsl. If so, the pose is
+  /// converted to dual quaternions even if no job uses it, and `Plan::paletteOffset` returns where
+  /// they are.
   bool isReadByShaders = false;
 };
 
@@ -120,32 +124,35 @@ struct Job {
   OutputAttribute positions;  ///< required; `isPositionFormat`
   OutputAttribute normals;    ///< unit length; the mesh must have normals
   OutputAttribute tangents;   ///< unit length; the mesh must have tangents
-  /// The box that snorm16 positions are relative to: the engine's own, or `skinnedBounds` of the
-  /// pose (bounds.h). Its sides must be finite and longer than 1e-38.
+  /// The box that snorm16 positions are relative to: one of the engine's, or `skinnedBounds` of the
+  /// pose (bounds.h). It must be finite, and each side longer than 1e-38.
   Box box;
 
   /// Active morph targets, in any order, each once. Weights of 0 are skipped. `makePlan` copies
   /// them. Only active targets take time.
   std::span<const MorphWeight> morphs;
 
-  Motion motion = Motion::none;
-  /// Its format is that of `positions`; `format` is ignored here. With `Motion::kept`, snorm16
-  /// values stay relative to the box that they were written with.
+  Motion motion = Motion::none;  ///< where previous positions come from
+  /// Where previous positions are written. Their format is that of `positions`; the member `format`
+  /// is ignored. With `Motion::kept`, snorm16 values stay relative to the box that they were
+  /// written with.
   OutputAttribute previousPositions;
-  /// reskinned: index into `Batch::poses`; with at least the joints that the mesh requires.
+  /// With `Motion::reskinned`: index into `Batch::poses`. The pose needs as many joints as `pose`
+  /// does: at least `MeshInfo::requiredJoints`.
   std::uint32_t previousPose = 0;
-  std::span<const MorphWeight> previousMorphs;  ///< reskinned: the previous weights
-  /// Previous positions are set to the new positions. For the first frame of an instance, and for a
-  /// teleport. Needs `motion`.
+  std::span<const MorphWeight> previousMorphs;  ///< with `Motion::reskinned`: the previous weights
+  /// Sets previous positions to the new positions: for the first frame of an instance, and after a
+  /// teleport. Requires `motion`.
   bool restartsMotion = false;
-  /// The instance is not skinned; its previous positions are set to the positions in the output.
-  /// For the first frame in which an instance no longer moves. Needs `motion`.
+  /// Does not skin the instance, but sets its previous positions to the positions in the output:
+  /// for the first frame in which an instance no longer moves. Requires `motion`.
   bool settles = false;
 
-  /// Write the box of the skinned positions to the results buffer: `Plan::resultOffset`.
+  /// Whether the box of the skinned positions is written to the results buffer, at
+  /// `Plan::resultOffset`.
   bool bounds = false;
 
-  /// Sets where the attributes are written, and `motion`.
+  /// Sets the four attributes and `motion` from what `placeVertices` returned.
   DERMIS_CORE_API void place(const VertexPlaces& places);
 };
 
@@ -156,26 +163,27 @@ struct Job {
 /// `uintBitsToFloat((n & 0x80000000u) != 0u ? n & 0x7fffffffu : ~n)`.
 struct InstanceResult {
   std::uint32_t orderedMin[3] = {0xffffffffu, 0xffffffffu, 0xffffffffu};
-  std::uint32_t clampedVertices = 0;  ///< those outside `Job::box`
+  std::uint32_t clampedVertices = 0;  ///< number of vertices outside `Job::box`
   std::uint32_t orderedMax[3] = {0, 0, 0};
   std::uint32_t reserved = 0;
 
-  /// The exact box of the skinned float32 positions, before conversion to their format, without
-  /// NaNs. Nothing if all are NaN, if `Job::bounds` is false, or if the job settles.
+  /// The exact box of the skinned float32 positions, before conversion to their format. NaNs are
+  /// ignored. Empty if all positions are NaN, if `Job::bounds` is false, or if the job settles.
   DERMIS_CORE_API std::optional<Box> box() const;
 };
 static_assert(sizeof(InstanceResult) == 32);
 
-/// Bytes of the output buffer of each attribute. Attributes may share a buffer.
+/// Size in bytes of the output buffer of each attribute. Attributes may share a buffer.
 struct OutputSizes {
   std::uint64_t positions = 0;
   std::uint64_t normals = 0;
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
-  /// All attributes share one buffer. `record` checks the bindings if a variant depends on it
-  /// (`Variant::pairs`).
+  /// Whether all attributes share one buffer. `OutputAttribute` says when they must. `record` then
+  /// checks it if a kernel relies on it.
   bool isOneBuffer = false;
 
+  /// For one buffer of `size` bytes that all attributes share.
   static constexpr OutputSizes oneBuffer(std::uint64_t size) {
     return {size, size, size, size, true};
   }
@@ -183,36 +191,40 @@ struct OutputSizes {
 
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
-  std::span<const PoseDescription> poses;
-  std::span<const Job> jobs;
+  std::span<const PoseDescription>
+      poses;                     ///< each is converted once, whatever number of jobs use it
+  std::span<const Job> jobs;     ///< one for each instance
   std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
   std::uint64_t posesSize = 0;   ///< bytes of the poses buffer
   OutputSizes outputs;
 };
 
+/// The compute shaders of Dermis.
 enum class Kernel : std::uint8_t {
   palette,     ///< converts poses to palettes
   skin,        ///< skins instances
-  visibility,  ///< of a scene: chooses instances that are culled on the GPU
+  visibility,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
   clear,       ///< clears the results of instances that are skinned
 };
 
 /// The four attributes of an output, in the order of the arrays below.
 enum class Stream : std::uint8_t { positions, normals, tangents, previousPositions };
-inline constexpr std::size_t streamCount = 4;
+inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
-/// One specialisation of a kernel, from which a pipeline is built. All members but `kernel` and
-/// `workgroupSize` apply to the skin kernel only, but for two of the palette kernel: `method` is
-/// what joints become (dualQuaternion; logMatrix: logarithms; linear: matrices, as they are), and
-/// `scales` is `PoseDescription::mayScale`.
+/// One specialization of a kernel, from which one pipeline is built. An engine compares variants,
+/// and passes them to `Context::prepare` or to the functions of vulkan/kernels.h.
+///
+/// `kernel` and `workgroupSize` apply to all kernels. The palette kernel also has `method`, which
+/// is what joints are converted to (dualQuaternion: dual quaternions, logMatrix: logarithms,
+/// linear: unchanged matrices), and `scales`. All other members apply to the skin kernel only.
 struct Variant {
   Kernel kernel = Kernel::skin;
   Method method = Method::dualQuaternion;
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::none;
   VertexFormat tangents = VertexFormat::none;
-  /// Bytes that one store writes to each stream: 1, 2 or 4; with `DeviceLimits::scalarBlockLayout`
-  /// also 8, 12 or 16, the size of the attribute.
+  /// Bytes that one store writes to each stream: 1, 2 or 4. With `DeviceLimits::scalarBlockLayout`
+  /// also 8, 12 or 16, which is then the size of the attribute.
   std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
   Motion motion = Motion::none;
   bool bounds = false;
@@ -222,19 +234,19 @@ struct Variant {
   bool scales = false;
   /// Tables, meshes and palettes are read through uniform texel buffers, not storage buffers.
   bool texels = false;
-  /// Each position and the normal behind it are stored together, 8 bytes at a time
-  /// (`OutputAttribute`). Only with `texels` and `DeviceLimits::shaderInt64`, and where
-  /// `recordBytes` is 0; with motion or results only with `wideStores`.
+  /// Each position is stored together with the normal that follows it, 8 bytes at a time. Only with
+  /// `texels` and `DeviceLimits::shaderInt64`, and if `recordBytes` is 0. With motion or results
+  /// only if `wideStores` is set, too.
   bool pairs = false;
-  /// Bytes of one store that writes the positions, normals and tangents of a vertex, which stand
-  /// one behind the other: 8, 12, 16, 24 or 32. 0: there is none. Only with `texels` and
+  /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
+  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `texels` and
   /// `DeviceLimits::scalarBlockLayout`.
   std::uint8_t recordBytes = 0;
-  /// Stores may be wider than 4 bytes: which module it is.
+  /// The kernel is of the module that can store more than 4 bytes at a time.
   bool wideStores = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
-  /// Every vertex has as many influences as that.
+  /// Every vertex has exactly `influences` influences.
   bool fullInfluences = false;
   std::uint8_t instancesPerInvocation = 1;
   std::uint16_t workgroupSize = 64;
@@ -244,101 +256,103 @@ struct Variant {
   DERMIS_CORE_API std::uint64_t key() const;
 };
 
-/// Whether the kernel writes `InstanceResult`: for bounds, and positions in snorm16.
+/// Whether the kernel writes `InstanceResult`: if it has bounds, or positions in snorm16.
 DERMIS_CORE_API bool hasResults(const Variant& variant);
 
-/// All variants that jobs with the method, outputs, motion and bounds of this job can need,
-/// whatever their mesh, pose, morph targets and batch: for `Context::prepare`, while loading.
-/// They are the palette kernel with and without scale, the clear kernel for bounds and snorm16
-/// positions, and the skin kernel for at most 1, 2 and 4 influences; for exactly
-/// 4; for 4 with joints that scale; for any number; and for any number with morph targets. Some
-/// methods need fewer. `Promises` reduce the number further. With `scalarBlockLayout` and
-/// `texelBuffers` each skin kernel may come twice: with stores of up to 32 bytes, for jobs of which
-/// each attribute begins at a multiple of what one store writes, and with narrower stores, for all
-/// others. This is for jobs whose offsets differ from those of this one by multiples of 4 bytes,
-/// all of an interleaved vertex alike.
+/// All variants that a job like this one can need, with any mesh, pose and morph targets, in any
+/// batch. For `Context::prepare`, while loading. Jobs are alike if they have the same method,
+/// formats, strides, motion and bounds, and if their offsets differ by multiples of 4 bytes, by the
+/// same number for all attributes of an interleaved vertex.
+///
+/// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
+/// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
+/// with joints that scale, for any number, and for any number with morph targets. Some methods need
+/// fewer. `Promises` reduce the number further. With `scalarBlockLayout` and `texelBuffers` each
+/// skin kernel may be listed twice: with stores of up to 32 bytes, for jobs whose attributes are
+/// all aligned to the size of their stores, and with narrower stores, for all other jobs.
 DERMIS_CORE_API std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
                                                   const Tuning& tuning);
 
-/// What pipelines depend on, known while loading.
+/// What pipelines depend on. It is known while loading.
 struct PipelineNeeds {
   Method method = Method::dualQuaternion;
   VertexLayout layout = {};
   bool bounds = false;       ///< `Job::bounds`
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
-  // -- What is the same for all instances, if anything is: each leaves pipelines out. Instances for
-  // which it is not so may not be prepared then.
-  /// A mesh with the most and the fewest influences of them all, and morph targets if any has some.
+  // -- Optional. Each of these reduces the number of pipelines. Instances that differ from it are
+  // then not prepared.
+  /// What is true of all meshes: `maxInfluences` is the maximum, `minInfluences` the minimum, and
+  /// `morphTargetCount` is not 0 if any mesh has morph targets. Other members are ignored.
   std::optional<MeshInfo> mesh = {};
-  std::optional<bool> mayScale = {};  ///< that of their poses
+  std::optional<bool> mayScale = {};  ///< `PoseDescription::mayScale` of all poses
 };
 
-/// All variants for instances with these needs, wherever `placeVertices` places them; with
-/// `culledOnGpu`, the visibility kernel too.
-/// Fails as `placeVertices`.
+/// All variants for instances with these needs, at any offset that `placeVertices` accepts. With
+/// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does.
 DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
-  meshes,
-  poses,     ///< joint matrices; of a scene, those that the CPU writes
-  tables,    ///< what `writeTables` writes
-  palettes,  ///< what the palette kernel makes of poses
-  results,
-  positions,
-  normals,
-  tangents,
-  previousPositions,
-  // Only of a scene (scene.h), whose attributes share one buffer.
-  gpuPoses,    ///< joint matrices that the engine's GPU writes
+  meshes,             ///< packed meshes
+  poses,              ///< joint matrices; in a scene, those that the CPU writes
+  tables,             ///< what `writeTables` writes
+  palettes,           ///< what the palette kernel writes: palettes and `PoseStatus`
+  results,            ///< `InstanceResult`
+  positions,          ///< skinned positions; in a scene, all attributes
+  normals,            ///< skinned normals
+  tangents,           ///< skinned tangents
+  previousPositions,  ///< positions of the previous frame
+  // Only in a scene (scene.h).
+  gpuPoses,    ///< joint matrices that a GPU pass of the engine writes
   upload,      ///< what `writeTables` writes; copied to `tables`
   readBack,    ///< what `Scene::readBack` reads; copied from counters and results
   visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
-  history,     ///< what the visibility kernel remembers
+  history,     ///< what the visibility kernel remembers from frame to frame
   counters,    ///< what the visibility kernel counts
 };
-inline constexpr std::size_t bufferRoleCount = 15;
+inline constexpr std::size_t bufferRoleCount = 15;  ///< number of values of `BufferRole`
 
+/// What a buffer of a plan or a scene needs.
 struct BufferRequirement {
-  std::uint64_t size = 0;       ///< bytes, at least
-  std::uint32_t alignment = 0;  ///< of its offset in a larger VkBuffer
+  std::uint64_t size = 0;       ///< minimum, in bytes
+  std::uint32_t alignment = 0;  ///< of its offset, if it is part of a larger VkBuffer; in bytes
   std::uint32_t usage = 0;      ///< VkBufferUsageFlags
   bool perFrame = false;        ///< rewritten every frame: one copy for each frame in flight
   bool hostWritten = false;     ///< written by the CPU: mapped, or copied to before `record`
 };
 
 /// The part of an output buffer that a dispatch writes: bind min(buffer size - `offset`,
-/// `maxStorageBufferRange`) bytes from `offset` on.
+/// `maxStorageBufferRange`) bytes that begin at `offset`.
 struct OutputWindow {
-  std::uint32_t index = 0;  ///< among the windows of that buffer
+  std::uint32_t index = 0;  ///< number of the window in that buffer
   /// Bytes. 0 unless the buffer is larger than `maxStorageBufferRange`.
   std::uint64_t offset = 0;
 };
 
-// -- Commands, in the words of Vulkan. An engine with its own RHI visits each and calls the command
-// of that name.
+// -- Commands, in the terms of Vulkan. An engine with its own RHI visits each and calls what
+// corresponds to the Vulkan command.
 
 /// vkCmdBindPipeline, vkCmdPushConstants and vkCmdDispatch or vkCmdDispatchIndirect.
 struct DispatchCommand {
-  Variant variant;
+  Variant variant;                ///< which pipeline
   std::uint32_t groupCountX = 0;  ///< 0 if indirect
-  std::uint32_t groupCountY = 0;
-  /// Workgroups with something to do. The product of both counts may be a little larger. 0 if
-  /// indirect.
+  std::uint32_t groupCountY = 0;  ///< the third count is 1
+  /// Workgroups that do work. `groupCountX` × `groupCountY` may be a little larger. 0 if indirect.
   std::uint32_t workgroupCount = 0;
-  /// Byte offset of a VkDispatchIndirectCommand in the tables, if indirect.
+  /// If indirect: byte offset of the VkDispatchIndirectCommand in the tables buffer.
   std::optional<std::uint64_t> indirectOffset;
   /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
   /// SkinPush or VisibilityPush of shaders/abi.h.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
-  std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel
-  /// What the kernel reads joints from. The palette kernel: `poses` or `gpuPoses`. The skin kernel:
-  /// `palettes`, but `poses` for `Method::linear` in a batch.
+  std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel, by `Stream`
+  /// The buffer that the kernel reads joints from. The palette kernel: `poses` or `gpuPoses`. The
+  /// skin kernel: `palettes`, except with `Method::linear` in a batch, where it is `poses`.
   BufferRole joints = BufferRole::palettes;
-  std::uint32_t poseBuffer = 0;  ///< of a scene's palette kernel: which of `Scene::poseBuffer`
+  std::uint32_t poseBuffer =
+      0;  ///< for the palette kernel of a scene: number of `Scene::poseBuffer`
 };
 
 /// vkCmdCopyBuffer. Consecutive copies do not depend on each other.
@@ -362,39 +376,43 @@ enum class Access : std::uint8_t {
   indirectRead = 16,
   hostRead = 32,
 };
+/// Both kinds of access.
 constexpr Access operator|(Access a, Access b) {
   return static_cast<Access>(static_cast<std::uint8_t>(a) | static_cast<std::uint8_t>(b));
 }
+/// Whether `accesses` include `one`.
 constexpr bool includes(Access accesses, Access one) {
   return (static_cast<std::uint8_t>(accesses) & static_cast<std::uint8_t>(one)) != 0;
 }
 
-/// vkCmdPipelineBarrier with a VkMemoryBarrier: accesses `before` happen, and are visible, before
-/// accesses `after`.
+/// vkCmdPipelineBarrier with a VkMemoryBarrier: accesses `before` it are complete and visible to
+/// accesses `after` it.
 struct BarrierCommand {
   Access before, after;
 };
 
+/// One command of a plan.
 using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, BarrierCommand>;
 
-/// Bytes from the beginning of one output window to the next. A window is at most
+/// Bytes from the beginning of one output window to the beginning of the next. A window has at most
 /// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
 /// instance, lies in one window.
 DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
-/// What the palette kernel writes about one pose to the palettes buffer; the engine may read it.
+/// What the palette kernel reports about one pose, in the palettes buffer. The engine may read it.
 struct PoseStatus {
-  std::uint32_t twoPhase = 0;         ///< 1 if joints are skinned in two phases: scale, rotation
+  std::uint32_t twoPhase = 0;         ///< 1 if vertices are skinned in two phases: scale, rotation
   std::uint32_t nonRigidJoints = 0;   ///< joints with scale, shear or a mirror
-  std::uint32_t undeclaredScale = 0;  ///< those whose scale was ignored: `mayScale` is false
+  std::uint32_t undeclaredScale = 0;  ///< joints whose scale was ignored, as `mayScale` is false
   std::uint32_t nonFiniteJoints = 0;  ///< joints with a NaN or an infinity
 };
 
 struct PlanData;
 
-/// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. Not
-/// thread-safe while `makePlan` or `Scene::plan` fills it, immutable afterwards. A plan that was
-/// moved from may only be filled, assigned to or destroyed.
+/// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. While
+/// `makePlan` or `Scene::plan` fills it, no other thread may use it. Afterwards it is immutable:
+/// any number of threads may read it. A moved-from plan may only be filled, assigned to or
+/// destroyed.
 class DERMIS_CORE_API Plan {
  public:
   Plan();
@@ -402,25 +420,26 @@ class DERMIS_CORE_API Plan {
   Plan(Plan&&) noexcept;
   Plan& operator=(Plan&&) noexcept;
 
-  /// In the order in which they must be issued. For a batch: the palette kernel if there is
-  /// anything to convert or clear, then the skin kernels, with a barrier before the first that
-  /// needs it. Barriers against what the engine does before and after are not among them.
+  /// The commands, in the order in which they must be issued. For a batch: the palette and clear
+  /// kernels if there is anything to convert or clear, then the skin kernels, with a barrier before
+  /// the first that needs it. The engine records the barriers before the first command and after
+  /// the last one (vulkan/scope.h).
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
-  /// Requirements of a buffer. Sizes of meshes, poses and outputs are those that the batch states;
-  /// tables, palettes and results are as large as this plan needs. For a scene: as `Scene::buffer`,
-  /// and tables and upload as large as this plan needs.
+  /// Requirements of a buffer. For a batch: the sizes of meshes, poses and outputs are those of the
+  /// `Batch`, and the sizes of tables, palettes and results are what this plan needs. For a scene:
+  /// as `Scene::buffer`, but the sizes of tables and upload are what this plan needs.
   BufferRequirement buffer(BufferRole role) const;
-  /// Byte offset of a pose's `PoseStatus` in the palettes buffer; `noStatus` if the pose is not
-  /// converted, and for a scene's plan.
+  /// Byte offset of a pose's `PoseStatus` in the palettes buffer. `noStatus` if the pose is not
+  /// converted, and for the plan of a scene.
   std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
-  /// Byte offset in the palettes buffer of a pose's palette of dual quaternions; `noPalette` if it
-  /// has none.
+  /// Byte offset in the palettes buffer of a pose's palette of dual quaternions. `noPalette` if the
+  /// pose is not converted to dual quaternions.
   std::uint64_t paletteOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noPalette = ~std::uint64_t{0};
-  /// Byte offset of a job's `InstanceResult` in the results buffer; `noResult` if it has none.
+  /// Byte offset of a job's `InstanceResult` in the results buffer. `noResult` if the job has none.
   /// Results are in the order of their jobs, without gaps.
   std::uint64_t resultOffset(std::uint32_t job) const;
   static constexpr std::uint64_t noResult = ~std::uint64_t{0};
@@ -428,9 +447,10 @@ class DERMIS_CORE_API Plan {
   /// The limits that the plan was made for.
   const DeviceLimits& limits() const;
 
-  std::uint32_t dispatchCount() const;
-  std::uint32_t instanceCount() const;  ///< jobs of a batch; instance records of a scene's frame
-  /// Vertices of all jobs; of a scene's frame those that are skinned, without instances that are
+  std::uint32_t dispatchCount() const;  ///< number of dispatches, indirect ones included
+  /// Batch: number of jobs. Scene: number of instance records in the tables.
+  std::uint32_t instanceCount() const;
+  /// Batch: vertices of all jobs. Scene: vertices that the frame skins, without instances that are
   /// culled on the GPU.
   std::uint64_t vertexCount() const;
 
@@ -442,20 +462,23 @@ class DERMIS_CORE_API Plan {
 /// Turns a batch into commands: one dispatch for all poses, then one for each variant and output
 /// window. O(poses + jobs + morph weights). An empty batch gives an empty plan.
 ///
-/// Fails with `invalidArgument` if a job or pose breaks a rule above (the message names it by
-/// its index), for example: a pose with fewer joints than the mesh requires, normals for a mesh
-/// without normals, a range outside its buffer, a broken promise; and if limits or tuning make no
-/// sense. Fails with `missingFeature` if an attribute is not at multiples of 4 bytes and the device
-/// cannot store less, or if this build lacks the method's kernels; and with `limitExceeded` if
-/// meshes, poses, palettes or tables are larger than the device's storage buffer range, a dispatch
-/// has too many workgroups, or the device has too few storage buffers for the job. The plan is then
-/// empty.
+/// Fails with
+/// - `invalidArgument` if a job or pose breaks a rule above (the message names it by its index),
+/// for
+///   example: a pose with fewer joints than the mesh requires, normals for a mesh without normals,
+///   a range outside its buffer, a broken promise. Also if limits or tuning are not valid;
+/// - `missingFeature` if an attribute is not at multiples of 4 bytes and the device cannot store
+///   less, or if this build lacks the kernels of the method;
+/// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,
+///   if a dispatch has too many workgroups, or if the device has too few storage buffers for a job.
+///
+/// After a failure the plan is empty.
 DERMIS_CORE_API Result<void> makePlan(const Batch& batch, const DeviceLimits& limits,
                                       const Tuning& tuning, Plan& out);
 
-/// Writes the tables that the kernels read, `buffer(BufferRole::tables).size` bytes. `bytes` may be
-/// mapped memory: it is written once, front to back, and never read. Fails with `invalidArgument`
-/// if `bytes` is too small.
+/// Writes the tables that the kernels read: `plan.buffer(BufferRole::tables).size` bytes. `bytes`
+/// may be mapped memory: it is written once, front to back, and never read. Fails with
+/// `invalidArgument` if `bytes` is too small.
 DERMIS_CORE_API Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes);
 
 }  // namespace dermis
