@@ -191,11 +191,10 @@ struct OutputSizes {
 
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
-  std::span<const PoseDescription>
-      poses;                     ///< each is converted once, whatever number of jobs use it
-  std::span<const Job> jobs;     ///< one for each instance
-  std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
-  std::uint64_t posesSize = 0;   ///< bytes of the poses buffer
+  std::span<const PoseDescription> poses;  ///< jobs name them by index; each is converted once
+  std::span<const Job> jobs;               ///< one for each instance
+  std::uint64_t meshesSize = 0;            ///< bytes of the mesh buffer
+  std::uint64_t posesSize = 0;             ///< bytes of the poses buffer
   OutputSizes outputs;
 };
 
@@ -351,8 +350,7 @@ struct DispatchCommand {
   /// The buffer that the kernel reads joints from. The palette kernel: `poses` or `gpuPoses`. The
   /// skin kernel: `palettes`, except with `Method::linear` in a batch, where it is `poses`.
   BufferRole joints = BufferRole::palettes;
-  std::uint32_t poseBuffer =
-      0;  ///< for the palette kernel of a scene: number of `Scene::poseBuffer`
+  std::uint32_t poseBuffer = 0;  ///< palette kernel of a scene: number of the `Scene::poseBuffer`
 };
 
 /// vkCmdCopyBuffer. Consecutive copies do not depend on each other.
