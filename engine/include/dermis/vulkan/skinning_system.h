@@ -1,15 +1,15 @@
-// Skinning for a whole scene: meshes, poses and instances by handle. They may come, go and change
-// while frames are in flight. A SkinningSystem has a Scene (scene.h) and its buffers; the engine
-// has the device and the command buffer. It is built on plan.h and `Context`, which an engine with
-// its own buffers and instances uses directly.
+// Skins a whole scene on the GPU: meshes, poses and instances, each with a handle, which may be
+// added, removed and changed while frames are in flight. A SkinningSystem contains a Scene
+// (scene.h) and owns the buffers. The engine owns the device and the command buffers. An engine
+// that manages its own buffers and instances uses `Context` and plan.h instead.
 //
 // One frame:
 //
-//   system.beginFrame(frame, completedFrame);      // the engine's own count of frames
-//   std::span<JointMatrix> matrices = *system.writePose(pose);   // for poses that change
-//   ... add, remove, change ...
-//   system.record(commandBuffer);                  // with the engine's barriers around it
-//   draw from system.outputBuffer() at system.output(instance)
+//     system.beginFrame(frame, completedFrame);      // frame numbers of the engine
+//     std::span<JointMatrix> matrices = *system.writePose(pose);   // for each pose that changes
+//     ... add, remove, change ...
+//     system.record(commandBuffer);                  // with the engine's barriers before and after
+//     draw from system.outputBuffer() at system.output(instance)
 #pragma once
 
 #include <cstdint>
@@ -36,13 +36,15 @@ namespace dermis::vulkan {
 /// A part of a buffer that the CPU writes.
 struct MappedRange {
   BufferRange range;
-  void* mapped = nullptr;  ///< the address of its first byte; host-coherent, and stays mapped
+  /// Address of the first byte of the range. The memory is host-coherent and stays mapped.
+  void* mapped = nullptr;
 };
 
+/// What `SkinningSystem::create` needs to know.
 struct SkinningSystemDescription {
-  /// Borrowed: it, or the Context that it is moved to, must outlive the system.
+  /// Required, not owned. The Context must outlive the system. It may be moved.
   Context* context = nullptr;
-  /// This and the capacities: as those of `SceneDescription`.
+  // -- These have the meaning that they have in `SceneDescription`.
   std::uint32_t framesInFlight = 2;
   Capacity meshCapacity = SceneDescription().meshCapacity;  ///< bytes
   Capacity jointCapacity = SceneDescription().jointCapacity;
@@ -51,184 +53,216 @@ struct SkinningSystemDescription {
   Capacity instanceCapacity = SceneDescription().instanceCapacity;
   Capacity boundsCapacity = SceneDescription().boundsCapacity;
 
-  // -- Ranges of the engine's buffers. `SkinningSystem::requirement` tells their usage and
-  // alignment, which for the output need not be a power of two. A range does not grow: its size is
-  // the capacity, and the one above is not used. Dermis uses nothing outside of it. The engine
-  // destroys the buffer after the system. Without a range the system creates a buffer, and without
-  // joints at first the one for poses with the first pose.
+  // -- Optional: parts of buffers that the engine owns. If one is not set, the system creates the
+  // buffer. `SkinningSystem::requirement` returns the usage and alignment that a range needs. A
+  // range does not grow: its size is the capacity, and the capacity above is ignored. Dermis reads
+  // and writes nothing outside the range. The engine destroys the buffer after the system.
   BufferRange meshes;
-  MappedRange poses;     ///< that the CPU writes
-  BufferRange gpuPoses;  ///< that a pass of the engine writes
+  MappedRange poses;     ///< for poses that the CPU writes
+  BufferRange gpuPoses;  ///< for poses that a GPU pass of the engine writes
   BufferRange output;
-  /// How the engine uses the output buffer if the system creates it:
-  /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, or that and `buildInputUsage`.
+  /// What the engine uses the output buffer for, if the system creates it. For example
+  /// `vertexBufferUsage`, or that with `buildInputUsage` (acceleration_structure.h).
   VkBufferUsageFlags outputUsage = vertexBufferUsage;
 
-  /// How all other buffers are created: by `create`, by what is added, and by `record` (tables, and
-  /// what is copied to and from them, until a frame needs no more than those before it). Both
-  /// functions, or none: then the system allocates blocks of memory, small ones first, of at most
-  /// 64 MiB where no buffer is larger.
+  /// Create and destroy all other buffers. Set both functions or none. Buffers are created by
+  /// `SkinningSystem::create`, by functions that add something, and by `record` if a frame needs
+  /// more memory for tables than all frames before it. If not set, the system allocates memory
+  /// blocks: small ones first, and at most 64 MiB each unless one buffer is larger.
   BufferCallbacks buffers;
-  /// Measure the GPU time of each `record` with timestamps. The queue's family must support them.
+  /// Whether the GPU time of each `record` is measured with timestamps. The queue family must
+  /// support them.
   bool measuresGpuTime = false;
-  std::optional<Tuning> tuning;  ///< nothing: `Context::tuning`
+  std::optional<Tuning> tuning;  ///< if empty: `Context::tuning`
 };
 
+/// What `SkinningSystem::record` needs to know.
 struct FrameDescription {
-  /// For instances that are `culledOnGpu`: `SkinningSystem::instanceCapacity` words, in a buffer
-  /// with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. The word at `visibilityIndex` of an instance is not 0
-  /// if it is visible. The engine's culling writes it on the GPU, before `record`, with a barrier
-  /// `inputScope(PreviousUse::computeWrite)`. `visibilityOffset` is a multiple of the device's
-  /// minStorageBufferOffsetAlignment, which is not checked.
+  /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
+  /// holds `SkinningSystem::instanceCapacity` words of 4 bytes. An instance is visible if the word
+  /// at its `visibilityIndex` is not 0. The engine's culling writes them on the GPU before
+  /// `record`, with the barrier `inputScope(PreviousUse::computeWrite)` in between.
   VkBuffer visibility{};
+  /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
   VkDeviceSize visibilityOffset = 0;
 };
 
 /// What the last `record` did.
 struct FrameStatistics : FrameWorkStatistics {
-  std::uint32_t dispatches = 0;     ///< all of them, indirect ones too
+  std::uint32_t dispatches = 0;     ///< direct and indirect
   std::uint64_t workgroups = 0;     ///< of direct dispatches
-  std::uint32_t copies = 0;         ///< commands that copy: tables, meshes, moves, results
-  std::uint64_t uploadedBytes = 0;  ///< tables, meshes, `poseBytes`
-  double planSeconds = 0;           ///< CPU time: choosing, and writing the tables
-  double recordSeconds = 0;         ///< CPU time: the commands
+  std::uint32_t copies = 0;         ///< copy commands: tables, meshes, moved outputs, results
+  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and `poseBytes`
+  double planSeconds = 0;           ///< CPU time to plan the frame and write its tables
+  double recordSeconds = 0;         ///< CPU time to record the commands
 };
 
 /// What the GPU did in the newest complete frame.
 struct GpuStatistics : CullingStatistics {
-  std::optional<double> seconds;  ///< if `measuresGpuTime`
+  std::optional<double> seconds;  ///< GPU time, if `measuresGpuTime`
 };
 
+/// What `SkinningSystem::statistics` returns.
 struct SystemStatistics {
   FrameStatistics lastFrame;
   GpuStatistics lastCompletedFrame;
   StoreStatistics meshes, palettes, outputs;
-  /// Bytes of the memory blocks; with `BufferCallbacks`, of all buffers that these created.
+  /// Bytes of the memory blocks. With `BufferCallbacks`: bytes of all buffers that they created.
   std::uint64_t deviceMemory = 0;
 };
 
-/// One thread at a time may call a member function, except
-/// `prepare` with `PipelineNeeds`. Any thread may write the
-/// memory that `writePose` returns, until `record`. Nothing here submits, waits or touches a queue.
+/// A scene and the buffers for it. It does not submit, wait, or use a queue.
 ///
-/// All frames are recorded for queues that execute them one after the other, in the order of
-/// `record`: usually one queue. Palettes of a system cannot be read by the engine's own shaders:
-/// use tier 1 for that.
+/// One thread at a time may call a member function, except for `prepare` with `PipelineNeeds`,
+/// which any thread may call. Any thread may write the memory that `writePose` returns, until
+/// `record`.
+///
+/// The GPU must execute all frames one after the other, in the order of `record`; usually they are
+/// on one queue. The engine's own shaders cannot read the palettes of a system: use `Context` and
+/// plan.h for that.
 class DERMIS_VULKAN_API SkinningSystem {
  public:
   /// Creates the buffers with their initial capacities. Fails with `invalidArgument` or
-  /// `limitExceeded` as `Scene::create`, with `missingEntryPoint`, `vulkanError`, or what
-  /// `BufferCallbacks::create` fails with.
+  /// `limitExceeded` as `Scene::create` does, with `missingEntryPoint`, with `vulkanError`, or with
+  /// the error of `BufferCallbacks::create`.
   static Result<SkinningSystem> create(const SkinningSystemDescription& description);
 
-  /// What a range of the engine's needs, for `meshes`, `poses`, `gpuPoses` and `positions` (the
-  /// output): usage, alignment, and the size of the capacity in `description`, in which the range
-  /// is then set. Of other roles: what the system will create at first; tables and uploads as large
-  /// as needed later. Creates nothing. Fails as `Scene::create`.
+  /// Call it before `create`, to find out what a range of the engine needs. `role` is `meshes`,
+  /// `poses`, `gpuPoses` or `positions` (the output). Returns usage and alignment, and the size for
+  /// the initial capacity in `description`. The alignment of the output need not be a power of two.
+  /// For other roles it returns what the system will create at first. Creates nothing. Fails as
+  /// `Scene::create` does.
   static Result<BufferRequirement> requirement(const SkinningSystemDescription& description,
                                                BufferRole role);
 
-  /// Every recorded frame must be complete.
+  /// The GPU must have completed every recorded frame.
   ~SkinningSystem();
   SkinningSystem(SkinningSystem&&) noexcept;
   SkinningSystem& operator=(SkinningSystem&&) noexcept;
 
-  // -- Meshes, poses, instances: as those of `Scene` (scene.h). What is said there of `plan` and
-  // `commit` is true of `record`.
+  // -- Meshes, poses, instances: as in `Scene` (scene.h), with `record` in the place of `plan` and
+  // `commit`.
+  //
+  // Adding something may make a buffer grow. The larger buffer is created at once, for twice the
+  // size, or for the minimum if there is no memory for that. If there is no memory for the minimum
+  // either, the function fails with `vulkanError` or with the error of `BufferCallbacks::create`.
+  // The next `record` copies the contents of the old buffer. The old buffer is destroyed once the
+  // frames that use it are complete.
 
-  // What is added may make a buffer grow: a larger one is created at once, and the next `record`
-  // copies what the old one holds. The old one is destroyed when the frames that use it are
-  // complete. If there is no memory for twice the size, the least that is needed is tried; if there
-  // is none for that, the call fails with `vulkanError`, or what `BufferCallbacks::create` fails
-  // with.
-
-  /// Copies the bytes; the next `record` uploads them.
+  /// As `Scene::addMesh`. Copies the bytes; the next `record` uploads them.
   Result<MeshHandle> addMesh(const PackedMesh& mesh);
+  /// As `Scene::removeMesh`.
   Result<void> removeMesh(MeshHandle mesh);
-  /// All joint matrices are the identity until `writePose`. Those of a pose that the GPU writes are
-  /// undefined until a pass of the engine writes them.
+  /// As `Scene::addPose`. All joint matrices are identities until `writePose`. For a pose that the
+  /// GPU writes, they are undefined until a pass of the engine writes them.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
+  /// As `Scene::addPoses`, and as `addPose`.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
+  /// As `Scene::removePose`.
   Result<void> removePose(PoseHandle pose);
+  /// As `Scene::addInstance`.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
+  /// As `Scene::removeInstance`.
   Result<void> removeInstance(InstanceHandle instance);
 
-  /// As `Context::prepare`, with the system's tuning. May be called by any thread at any time.
+  /// As `Context::prepare`, with the tuning of the system. Any thread may call it at any time.
   Result<void> prepare(const PipelineNeeds& needs) const;
-  /// Only what `Scene::pipelineNeeds` tells for this instance: the fastest start. Fails as that,
-  /// too. Reads the scene: not while another thread changes it.
+  /// Builds only the pipelines that this instance can need with its mesh, pose and method: the
+  /// fastest start. Fails as `Scene::pipelineNeeds` does, too. It reads the scene, so no other
+  /// thread may change the scene at the same time.
   Result<void> prepare(const InstanceDescription& instance) const;
 
-  // -- What changes: as `Scene`.
+  // -- What changes: as in `Scene`.
 
-  /// Also reads back what complete frames found out: `bounds`, `statistics`.
+  /// As `Scene::beginFrame`. Also reads back the results of complete frames, for `bounds` and
+  /// `statistics`.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
-  /// Where to write the joint matrices of this frame: mapped memory, to be written as a whole and
-  /// never read, until `record`.
+  /// As `Scene::writePose`. Returns mapped memory for the joint matrices of this frame. The engine
+  /// writes all of it before `record`, and never reads it.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
-  /// Where a pass of the engine writes the joint matrices of a pose that the GPU writes:
-  /// `JointMatrix` by `JointMatrix`, 48 bytes each. The same as long as the pose lives. Poses of
-  /// one call of `addPoses` are in one buffer, one behind the other, and the first of them can be
-  /// bound: its offset is a multiple of minStorageBufferOffsetAlignment. Other calls may use other
-  /// buffers. A buffer of the system's own has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and
+  /// Where a GPU pass of the engine writes the joint matrices of a pose: consecutive `JointMatrix`,
+  /// 48 bytes each. The range stays the same until the pose is removed. Poses of one call of
+  /// `addPoses` are consecutive in one buffer, and the offset of the first is a multiple of
+  /// minStorageBufferOffsetAlignment, so that it can be bound. Poses of different calls may be in
+  /// different buffers. A buffer that the system created has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and
   /// VK_BUFFER_USAGE_TRANSFER_DST_BIT.
   ///
-  /// Before its writes the engine records a barrier `overwriteScope(Writer::compute)`, since frames
-  /// in flight may still read them, after them `inputScope(PreviousUse::computeWrite)`, and calls
-  /// `markWritten`. Fails with `invalidArgument` for a pose that the CPU writes.
+  /// The engine records the barrier `overwriteScope(Writer::compute)`, as frames in flight may
+  /// still read the matrices, then its pass, then the barrier
+  /// `inputScope(PreviousUse::computeWrite)`; and it calls `markWritten`. Fails with
+  /// `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
+  /// As `Scene::markWritten`.
   Result<void> markWritten(std::span<const PoseHandle> poses);
+  /// As `Scene::markAllWritten`.
   Result<void> markAllWritten();
+  /// As `Scene::change`.
   Result<void> change(const InstanceChange& change);
+  /// As `Scene::change`.
   Result<void> change(std::span<const InstanceChange> changes);
+  /// As `Scene::setVisibility`.
   Result<void> setVisibility(std::span<const InstanceVisibility> instances);
+  /// As `Scene::isDue`.
   Result<bool> isDue(InstanceHandle instance) const;
+  /// As `Scene::compact`.
   std::uint64_t compact(std::uint64_t maxBytes);
 
   // -- Recording.
 
-  /// Records uploads and the commands of the frame (`Scene::plan`), with the barriers between them;
-  /// nothing if nothing changed and no instance is culled on the GPU. Once after each `beginFrame`,
-  /// outside a render pass, with a primary or secondary command buffer. The engine records a
-  /// barrier `inputScope(PreviousUse)` of what last used the output before it, and
-  /// `outputScope(Consumer)` after it.
+  /// Records the uploads and the commands of the frame (`Scene::plan`), with the barriers between
+  /// them. Records nothing if nothing changed and no instance is culled on the GPU. Call it once
+  /// after each `beginFrame`, outside a render pass, with a primary or secondary command buffer.
+  /// Before it the engine records the barrier `inputScope` for the last use of the output, and
+  /// after it the barrier `outputScope` for the next use (scope.h).
   ///
-  /// Fails with `notPrepared` (`prepare` was not called for such instances), `invalidArgument` (no
-  /// `beginFrame`; instances culled on the GPU without `FrameDescription::visibility`),
-  /// `limitExceeded` (tables larger than a storage buffer range), `vulkanError`, or what
-  /// `BufferCallbacks::create` fails with. Nothing is recorded then, and the next `record` does all
-  /// of it.
+  /// Fails with
+  /// - `notPrepared` if `prepare` was not called for such instances;
+  /// - `invalidArgument` if `beginFrame` was not called, or if instances are culled on the GPU and
+  ///   `FrameDescription::visibility` is null;
+  /// - `limitExceeded` if the tables are larger than a storage buffer range;
+  /// - `vulkanError`, or the error of `BufferCallbacks::create`.
+  ///
+  /// If it fails, nothing is recorded, and the next `record` does all of the work.
   Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
 
-  /// The engine did not submit what the last `record` recorded, and never will: that command buffer
-  /// may be reset or freed at once. What `record` did is undone, and the next one does all of it
-  /// again, uploads included. What was added, removed, changed or written, before that `record` or
-  /// after it, stays; poses that the GPU writes are written and marked again. It is then as after
-  /// `beginFrame`: the engine may `record` the same frame again, or begin another one. The frame
-  /// does not count as in flight. O(instances).
+  /// States that the engine did not submit the commands of the last `record`, and never will. The
+  /// command buffer may be reset or freed at once, and the frame does not count as in flight.
+  /// Undoes what `record` did: the next `record` does the work again, uploads included. Everything
+  /// that was added, removed, changed or written remains, whether before that `record` or after it.
+  /// The engine writes and marks again the poses that its GPU passes wrote for the frame.
+  /// Afterwards the system is in the same frame, as after `beginFrame`: the engine may `record` it
+  /// again, or begin another frame. O(instances).
   ///
-  /// To be called for every frame that is recorded and not submitted, before the next `beginFrame`:
-  /// if not, the system takes it for executed as soon as a later frame is complete. Fails with
-  /// `invalidArgument` if `frame` is not the one that was recorded last, or if another has begun.
+  /// Call it for every frame that is recorded and not submitted, before the next `beginFrame`.
+  /// Otherwise the system assumes that the frame was executed once a later frame is complete. Fails
+  /// with `invalidArgument` if `frame` is not the one that was recorded last, or if `beginFrame`
+  /// was called since.
   Result<void> abandonFrame(std::uint64_t frame);
 
-  // -- Results, as of the last `record`: as `Scene`.
+  // -- Results, as of the last `record`: as in `Scene`.
 
-  /// All outputs are in this buffer: the system's own, or that of
-  /// `SkinningSystemDescription::output`. Offsets count from its beginning.
+  /// The buffer that holds all outputs: one that the system created, or the buffer of
+  /// `SkinningSystemDescription::output`. Offsets of outputs count from its beginning.
   VkBuffer outputBuffer() const;
-  /// Differs from what it was if `outputBuffer` is another buffer: it grew, or the frame in which
-  /// it grew was abandoned. All offsets stay when it grows.
+  /// A number that changes whenever `outputBuffer` becomes another buffer: when it grew, or when
+  /// the frame in which it grew was abandoned. Offsets stay the same when it grows.
   std::uint64_t outputGeneration() const;
+  /// As `Scene::output`.
   Result<InstanceOutput> output(InstanceHandle instance) const;
+  /// As `Scene::skinnedInstances`.
   std::span<const InstanceHandle> skinnedInstances() const;
+  /// As `Scene::settledInstances`.
   std::span<const InstanceHandle> settledInstances() const;
+  /// As `Scene::movedInstances`.
   std::span<const InstanceHandle> movedInstances() const;
+  /// As `Scene::bounds`.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
-  /// Larger than every `visibilityIndex`. It grows when instances are added.
+  /// As `Scene::instanceCapacity`.
   std::uint32_t instanceCapacity() const;
+  /// As `Scene::visibilityIndex`.
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
+  /// As `Scene::statistics`, with times and counts of the recorded commands.
   SystemStatistics statistics() const;
 
  private:
