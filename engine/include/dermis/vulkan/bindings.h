@@ -1,4 +1,4 @@
-// The engine's buffers, and the descriptors of Dermis for them.
+// The engine's buffers, and the descriptors with which Dermis binds them.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 namespace dermis::vulkan {
 
-/// A part of a VkBuffer. The offset is a multiple of
-/// `DeviceLimits::minStorageBufferOffsetAlignment`, the size of 4.
+/// A part of a VkBuffer.
 struct BufferRange {
   VkBuffer buffer{};
+  /// Bytes; a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`.
   VkDeviceSize offset = 0;
-  VkDeviceSize size = 0;  ///< bytes; VK_WHOLE_SIZE is not allowed here
+  VkDeviceSize size = 0;  ///< bytes; a multiple of 4, not VK_WHOLE_SIZE
 };
 
-/// The output buffers, by attribute. Attributes may share a buffer. Each may be larger than a
+/// The output buffer of each attribute. Attributes may share a buffer. Each may be larger than a
 /// storage buffer range.
 struct OutputBuffers {
   BufferRange positions;
@@ -25,31 +25,32 @@ struct OutputBuffers {
   BufferRange tangents;
   BufferRange previousPositions;
 
-  /// All attributes in one buffer.
+  /// For one buffer that all attributes share.
   static OutputBuffers oneBuffer(const BufferRange& range) { return {range, range, range, range}; }
 };
 
-/// The buffers of a batch, each with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. If
-/// `DeviceLimits::texelBuffers`, meshes, poses, tables and palettes also have
-/// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT. `Plan::buffer` gives their sizes and usage. An engine
-/// that cannot give them that usage sets `DeviceDescription::texelBuffers` to false. The engine
-/// owns the buffers. One that a plan does not need may be left empty: meshes and outputs if there
-/// is no job, poses and tables if the batch is empty, palettes if all jobs are linear and no pose
-/// `isReadByShaders`, results if no job has any, an attribute's output if no job wants it.
+/// The buffers of a batch. The engine owns them. `Plan::buffer` returns their sizes and usage: each
+/// has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. If `DeviceLimits::texelBuffers` is set, meshes, poses,
+/// tables and palettes have VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT, too; an engine that cannot
+/// add that usage sets `DeviceDescription::texelBuffers` to false.
+///
+/// A buffer that no plan needs may be left out: meshes and outputs if there are no jobs, poses and
+/// tables if batches are empty, palettes if all jobs are linear and no pose `isReadByShaders`,
+/// results if no job has results, and the output of an attribute that no job writes.
 struct BatchBuffers {
-  BufferRange meshes;    ///< packed meshes at the jobs' `meshOffset`
+  BufferRange meshes;    ///< packed meshes, each at its `Job::meshOffset`
   BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
   BufferRange tables;    ///< what `writeTables` wrote
-  BufferRange palettes;  ///< palettes and `PoseStatus`: the palette kernel writes them
+  BufferRange palettes;  ///< palettes and `PoseStatus`, which the palette kernel writes
   OutputBuffers outputs;
   BufferRange results;  ///< `InstanceResult` at `Plan::resultOffset`
 };
 
 struct BindingsState;
 
-/// Descriptor sets and buffer views for one set of buffers, created by `Context::createBindings`.
-/// It must live until the GPU has completed all commands that `record` recorded with it. Destroy it
-/// before the Context. Any number of threads may `record` with it at the same time.
+/// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. They
+/// must live until the GPU has completed all commands that were recorded with them. Destroy them
+/// before the Context. Any number of threads may `record` with them at the same time.
 class DERMIS_VULKAN_API Bindings {
  public:
   Bindings();

@@ -1,4 +1,4 @@
-// Where a SkinningSystem gets its buffers from: an engine's allocator, by two functions.
+// Two functions by which a SkinningSystem creates its buffers with the engine's allocator.
 #pragma once
 
 #include <cstdint>
@@ -8,40 +8,46 @@
 
 namespace dermis::vulkan {
 
-/// What the memory of a buffer is for.
+/// Who uses the memory of a buffer. This decides on the memory type.
 enum class BufferUse : std::uint8_t {
-  device,    ///< only the GPU uses it: device-local if possible
-  upload,    ///< the CPU writes it and never reads it, the GPU reads it: host-visible and coherent,
-             ///< also device-local if possible
-  readBack,  ///< the GPU writes it and the CPU reads it: host-visible and coherent, also cached if
-             ///< possible
+  /// Only the GPU: device-local if possible.
+  device,
+  /// The CPU writes it and never reads it, the GPU reads it: host-visible and host-coherent, also
+  /// device-local if possible.
+  upload,
+  /// The GPU writes it, the CPU reads it: host-visible and host-coherent, also host-cached if
+  /// possible.
+  readBack,
 };
 
+/// What `BufferCallbacks::create` creates.
 struct BufferRequest {
-  /// Size and usage; exclusive to a queue family, nothing in pNext. It lives as long as the call.
-  /// With VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT the memory must be allocated with
-  /// VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
+  /// Size and usage, with VK_SHARING_MODE_EXCLUSIVE and an empty pNext chain. The pointer is valid
+  /// during the call only. If the usage has VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, the memory
+  /// must be allocated with VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
   const VkBufferCreateInfo* info = nullptr;
   BufferUse use = BufferUse::device;
-  const char* name = "";  ///< "dermis output": the same for all buffers of a kind; a constant
+  /// For debugging, for example "dermis output". A constant, the same for all buffers of a kind.
+  const char* name = "";
 };
 
 /// A buffer with its memory.
 struct CreatedBuffer {
   VkBuffer buffer{};
-  void* mapped = nullptr;      ///< upload, readBack: the address of its first byte; stays mapped
-  void* allocation = nullptr;  ///< for the allocator; `destroy` gets it back
+  /// For `upload` and `readBack`: address of the first byte. The memory stays mapped.
+  void* mapped = nullptr;
+  void* allocation = nullptr;  ///< for the engine's allocator; `destroy` gets it
 };
 
-/// The thread that calls the SkinningSystem calls both functions. They may call Vulkan. With the
-/// Vulkan Memory Allocator `create` is one call of vmaCreateBuffer with `info`, and `destroy` one
-/// of vmaDestroyBuffer.
+/// Create and destroy the buffers of a SkinningSystem. They are called in the thread that calls the
+/// SkinningSystem, and may call Vulkan. With the Vulkan Memory Allocator, `create` calls
+/// vmaCreateBuffer with `info`, and `destroy` calls vmaDestroyBuffer.
 struct BufferCallbacks {
-  void* user = nullptr;
-  /// Creates a buffer and binds memory to it. If it fails, the call of the SkinningSystem fails
-  /// with its error.
+  void* user = nullptr;  ///< passed to both functions
+  /// Creates a buffer and binds memory to it. If it fails, the function of the SkinningSystem fails
+  /// with the same error.
   Result<CreatedBuffer> (*create)(void* user, const BufferRequest& request) = nullptr;
-  /// The GPU no longer uses the buffer.
+  /// Destroys a buffer that the GPU no longer uses, and frees its memory.
   void (*destroy)(void* user, const CreatedBuffer& buffer) = nullptr;
 };
 

@@ -1,7 +1,6 @@
-// The types of Vulkan that Dermis' headers name, declared as vulkan_core.h declares them, which is
-// not included: an engine may include volk, or Vulkan's header with or without prototypes, before
-// Dermis' headers or after them. Only vertex_input.h and acceleration_structure.h include
-// vulkan_core.h.
+// The Vulkan types that Dermis' headers name, declared as in vulkan_core.h, which this header does
+// not include. So an engine may include volk, or Vulkan's header with or without prototypes, before
+// or after Dermis' headers. Only vertex_input.h and acceleration_structure.h include vulkan_core.h.
 #pragma once
 
 #include <cstdint>

@@ -1,21 +1,23 @@
-// The kernels as data, for an engine that executes the commands of a plan with its own RHI. Needs
+// The kernels as SPIR-V, for an engine that executes the commands of a plan with its own RHI. Needs
 // no Vulkan device.
 //
-// Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers, or the first four on
-// a device that has fewer per stage:
+// Descriptor set 0 of every kernel has `storageBuffersWanted` storage buffers:
 //
 // - palette kernel: 0 tables, 1 poses, 2 palettes;
 // - clear kernel: 0 tables, 7 results;
-// - skin kernel: 0 tables, 1 meshes, 2 palettes (linear: poses), 3 positions, 4 normals, 5
-// tangents,
-//   6 previous positions, 7 results;
+// - skin kernel: 0 tables, 1 meshes, 2 `DispatchCommand::joints`, 3 positions, 4 normals,
+//   5 tangents, 6 previous positions, 7 results;
 // - visibility kernel: 0 tables, 1 visibility, 2 history, 3 counters, 7 results.
 //
-// A binding that a kernel does not use may have any buffer. With four, all attributes go to
-// binding 3. Variants with `texels` also have uniform texel buffers: 8 tables, 9 meshes and 11
-// palettes (linear: poses) in VK_FORMAT_R32G32B32A32_UINT, 10 meshes in VK_FORMAT_R32_UINT, views
-// of the same ranges. Records and push constants are in shaders/abi.h, which compiles as C++; it is
-// installed in DERMIS_SHADER_DIR.
+// On a device with fewer storage buffers per stage, the set has bindings 0 to 3 only, and all
+// attributes go to binding 3. A binding that a kernel does not use may have any buffer.
+//
+// Kernels of variants with `texels` also have uniform texel buffers. They are views of the same
+// ranges: 8 tables, 9 meshes and 11 `DispatchCommand::joints` as VK_FORMAT_R32G32B32A32_UINT, 10
+// meshes as VK_FORMAT_R32_UINT.
+//
+// The records in the buffers and the push constants are declared in shaders/abi.h, which compiles
+// as C++. It is installed in DERMIS_SHADER_DIR.
 #pragma once
 
 #include <array>
@@ -28,20 +30,21 @@
 namespace dermis::vulkan {
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
-/// memory is static: variants with one module get the same span. A module that stores less than a
-/// word requires `storage16Bit` or `storage8Bit` of `DeviceLimits`, one that stores more
-/// `shaderInt64` and perhaps `scalarBlockLayout`. Empty if this build of Dermis does not contain
-/// the module.
+/// memory is static, and variants of the same module get the same span. A module that stores fewer
+/// than 4 bytes at a time requires `DeviceLimits::storage16Bit` or `DeviceLimits::storage8Bit`; one
+/// that stores more requires `DeviceLimits::shaderInt64`, and `DeviceLimits::scalarBlockLayout` if
+/// `Variant::wideStores` is set. Empty if this build of Dermis does not contain the module.
 DERMIS_VULKAN_API std::span<const std::uint32_t> kernelSpirv(const Variant& variant,
                                                              const DeviceLimits& limits);
 
-/// The values of a kernel's specialisation constants: `values[id]` for the ids from 0 to `count` -
-/// 1, 4 bytes each.
+/// The values of the specialization constants of a kernel: `values[id]`, 4 bytes each, for the ids
+/// from 0 to `count` - 1.
 struct SpecializationConstants {
   std::array<std::uint32_t, 20> values{};
   std::uint32_t count = 0;
 };
 
+/// The specialization constants for a variant.
 DERMIS_VULKAN_API SpecializationConstants specializationConstants(const Variant& variant);
 
 }  // namespace dermis::vulkan

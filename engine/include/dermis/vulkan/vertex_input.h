@@ -1,5 +1,6 @@
-// Skinned vertices as the vertex input of a graphics pipeline. Structures as data, no Vulkan call:
-// they follow from the layout, so that pipelines can be created before there is any instance.
+// Skinned vertices as the vertex input of a graphics pipeline. The functions fill structures and
+// call no Vulkan function. Vertex input depends on the layout only, so an engine can create its
+// pipelines before it adds instances.
 #pragma once
 
 #include <array>
@@ -15,43 +16,47 @@
 
 namespace dermis::vulkan {
 
-/// The format in which vertex input reads an attribute; every Vulkan device supports it for vertex
-/// buffers. VK_FORMAT_UNDEFINED for `none`, float16x3, snorm16x3 and snorm8x3: devices commonly
-/// read no vertices of three components smaller than 32 bits. Use x4 formats, or read them from a
+/// The format with which vertex input reads an attribute. Every Vulkan device supports it for
+/// vertex buffers. VK_FORMAT_UNDEFINED for `none`, and for float16x3, snorm16x3 and snorm8x3, which
+/// Vulkan does not require devices to read. Use x4 formats instead, or read the attribute from a
 /// storage buffer.
 ///
-/// Positions in snorm16x4 and octahedral directions still have to be decoded in the shader:
-/// dermis_decode.glsl.
+/// The shader must decode snorm16x4 positions and octahedral directions (dermis_decode.glsl).
 DERMIS_VULKAN_API VkFormat vertexInputFormat(VertexFormat format);
 
-/// The numbers that the engine's shaders and pipelines use.
+/// Locations and bindings that the engine's shaders and pipelines use.
 struct VertexInputNumbers {
-  std::uint32_t positions = 0;  ///< locations
-  std::uint32_t normals = 1;
-  std::uint32_t tangents = 2;
-  std::uint32_t previousPositions = 3;
-  std::uint32_t firstBinding = 0;
+  std::uint32_t positions = 0;          ///< location of the positions
+  std::uint32_t normals = 1;            ///< location of the normals
+  std::uint32_t tangents = 2;           ///< location of the tangents
+  std::uint32_t previousPositions = 3;  ///< location of the previous positions
+  std::uint32_t firstBinding = 0;       ///< number of the first binding
 };
 
-/// For VkPipelineVertexInputStateCreateInfo. Interleaved layouts have one binding, planar ones a
-/// binding for each attribute, in the order of `VertexLayout`.
+/// For VkPipelineVertexInputStateCreateInfo. An interleaved layout has one binding. A planar layout
+/// has one binding for each attribute, in the order positions, normals, tangents, previous
+/// positions.
 struct VertexInput {
   std::array<VkVertexInputBindingDescription, 4> bindings{};
   std::array<VkVertexInputAttributeDescription, 4> attributes{};
-  std::uint32_t bindingCount = 0;
-  std::uint32_t attributeCount = 0;
+  std::uint32_t bindingCount = 0;    ///< elements of `bindings` that are used
+  std::uint32_t attributeCount = 0;  ///< elements of `attributes` that are used
 };
 
-/// Fails with `invalidArgument` as `placeVertices`, if an attribute's format has no
-/// `vertexInputFormat`, and if the layout's stride is no multiple of an attribute's component.
+/// The vertex input of a layout. Fails with `invalidArgument` as `placeVertices` does, if
+/// `vertexInputFormat` returns VK_FORMAT_UNDEFINED for an attribute, and if the stride of the
+/// layout is not a multiple of the size of an attribute's component.
 DERMIS_VULKAN_API Result<VertexInput> vertexInput(const VertexLayout& layout,
                                                   const VertexInputNumbers& numbers = {});
 
-/// The offsets for vkCmdBindVertexBuffers: as many as `VertexInput::bindingCount`, each into the
-/// output buffer. The buffer handle is the same for all of them. Drawing with offset 0 instead is
-/// possible for interleaved layouts: `firstVertex` is `InstanceOutput::offset` / stride then.
+/// The offsets for vkCmdBindVertexBuffers: the first `VertexInput::bindingCount` elements, in bytes
+/// from the beginning of the output buffer. All bindings have the same buffer. With an interleaved
+/// layout an engine may bind offset 0 instead, and draw with `firstVertex` =
+/// `InstanceOutput::offset` / stride.
 DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
                                                                   const InstanceOutput& output);
+/// The same for what `placeVertices` returned. Offsets count from the beginning of the range that
+/// is bound as the output.
 DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
                                                                   const VertexPlaces& places);
 

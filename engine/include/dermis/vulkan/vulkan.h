@@ -1,6 +1,6 @@
-// All of dermis::vulkan that does without Vulkan's own header: not vertex_input.h and
-// acceleration_structure.h, which include vulkan_core.h. An engine that uses volk includes volk.h
-// before those two, or defines VK_NO_PROTOTYPES.
+// All headers of dermis::vulkan except vertex_input.h and acceleration_structure.h, which include
+// vulkan_core.h. An engine that uses volk includes volk.h before those two, or defines
+// VK_NO_PROTOTYPES.
 #pragma once
 
 #include "dermis/vulkan/bindings.h"
