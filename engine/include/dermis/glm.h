@@ -1,4 +1,4 @@
-// Between the plain arrays of the interface and GLM.
+// Conversion between the plain arrays of the interface and GLM.
 #pragma once
 
 #include <glm/mat4x3.hpp>
@@ -8,7 +8,7 @@
 
 namespace dermis {
 
-/// The upper three rows of a GLM matrix (its last row must be 0 0 0 1).
+/// From a GLM matrix. Its last row must be 0 0 0 1.
 inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
   JointMatrix result;
   for (glm::length_t row = 0; row < 3; ++row) {
@@ -18,7 +18,7 @@ inline JointMatrix toJointMatrix(const glm::mat4& matrix) {
   return result;
 }
 
-/// Four columns of three.
+/// To a GLM matrix of four columns with three components each.
 inline glm::mat4x3 toGlm(const JointMatrix& matrix) {
   glm::mat4x3 result(1.0f);
   for (glm::length_t row = 0; row < 3; ++row) {

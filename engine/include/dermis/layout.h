@@ -1,5 +1,5 @@
-// Where the attributes of skinned vertices stand: said of one instance by offsets and strides
-// (`OutputAttribute`), or of many instances by a layout (`VertexLayout`).
+// Where the attributes of skinned vertices are written: offset and stride for one instance
+// (`OutputAttribute`), or a layout for many instances (`VertexLayout`).
 #pragma once
 
 #include <cstdint>
@@ -10,72 +10,75 @@
 
 namespace dermis {
 
-/// Where one attribute of the skinned vertices is written: vertex v at `offset + v * stride` in the
-/// output buffer of that attribute. Bytes between attributes are never written.
+/// Where one attribute of the skinned vertices is written. Vertex v is at `offset + v * stride` in
+/// the output buffer of that attribute. Bytes between attributes are never written.
 ///
-/// If a job's attributes stand one right behind the other in the order positions, normals,
-/// tangents, with equal strides, all must go to one buffer (`OutputSizes::isOneBuffer`). If
-/// positions and normals are float32x3 as well and the stride is a multiple of 8, positions must
-/// begin at a multiple of 8.
-///
-/// Offset, stride and the format's size must be multiples of 4; with `DeviceLimits::storage16Bit`,
-/// of 2; with `storage8Bit` too, they may be any number. On a device with fewer storage buffers
-/// than `storageBuffersWanted` they must always be multiples of 4.
+/// Rules:
+/// - Offset, stride and the size of the format must be multiples of 4. With
+///   `DeviceLimits::storage16Bit` they must be multiples of 2. With `DeviceLimits::storage8Bit`,
+///   too, they may be any number. If a device has fewer storage buffers than
+///   `storageBuffersWanted`, they must always be multiples of 4.
+/// - If the attributes of a job are adjacent, in the order positions, normals, tangents and with
+///   equal strides, they must be in one buffer (`OutputSizes::isOneBuffer`).
+/// - If, in addition, positions and normals are float32x3 and the stride is a multiple of 8, the
+///   offset of the positions must be a multiple of 8.
 struct OutputAttribute {
   std::uint64_t offset = 0;                  ///< bytes
   std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`
-  VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not wanted
+  VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not written
 };
 
-/// Where previous positions come from. They are for motion vectors.
+/// Where previous positions come from. An engine needs them for motion vectors.
 enum class Motion : std::uint8_t {
-  none,
-  /// Copied from the output before it is overwritten: the positions from the last time that this
-  /// instance was skinned. Takes a read and a write; the output must persist between frames.
+  none,  ///< there are no previous positions
+  /// Copied from the output before it is overwritten: the positions of the last time that the
+  /// instance was skinned. Costs a read and a write. The output must persist between frames.
   kept,
-  /// Skinned again with the previous pose and morph weights. Takes a second skinning; only the
-  /// pose must persist. Not in a scene.
+  /// Skinned again with the previous pose and morph weights. Costs a second skinning of positions.
+  /// Only the previous pose must persist. Not available in a scene.
   reskinned,
 };
 
+/// How the attributes of many vertices are arranged.
 enum class Arrangement : std::uint8_t {
-  /// Vertex after vertex: positions, normals, tangents, previous positions, each at a multiple of
-  /// `formatAlignment`.
+  /// One vertex after the other. In each vertex: position, normal, tangent, previous position, each
+  /// at a multiple of `formatAlignment`.
   interleaved,
-  /// Attribute after attribute, each beginning at a multiple of 48 bytes.
+  /// One attribute after the other. Each begins at a multiple of 48 bytes.
   planar,
 };
 
-/// The attributes of skinned vertices, their formats, and how they stand together. With a method,
-/// it decides on pipelines (`PipelineNeeds`).
+/// The attributes of skinned vertices, their formats and their arrangement. Method and layout
+/// decide which pipelines are needed (`PipelineNeeds`).
 struct VertexLayout {
   VertexFormat positions = VertexFormat::float32x3;  ///< `isPositionFormat`
-  VertexFormat normals = VertexFormat::none;
-  VertexFormat tangents = VertexFormat::none;
-  /// Whether there are previous positions, in the format of positions. In a scene they are those of
-  /// the last frame that displayed the instance.
+  VertexFormat normals = VertexFormat::none;         ///< `isNormalFormat`, or `none`
+  VertexFormat tangents = VertexFormat::none;        ///< `isTangentFormat`, or `none`
+  /// Whether there are previous positions. Their format is that of the positions. In a scene they
+  /// are the positions of the last frame that displayed the instance.
   Motion motion = Motion::none;
   Arrangement arrangement = Arrangement::interleaved;
-  /// Interleaved: bytes from vertex to vertex, for attributes of the engine's own behind those of
-  /// Dermis. 0: the minimum, rounded up to a multiple of 4.
+  /// For interleaved layouts: bytes from one vertex to the next. It may leave room for attributes
+  /// of the engine after those of Dermis. 0: the minimum, rounded up to a multiple of 4.
   std::uint32_t stride = 0;
 
   friend bool operator==(const VertexLayout&, const VertexLayout&) = default;
 };
 
-/// Where the attributes of `vertexCount` vertices stand.
+/// Where the attributes of all vertices of an instance are. `placeVertices` returns it.
 struct VertexPlaces {
   OutputAttribute positions, normals, tangents, previousPositions;
   Motion motion = Motion::none;
-  std::uint64_t size = 0;  ///< bytes
-  /// Bytes: `offset` must be a multiple of this, which need not be a power of two. Interleaved: the
-  /// stride, so that an instance may be drawn by `firstVertex`.
+  std::uint64_t size = 0;  ///< bytes of all vertices
+  /// Bytes: the offset of the vertices must be a multiple of this, which need not be a power of
+  /// two. For interleaved layouts it is the stride, so that a draw can use `firstVertex`.
   std::uint64_t alignment = 1;
 };
 
-/// Places vertices from byte `offset` of a buffer on. Fails with `invalidArgument` if positions are
-/// not `isPositionFormat`, if the stride is too small or the layout is planar and has one, and if
-/// the offset is not a multiple of `VertexPlaces::alignment`.
+/// Places `vertexCount` vertices at byte `offset` of a buffer. Fails with `invalidArgument`
+/// - if the positions are not `isPositionFormat`;
+/// - if the stride is too small, or the layout is planar and has a stride;
+/// - if `offset` is not a multiple of `VertexPlaces::alignment`.
 DERMIS_CORE_API Result<VertexPlaces> placeVertices(const VertexLayout& layout,
                                                    std::uint32_t vertexCount,
                                                    std::uint64_t offset = 0);

@@ -1,6 +1,6 @@
-// Views of a mesh in the caller's memory: bind-pose vertices and their influences. Nothing is
-// copied, nothing is owned; the memory must stay as it is for the call that takes the view, no
-// longer.
+// Views of a mesh in the caller's memory: vertices in bind pose and their influences. A view copies
+// nothing and owns nothing. The memory must stay valid and unchanged during the call that takes the
+// view.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@
 
 namespace dermis {
 
-/// How one component of an attribute is stored. `unorm` types stand for the value divided by the
-/// type's largest, `snorm` types likewise and no less than -1 (as in Vulkan and glTF). float16 is
-/// IEEE 754 binary16.
+/// How one component of an attribute is stored. As in Vulkan and glTF, the value of a `unorm` type
+/// is the integer divided by its maximum, and the value of a `snorm` type is the same, but at least
+/// -1. float16 is IEEE 754 binary16.
 enum class ComponentType : std::uint8_t {
   float32,
   float16,
@@ -44,77 +44,85 @@ constexpr std::uint32_t componentSize(ComponentType type) {
   return 0;
 }
 
-/// `count` elements of `components` components each, `stride` bytes apart: any interleaving.
-/// Alignment is not needed.
+/// One attribute: `count` elements of `components` components each, `stride` bytes apart. So it can
+/// be part of interleaved vertices. Needs no alignment.
 struct AttributeView {
-  const void* data = nullptr;  ///< The first element; null where the mesh lacks the attribute.
-  std::uint32_t count = 0;     ///< Elements: the mesh's vertex count.
-  std::uint32_t stride =
-      0;  ///< Bytes from one element to the next, at least the size of an element.
+  const void* data = nullptr;  ///< the first element; null if the mesh does not have the attribute
+  std::uint32_t count = 0;     ///< number of elements: `MeshView::vertexCount`
+  /// Bytes from one element to the next; at least the size of an element.
+  std::uint32_t stride = 0;
   ComponentType type = ComponentType::float32;
-  std::uint32_t components = 0;
+  std::uint32_t components = 0;  ///< per element
 
+  /// Whether the mesh has the attribute.
   explicit operator bool() const { return data != nullptr; }
 };
 
-/// Joints and their weights for every vertex: `components` influences a vertex (4 in a glTF set;
-/// any number here). A slot of weight 0 is no influence, whatever its joint.
+/// Joints and weights of every vertex. `components` is the number of influences per vertex: 4 in a
+/// set of glTF, any number here, the same for joints and weights. An influence of weight 0 is
+/// ignored, whatever its joint is.
 struct InfluenceSet {
   AttributeView joints;   ///< uint8, uint16 or uint32
   AttributeView weights;  ///< float32, unorm8 or unorm16
 };
 
-/// One morph target (blend shape): displacements that are added, times a weight, to the attributes
-/// in bind pose, before skinning. An absent attribute is not displaced; one that the mesh lacks is
-/// ignored. What is zero costs nothing: `pack` stores the displaced vertices only.
+/// One morph target (blend shape): displacements that are multiplied by a weight and added to the
+/// attributes in bind pose, before skinning. If an attribute is absent here, it is not displaced.
+/// If the mesh does not have the attribute, its displacements are ignored. `pack` stores only
+/// vertices with a displacement other than zero.
 struct MorphTargetView {
-  /// The vertices that the elements below belong to, strictly rising. Empty: all, in their order.
+  /// The vertices that the elements below belong to, strictly ascending. If empty, there is an
+  /// element for each vertex of the mesh.
   std::span<const std::uint32_t> vertices;
-  AttributeView positions;  ///< float32, float16 or snorm16 × 3, times `positionScale`
-  AttributeView normals;    ///< float32, float16, snorm8 or snorm16 × 3
-  AttributeView tangents;   ///< likewise; the handedness is not displaced
+  /// float32, float16 or snorm16, 3 components, multiplied by `positionScale`.
+  AttributeView positions;
+  AttributeView normals;   ///< float32, float16, snorm8 or snorm16, 3 components
+  AttributeView tangents;  ///< the same; the handedness is not displaced
   std::array<float, 3> positionScale{1, 1, 1};
 };
 
-/// One morph target at work on an instance.
+/// A morph target that is active on an instance, and its weight.
 struct MorphWeight {
   std::uint32_t target = 0;  ///< index into `MeshView::morphTargets`
-  float weight = 0;          ///< any finite number; 0 is as if it were not there
+  float weight = 0;          ///< any finite number; a target with weight 0 is not active
 };
 
 /// A mesh in bind pose. The influences of a vertex are those of all sets together, in any order and
-/// any number; they need not sum to 1 (they are normalised) and a joint may stand twice (its
-/// weights are added up).
+/// any number. Weights need not sum to 1: they are normalized. If a joint occurs twice in a vertex,
+/// its weights are added.
 struct MeshView {
-  std::string_view name;  ///< For messages only.
+  std::string_view name;  ///< for messages only
   std::uint32_t vertexCount = 0;
-  /// float32, float16, snorm16 or unorm16, × 3 (a fourth component is not read), each component
-  /// times `positionScale` plus `positionOffset`.
+  /// Required. float32, float16, snorm16 or unorm16, 3 components (a fourth is ignored). Each
+  /// component is multiplied by `positionScale`; then `positionOffset` is added.
   AttributeView positions;
   std::array<float, 3> positionScale{1, 1, 1};
   std::array<float, 3> positionOffset{0, 0, 0};
-  /// float32, float16, snorm8 or snorm16, × 3 (a fourth is not read), or absent. A zero normal
-  /// stays zero.
+  /// Optional. float32, float16, snorm8 or snorm16, 3 components (a fourth is ignored). A zero
+  /// normal stays zero.
   AttributeView normals;
-  /// The same types × 4, or absent; the fourth is the handedness: negative, or not.
+  /// Optional. The same types, 4 components. The fourth is the handedness: -1 if it is negative,
+  /// otherwise 1.
   AttributeView tangents;
-  std::span<const InfluenceSet> influenceSets;
-  std::span<const MorphTargetView> morphTargets;
+  std::span<const InfluenceSet> influenceSets;    ///< at least one
+  std::span<const MorphTargetView> morphTargets;  ///< may be empty
 
-  // Inputs of some methods. Morph targets do not change them.
-  /// `Method::blended`, float32, unorm8 or unorm16 × 1: from 0, linear, to 1, dual quaternions.
+  // -- Inputs of some methods. Morph targets do not change them.
+
+  /// For `Method::blended`: from 0 (linear) to 1 (dual quaternions). Optional; float32, unorm8 or
+  /// unorm16, 1 component.
   AttributeView dualQuaternionWeights;
-  float dualQuaternionWeight = 0.5f;  ///< of every vertex, where those are absent
-  /// `Method::bulgeControlled`, the same types: from 0, as much as dual quaternions bulge, to 1, as
-  /// little as `Method::centerOfRotation`.
+  float dualQuaternionWeight = 0.5f;  ///< of every vertex, if `dualQuaternionWeights` is absent
+  /// For `Method::bulgeControlled`: from 0 (bulges like dual quaternions) to 1 (bulges as little as
+  /// `Method::centerOfRotation`). Optional; the same types.
   AttributeView bulgeStrengths;
-  float bulgeStrength = 1;  ///< of every vertex, where those are absent
-  /// Points in bind space, float32 × 3, that `CenterOfRotationSolver` finds
-  /// (centers_of_rotation.h).
+  float bulgeStrength = 1;  ///< of every vertex, if `bulgeStrengths` is absent
+  /// For methods that `needsCentersOfRotation`: points in bind space, float32, 3 components.
+  /// `CenterOfRotationSolver` computes them (centers_of_rotation.h).
   AttributeView centersOfRotation;
 };
 
-/// A float32 attribute; `stride` in bytes, 0 for tightly packed.
+/// A view of float32 values. `stride` is in bytes; 0 if elements are tightly packed.
 inline AttributeView floatAttribute(const float* data, std::uint32_t count,
                                     std::uint32_t components, std::uint32_t stride = 0) {
   return {data, count, stride != 0 ? stride : components * 4, ComponentType::float32, components};

@@ -1,4 +1,4 @@
-// The rules by which the joints of a vertex are blended.
+// The methods by which the joints of a vertex are blended.
 #pragma once
 
 #include <array>
@@ -10,48 +10,52 @@
 
 namespace dermis {
 
-/// All take the same mesh and pose. Those that blend rotations do it in two phases where joints
-/// scale or shear: the scale/shear parts are blended linearly and applied in bind space, then the
-/// rigid parts are blended by the rule. docs/methods.md has a page on each.
+/// How the joints of a vertex are blended. All methods use the same meshes and poses. If joints
+/// scale or shear, all methods except `linear` blend in two phases: first the scale and shear parts
+/// are blended linearly and applied in bind space, then the rigid parts are blended by the method.
+/// docs/methods.md describes each.
 enum class Method : std::uint8_t {
-  /// Linear blend skinning: the joint matrices are blended. Collapses where joints twist.
+  /// Linear blend skinning: blends the joint matrices. The mesh collapses where joints twist.
   linear,
-  /// Dual-quaternion linear blending, DLB (Kavan et al. 2007, section 4). Bulges where joints bend.
+  /// Dual-quaternion linear blending, DLB (Kavan et al. 2007, section 4). The mesh bulges where
+  /// joints bend.
   dualQuaternion,
-  /// DIB (Kavan et al. 2008): DLB refined towards the screw motion "in the middle" of the joints',
-  /// by at most 20 steps. For comparison.
+  /// Dual-quaternion iterative blending, DIB (Kavan et al. 2008): refines the result of DLB in at
+  /// most 20 steps. For comparison.
   dualQuaternionIterative,
-  /// The logarithms of the rigid parts are blended as matrices (Cordier and Magnenat-Thalmann 2005,
-  /// Alexa 2002). May go the long way round. For comparison.
+  /// Blends the logarithms of the rigid parts as matrices (Cordier and Magnenat-Thalmann 2005,
+  /// Alexa
+  /// 2002). May rotate the long way round. For comparison.
   logMatrix,
-  /// Blended quaternions about a centre of rotation that is found for each vertex and pose (Kavan
-  /// and Žára 2005). For comparison.
+  /// Spherical blend skinning (Kavan and Žára 2005): blends quaternions about a center of rotation
+  /// that is computed for each vertex and pose. For comparison.
   sphericalBlend,
-  /// Quaternions and translations, each blended on its own (Hejl 2004). Tears where a vertex has
-  /// joints that do not meet. For comparison.
+  /// Blends quaternions and translations separately (Hejl 2004). The mesh tears at vertices whose
+  /// joints do not meet. For comparison.
   quaternionTranslation,
-  /// Between `linear` and `dualQuaternion`, by `MeshView::dualQuaternionWeights`.
+  /// Interpolates between `linear` and `dualQuaternion`, by `MeshView::dualQuaternionWeights`.
   blended,
-  /// Blended quaternions about centres of rotation that are found once, at import (Le and Hodgins
-  /// 2016): does not collapse, and bulges less. Needs `MeshView::centersOfRotation`.
+  /// Blends quaternions about centers of rotation that are computed once, at import (Le and Hodgins
+  /// 2016). Does not collapse, and bulges less. Requires `MeshView::centersOfRotation`.
   centerOfRotation,
-  /// `dualQuaternion` drawn towards `centerOfRotation` by `MeshView::bulgeStrengths`. Needs
+  /// `dualQuaternion`, moved towards `centerOfRotation` by `MeshView::bulgeStrengths`. Requires
   /// `MeshView::centersOfRotation`.
   bulgeControlled,
 };
 
+/// All methods, in the order of `Method`.
 inline constexpr std::array<Method, 9> allMethods{
     Method::linear,    Method::dualQuaternion,   Method::dualQuaternionIterative,
     Method::logMatrix, Method::sphericalBlend,   Method::quaternionTranslation,
     Method::blended,   Method::centerOfRotation, Method::bulgeControlled};
 
-/// Whether meshes need `MeshView::centersOfRotation` for it.
+/// Whether the method requires `MeshView::centersOfRotation`.
 constexpr bool needsCentersOfRotation(Method method) {
   return method == Method::centerOfRotation || method == Method::bulgeControlled;
 }
 
-/// Whether it is there to be compared with, not for every day: its kernels may have been left out
-/// of the library (`DERMIS_COMPARISON_METHODS`).
+/// Whether the method is meant for comparison, not for use in an engine. The library may have been
+/// built without its kernels (`DERMIS_COMPARISON_METHODS`).
 constexpr bool isForComparison(Method method) {
   return method == Method::dualQuaternionIterative || method == Method::logMatrix ||
          method == Method::sphericalBlend || method == Method::quaternionTranslation;
@@ -62,7 +66,7 @@ constexpr bool isForComparison(Method method) {
 /// "blended", "center_of_rotation", "bulge_controlled".
 DERMIS_CORE_API std::string_view methodName(Method method);
 
-/// The method of that name, or nothing.
+/// The method of that name; empty if there is none.
 DERMIS_CORE_API std::optional<Method> methodFromName(std::string_view name);
 
 }  // namespace dermis

@@ -10,23 +10,23 @@
 
 namespace dermis {
 
-/// The format of one attribute. Components stand one after the other, little-endian, without
-/// padding.
+/// The format of one attribute. Components are consecutive and little-endian, without padding. All
+/// formats round to nearest. The fourth component of `x4` formats is 1 for positions, 0 for
+/// normals, and the handedness (1 or -1) for tangents.
 ///
-/// `x4` formats fill their fourth component: 1 for positions, 0 for normals, the handedness (1 or
-/// -1) for tangents. Rounding is to nearest everywhere.
-///
-/// - float16: IEEE 754 binary16, ties to even; what is too large becomes infinite.
-/// - snorm8, snorm16: round(127 c), round(32767 c). Positions are taken relative to a box, c =
-///   (p - centre) / half its size: what lies outside is clamped, and counted.
-/// - octahedral: Meyer et al. 2010, "On floating-point normal vectors": the direction divided by
-///   |x| + |y| + |z|, its lower half folded outwards; two snorm components. A zero vector cannot be
-///   told: it becomes (0, 0, 1).
-/// - octahedral tangents have the handedness as the sign of the second component: with L = 127 or
-///   32767, the largest integer, y goes from 1 to L instead of -L to L: q = 1 + round((y + 1) / 2
-///   · (L - 1)), negated for a handedness of -1. So y = 2 (|q| - 1) / (L - 1) - 1.
+/// - float16: IEEE 754 binary16. Ties round to even. Values that are too large become infinite.
+/// - snorm8, snorm16: component c is stored as round(127 c) or round(32767 c). Positions are
+/// relative
+///   to a box: c = (p - center) / (half of its size). Positions outside the box are clamped, and
+///   counted in `InstanceResult`.
+/// - octahedral: the direction is divided by |x| + |y| + |z|, and its lower half is folded outwards
+///   (Meyer et al. 2010, "On floating-point normal vectors"). x and y are stored as snorm. A zero
+///   vector has no encoding; it becomes (0, 0, 1).
+/// - octahedral, for tangents: the sign of the second component is the handedness. Let L = 127 or
+///   32767 be the maximum integer. y is stored as q = 1 + round((y + 1) / 2 · (L - 1)), from 1 to
+///   L, and q is negated if the handedness is -1. To decode: y = 2 (|q| - 1) / (L - 1) - 1.
 enum class VertexFormat : std::uint8_t {
-  none,  ///< the attribute is not wanted
+  none,  ///< the attribute is not written
   float32x3,
   float32x4,
   float16x3,
@@ -39,6 +39,7 @@ enum class VertexFormat : std::uint8_t {
   octahedral8x2,
 };
 
+/// All formats except `none`.
 inline constexpr std::array<VertexFormat, 10> allVertexFormats{
     VertexFormat::float32x3,    VertexFormat::float32x4, VertexFormat::float16x3,
     VertexFormat::float16x4,    VertexFormat::snorm16x3, VertexFormat::snorm16x4,
@@ -71,11 +72,11 @@ constexpr std::uint32_t formatSize(VertexFormat format) {
   return 0;
 }
 
-/// Bytes of one component: vertex fetch requires attributes to begin at multiples of them. 1 for
-/// `none`.
+/// Bytes of one component; 1 for `none`. For vertex input, the offset of an attribute must be a
+/// multiple of it.
 DERMIS_CORE_API std::uint32_t formatAlignment(VertexFormat format);
 
-/// The format's name in reports: "snorm16x4".
+/// The name of the format, for example "snorm16x4".
 DERMIS_CORE_API std::string_view formatName(VertexFormat format);
 
 /// Whether positions in this format are relative to a box.
@@ -83,31 +84,33 @@ constexpr bool isSnormPosition(VertexFormat format) {
   return format == VertexFormat::snorm16x3 || format == VertexFormat::snorm16x4;
 }
 
-/// Whether skinned positions, normals, tangents may be stored so: positions as float32, float16 or
-/// snorm16; normals as anything; tangents as anything with four components, or octahedral.
+/// Whether positions may have this format: float32, float16 or snorm16.
 constexpr bool isPositionFormat(VertexFormat format) {
   return format == VertexFormat::float32x3 || format == VertexFormat::float32x4 ||
          format == VertexFormat::float16x3 || format == VertexFormat::float16x4 ||
          isSnormPosition(format);
 }
+/// Whether normals may have this format: any except `none`.
 constexpr bool isNormalFormat(VertexFormat format) {
   return formatSize(format) != 0;
 }
+/// Whether tangents may have this format: those with four components, and octahedral ones.
 constexpr bool isTangentFormat(VertexFormat format) {
   return format == VertexFormat::float32x4 || format == VertexFormat::float16x4 ||
          format == VertexFormat::snorm16x4 || format == VertexFormat::snorm8x4 ||
          format == VertexFormat::octahedral16x2 || format == VertexFormat::octahedral8x2;
 }
 
-/// What stands at `data`, in double precision: by the formulas above, for tests and tools. A
-/// direction that was stored octahedral is of unit length, any other as long as it was stored.
-/// `box` matters for snorm16 only; along an axis where it has no extent every value stands for its
-/// one coordinate. `data` needs no alignment, and holds `formatSize` bytes. A format that the
-/// attribute may not have gives zeros.
+/// Decodes a position in double precision, for tests and tools. `data` points to `formatSize` bytes
+/// and needs no alignment. `box` is used for snorm16 only; if it has no extent along an axis, all
+/// values have the same coordinate there. Returns zeros if the format is not `isPositionFormat`.
 DERMIS_CORE_API std::array<double, 3> decodePosition(VertexFormat format, const void* data,
                                                      const Box& box);
+/// Decodes a normal, as `decodePosition`. An octahedral normal has unit length; any other has the
+/// length that it was stored with. Returns zeros if the format is not `isNormalFormat`.
 DERMIS_CORE_API std::array<double, 3> decodeNormal(VertexFormat format, const void* data);
-/// x y z and the handedness.
+/// Decodes a tangent, as `decodeNormal`: x, y, z and the handedness. Returns zeros if the format is
+/// not `isTangentFormat`.
 DERMIS_CORE_API std::array<double, 4> decodeTangent(VertexFormat format, const void* data);
 
 }  // namespace dermis
