@@ -1,6 +1,7 @@
-// A box around a skinned mesh, from the pose alone: for culling, and for positions in snorm16,
-// which need a box before there are positions. What has to be known of the vertices is gathered
-// once, at import; a pose then costs a few microseconds. docs/bounds.md has the proof.
+// Computes a box around a skinned mesh from its pose, without skinning it. Engines need it for
+// culling, and for positions in snorm16, which are relative to a box. `jointBounds` collects what
+// is needed about the vertices, once, at import. `skinnedBounds` then takes a few microseconds for
+// a pose. docs/bounds.md has the proof.
 #pragma once
 
 #include <array>
@@ -18,92 +19,97 @@
 
 namespace dermis {
 
-/// How far a set of points reaches: `reach[2 i]` is the largest d · p for direction d = i of the 13
-/// below, `reach[2 i + 1]` that for −d. -inf for no points at all. A box with its edges and corners
-/// cut: it stays tight when it is turned.
+/// The extent of a set of points along 26 directions: a box with its edges and corners cut off,
+/// which stays tight when it is rotated.
 struct Extent {
+  /// `reach[2 i]` is the maximum of d · p over all points p, with d = `directions[i]`.
+  /// `reach[2 i + 1]` is the same for −d. All are -inf if there are no points.
   float reach[26];
 
-  /// Faces, edges and corners of a cube.
+  /// Towards the faces, edges and corners of a cube.
   static constexpr std::int8_t directions[13][3] = {
       {1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, -1, 0}, {1, 0, 1},  {1, 0, -1},
       {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 
+  /// Whether there are no points.
   bool empty() const { return reach[0] < -reach[1]; }
 };
 
-/// Where the vertices lie in bind pose, by the joints that move them. Plain data, made once at
-/// import by `jointBounds`. It depends on no pose and on no method, and may be stored with the
-/// mesh: `bytes`, `fromBytes`.
+/// The extents of the vertices in bind pose, grouped by the joints that move them. Plain data.
+/// `jointBounds` makes it once, at import. It does not depend on pose and method, and may be stored
+/// with the mesh (`bytes`, `fromBytes`).
 struct JointBounds {
   /// A joint that moves vertices.
   struct Joint {
     std::uint32_t joint;  ///< index into the pose
-    Extent alone;         ///< of the vertices that this joint moves on its own, in bind space
+    Extent alone;         ///< of the vertices that only this joint moves, in bind space
   };
 
-  /// Two joints that have vertices in common, and the vertices that both of them move.
+  /// Two joints that have vertices in common, and these vertices.
   struct Pair {
     std::uint32_t first, second;  ///< indices into `joints`, first < second
-    std::uint32_t influences;     ///< the most influences that one of the vertices has
+    std::uint32_t influences;     ///< maximum influences of the vertices
     Extent extent;                ///< of the vertices, in bind space
-    /// How the joints share the vertices: the least and greatest a = w₁ / (w₂ (k − 1)) and
-    /// b = w₂ / (w₁ (k − 1)), and the least a + b, of a vertex with k influences, w₁ the weight of
-    /// the first joint and w₂ that of the second.
+    /// Minimum and maximum over the vertices of a = w₁ / (w₂ (k − 1)): k is the number of
+    /// influences of the vertex, w₁ and w₂ are the weights of the first and second joint.
     float firstOverSecond[2];
-    float secondOverFirst[2];
-    float leastSum;
+    float secondOverFirst[2];  ///< the same of b = w₂ / (w₁ (k − 1))
+    float leastSum;            ///< minimum of a + b
   };
 
   static constexpr float infinity = std::numeric_limits<float>::infinity();
-  /// Above this number of influences a vertex adds no trios.
+  /// Vertices with more influences than this add no trios.
   static constexpr std::uint32_t mostInfluencesOfTrio = 8;
 
-  std::vector<Joint> joints;  ///< by rising pose index
-  std::vector<Pair> pairs;    ///< by rising first, then second
-  /// Three joints that have vertices in common: indices into `joints`, rising.
+  std::vector<Joint> joints;  ///< by ascending index into the pose
+  std::vector<Pair> pairs;    ///< by ascending `first`, then `second`
+  /// Three joints that have vertices in common: ascending indices into `joints`.
   std::vector<std::array<std::uint32_t, 3>> trios;
-  /// Of the vertices without weight, which stay in bind pose; min > max for none.
+  /// Box of the vertices without weight, which stay in bind pose. min > max if there are none.
   Box unweighted{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   std::uint32_t requiredJoints = 0;  ///< minimum joints of a pose: the largest index + 1
 
-  /// To be stored: little-endian words with a version and a checksum.
+  /// The data as little-endian words with a version and a checksum, to store it.
   DERMIS_CORE_API std::vector<std::byte> bytes() const;
-  /// Reads them back, checked so that `skinnedBounds` is safe with the result. Fails with
-  /// `invalidData` (damaged), or `unsupportedVersion`.
+  /// Reads what `bytes` returned. It is checked, so that `skinnedBounds` never reads out of range.
+  /// Fails with `invalidData` if it is damaged, or with `unsupportedVersion`.
   DERMIS_CORE_API static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
 };
 
-/// The weights that a morph target is given, whatever the pose.
+/// The range of weights that a morph target will have.
 struct MorphRange {
   float min = 0;
   float max = 1;
 };
 
-/// Gathers what `skinnedBounds` has to know of a mesh for poses of `jointCount` joints.
-/// O(vertices × influences²). Morph targets may move every vertex by every combination of weights
-/// within `morphRanges`, one a target; empty: 0 to 1 for each. A mesh that is drawn without its
-/// morph targets gets a tighter box from a view without them. Fails with `invalidMesh` where `pack`
-/// would refuse the mesh, or a morph target does not fit it, and with `invalidArgument` for a
-/// `jointCount` of 0 or above `maxPoseJoints`, or for ranges that are not finite, not in order
-/// or not one a target.
+/// Collects what `skinnedBounds` needs to know about a mesh, for poses of `jointCount` joints.
+/// O(vertices × influences²).
+///
+/// The boxes hold for all combinations of morph weights within `morphRanges`, which has one element
+/// for each morph target. If it is empty, all ranges are 0 to 1. For a mesh that is drawn without
+/// its morph targets, pass a view without them: the box is tighter.
+///
+/// Fails with `invalidMesh` if `pack` refuses the mesh or a morph target does not fit it. Fails
+/// with `invalidArgument` if `jointCount` is 0 or above `maxPoseJoints`, if a range is not finite
+/// or its minimum is above its maximum, or if the number of ranges is wrong.
 DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
                                                 std::span<const MorphRange> morphRanges = {});
 
-/// A box that holds every position that a kernel or the reference makes of the mesh in this pose,
-/// rounding included, in the pose's space. `pose` is what the mesh is skinned with: joint
-/// global transform × inverse bind matrix.
+/// A box that contains every position that the kernels or the reference compute for the mesh in
+/// this pose, including rounding errors. It is in the space of the pose. In ordinary poses it is a
+/// few percent larger than necessary; docs/bounds.md has the formulas, the proof and numbers.
 ///
-/// For `linear`, `dualQuaternion` and `blended`; of the other methods nothing is proven, and the
-/// box is infinite. A few percent larger than it need be in ordinary poses; docs/bounds.md has the
-/// formulas, the proof and numbers. Joints that move no vertex have no effect, whatever their
-/// matrices. The box is infinite (from -inf to inf) where a joint that moves vertices is not finite
-/// or outside the pose, or the mesh reaches beyond 1e38, and its sides may be infinite where
-/// numbers leave the range of float32: ask `std::isfinite` before it becomes a format's box. It
-/// never has a NaN. A default-made `JointBounds` gives min > max.
+/// The methods are `linear`, `dualQuaternion` and `blended`. For all other methods nothing is
+/// proven, and the box is infinite.
 ///
-/// O(joints + pairs + trios); allocates only above 128 joints that move vertices, and needs
-/// 32 KiB of stack. Any thread.
+/// The box is infinite (from -inf to inf), too, if a joint that moves vertices is not finite or is
+/// outside the pose, or if the mesh reaches beyond 1e38. A side may be infinite if numbers leave
+/// the range of float32. So check the box with `std::isfinite` before you use it for snorm16. It
+/// never contains a NaN. Joints that move no vertices have no effect. For a default-constructed
+/// `JointBounds` the box has min > max.
+///
+/// O(joints + pairs + trios). Any thread. Needs 32 KiB of stack, and allocates only if more than
+/// 128 joints move vertices.
 DERMIS_CORE_API Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose,
                                   Method method);
 

@@ -1,14 +1,15 @@
-// Centres of rotation: for each vertex the point about which its joints' blended rotation turns it.
-// Made once from the bind pose, at import; they depend on no pose. After "Real-time skeletal
-// skinning with optimized centers of rotation", Le and Hodgins 2016.
+// Computes centers of rotation: for each vertex, the point about which the blended rotation of its
+// joints rotates it. They are computed once, at import, from the bind pose. Source: Le and Hodgins
+// 2016, "Real-time skeletal skinning with optimized centers of rotation".
 //
-// Two vectors of weights, i and t, are the more similar the more joints they share in the same
-// proportion (σ = 0.1):
+// The similarity of two vectors of weights, i and t, is greater the more joints they share in the
+// same proportion (σ = 0.1):
 //
-//   s(i, t) = Σ_{j≠k} w_ij w_ik w_tj w_tk exp(−(w_ij w_tk − w_ik w_tj)² / σ²)
+//     s(i, t) = Σ_{j≠k} w_ij w_ik w_tj w_tk exp(−(w_ij w_tk − w_ik w_tj)² / σ²)
 //
-// The centre of vertex i is the mean of the centroids of all triangles t of the mesh, weighted by
-// s(i, t) and by their areas. A triangle's weights are the mean of those of its vertices.
+// The center of vertex i is the mean of the centroids of all triangles t of the mesh, weighted by
+// s(i, t) and by their areas. The weights of a triangle are the mean of the weights of its
+// vertices.
 #pragma once
 
 #include <cstdint>
@@ -22,39 +23,40 @@
 
 namespace dermis {
 
-/// Finds the centres of a mesh, 3 floats a vertex, in bind space. `make` sorts the triangles once;
-/// `solve` then takes any part of the vertices, on any thread, so that an engine's job system can
-/// share the work. It starts no thread. `solve(0, all)` does all of it on the calling thread.
+/// Computes the centers of rotation of a mesh, 3 floats per vertex, in bind space. `make` sorts the
+/// triangles once. `solve` then computes the centers of any range of vertices, on any thread, so
+/// that an engine's job system can share the work. The solver starts no threads.
 ///
-/// Weights are those that `pack` stores: normalised, a joint's added up, those below 2^-49 dropped.
-/// A vertex without weight adds nothing to the weights of its triangles, and a triangle without
-/// area adds nothing to a centre. Centres are finite and lie among the triangles' centroids. A
-/// vertex has its own bind position as the centre if it has fewer than two influences (with one
-/// joint the centre makes no difference), or if no triangle has two of its joints.
+/// Weights are those that `pack` stores: normalized, those of one joint added, and those below
+/// 2^-49 dropped. A vertex without weight adds nothing to the weights of its triangles. A triangle
+/// without area adds nothing to a center. If a vertex has fewer than two influences, or no triangle
+/// has two of its joints, its center is its own position in bind pose; with one joint the center
+/// makes no difference. Centers are finite and lie between the centroids of the triangles.
 ///
-/// Sums are in double precision and in an order of their own: the result differs from the exact
-/// centre by the rounding of weights and centres to float32 only.
+/// Sums are computed in double precision. The result differs from the exact center only by the
+/// rounding of weights and centers to float32.
 ///
-/// Takes some 4 ns for each vertex, triangle and pair of joints that the two share (x86-64, one
-/// core). That is O(vertices × triangles) for each pair of joints: 0.5 s for a body of 10,000
-/// vertices, 20,000 triangles and 26 joints. The worst case, the same four joints in all vertices,
-/// takes 5 s for 10,000 vertices and a hundred times that for ten times as many. Triangles of equal
-/// weights count as one.
+/// `solve` takes about 4 ns for each term: for each vertex, triangle and pair of joints that the
+/// two share (x86-64, one core). Triangles of equal weights count as one. That is O(vertices ×
+/// triangles) for each pair of joints: 0.5 s for a body of 10,000 vertices, 20,000 triangles and 26
+/// joints. The worst case, with the same four joints in all vertices, takes 5 s for 10,000 vertices
+/// and a hundred times as long for ten times as many.
 ///
-/// Owns what it needs: the memory of mesh and triangles may be released. Movable, not copyable. A
-/// moved-from solver may only be destroyed or assigned to.
+/// The solver owns its data: the memory of mesh and triangles may be released after `make`.
+/// Movable, not copyable. A moved-from solver may only be destroyed or assigned to.
 class DERMIS_CORE_API CenterOfRotationSolver {
  public:
-  /// Sorts the triangles by the pairs of joints that move them: O(triangles × joints²), with the
-  /// joints of one triangle. Takes 20 bytes of memory for each pair of each triangle, which has 6
-  /// to 15 pairs if vertices have four influences, and as much again while it runs.
+  /// Sorts the triangles by the pairs of joints that move them. O(triangles × joints²), where
+  /// joints is the number of joints of one triangle. Takes 20 bytes for each pair of each triangle,
+  /// and as much again while it runs. A triangle has 6 to 15 pairs if vertices have four
+  /// influences.
   ///
-  /// `triangles` has three vertex indices for each triangle. Pass the whole surface: what is left
-  /// out draws no centre towards it. Pass a mesh that was cut up, by material say, as one.
+  /// `triangles` has three vertex indices for each triangle. Pass the whole surface, as one mesh,
+  /// even if it is split, for example by material: the centers depend on all of it.
   ///
-  /// Fails with `invalidMesh` if `pack` would refuse the mesh, with that finding's sentence; with
-  /// `invalidArgument` for a `jointCount` of 0 or above `maxPoseJoints`, a number of indices
-  /// that is no multiple of 3, or an index outside the mesh; with `limitExceeded` above 2^32 − 1
+  /// Fails with `invalidMesh` if `pack` refuses the mesh, with the same message; with
+  /// `invalidArgument` if `jointCount` is 0 or above `maxPoseJoints`, if the number of indices is
+  /// not a multiple of 3, or if an index is outside the mesh; with `limitExceeded` above 2^32 − 1
   /// triangles. Any thread.
   static Result<CenterOfRotationSolver> make(const MeshView& mesh, std::uint32_t jointCount,
                                              std::span<const std::uint32_t> triangles);
@@ -62,18 +64,18 @@ class DERMIS_CORE_API CenterOfRotationSolver {
   CenterOfRotationSolver(CenterOfRotationSolver&&) noexcept;
   CenterOfRotationSolver& operator=(CenterOfRotationSolver&&) noexcept;
 
+  /// Number of vertices of the mesh.
   std::uint32_t vertexCount() const;
 
-  /// Terms in the sums of all vertices: one for each vertex, triangle (those of equal weights count
-  /// as one) and pair of joints that the two share. Some 4 ns each (x86-64, one core). Check it
-  /// before solving a mesh of unknown origin. O(vertices × influences²).
+  /// Number of terms in the sums of all vertices; see above for the time that a term takes. Check
+  /// it before you solve a mesh of unknown origin. O(vertices × influences²).
   std::uint64_t termCount() const;
 
-  /// Writes the centres of the vertices from `firstVertex` on, as many as `centers` has room for at
-  /// 3 floats each. Any number of threads may call it at a time. The bits do not depend on how the
-  /// mesh is divided; 64 vertices are enough for a job. Allocates nothing unless it fails: with
-  /// `invalidArgument`, nothing written, if the size of `centers` is no multiple of 3 or the
-  /// vertices are not all in the mesh.
+  /// Computes the centers of `centers.size()` / 3 vertices, beginning with `firstVertex`. Any
+  /// number of threads may call it at the same time. Results are the same to the bit however the
+  /// vertices are divided among calls; 64 vertices are enough for a job. Allocates nothing unless
+  /// it fails. Fails with `invalidArgument`, and writes nothing, if the size of `centers` is not a
+  /// multiple of 3 or a vertex is not in the mesh.
   Result<void> solve(std::uint32_t firstVertex, std::span<float> centers) const;
 
  private:

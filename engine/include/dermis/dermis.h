@@ -1,4 +1,4 @@
-// All of dermis::core but glm.h, which needs GLM.
+// All headers of dermis::core except glm.h, which needs GLM.
 #pragma once
 
 #include "dermis/bounds.h"

@@ -1,7 +1,8 @@
-// What a shared library of Dermis exports. With DERMIS_SHARED defined, which the CMake targets and
-// dermis.pc of a shared build do, what is marked with the macro of its library is exported while
-// that library is compiled, and imported elsewhere. All else is hidden. In a static build the
-// macros are empty: a plugin that links Dermis exports none of it.
+// Macros for what the shared libraries of Dermis export. There is one macro for each library. If
+// DERMIS_SHARED is defined, a declaration with the macro is exported while that library is
+// compiled, and imported elsewhere; everything else is hidden. The CMake targets and dermis.pc of a
+// shared build define DERMIS_SHARED. In a static build the macros are empty, so a plugin that links
+// Dermis exports nothing of it.
 #pragma once
 
 #if !defined(DERMIS_SHARED)
@@ -15,7 +16,7 @@
 #define DERMIS_IMPORTED __attribute__((visibility("default")))
 #endif
 
-// DERMIS_BUILDS_NAME is defined while the sources of that library are compiled.
+// DERMIS_BUILDS_... is defined while the sources of that library are compiled.
 #if defined(DERMIS_BUILDS_CORE)
 #define DERMIS_CORE_API DERMIS_EXPORTED
 #else

@@ -1,5 +1,6 @@
-// Names that come from files, made fit for a message. A file may put three million characters into
-// a name, and line ends, terminal controls or marks that turn the direction of writing around.
+// Makes names from files fit for messages. A name in a file may have millions of characters, and
+// may contain line breaks, control characters for terminals, or marks that reverse the writing
+// direction.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +11,12 @@
 
 namespace dermis {
 
-/// The text on one line, nothing in it that a terminal obeys: controls (C0, DEL, C1), line and
-/// paragraph separators and the marks of bidirectional text become `\n`, `\u001b`, `\u202e` and so
-/// on; bytes that are not UTF-8 become `\xff`. Nothing else changes.
+/// The text on one line, without characters that a terminal interprets. Control characters (C0,
+/// DEL, C1), line and paragraph separators and the marks of bidirectional text are escaped: `\n`,
+/// `\u001b`, `\u202e`. Bytes that are not UTF-8 become `\xff`. Nothing else changes.
 DERMIS_CORE_API std::string oneLine(std::string_view text);
 
-/// The first characters of a name on one line, "..." behind them if there are more.
+/// The first characters of `oneLine(name)`, with "..." after them if there are more.
 DERMIS_CORE_API std::string shortName(std::string_view name, std::size_t mostCharacters = 80);
 
 /// `shortName` in single quotation marks.

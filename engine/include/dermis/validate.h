@@ -1,4 +1,4 @@
-// What can be wrong with a mesh, found once, at import.
+// Finds what is wrong with a mesh, and repairs it. Both are done once, at import.
 #pragma once
 
 #include <cstdint>
@@ -11,67 +11,71 @@
 
 namespace dermis {
 
-/// Kinds of problem. Those up to `jointOutOfRange` make `pack` refuse the mesh; the rest are dealt
-/// with and counted.
+/// Kinds of problems. `pack` refuses a mesh with a problem up to `jointOutOfRange`; the other
+/// problems it fixes itself.
 enum class MeshProblem : std::uint8_t {
-  // The views make no sense: `repair` cannot help.
+  // The views are not valid. `repair` cannot help.
   emptyMesh,        ///< no vertices, or no positions
-  noInfluenceSets,  ///< nothing to skin by
-  countMismatch,    ///< an attribute's count is not the vertex count
-  strideTooSmall,   ///< an attribute's stride is less than its element
-  wrongFormat,      ///< a component type or number that the attribute may not have
-  morphVertices,    ///< a morph target's vertices do not rise, or lie outside the mesh
-  // Values that `pack` refuses and `repair` mends.
+  noInfluenceSets,  ///< no influences, or a set without joints or weights
+  countMismatch,    ///< the count of an attribute is not the vertex count
+  strideTooSmall,   ///< the stride of an attribute is less than the size of an element
+  wrongFormat,      ///< an attribute has a component type or count that is not allowed
+  morphVertices,    ///< vertices of a morph target are not ascending, or are outside the mesh
+  // Values that `pack` refuses and `repair` fixes.
   nonFinitePosition,
   nonFiniteNormal,
   nonFiniteTangent,
   nonFiniteMorph,   ///< a displacement of a morph target
-  nonFiniteCenter,  ///< a centre of rotation
-  shareOutOfRange,  ///< a dual-quaternion weight or bulge strength not from 0 to 1
+  nonFiniteCenter,  ///< a center of rotation
+  shareOutOfRange,  ///< a dual-quaternion weight or bulge strength that is not from 0 to 1
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
-  jointOutOfRange,  ///< with a weight that is not 0
-  // Dealt with by `pack`.
-  weightsNotNormalized,  ///< they do not sum to 1: normalised over all sets together
-  duplicateJoint,        ///< the same joint twice in one vertex: the weights are added up
-  vertexWithoutWeight,   ///< stays in bind pose
+  jointOutOfRange,  ///< a joint that the pose does not have, with a weight that is not 0
+  // Values that `pack` fixes.
+  weightsNotNormalized,  ///< the weights of a vertex do not sum to 1: they are normalized
+  duplicateJoint,        ///< a joint occurs twice in a vertex: its weights are added
+  vertexWithoutWeight,   ///< all weights are 0: the vertex stays in bind pose
 };
 
 /// One kind of problem in one mesh.
 struct MeshFinding {
   MeshProblem problem = MeshProblem::emptyMesh;
-  std::uint64_t count = 0;  ///< Vertices that have it, or morph displacements; 1 for the views.
-  std::uint32_t firstVertex = 0;  ///< The first of them.
-  std::string message;  ///< A sentence with the first place: "mesh 'Fox', vertex 17: joint 31 is
-                        ///< outside …".
+  std::uint64_t count = 0;        ///< number of vertices, morph displacements or views that have it
+  std::uint32_t firstVertex = 0;  ///< the first such vertex
+  /// A sentence about the first place, for example "mesh 'Fox', vertex 17: joint 31 is outside the
+  /// palette of 24".
+  std::string message;
 };
 
+/// All problems of one mesh.
 struct MeshReport {
-  std::vector<MeshFinding> findings;  ///< At most one a kind, in the order of `MeshProblem`.
+  std::vector<MeshFinding> findings;  ///< at most one for each kind, in the order of `MeshProblem`
 
-  /// Whether `pack` takes the mesh.
+  /// Whether `pack` accepts the mesh.
   DERMIS_CORE_API bool packable() const;
-  /// Whether the views make sense, so that `repair` can mend what is wrong.
+  /// Whether all views are valid, so that `repair` can fix the mesh.
   DERMIS_CORE_API bool repairable() const;
+  /// The finding of this kind; null if there is none.
   DERMIS_CORE_API const MeshFinding* find(MeshProblem problem) const;
-  /// What `pack` says: fails with `invalidMesh` unless `packable()`. The sentence is that of the
-  /// first finding that is refused, and names `repair` if that can mend the mesh.
+  /// Fails with `invalidMesh`, as `pack` does, unless the mesh is `packable`. The message is that
+  /// of the first finding that is `refusedByPack`. It mentions `repair` if the mesh is
+  /// `repairable`.
   DERMIS_CORE_API Result<void> accepted() const;
 };
 
-/// True for the kinds that make `pack` refuse the mesh.
+/// Whether `pack` refuses a mesh with this problem.
 DERMIS_CORE_API bool refusedByPack(MeshProblem problem);
 
-/// A short name for a kind, as in reports: "joint out of range".
+/// A short name of the problem, for reports: "joint out of range".
 DERMIS_CORE_API const char* meshProblemName(MeshProblem problem);
 
-/// Looks at every vertex: O(vertices × influences + displacements). `jointCount` is the number of
-/// joints of the poses that the mesh will be skinned with, at most `maxPoseJoints`. Sums of
-/// weights count as 1 within 2e-7 for each weight that is not 0 (float weights: the tolerance of
-/// the official glTF validator), or when the stored integers sum to 255 or 65535 exactly.
+/// Finds all problems of a mesh. O(vertices × influences + displacements). `jointCount` is the
+/// number of joints of the poses, at most `maxPoseJoints`. If there are float weights, a sum counts
+/// as 1 within 2e-7 for each weight other than 0, which is the tolerance of the official glTF
+/// validator. Integer weights must sum to exactly 1.
 DERMIS_CORE_API MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
-/// A copy of a mesh with its bad values mended. Owns its memory; movable, not copyable.
+/// A repaired copy of a mesh. Owns its memory. Movable, not copyable.
 class DERMIS_CORE_API RepairedMesh {
  public:
   RepairedMesh(RepairedMesh&&) = default;
@@ -79,11 +83,11 @@ class DERMIS_CORE_API RepairedMesh {
   RepairedMesh(const RepairedMesh&) = delete;
   RepairedMesh& operator=(const RepairedMesh&) = delete;
 
-  /// The mended mesh: float32 attributes without scale or offset, one influence set of uint32
-  /// joints and float32 weights. Valid as long as this object lives and is neither moved nor
+  /// The repaired mesh: float32 attributes without scale or offset, and one influence set of uint32
+  /// joints and float32 weights. The view is valid until this object is destroyed, moved or
   /// assigned to.
   MeshView view() const;
-  /// What was found before: every finding that `refusedByPack` has been mended.
+  /// What `validate` found before the repair. Problems that are `refusedByPack` are fixed now.
   const MeshReport& report() const { return report_; }
 
  private:
@@ -107,10 +111,13 @@ class DERMIS_CORE_API RepairedMesh {
   MeshReport report_;
 };
 
-/// Mends what `validate` finds: influences with a weight that is negative or not finite, or a joint
-/// outside the pose, are dropped (weights are normalised by `pack`); a position, normal,
-/// tangent, displacement or centre of rotation that is not finite becomes 0; dual-quaternion
-/// weights and bulge strengths are clamped. Fails with `invalidMesh` where the views make no sense.
+/// Fixes the problems that `validate` finds and `pack` refuses:
+/// - An influence is dropped if its weight is negative or not finite, or if the pose does not have
+///   its joint. `pack` normalizes the remaining weights.
+/// - A position, normal, tangent, displacement or center of rotation that is not finite becomes 0.
+/// - Dual-quaternion weights and bulge strengths are clamped to the range from 0 to 1.
+///
+/// Fails with `invalidMesh` if the views are not valid (`MeshReport::repairable`).
 DERMIS_CORE_API Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount);
 
 }  // namespace dermis
