@@ -1,4 +1,4 @@
-// A mesh as the CPU path reads it.
+// A mesh in the form that the CPU path reads.
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,22 @@ namespace dermis::cpu {
 
 struct MeshData;
 
-/// Made once, at import, from a packed mesh. It is immutable: any number of threads may skin it. It
-/// owns its memory: about 80 bytes a vertex with normals, 32 more with tangents, and 8 for each
-/// influence of the vertex of eight neighbours that has most; with morph targets a copy of the
-/// packed mesh too. One that was moved from may only be assigned to or destroyed.
+/// Made once, at import, from a packed mesh. It is immutable: any number of threads may skin it at
+/// the same time. A moved-from mesh may only be assigned to or destroyed.
+///
+/// It owns its memory. Per vertex this is about 80 bytes with normals, 32 more with tangents, and 8
+/// for each influence; for the influences, each group of eight vertices counts as if all had as
+/// many as the one with the most. With morph targets it keeps a copy of the packed mesh, too.
 class DERMIS_CPU_API Mesh {
  public:
-  /// O(vertices × influences). Fails with `limitExceeded` if a vertex has more than 1,000
-  /// influences.
+  /// Converts a packed mesh, which may be released afterwards. O(vertices × influences). Fails with
+  /// `limitExceeded` if a vertex has more than 1,000 influences.
   static Result<Mesh> create(const PackedMesh& packed);
   ~Mesh();
   Mesh(Mesh&&) noexcept;
   Mesh& operator=(Mesh&&) noexcept;
 
+  /// What `PackedMesh::info` returned.
   const MeshInfo& info() const;
 
  private:

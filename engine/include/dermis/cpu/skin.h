@@ -1,12 +1,12 @@
-// Skinning on the CPU by the everyday methods, with the SIMD instructions of its processor. It
-// needs no Vulkan, and starts no threads: the thread that calls `skin` does the job.
+// Skins on the CPU, with SIMD instructions. All methods except those for comparison are available.
+// It needs no Vulkan, and starts no threads: the thread that calls `skin` does the work.
 //
-//   const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
-//   cpu::Job job;
-//   job.mesh = &mesh;
-//   job.places = *placeVertices(layout, mesh.info().vertexCount);
-//   job.instances = instances;             // each with its pose, and memory for its vertices
-//   cpu::skin(job);
+//     const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
+//     cpu::Job job;
+//     job.mesh = &mesh;
+//     job.places = *placeVertices(layout, mesh.info().vertexCount);
+//     job.instances = instances;             // each with its pose, and memory for its vertices
+//     cpu::skin(job);
 #pragma once
 
 #include <cstddef>
@@ -26,21 +26,22 @@
 
 namespace dermis::cpu {
 
-/// Where the vertices of an instance are written: what the offsets of `Job::places` count from.
-/// Each attribute that is written needs offset + (vertexCount - 1) × stride + `formatSize` bytes
-/// from there on.
+/// The memory that the vertices of an instance are written to. Offsets in `Job::places` count from
+/// these addresses. For each attribute that the job writes, there must be offset + (vertexCount -
+/// 1) × stride + `formatSize` bytes. The addresses need no alignment.
 struct OutputMemory {
   void* positions = nullptr;
   void* normals = nullptr;
   void* tangents = nullptr;
   void* previousPositions = nullptr;
 
+  /// No memory.
   constexpr OutputMemory() = default;
-  /// The same for all attributes: the usual case.
+  /// One address for all attributes, for what `placeVertices` returns.
   constexpr OutputMemory(void* all)
       : positions(all), normals(all), tangents(all), previousPositions(all) {}
-  /// An array for each attribute; null for those that the job does not write. Offsets are then
-  /// mostly 0, not those of `placeVertices`.
+  /// An array for each attribute; null for attributes that the job does not write. Offsets then
+  /// usually are 0, and not those of `placeVertices`.
   constexpr OutputMemory(void* positionArray, void* normalArray, void* tangentArray,
                          void* previousArray)
       : positions(positionArray),
@@ -53,58 +54,65 @@ struct OutputMemory {
 struct Instance {
   std::span<const JointMatrix> pose;    ///< at least `MeshInfo::requiredJoints`
   bool mayScale = true;                 ///< as `PoseDescription::mayScale`
-  OutputMemory output;                  ///< any alignment
+  OutputMemory output;                  ///< where the vertices are written
   Box box;                              ///< as `dermis::Job::box`
-  std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, rising by target
+  std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, ascending by target
   bool restartsMotion = false;          ///< as `dermis::Job::restartsMotion`
   bool settles = false;                 ///< as `dermis::Job::settles`
-  /// Motion::reskinned: the previous pose, and the previous morph weights, rising by target.
+  /// With `Motion::reskinned`: the previous pose.
   std::span<const JointMatrix> previousPose;
+  /// With `Motion::reskinned`: the previous morph weights, ascending by target.
   std::span<const MorphWeight> previousMorphs;
-  /// Not null: what was found out about the vertices of this job is written here. Results of
-  /// several jobs of an instance are put together by `addResult`.
+  /// Optional. `skin` writes the box and the clamped vertices of this job here. If an instance has
+  /// several jobs, `addResult` combines their results.
   InstanceResult* result = nullptr;
 };
 
-/// Vertices of one mesh, for some instances that are skinned alike. Instances in one job take less
-/// time than in a job each.
+/// A range of vertices of one mesh, for instances that are skinned by the same method. Several
+/// instances in one job take less time than one job for each.
 struct Job {
-  const Mesh* mesh = nullptr;
-  Method method = Method::dualQuaternion;  ///< not for comparison
-  VertexPlaces places;                     ///< `placeVertices`, or arranged otherwise
+  const Mesh* mesh = nullptr;              ///< required, not owned
+  Method method = Method::dualQuaternion;  ///< any that is not `isForComparison`
+  VertexPlaces places;                     ///< from `placeVertices`, or any other arrangement
   std::uint32_t firstVertex = 0;
-  std::uint32_t vertexEnd = 0xffffffff;  ///< or the end of the mesh
+  std::uint32_t vertexEnd = 0xffffffff;  ///< the vertex after the last; at most the vertex count
   std::span<const Instance> instances;
 };
 
-/// Writes the vertices. Every vertex comes out the same, to the bit, whatever the range, the other
-/// instances, the thread and the processor. This is true of finite poses, and of threads that round
-/// to nearest and do not flush subnormal numbers to zero. Any number of threads may call it at
-/// once, with output that does not overlap. It allocates until a thread has seen its longest job.
-/// Each thread keeps the memory that it worked in: at most 1.5 MiB where no vertex has more than
-/// 128 influences, and 150 bytes for each instance of a job.
+/// Skins the vertices of a job. Any number of threads may call it at the same time, if they write
+/// different bytes.
 ///
-/// Fails with `invalidArgument` if a field makes no sense, as `makePlan` does; nothing is written
-/// then.
+/// Every vertex has the same bits whatever the range, the other instances, the thread and the
+/// processor are. This holds for finite poses, in threads that round to nearest and do not flush
+/// subnormal numbers to zero.
+///
+/// Each thread keeps its working memory for the next job, so it stops allocating after its largest
+/// job. This is at most 1.5 MiB if no vertex has more than 128 influences, plus 150 bytes for each
+/// instance of a job.
+///
+/// Fails with `invalidArgument` if the job breaks a rule, as `makePlan` does. It then writes
+/// nothing.
 DERMIS_CPU_API Result<void> skin(const Job& job);
 
-/// Where some vertices of an instance are, without skinning the others: for picking, and for things
-/// that hang on a vertex. `positions` gets three floats for each of `vertices`, which may stand in
-/// any order: of finite poses the same values that `skin` writes as float32x3. O(vertices ×
-/// influences); it allocates. Of the instance, pose, `mayScale` and morph targets count. Fails as
-/// `skin`, and with `invalidArgument` for a vertex that the mesh does not have.
+/// Computes the positions of some vertices of an instance, for example for picking, or for objects
+/// that are attached to a vertex. `vertices` are in any order. `positions` has three floats for
+/// each; for finite poses they are the values that `skin` writes as float32x3. Of `instance` it
+/// uses pose, `mayScale` and `morphs` only. O(vertices × influences); it allocates. Fails as `skin`
+/// does, and with `invalidArgument` if the mesh does not have a vertex or `positions` has the wrong
+/// size.
 DERMIS_CPU_API Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,
                                          std::span<const std::uint32_t> vertices,
                                          std::span<float> positions);
 
-/// Adds to the result of some vertices of an instance that of others.
+/// Combines the results of two jobs of an instance. `result` then holds for the vertices of both.
 DERMIS_CPU_API void addResult(InstanceResult& result, const InstanceResult& other);
 
-/// The names of the instruction sets that `skin` was compiled for and that this processor has, the
-/// best one first: "AVX3", "AVX2", "SSE4", "EMU128" (none), "NEON".
+/// Names of the instruction sets that `skin` can use on this processor, the best one first. They
+/// are the names of Highway, for example "AVX3", "AVX2", "SSE4", "NEON", or "EMU128" for no SIMD.
 DERMIS_CPU_API std::vector<std::string_view> targetNames();
-/// Has `skin` use one of them from now on, in the whole process, to test or measure it. Fails with
-/// `invalidArgument` for a name that is not in `targetNames`. Empty: the best one again.
+/// Makes `skin` use this instruction set from now on, in the whole process, for tests and
+/// measurements. An empty name selects the best one again. Fails with `invalidArgument` if the name
+/// is not in `targetNames`.
 DERMIS_CPU_API Result<void> setTarget(std::string_view name);
 
 }  // namespace dermis::cpu
