@@ -24,8 +24,7 @@ enum class Method : std::uint8_t {
   /// most 20 steps. For comparison.
   dualQuaternionIterative,
   /// Blends the logarithms of the rigid parts as matrices (Cordier and Magnenat-Thalmann 2005,
-  /// Alexa
-  /// 2002). May rotate the long way round. For comparison.
+  /// Alexa 2002). May rotate the long way round. For comparison.
   logMatrix,
   /// Spherical blend skinning (Kavan and Žára 2005): blends quaternions about a center of rotation
   /// that is computed for each vertex and pose. For comparison.

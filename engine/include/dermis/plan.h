@@ -23,12 +23,11 @@
 
 namespace dermis {
 
-/// What an engine promises about its meshes and poses. Each promise reduces the number of
-/// pipelines (see `everyVariant`). `makePlan`, `addMesh` and `addPose` fail if a promise is
-/// broken.
+/// What an engine promises about its meshes and poses. Each promise reduces the number of pipelines
+/// (see `everyVariant`). `makePlan`, `addMesh` and `addPose` fail if a promise is broken.
 struct Promises {
-  /// Maximum influences per vertex: 1, 2 or 4. All meshes then use pipelines for that number.
-  /// 0: no promise; there are pipelines for 1, 2, 4 and any number.
+  /// Maximum influences per vertex: 1, 2 or 4. All meshes then use pipelines for that number. 0: no
+  /// promise; there are pipelines for 1, 2, 4 and any number.
   std::uint8_t maxInfluences = 0;
   bool noMorphTargets = false;  ///< no mesh has morph targets
   bool noScale = false;         ///< no pose has `mayScale`
@@ -462,9 +461,8 @@ class DERMIS_CORE_API Plan {
 ///
 /// Fails with
 /// - `invalidArgument` if a job or pose breaks a rule above (the message names it by its index),
-/// for
-///   example: a pose with fewer joints than the mesh requires, normals for a mesh without normals,
-///   a range outside its buffer, a broken promise. Also if limits or tuning are not valid;
+///   for example: a pose with fewer joints than the mesh requires, normals for a mesh without
+///   normals, a range outside its buffer, a broken promise. Also if limits or tuning are not valid;
 /// - `missingFeature` if an attribute is not at multiples of 4 bytes and the device cannot store
 ///   less, or if this build lacks the kernels of the method;
 /// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,

@@ -65,8 +65,7 @@ class DERMIS_SHADER_COMPILER_API ShaderCompiler {
   ///   "FILE:LINE: text", or "FILE: text" if it belongs to no line. FILE is the included file if
   ///   the error is in one;
   /// - `invalidArgument` if a define is not a name and one line of text, or if the name of the
-  /// source
-  ///   is not valid.
+  ///   source is not valid.
   Result<std::vector<std::uint32_t>> compile(const ShaderSource& source);
 
   /// Reads a file and compiles it. The extension selects the stage: .comp, .vert or .frag. Fails as

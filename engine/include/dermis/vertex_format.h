@@ -16,9 +16,8 @@ namespace dermis {
 ///
 /// - float16: IEEE 754 binary16. Ties round to even. Values that are too large become infinite.
 /// - snorm8, snorm16: component c is stored as round(127 c) or round(32767 c). Positions are
-/// relative
-///   to a box: c = (p - center) / (half of its size). Positions outside the box are clamped, and
-///   counted in `InstanceResult`.
+///   relative to a box: c = (p - center) / (half of its size). Positions outside the box are
+///   clamped, and counted in `InstanceResult`.
 /// - octahedral: the direction is divided by |x| + |y| + |z|, and its lower half is folded outwards
 ///   (Meyer et al. 2010, "On floating-point normal vectors"). x and y are stored as snorm. A zero
 ///   vector has no encoding; it becomes (0, 0, 1).

@@ -19,11 +19,9 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 /// Maximum distance between a position in float32 and the same position stored in `format`.
 /// - float32: 0.
 /// - float16: half a unit in the last place of each component c. This is at most 2^-11 |c|, or
-/// 2^-25
-///   below the smallest normal number.
+///   2^-25 below the smallest normal number.
 /// - snorm16: along each axis half a step, h / 32767 / 2, plus the rounding errors of (p − c) / h
-/// in
-///   float32, 4 u |c| + 8 u h. c is the center of `box` and h half of its size. This holds for
+///   in float32, 4 u |c| + 8 u h. c is the center of `box` and h half of its size. This holds for
 ///   positions inside the box.
 DERMIS_VERIFY_API double positionFormatBound(VertexFormat format,
                                              const reference::Double3& position, const Box& box);
@@ -105,8 +103,7 @@ struct SkinnedView {
 /// - If a direction is zero in the reference, it must be zero; if octahedral, (0, 0, 1).
 /// - A position outside the snorm16 box is compared with the nearest point of the box.
 /// - A float16 component may be infinite, with the right sign, if the value of the reference plus
-/// its
-///   bound reaches 65520, which is half a step above the largest finite number.
+///   its bound reaches 65520, which is half a step above the largest finite number.
 ///
 /// Fails with `invalidArgument` if the counts differ, if a format is not allowed for its attribute,
 /// if a stride is smaller than an element, or if the snorm16 box is not finite or has min > max.

@@ -52,16 +52,13 @@ struct SkinnedMesh {
 ///
 /// - First the active morph targets are added to the bind pose.
 /// - Influences are normalized over all sets together. A vertex without weight stays in bind pose,
-/// with
-///   its morph targets.
+///   with its morph targets.
 /// - docs/methods.md has the formulas and sources: Kavan et al. 2007, section 4, for dual
-/// quaternions;
-///   Kavan et al. 2008 for iterative blending; Alexa 2002 and Cordier and Magnenat-Thalmann 2005
-///   for logarithms; Kavan and Žára 2005 for spherical blending; Hejl 2004 for quaternions and
-///   translations; Le and Hodgins 2016 for centers of rotation.
+///   quaternions; Kavan et al. 2008 for iterative blending; Alexa 2002 and Cordier and
+///   Magnenat-Thalmann 2005 for logarithms; Kavan and Žára 2005 for spherical blending; Hejl 2004
+///   for quaternions and translations; Le and Hodgins 2016 for centers of rotation.
 /// - All methods except `linear` apply scale and shear in two phases, by polar decomposition,
-/// without
-///   a threshold.
+///   without a threshold.
 /// - Normals are transformed by the adjugate transpose of the blended 3×3 matrix, tangents by the
 ///   blended 3×3 matrix. Both are normalized. Tangents are not made orthogonal to normals. The
 ///   handedness is multiplied by the sign of the determinant.

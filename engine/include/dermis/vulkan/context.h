@@ -101,9 +101,8 @@ class DERMIS_VULKAN_API Context {
   /// Makes the descriptor sets and buffer views for a set of buffers. Fails with
   /// - `invalidArgument` if a range is misaligned, or its size is 0 or not a multiple of 4;
   /// - `limitExceeded` if a range other than the output is larger than a storage buffer range, or
-  /// if
-  ///   attributes have different outputs on a device with fewer than `storageBuffersWanted` storage
-  ///   buffers per stage;
+  ///   if attributes have different outputs on a device with fewer than `storageBuffersWanted`
+  ///   storage buffers per stage;
   /// - `vulkanError`.
   Result<Bindings> createBindings(const BatchBuffers& buffers) const;
 

@@ -5,8 +5,8 @@
 //
 // - palette kernel: 0 tables, 1 poses, 2 palettes;
 // - clear kernel: 0 tables, 7 results;
-// - skin kernel: 0 tables, 1 meshes, 2 `DispatchCommand::joints`, 3 positions, 4 normals,
-//   5 tangents, 6 previous positions, 7 results;
+// - skin kernel: 0 tables, 1 meshes, 2 `DispatchCommand::joints`, 3 positions, 4 normals, 5
+//   tangents, 6 previous positions, 7 results;
 // - visibility kernel: 0 tables, 1 visibility, 2 history, 3 counters, 7 results.
 //
 // On a device with fewer storage buffers per stage, the set has bindings 0 to 3 only, and all
