@@ -18,6 +18,7 @@ pkg-config libvulkan-volk-dev
 libpng-dev libstb-dev fonts-dejavu-core
 libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
+doxygen
 "
 if [ "${1:-}" = nightly ]; then
   packages="$packages
