@@ -1,4 +1,4 @@
-// A vertex, its influences and a palette to a skinned vertex, by the method.
+// Skins a vertex by the method of the module or constant.
 #ifndef DERMIS_BLEND_GLSL
 #define DERMIS_BLEND_GLSL
 
@@ -47,15 +47,15 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
       return skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
 #endif
     default:
-      return vertex;  // no other method has this module
+      return vertex;  // no other method is in this module
 #endif
   }
 }
 
 // A vertex without influences stays in bind pose.
 Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
-  // The loaded influences of such a vertex are joint 0. Most meshes have none: choosing afterwards costs less than a branch around
-  // everything, unless the method goes on until it converges.
+  // All loaded influences of such a vertex are joint 0. Most meshes have no such vertex: selecting the result afterwards costs less
+  // than a branch around everything, except for methods that iterate until they converge.
 #ifdef COMPARISON
   const bool branches = true;
 #else

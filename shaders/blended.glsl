@@ -1,15 +1,15 @@
-// Between linear blending and dual quaternions. The linear part is made of the joints as they were taken apart, so that one
-// palette serves both.
+// Interpolates between linear blending and dual quaternions. The linear part uses the decomposed joints, so that both parts read
+// the same palette.
 #ifndef DERMIS_BLENDED_GLSL
 #define DERMIS_BLENDED_GLSL
 
 #include "linear.glsl"
 #include "dual_quaternion.glsl"
 
-// The rows of R S, one joint's 3×3.
+// The rows of R S, the 3×3 matrix of one joint.
 void jointRows(vec4 q, Pose pose, uint joint, out vec3 r0, out vec3 r1, out vec3 r2) {
   rowsOfQuaternion(q, r0, r1, r2);
-  if (pose.scales) {  // S is symmetric: a row of R S is S times that row of R
+  if (pose.scales) {  // S is symmetric, so a row of R S is S times the row of R
     ScaleShear part = paletteScaleShear(pose, joint);
     r0 = scalePosition(part, r0);
     r1 = scalePosition(part, r1);
@@ -40,7 +40,8 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;
   skinned.position = position;
-  // A mirror shows in the scale parts; what linear blending makes of it where joints cancel does not count.
+  // The handedness is that of the dual quaternions: mirrors are in the scale parts. Where joints cancel, linear blending may
+  // differ.
   if (withNormal) {
     precise vec3 normal = rest * straight.normal + share * skinned.normal;
     skinned.normal = unitOr(normal, skinned.normal);

@@ -1,11 +1,11 @@
-// Blended quaternions about a centre of rotation that was found at import (Le and Hodgins 2016), and dual quaternions drawn
-// towards them. The centre itself is skinned linearly, by the joints as they were taken apart.
+// Blends quaternions about a center of rotation that was computed at import (Le and Hodgins 2016). Also dual quaternions that are
+// moved towards this result. The center itself is skinned linearly, by the decomposed joints.
 #ifndef DERMIS_CENTER_OF_ROTATION_GLSL
 #define DERMIS_CENTER_OF_ROTATION_GLSL
 
 #include "dual_quaternion.glsl"
 
-// A point moved by one joint: R S p + t.
+// A point transformed by one joint: R S p + t.
 vec3 throughJoint(Pose pose, uint joint, vec3 point) {
   if (pose.scales) point = scalePosition(paletteScaleShear(pose, joint), point);
   vec4 real = paletteRotation(pose.palette, joint);
@@ -32,7 +32,8 @@ Vertex skinCenterOfRotation(Vertex vertex, Influences influences, Pose pose, vec
                     withTangent);
 }
 
-// Both methods turn a vertex alike, and differ by what becomes of the centre: some of that difference takes the bulge away.
+// Dual quaternions and centers of rotation rotate a vertex in the same way, and differ only in where the center goes. Adding a part
+// of that difference removes a part of the bulge.
 Vertex skinBulgeControlled(Vertex vertex, Influences influences, Pose pose, vec3 center, float strength, bool withNormal,
                            bool withTangent) {
   Blend blend = blendJoints(influences, pose);

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Clears the results that skin kernels add to: one an invocation.
+// Clears the results that skin kernels add to. One result for each invocation.
 
 #include "abi.h"
 #include "results.glsl"

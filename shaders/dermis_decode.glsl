@@ -1,10 +1,10 @@
-// For an engine's own shaders: the formats of skinned vertices decoded (VertexFormat in dermis/vertex_format.h). float32, float16
-// and snorm attributes need nothing of this where the vertex input decodes them: VK_FORMAT_R16G16_SNORM for octahedral16x2.
+// For an engine's own shaders: decodes the formats of skinned vertices (VertexFormat in dermis/vertex_format.h). Vertex input
+// decodes float32, float16 and snorm components itself. It reads octahedral16x2 as VK_FORMAT_R16G16_SNORM.
 #ifndef DERMIS_DECODE_GLSL
 #define DERMIS_DECODE_GLSL
 
-// A direction of unit length from octahedral16x2 or octahedral8x2, read as snorm: both components from -1 to 1.
-// Source: Meyer et al. 2010, "On floating-point normal vectors".
+// A normal of unit length from octahedral16x2 or octahedral8x2. `stored` is read as snorm: from -1 to 1. Source: Meyer et al. 2010,
+// "On floating-point normal vectors".
 vec3 dermisDecodeOctahedral(vec2 stored) {
   vec3 direction = vec3(stored, 1.0 - abs(stored.x) - abs(stored.y));
   float below = max(-direction.z, 0.0);
@@ -13,20 +13,20 @@ vec3 dermisDecodeOctahedral(vec2 stored) {
   return normalize(direction);
 }
 
-// A tangent from octahedral16x2 (`largest` 32767) or octahedral8x2 (127), read as snorm. The sign of the second component is the
-// handedness, its size 1 to `largest` is the coordinate.
+// A tangent of unit length from octahedral16x2 (`largest` is 32767) or octahedral8x2 (127); w is the handedness. `stored` is read
+// as snorm. The sign of its second component is the handedness; its absolute value, from 1 to `largest`, is the coordinate.
 vec4 dermisDecodeOctahedralTangent(vec2 stored, float largest) {
   float handedness = stored.y < 0.0 ? -1.0 : 1.0;
   float y = (abs(stored.y) * largest - 1.0) / (largest - 1.0) * 2.0 - 1.0;
   return vec4(dermisDecodeOctahedral(vec2(stored.x, y)), handedness);
 }
 
-// A position from snorm16x3 or snorm16x4, read as snorm: relative to the box that the job or instance was given.
+// A position from snorm16x3 or snorm16x4. `stored` is read as snorm. The box is that of the job or instance.
 vec3 dermisDecodePosition(vec3 stored, vec3 boxMin, vec3 boxMax) {
   return 0.5 * (boxMin + boxMax) + stored * (0.5 * (boxMax - boxMin));
 }
 
-// The same from words of a storage buffer. snorm16x4 takes two words, octahedral16x2 one; snorm8x4 and octahedral8x2 one.
+// For attributes that a shader reads as words from a storage buffer, not through vertex input: to what the functions above take.
 vec4 dermisUnpackSnorm16(uvec2 words) { return vec4(unpackSnorm2x16(words.x), unpackSnorm2x16(words.y)); }
 vec2 dermisUnpackOctahedral16(uint word) { return unpackSnorm2x16(word); }
 vec4 dermisUnpackSnorm8(uint word) { return unpackSnorm4x8(word); }

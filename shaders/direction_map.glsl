@@ -1,12 +1,12 @@
-// What directions go through.
+// Transforms normals and tangents.
 #ifndef DERMIS_DIRECTION_MAP_GLSL
 #define DERMIS_DIRECTION_MAP_GLSL
 
 #include "exact.glsl"
 #include "vertex.glsl"
 
-// A blended 3×3 matrix by its rows, scaled so that no product of two of them leaves the range of a float, and the sign of its
-// determinant: what directions are transformed by.
+// The rows of a blended 3×3 matrix, scaled so that no product of two of them leaves the range of a float, and the sign of its
+// determinant.
 struct DirectionMap {
   vec3 r0;
   vec3 r1;
@@ -14,7 +14,8 @@ struct DirectionMap {
   float side;
 };
 
-// Where no pose may scale, products are in range as they are. The scale is a power of two, so that bits are the same without it.
+// If no pose may scale, products are in range without scaling. The scale is a power of two, so results have the same bits with and
+// without it.
 DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
   if (!SCALES) return DirectionMap(r0, r1, r2, dot3(r0, cross3(r1, r2)) < 0.0 ? -1.0 : 1.0);
   float scale = powerScale(max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2))));
@@ -24,15 +25,15 @@ DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
   return DirectionMap(n0, n1, n2, dot3(n0, cross3(n1, n2)) < 0.0 ? -1.0 : 1.0);
 }
 
-// Normals go by the cofactors of the matrix, which have the direction of its inverse transpose and stay finite where it is
-// singular; a mirror turns them over once. Not of unit length, and zero where nothing is left.
+// Transforms a normal by the cofactor matrix, times the sign of the determinant. It has the direction of the inverse transpose, and
+// is finite for singular matrices. The result does not have unit length, and may be zero.
 vec3 mapNormal(DirectionMap map, vec3 normal) {
   precise vec3 turned = map.side * vec3(dot3(cross3(map.r1, map.r2), normal), dot3(cross3(map.r2, map.r0), normal),
                                         dot3(cross3(map.r0, map.r1), normal));
   return turned;
 }
 
-// What a direction became, with length 1, or `fallback` where it vanished.
+// The direction with length 1, or `fallback` if it is zero.
 vec3 unitOfMapped(vec3 direction, vec3 fallback) {
   if (SCALES) return unitOr(direction, fallback);
   float squared = dot3(direction, direction);
@@ -40,7 +41,7 @@ vec3 unitOfMapped(vec3 direction, vec3 fallback) {
   return squared == 0.0 ? fallback : unit;
 }
 
-// Tangents go by the matrix itself.
+// Transforms a tangent by the matrix itself.
 vec3 mapTangent(DirectionMap map, vec3 tangent) {
   precise vec3 turned = vec3(dot3(map.r0, tangent), dot3(map.r1, tangent), dot3(map.r2, tangent));
   return turned;

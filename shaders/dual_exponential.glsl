@@ -1,18 +1,17 @@
-// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix): polynomials, since what a driver's own sine
-// and arc tangent are worth differs.
+// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix). They are polynomials, because the accuracy of
+// built-in sine and arc tangent differs between drivers.
 #ifndef DERMIS_DUAL_EXPONENTIAL_GLSL
 #define DERMIS_DUAL_EXPONENTIAL_GLSL
 
 #include "exact.glsl"
 
-// A pure dual quaternion: half the angle about, and half the way along, a screw axis.
+// A pure dual quaternion: half the angle about a screw axis, and half the distance along it.
 struct Screw {
   vec3 real;
   vec3 dual;
 };
 
-// θ / sin θ for the angle θ from 0 to π with that sine and cosine. tan(θ/4) is at most √2 − 1 for a
-// cosine that is not negative.
+// θ / sin θ for the angle θ from 0 to π with this sine and cosine. If the cosine is not negative, tan(θ/4) is at most √2 − 1.
 float angleOverSine(float sine, float cosine) {
   float upright = abs(cosine);
   precise float halfway = quotient(sine, 1.0 + upright);
@@ -34,7 +33,7 @@ Screw screwOf(vec4 real, vec4 dual) {
   precise float square = dot3(real.xyz, real.xyz);
   float sine = squareRoot(square);
   float factor = angleOverSine(sine, real.w);
-  // (1 − θ cot θ) / sin² θ, by its series where the difference would cancel.
+  // (1 − θ cot θ) / sin² θ. Small angles use the series, since the difference would cancel.
   precise float slope;
   if (square < 0.25 && real.w > 0.0) {
     precise float s = square;

@@ -1,4 +1,4 @@
-// Dual-quaternion linear blending, in two phases where joints scale or shear, and what other methods share with it.
+// Dual-quaternion linear blending, in two phases if joints scale or shear; and functions that other methods share with it.
 #ifndef DERMIS_DUAL_QUATERNION_GLSL
 #define DERMIS_DUAL_QUATERNION_GLSL
 
@@ -10,8 +10,8 @@
 #include "palette_access.glsl"
 #include "vertex.glsl"
 
-// What the joints of a vertex blend to (Kavan et al. 2007, section 4): in the hemisphere of the pivot, which stands first. Not
-// normalised.
+// The blended dual quaternion of a vertex (Kavan et al. 2007, section 4), in the hemisphere of the pivot, which is the first
+// influence. Not normalized.
 struct Blend {
   vec4 real;
   vec4 dual;
@@ -46,8 +46,8 @@ Blend blendJoints(Influences influences, Pose pose) {
   return blend;
 }
 
-// Weights sum to 1: the pivot's part, and how far the others differ. Where no joint scales that is 1 exactly, and the vertex comes
-// out to the bit as if the palette had no joint that does.
+// Since weights sum to 1, the blended part is the pivot's part plus the weighted differences of the others. If no joint of the
+// vertex scales, this is exactly 1, so the vertex has the same bits as with a palette in which no joint scales.
 ScaleShear addScaleShear(ScaleShear blend, ScaleShear pivot, float weight, Pose pose, uint joint) {
   ScaleShear part = paletteScaleShear(pose, joint);
   precise vec3 diagonal = blend.diagonal + weight * (part.diagonal - pivot.diagonal);
@@ -72,11 +72,11 @@ ScaleShear blendScaleShear(Influences influences, Pose pose) {
   return blend;
 }
 
-// The first phase: a vertex scaled and sheared in bind space. Its directions are of unit length.
+// The result of the first phase: the vertex, scaled and sheared in bind space. Its directions have unit length.
 struct Scaled {
   Vertex vertex;
   ScaleShear part;
-  float side;  // -1 where it was mirrored
+  float side;  // -1 if the vertex is mirrored, otherwise 1
 };
 
 vec3 scalePosition(ScaleShear part, vec3 p) {
@@ -110,7 +110,8 @@ float turningFactor(vec4 q) {
   return factor;
 }
 
-// The second phase: turned by a quaternion q of any length but 0, `factor` being 2 / |q|², then moved. Directions stay of unit length.
+// The second phase: rotates a vertex by a quaternion q of any length except 0, then translates it. `factor` is 2 / |q|². Directions
+// keep unit length.
 Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation, bool withNormal, bool withTangent) {
   Vertex skinned = scaled.vertex;
   precise vec3 position = rotateBy(real, factor, scaled.vertex.position) + translation;
@@ -122,7 +123,7 @@ Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation, bool
   return skinned;
 }
 
-// The translation of a dual quaternion of any length but 0. Dividing by the squared length replaces normalising.
+// The translation of a dual quaternion of any length except 0. The division by the squared length replaces normalizing.
 vec3 translationOf(vec4 real, vec4 dual, float factor) {
   precise vec3 translation = (real.w * dual.xyz - dual.w * real.xyz + cross3(real.xyz, dual.xyz)) * factor;
   return translation;

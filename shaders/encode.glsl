@@ -1,4 +1,4 @@
-// Attributes as they are stored: the formats of VertexFormat, in up to four words.
+// Encodes attributes in the formats of VertexFormat, as up to four words.
 #ifndef DERMIS_ENCODE_GLSL
 #define DERMIS_ENCODE_GLSL
 
@@ -21,7 +21,8 @@ uint formatBytes(uint format) {
   }
 }
 
-// IEEE 754 binary16, rounded to nearest, ties to even. packHalf2x16 may round as it likes. Without branches: neighbours differ.
+// IEEE 754 binary16, rounded to nearest, ties to even; Vulkan does not define how packHalf2x16 rounds. Without branches, since
+// neighboring invocations would diverge.
 uint halfBits(float value) {
   uint bits = floatBitsToUint(value);
   uint magnitude = bits & 0x7fffffffu;
@@ -30,7 +31,7 @@ uint halfBits(float value) {
   precise float shifted = uintBitsToFloat(min(magnitude, 0x38800000u)) + 0.5;
   uint subnormal = floatBitsToUint(shifted) - 0x3f000000u;
   uint finite = magnitude < 0x38800000u ? subnormal : normal;
-  uint special = magnitude > 0x7f800000u ? 0x7e00u : 0x7c00u;  // NaN; 65520 and more round to infinity
+  uint special = magnitude > 0x7f800000u ? 0x7e00u : 0x7c00u;  // NaN, or infinity for values of 65520 and more
   return ((bits >> 16u) & 0x8000u) | (magnitude >= 0x477ff000u ? special : finite);
 }
 
@@ -53,8 +54,8 @@ uvec4 packSnorm8(vec4 v) {
   return uvec4(c.x | c.y << 8u | c.z << 16u | c.w << 24u, 0u, 0u, 0u);
 }
 
-// Meyer et al. 2010, "On floating-point normal vectors": a direction projected onto the octahedron |x| + |y| + |z| = 1, whose
-// lower half is folded out to the square's corners.
+// A direction projected onto the octahedron |x| + |y| + |z| = 1, whose lower half is folded outwards to the corners of the square
+// (Meyer et al. 2010, "On floating-point normal vectors").
 vec2 octahedral(vec3 direction) {
   precise float sum = abs(direction.x) + abs(direction.y) + abs(direction.z);
   precise vec2 upper = direction.xy / (sum == 0.0 ? 1.0 : sum);
@@ -63,7 +64,7 @@ vec2 octahedral(vec3 direction) {
   return direction.z >= 0.0 ? upper : lower;
 }
 
-// 1 to `largest`, negated for a left hand.
+// An integer from 1 to `largest`, negated if the handedness is negative.
 int signedByHand(float value, float handedness, float largest) {
   precise float scaled = (clamp(value, -1.0, 1.0) * 0.5 + 0.5) * (largest - 1.0);
   int step = 1 + int(roundEven(scaled));
@@ -73,7 +74,7 @@ int signedByHand(float value, float handedness, float largest) {
 uvec4 packPair16(int x, int y) { return uvec4((uint(x) & 0xffffu) | (uint(y) & 0xffffu) << 16u, 0u, 0u, 0u); }
 uvec4 packPair8(int x, int y) { return uvec4((uint(x) & 0xffu) | (uint(y) & 0xffu) << 8u, 0u, 0u, 0u); }
 
-// Any format but the octahedral ones.
+// Any format except the octahedral ones.
 uvec4 encodeComponents(uint format, vec4 v) {
   switch (format) {
     case FORMAT_FLOAT16X3:

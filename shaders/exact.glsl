@@ -1,5 +1,5 @@
-// Arithmetic that a compiler may not reorder. Built-in dot, cross and normalize may be computed in any order and differ between
-// specialisations of one kernel, so every sum that reaches an output is spelled out here.
+// Arithmetic that a compiler may not reorder. Compilers may compute built-in dot, cross and normalize in any order, and differently
+// in each specialization of a kernel. So every sum that affects an output is written out here.
 #ifndef DERMIS_EXACT_GLSL
 #define DERMIS_EXACT_GLSL
 
@@ -22,8 +22,8 @@ float largestComponent(vec3 v) {
   return max(abs(v.x), max(abs(v.y), abs(v.z)));
 }
 
-// NaN and infinity are told by their bits: without SignedZeroInfNanPreserve a driver may take isnan
-// and isinf for false, and a comparison with NaN for anything.
+// NaN and infinity are recognized by their bits: without SignedZeroInfNanPreserve a driver may assume that isnan and isinf are
+// false, and may give comparisons with NaN any result.
 bool isNan(float value) {
   return (floatBitsToUint(value) & 0x7fffffffu) > 0x7f800000u;
 }
@@ -33,9 +33,8 @@ bool isFinite(vec4 v) {
   return all(notEqual(floatBitsToUint(v) & exponent, exponent));
 }
 
-// The power of two that brings a normal number to between a half and 4, and a subnormal one to at
-// least 2^-23, so that its square neither overflows nor vanishes: multiplying by it rounds nothing,
-// and takes less time than a division.
+// A power of two. Multiplied by it, a normal number is between a half and 4, and a subnormal number at least 2^-23, so that its
+// square neither overflows nor vanishes. The multiplication does not round, and takes less time than a division.
 float powerScale(float largest) {
   uint exponent = floatBitsToUint(largest) >> 23u;
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);
@@ -47,9 +46,8 @@ float inversePowerScale(float largest) {
   return uintBitsToFloat((1u + min(exponent, 252u)) << 23u);
 }
 
-// Vulkan allows a division to be 2.5 units in the last place off, an inverse square root 2, and a
-// square root what those two make together. A step of Newton's method leaves about one rounding of
-// each, on any device. Zero and infinity give NaN.
+// Vulkan permits an error of 2.5 units in the last place for a division, of 2 for an inverse square root, and of both together for
+// a square root. A step of Newton's method reduces each to about one rounding on any device. Zero and infinity give NaN.
 
 float quotient(float a, float b) {
   precise float guess = a / b;
@@ -69,7 +67,7 @@ float squareRoot(float square) {
   return square == 0.0 ? 0.0 : better;
 }
 
-// v with length 1, at any scale of a joint, or `fallback` where v vanished.
+// v with length 1, or `fallback` if v is zero. Works at any scale.
 vec3 unitOr(vec3 v, vec3 fallback) {
   precise vec3 scaled = v * powerScale(largestComponent(v));
   float squared = dot3(scaled, scaled);

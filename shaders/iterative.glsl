@@ -1,12 +1,12 @@
-// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blend b is moved by the mean screw from it to the joints',
-// until that is nothing.
+// Dual-quaternion iterative blending (DIB, Kavan et al. 2008): the blended transform is moved by the mean screw from it to the
+// joints, until the mean screw is negligible.
 #ifndef DERMIS_ITERATIVE_GLSL
 #define DERMIS_ITERATIVE_GLSL
 
 #include "dual_quaternion.glsl"
 #include "dual_exponential.glsl"
 
-// Reached where joints all but contradict each other; elsewhere a handful are enough.
+// Reached only if joints are nearly antipodal. Otherwise a few steps are enough.
 const uint MOST_STEPS = 20u;
 
 void makeUnit(inout vec4 real, inout vec4 dual) {
@@ -18,7 +18,7 @@ void makeUnit(inout vec4 real, inout vec4 dual) {
   dual = orthogonal;
 }
 
-// The mean screw from a transform to the joints', and how far their dual parts reach.
+// The mean screw from a transform to the joints. `reach` is the largest component of their dual parts.
 Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 pivot, out float reach) {
   precise vec3 turn = vec3(0.0);
   precise vec3 shift = vec3(0.0);
@@ -57,8 +57,7 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
     blend.real = quaternionProduct(blend.real, real);
     blend.dual = movedDual;
     makeUnit(blend.real, blend.dual);
-    // Five roundings. Joints may be so far away that the square of it is infinite, or so near that
-    // it is 0.
+    // The tolerance is five roundings. It is computed with scaling, since the square of `reach` may be infinite or 0.
     float scale = powerScale(reach);
     precise float scaledReach = scale * reach;
     precise vec3 shift = scale * screw.dual;

@@ -8,7 +8,7 @@
 #include "palette_access.glsl"
 #include "vertex.glsl"
 
-// A vertex through a blended 3×4 matrix, given by its rows.
+// Transforms a vertex by a blended 3×4 matrix, given by its rows.
 Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, bool withTangent) {
   Vertex skinned = vertex;
   vec3 p = vertex.position;
@@ -25,7 +25,7 @@ Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, 
   return skinned;
 }
 
-// Rows of a 3×4 matrix.
+// The rows of a 3×4 matrix.
 struct Rows {
   vec4 r0;
   vec4 r1;

@@ -1,11 +1,11 @@
-// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): the joints' logarithms, 3×4 matrices that the palette kernel made,
-// are blended, and the exponential is taken as Alexa 2002 does, by scaling and squaring.
+// Log-matrix blending (Cordier and Magnenat-Thalmann 2005): blends the logarithms of the joints, which are 3×4 matrices from the
+// palette kernel. The exponential is computed by scaling and squaring, as in Alexa 2002.
 #ifndef DERMIS_LOG_MATRIX_GLSL
 #define DERMIS_LOG_MATRIX_GLSL
 
 #include "dual_quaternion.glsl"
 
-struct Affine {  // rows; the fourth is 0 0 0 1, or 0 0 0 0 of a logarithm
+struct Affine {  // rows; the fourth row is 0 0 0 1, or 0 0 0 0 for a logarithm
   vec4 r0;
   vec4 r1;
   vec4 r2;
@@ -22,7 +22,7 @@ float rowSum(vec4 row) {
 }
 
 Affine exponentialOf(Affine logarithm) {
-  // Halved until its norm is at most a half: then eight terms are exact to 2e-9.
+  // Halve the matrix until its norm is at most a half. Then the error of eight terms is at most 2e-9.
   precise float norm = max(rowSum(logarithm.r0), max(rowSum(logarithm.r1), rowSum(logarithm.r2)));
   uint squarings = 0u;
   precise float scale = 1.0;

@@ -1,11 +1,11 @@
-// How a packed mesh is read: what every vertex has by units of four words, the rest by words.
+// Reads a packed mesh: data of every vertex in units of four words, all other data in words.
 #ifndef DERMIS_MESH_ACCESS_GLSL
 #define DERMIS_MESH_ACCESS_GLSL
 
 #include "abi.h"
 
 #if defined(DERMIS_SKIN_GLSL)
-// skin_include.glsl says how.
+// skin_include.glsl declares the buffers.
 #elif defined(TEXELS)
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
 layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
@@ -24,7 +24,7 @@ vec3 meshVector(uint word) {
   return vec3(uintBitsToFloat(meshWord(word)), uintBitsToFloat(meshWord(word + 1u)), uintBitsToFloat(meshWord(word + 2u)));
 }
 
-// Compilers leave out what is not used of it.
+// Compilers remove what is not used.
 MeshHeader loadMeshHeader(uint mesh) {
   uvec4 a = meshUnit(mesh / 4u);
   uvec4 b = meshUnit(mesh / 4u + 1u);
@@ -51,7 +51,7 @@ MorphBlockRecord loadMorphBlock(uint word) {
   return MorphBlockRecord(a.x, a.y, a.z, a.w);
 }
 
-// The units at which the sections of vertices begin.
+// The first unit of each section of the mesh.
 struct Sections {
   uint positions;
   uint normals;
@@ -65,13 +65,14 @@ Sections sectionsOf(uint mesh) {
   return Sections(units.x, units.y, units.z, units.w);
 }
 
-// Influences of a vertex that are read once, for all its instances. Bounds the loops over them, so that drivers unroll these.
+// The number of influences of a vertex that are loaded once, for all instances. It limits the loops over them, so that drivers
+// unroll the loops.
 const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
 
-// Whether a vertex has that many: a constant where every vertex of a mesh has.
+// Whether a vertex with `count` influences has this one. A constant if FULL.
 bool hasSlot(uint count, uint slot) { return FULL || slot < count; }
 
-// The influences of one vertex: the loaded ones, and where all of them stand.
+// The influences of one vertex: the loaded ones, and the place of all of them.
 struct Influences {
   uint unit;
   uint count;
@@ -106,10 +107,10 @@ InfluenceRecord loadInfluence(Influences influences, uint slot) {
   return slot % 2u == 0u ? InfluenceRecord(uintBitsToFloat(two.x), two.y) : InfluenceRecord(uintBitsToFloat(two.z), two.w);
 }
 
-// Whether a vertex has more than the loaded influences. Never, and a constant, where INFLUENCES is not 0.
+// Whether a vertex has more than the loaded influences. The constant false if INFLUENCES is not 0.
 bool hasFurther(Influences influences) { return INFLUENCES == 0u && influences.count > LOADED_INFLUENCES; }
 
-// Any of them, for loops that do not tell apart which are loaded.
+// The weight of any influence, for loops that do not distinguish loaded influences from others.
 float influenceWeight(Influences influences, uint slot) {
   return INFLUENCES != 0u ? influences.weights[slot] : loadInfluence(influences, slot).weight;
 }
@@ -118,13 +119,13 @@ uint influenceJoint(Influences influences, uint slot) {
   return INFLUENCES != 0u ? influences.joints[slot] : loadInfluence(influences, slot).joint;
 }
 
-// What some methods want to know of a vertex besides.
+// Data of a vertex that only some methods use.
 struct MethodInputs {
   vec3 center;
-  float share;  // of dual quaternions, or the strength of bulge control
+  float share;  // the share of dual quaternions, or the strength of bulge control
 };
 
-// A float for each vertex, or one for all.
+// A value of each vertex from `section`, or `value` for all vertices if the mesh has no such section.
 float meshShare(uint mesh, uint vertex, uint section, float value) {
   return section == 0u ? value : uintBitsToFloat(meshWord(mesh + section + vertex));
 }

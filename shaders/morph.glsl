@@ -1,4 +1,4 @@
-// Morph targets: what the active ones add to a vertex in bind pose.
+// Adds the displacements of active morph targets to a vertex in bind pose.
 #ifndef DERMIS_MORPH_GLSL
 #define DERMIS_MORPH_GLSL
 
@@ -7,10 +7,10 @@
 #include "mesh_access.glsl"
 #include "vertex.glsl"
 
-// The displacement of a vertex by a target, at `word`; false if the target does not displace it.
+// Finds the displacement of a vertex by a target: sets `word`, or returns false if the target does not displace the vertex.
 bool findDisplacement(uint mesh, MorphRecord target, uint vertex, out uint word) {
   uint number = vertex / MORPH_BLOCK_VERTICES - target.firstBlock;
-  // A block before the first wraps around.
+  // For a block before the first, the subtraction wraps around.
   if (number >= target.blockCount) return false;
   MorphBlockRecord block = loadMorphBlock(mesh + target.blocks + number * MORPH_BLOCK_WORDS);
   uint lane = vertex % MORPH_BLOCK_VERTICES;
@@ -22,7 +22,7 @@ bool findDisplacement(uint mesh, MorphRecord target, uint vertex, out uint word)
   return true;
 }
 
-// `first` is where the active targets stand in the tables, in rising order.
+// `first` is the word offset of the active targets in the tables, which are in ascending order.
 void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint count, bool withNormal, bool withTangent) {
   precise vec3 position = vertex.position;
   precise vec3 normal = vertex.normal;

@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Joint matrices (3×4) to unit dual quaternions and, where poses may scale, the scale/shear parts of joints that are not rigid. One
-// workgroup a palette, so that what is said of the whole palette needs no second pass.
-//   LOGARITHMS      the logarithms of the rigid parts instead of dual quaternions
+// Converts joint matrices (3×4) to unit dual quaternions and, if poses may scale, the scale and shear parts of joints that are not
+// rigid. One workgroup converts one palette, so that the status of the whole palette needs no second pass.
+//   LOGARITHMS      converts to logarithms of the rigid parts instead of dual quaternions
 
 #include "abi.h"
 #include "exact.glsl"
@@ -27,9 +27,9 @@ layout(set = 0, binding = BINDING_PALETTES, std430) writeonly buffer Palettes { 
 shared uint nonRigidJoints;
 shared uint nonFiniteJoints;
 
-// A joint is rigid when det > 0 and no row of CᵀC − 1 sums, by absolute values, to more than 8e-6: then no singular value is
-// further than 4e-6 from 1, and no decomposition is needed to know it. (Single entries would not do: nine of 8e-6 make a
-// stretch of 12e-6.)
+// A joint is rigid if det > 0 and the absolute values of each row of CᵀC − 1 sum to at most 8e-6. Then every singular value is
+// within 4e-6 of 1. This needs no decomposition. (Limiting single entries is not enough: nine entries of 8e-6 are a stretch of
+// 12e-6.)
 bool isRigid(vec3 r0, vec3 r1, vec3 r2) {
   precise vec3 c0 = vec3(r0.x, r1.x, r2.x);
   precise vec3 c1 = vec3(r0.y, r1.y, r2.y);
@@ -45,7 +45,7 @@ bool isRigid(vec3 r0, vec3 r1, vec3 r2) {
 #ifdef LOGARITHMS
 const uint UNITS_OF_JOINT = UNITS_OF_LOGARITHM;
 
-// The logarithm of a rigid transform, the short way round: rows of [ω]× | v, twice its screw.
+// The logarithm of a rigid transform, by the shorter rotation: rows of [ω]× | v, which is twice its screw.
 vec4 jointUnit(Screw screw, uint number) {
   precise vec3 turn = 2.0 * screw.real;
   precise vec3 shift = 2.0 * screw.dual;
@@ -62,7 +62,8 @@ vec4 scaleShearUnit(ScaleShear part, uint number) {
   return number == 0u ? vec4(part.diagonal, part.mixed.x) : vec4(part.mixed.yz, 0.0, 0.0);
 }
 
-// lavapipe compiles each load and each store into a loop over the lanes, which is most of a cold start: hence one of each, in loops.
+// There is one load and one store, each in a loop: lavapipe compiles every load and store into a loop over lanes, and that is most
+// of the time to compile this kernel.
 void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;

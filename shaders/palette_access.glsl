@@ -1,5 +1,5 @@
-// How the palette is read. A status unit, then each joint's rotation and dual part, or its logarithm, then the scale/shear parts.
-// Linear: the joint matrices, three rows each.
+// Reads the palette. It has a status unit, then the rotation and dual part of each joint, or its logarithm, then the scale and
+// shear parts of the joints. For linear blending it is the joint matrices, three rows each.
 #ifndef DERMIS_PALETTE_ACCESS_GLSL
 #define DERMIS_PALETTE_ACCESS_GLSL
 
@@ -7,7 +7,7 @@
 #include "scale_shear.glsl"
 
 #if defined(DERMIS_SKIN_GLSL)
-// skin_include.glsl says how.
+// skin_include.glsl declares the buffers.
 #elif defined(TEXELS)
 layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
 
@@ -20,7 +20,7 @@ uvec4 paletteBits(uint unit) { return palettes[unit]; }
 
 vec4 paletteUnit(uint unit) { return uintBitsToFloat(paletteBits(unit)); }
 
-// Where a palette stands, how many joints it has, and whether one of them scales or shears.
+// The first unit of a palette, its number of joints, and whether one of them scales or shears.
 struct Pose {
   uint palette;
   uint joints;
@@ -32,7 +32,7 @@ StatusRecord loadStatus(uint palette) {
   return StatusRecord(a.x, a.y, a.z, a.w);
 }
 
-// False, and a constant, where no palette may scale: nothing of what scales is left in the code. Matrices have no status.
+// The constant false if no palette may scale, so that compilers remove all code for scale. Matrices have no status.
 bool paletteScales(uint palette) { return SCALES && METHOD != METHOD_LINEAR && loadStatus(palette).twoPhase != 0u; }
 
 vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }

@@ -1,8 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Joint matrices as they are, for linear blending in a scene, which is to read the memory of the device, not that which the CPU
-// writes. One workgroup a palette.
+// Copies joint matrices to the palettes buffer, for linear blending in a scene: the skin kernel then reads device memory, and not
+// the memory that the CPU writes. One workgroup copies one palette.
 
 #include "abi.h"
 #include "tables.glsl"

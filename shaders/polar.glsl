@@ -6,9 +6,8 @@
 #include "quaternion.glsl"
 #include "scale_shear.glsl"
 
-// One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are
-// the other two indices, vp and vq the eigenvectors so far. In scalars, since drivers keep an array
-// that is indexed in memory.
+// One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are the other two indices, vp and vq
+// the eigenvectors so far. It uses scalars, since drivers put indexed arrays into memory.
 void turnJacobi(inout float app, inout float aqq, inout float apq, inout float ajp, inout float ajq, inout float akp,
                 inout float akq, inout vec4 vp, inout vec4 vq) {
   precise float theta = (aqq - app) / (2.0 * apq);
@@ -33,10 +32,9 @@ void turnJacobi(inout float app, inout float aqq, inout float apq, inout float a
   vq = turnedQ;
 }
 
-// The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue
-// of a symmetric 4×4 matrix (Horn 1987, "Closed-form solution of absolute orientation using unit
-// quaternions"). It also is the right rotation for a matrix of rank 2, and finite for any. Cyclic
-// Jacobi; `refineRotation` does the rest.
+// The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix (Horn
+// 1987, "Closed-form solution of absolute orientation using unit quaternions"). It is also the right rotation for a matrix of rank
+// 2, and finite for any matrix. Computed by cyclic Jacobi; `refineRotation` makes it accurate.
 vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   precise float xx = r0.x - r1.y - r2.z;
   precise float yy = -r0.x + r1.y - r2.z;
@@ -53,8 +51,8 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   vec4 vz = vec4(0.0, 0.0, 1.0, 0.0);
   vec4 vw = vec4(0.0, 0.0, 0.0, 1.0);
 
-  // Three turns of two pairs are a sweep: xy and zw, then y, z and w change places. It converges quadratically: four or five
-  // sweeps, and few matrices take more.
+  // A sweep is three turns. Each turn rotates the pairs xy and zw, and then y, z and w change places. Convergence is quadratic:
+  // most matrices need four or five sweeps.
   [[dont_unroll]] for (uint turn = 0u; turn < 24u; ++turn) {
     precise float outside = abs(xy) + abs(xz) + abs(xw) + abs(yz) + abs(yw) + abs(zw);
     precise float inside = abs(xx) + abs(yy) + abs(zz) + abs(ww);
@@ -85,9 +83,8 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   return unitQuaternion(q);
 }
 
-// Adds a b to a sum of two floats each, without a rounding: the product is taken apart as Dekker
-// does (1971, "A floating-point technique for extending the available precision"), the sum as Knuth
-// does.
+// Adds a b to a sum that is stored as two floats, without rounding errors. The product is split by Dekker's method (1971, "A
+// floating-point technique for extending the available precision"), the sum by Knuth's.
 void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
   precise vec4 product = a * b;
   precise float wideA = 4097.0 * a;
@@ -105,13 +102,12 @@ void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
   rest = restSoFar;
 }
 
-// Horn's matrix of C, the one that `nearestRotation` takes the eigenvector of, times q, less q
-// times what that is along q. Where C stretches by 1000 the rest is a millionth of the terms, and
-// is wanted to more than a digit.
+// The residual of q as an eigenvector of Horn's matrix H of C (see `nearestRotation`): H q − (q · H q) q. If C stretches by 1000,
+// the residual is a millionth of the terms, and more than one digit of it is needed.
 vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 sum = vec4(0.0);
   vec4 rest = vec4(0.0);
-  // What a row adds is what the first one does, with x, y and z in turn in the place of x.
+  // The second and third row are like the first, with x, y and z rotated.
   [[dont_unroll]] for (uint axis = 0u; axis < 3u; ++axis) {
     addExactly(sum, rest, r0.x, vec4(q.x, -q.y, -q.z, q.w));
     addExactly(sum, rest, r0.y, vec4(q.y, q.x, -q.w, -q.z));
@@ -129,8 +125,8 @@ vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return residual;
 }
 
-// Rᵀ C made symmetric: its columns are those of C turned back. q is of length 1 but for roundings,
-// and 2 / |q|² nearly 2 (2 − |q|²).
+// The symmetric part of Rᵀ C. Its columns are those of C, rotated back. q has length 1 except for rounding errors, so 2 / |q|² is
+// nearly 2 (2 − |q|²).
 ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 back = vec4(-q.xyz, q.w);
   precise float factor = 2.0 * (2.0 - dot4(q, q));
@@ -141,10 +137,9 @@ ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
 }
 
-// Newton's method for the polar decomposition: makes q better and finds S. Rᵀ C is symmetric for the right R; for R' = R (1 −
-// [ω]×) it is not, by a vector that is (tr S − S) ω. The residual, turned back, has that vector. Without this the rotation would
-// be known only to a few roundings times σ₁ / (σ₂ + σ₃), its condition, and for vertices that are also moved by other joints that
-// counts.
+// Newton's method for the polar decomposition: improves q and computes S. Rᵀ C is symmetric for the right R. For R' = R (1 − [ω]×)
+// its asymmetry is the vector (tr S − S) ω, which the residual contains, rotated. Without this, the error of the rotation would be
+// a few roundings times its condition σ₁ / (σ₂ + σ₃), which is visible at vertices that have other joints, too.
 ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   ScaleShear s;
   uint left = 3u;
@@ -173,8 +168,8 @@ ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return s;
 }
 
-// The determinant of a matrix given by its rows, and how large it would be if no product in it
-// cancelled: what its rounding error is measured by.
+// The determinant of a matrix, given by its rows. `magnitude` is the sum of the absolute values of all products: its rounding error
+// is relative to that.
 float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   vec3 c = cross3(r1, r2);
   precise vec3 uncancelled = abs(r1.yzx * r2.zxy) + abs(r1.zxy * r2.yzx);
@@ -182,9 +177,9 @@ float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   return dot3(r0, c);
 }
 
-// C, given by its rows, taken apart. With a negative determinant R is the rotation of −C and the
-// sign goes into S; one that rounding may have made negative (24 roundings of 2^-24) counts as 0: a
-// flat matrix has one of either sign.
+// The polar decomposition of C, given by its rows. If the determinant is negative, R is the rotation of −C, and S has the sign. A
+// determinant that may be negative only by rounding (24 roundings of 2^-24) counts as 0, since that of a flat matrix may have
+// either sign.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
   if (largest == 0.0) {

@@ -1,4 +1,4 @@
-// Quaternions are x y z w, Hamilton's.
+// Quaternions are x, y, z, w, with the product of Hamilton.
 #ifndef DERMIS_QUATERNION_GLSL
 #define DERMIS_QUATERNION_GLSL
 
@@ -9,12 +9,10 @@ vec4 unitQuaternion(vec4 q) {
   return unit;
 }
 
-// The unit quaternion of a matrix C that is all but a rotation, given by its rows: the first guess
-// by the largest of the four squared components (Shepperd 1978), which is a column of the symmetric
-// matrix below. For a rotation all its columns are multiples of the quaternion. Of a matrix that is
-// not quite orthogonal the guess is turned by up to 1.25 times the largest row sum of CᵀC − 1: a
-// step of the power method squares that, so that what is left is the rotation of the polar
-// decomposition.
+// The unit quaternion of a matrix C that is nearly a rotation, given by its rows. The first guess is the column of the symmetric
+// matrix below that has the largest of the four squared components (Shepperd 1978). For a rotation all columns are multiples of the
+// quaternion. If C is not quite orthogonal, the error of the guess is up to 1.25 times the largest row sum of CᵀC − 1. A step of
+// the power method squares this error, so that the result is the rotation of the polar decomposition.
 vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
   precise float x = 1.0 + r0.x - r1.y - r2.z;
   precise float y = 1.0 - r0.x + r1.y - r2.z;
@@ -38,8 +36,7 @@ vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
   return unitQuaternion(q);
 }
 
-// v turned by a quaternion of any length but 0, `factor` being 2 / |q|²: v + factor r × (r × v + w
-// v).
+// v rotated by a quaternion q = (r, w) of any length except 0: v + factor r × (r × v + w v). `factor` is 2 / |q|².
 vec3 rotateBy(vec4 q, float factor, vec3 v) {
   precise vec3 inner = cross3(q.xyz, v) + q.w * v;
   precise vec3 turned = v + cross3(q.xyz, inner) * factor;

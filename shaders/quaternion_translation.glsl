@@ -1,4 +1,4 @@
-// Quaternions and translations, each blended on its own (Hejl 2004).
+// Blends quaternions and translations separately (Hejl 2004).
 #ifndef DERMIS_QUATERNION_TRANSLATION_GLSL
 #define DERMIS_QUATERNION_TRANSLATION_GLSL
 

@@ -1,4 +1,4 @@
-// What is found out about an instance besides its vertices: the box of its positions, and how many were clamped.
+// The results of an instance: the box of its positions, and the number of clamped vertices.
 #ifndef DERMIS_RESULTS_GLSL
 #define DERMIS_RESULTS_GLSL
 
@@ -7,7 +7,7 @@
 
 #ifdef ONE_OUTPUT
 
-// There is no buffer for results; a plan asks for none.
+// There is no buffer for results, and no plan has any.
 void clearResult(uint result) {}
 void addToBounds(uint result, vec3 position) {}
 void countClamped(uint result) {}
@@ -20,14 +20,15 @@ void clearResult(uint result) {
   results[result] = ResultRecord(0xffffffffu, 0xffffffffu, 0xffffffffu, 0u, 0u, 0u, 0u, 0u);
 }
 
-// As unsigned numbers these have the order of the floats; -0 counts as 0.
+// Unsigned integers that compare like the floats. -0 counts as 0.
 uint orderedBits(float value) {
   uint bits = floatBitsToUint(value);
   if (bits == 0x80000000u) bits = 0u;
   return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 
-// Most positions are no extreme: it is cheaper to look first. What is read may be old; it is only ever farther in.
+// Most positions do not change the box, so it is cheaper to compare first. The value that is read may be outdated, but then the box
+// is only larger now.
 #define ADD_EXTREME(least, greatest, value)                  \
   if (!isNan(value)) {                                       \
     uint bits = orderedBits(value);                          \

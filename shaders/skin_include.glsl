@@ -1,19 +1,24 @@
-// For an engine's own vertex, mesh or compute shaders: a vertex of a packed mesh skinned by a pose, with the arithmetic of Dermis'
-// kernels. Made from the kernels' sources by the build, which puts `dermis_` before every name that is not for engines.
+// For an engine's own vertex, mesh or compute shaders: skins a vertex of a packed mesh, with the arithmetic of Dermis' kernels. The
+// build makes this file from the sources of the kernels. It puts `dermis_` before every name that is not for engines.
 //
-// Define before the #include, where the default does not suit:
-//   DERMIS_METHOD              0 linear, 1 dual quaternions (the default), 6 blended, 7 centre of rotation, 8 bulge-controlled
-//   DERMIS_INFLUENCES          the most influences of a vertex: 1, 2, 4, or 0 for any number (the default)
-//   DERMIS_SCALES              false if no pose has `mayScale`; true is the default
+// These macros may be defined before the #include:
+//   DERMIS_METHOD              0 linear, 1 dual quaternions (the default), 6 blended, 7 center of rotation, 8 bulge-controlled
+//   DERMIS_INFLUENCES          maximum influences of a vertex: 1, 2, 4, or 0 for any number (the default)
+//   DERMIS_SCALES              false if no pose has `mayScale`; the default is true
 //   DERMIS_SET, DERMIS_MESHES_BINDING, DERMIS_PALETTES_BINDING
-//                              where two readonly storage buffers stand: the mesh buffer, and the palettes buffer (linear: the poses
-//                              buffer). The defaults are 0, 0 and 1.
+//                              set and bindings of two readonly storage buffers: the mesh buffer and the palettes buffer (for
+//                              linear, the poses buffer). The defaults are 0, 0 and 1.
 //   DERMIS_MESH_UNIT(unit), DERMIS_PALETTE_UNIT(unit)
-//                              both, instead of the two buffers: 16 bytes of either as a uvec4, by `unit` times 16 bytes
+//                              define both to read from elsewhere than these two buffers. Each is a uvec4: the 16 bytes at byte
+//                              `unit` × 16 of the mesh data or the palette data.
 //
-// `mesh` is the byte offset of the packed mesh in its buffer, divided by 4. `palette` is Plan::paletteOffset, divided by 16; for
-// linear, PoseDescription::matrixOffset divided by 16. `jointCount` is that of the pose. Poses that no job reads are converted
-// only if PoseDescription::isReadByShaders. Morph targets are not applied: add them between dermisBindVertex and dermisSkinVertex.
+// Parameters of the functions:
+// - `mesh` is the byte offset of the packed mesh in its buffer, divided by 4.
+// - `palette` is Plan::paletteOffset, divided by 16; for linear, PoseDescription::matrixOffset, divided by 16. A pose that no job
+//   uses is converted only if PoseDescription::isReadByShaders is set.
+// - `jointCount` is the number of joints of the pose.
+//
+// Morph targets are not applied: an engine adds them between dermisBindVertex and dermisSkinVertex.
 #ifndef DERMIS_SKIN_GLSL
 #define DERMIS_SKIN_GLSL
 
@@ -55,11 +60,11 @@ uvec4 paletteBits(uint unit) { return DERMIS_PALETTE_UNIT(unit); }
 
 struct DermisVertex {
   vec3 position;
-  vec3 normal;   // of unit length; zero without normals
-  vec4 tangent;  // likewise; w: the handedness, 1 or -1
+  vec3 normal;   // zero if the mesh has no normals
+  vec4 tangent;  // zero if the mesh has no tangents; w is the handedness
 };
 
-// As the mesh has it.
+// A vertex in bind pose, as the mesh stores it. Directions need not have unit length.
 DermisVertex dermisBindVertex(uint mesh, uint vertex) {
   MeshHeader header = loadMeshHeader(mesh);
   Sections sections = sectionsOf(mesh);
@@ -70,7 +75,7 @@ DermisVertex dermisBindVertex(uint mesh, uint vertex) {
   return bind;
 }
 
-// Position and directions in the space of the joint matrices.
+// Skins a vertex. The result is in the space of the joint matrices. Its directions have unit length, the handedness is 1 or -1.
 DermisVertex dermisSkinVertex(DermisVertex bind, uint mesh, uint vertex, uint palette, uint jointCount) {
   Sections sections = sectionsOf(mesh);
   uint first = loadPosition(sections.positions + vertex).influences;
@@ -81,6 +86,7 @@ DermisVertex dermisSkinVertex(DermisVertex bind, uint mesh, uint vertex, uint pa
   return DermisVertex(skinned.position, skinned.normal, skinned.tangent);
 }
 
+// Both in one.
 DermisVertex dermisSkin(uint mesh, uint vertex, uint palette, uint jointCount) {
   return dermisSkinVertex(dermisBindVertex(mesh, vertex), mesh, vertex, palette, jointCount);
 }

@@ -1,13 +1,13 @@
-// Spherical blend skinning (Kavan and Žára 2005): blended quaternions about the point that the joints come nearest to agreeing
-// on. That point r solves (R_a − R_b) r = t_b − t_a over all pairs of joints in the least-squares sense, which is (R_j − mean R)
-// r = mean t − t_j over all joints. The rows are brought to triangular form one after the other, for the square of that matrix
-// would have half its digits.
+// Spherical blend skinning (Kavan and Žára 2005): blends quaternions about the point r that all joints move to nearly the same
+// place. r is the least-squares solution of (R_a − R_b) r = t_b − t_a over all pairs of joints, which is that of (R_j − mean R) r =
+// mean t − t_j over all joints. The rows are brought to triangular form one by one, because the normal equations would lose half of
+// the digits.
 #ifndef DERMIS_SPHERICAL_BLEND_GLSL
 #define DERMIS_SPHERICAL_BLEND_GLSL
 
 #include "dual_quaternion.glsl"
 
-// Directions in which rotations differ by less are left alone: the pseudo-inverse.
+// Smaller singular values count as 0, as in the pseudo-inverse.
 const float LEAST_SINGULAR_VALUE = 1e-3;
 
 // Rows of [A | b].
@@ -17,7 +17,7 @@ struct System {
   vec4 r2;
 };
 
-// Turns two rows so that the second's component vanishes (Givens).
+// A Givens rotation of two rows that makes a component of the second row 0.
 void eliminate(inout vec4 upper, inout vec4 row, uint component) {
   precise float square = upper[component] * upper[component] + row[component] * row[component];
   if (square == 0.0) return;
@@ -37,7 +37,8 @@ void addRow(inout System system, vec4 row) {
   eliminate(system.r2, row, 2u);
 }
 
-// Turns two columns, and what keeps account of that, until the columns are orthogonal (one-sided Jacobi).
+// One-sided Jacobi: rotates two columns so that they are orthogonal, and va and vb with them. Returns false if they were
+// orthogonal.
 bool orthogonalize(inout vec3 a, inout vec3 b, inout vec3 va, inout vec3 vb) {
   precise float alpha = dot3(a, a);
   precise float beta = dot3(b, b);

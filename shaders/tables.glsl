@@ -1,10 +1,10 @@
-// The records of the tables (abi.h), a loader for each.
+// Loads the records of the tables (abi.h).
 #ifndef DERMIS_TABLES_GLSL
 #define DERMIS_TABLES_GLSL
 
 #include "abi.h"
 
-// TABLES_ARE_WRITTEN: the kernel stores records, too. Never with TEXELS.
+// TABLES_ARE_WRITTEN: the kernel also stores records. Not with TEXELS.
 #ifdef TABLES_ARE_WRITTEN
 #define TABLE_ACCESS
 #else
@@ -47,7 +47,7 @@ InstanceRecord loadInstance(uint word) {
 ExtensionRecord loadExtension(uint word) {
   uvec4 a = tableUnit(word);
   uvec4 b = tableUnit(word + 4u);
-  vec4 c = uintBitsToFloat(tableUnit(word + 8u));  // all that snorm16 positions need is in this one and the next
+  vec4 c = uintBitsToFloat(tableUnit(word + 8u));  // snorm16 positions need this one and the next
   uvec4 d = tableUnit(word + 12u);
   return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, uintBitsToFloat(d.x), uintBitsToFloat(d.y),
                          d.z, d.w);
@@ -77,7 +77,7 @@ void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(
 
 ActiveMorph loadActiveMorph(uint word) { return ActiveMorph(tables[word], uintBitsToFloat(tables[word + 1u])); }
 
-// Workgroups are numbered through, whatever part of the number was folded into y.
+// The number of the workgroup. Dispatches with many workgroups use x and y.
 uint workgroupNumber() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
 
 #endif

@@ -1,4 +1,4 @@
-// A vertex on its way through a kernel.
+// A vertex that is being skinned.
 #ifndef DERMIS_VERTEX_GLSL
 #define DERMIS_VERTEX_GLSL
 
@@ -6,15 +6,15 @@
 
 struct Vertex {
   vec3 position;
-  vec3 normal;   // of unit length, or zero where it has none
-  vec4 tangent;  // likewise; w: the handedness, 1 or -1
-  // As the mesh has them. What scales starts from these: a unit that went through a joint that does not scale, and was made a unit
-  // again, would differ in its last bits from one that did not.
+  vec3 normal;   // of unit length; zero if there is none
+  vec4 tangent;  // the same; w is the handedness, 1 or -1
+  // As the mesh stores them, without normalizing. Scaling starts from these: a direction that is normalized, transformed by a joint
+  // that does not scale, and normalized again would differ in its last bits from one that is normalized once.
   vec3 givenNormal;
   vec3 givenTangent;
 };
 
-// Once for all instances: what only turns a vertex need not do it.
+// Called once for all instances: a method that only rotates a vertex need not normalize.
 void makeDirectionsUnit(inout Vertex vertex, bool withNormal, bool withTangent) {
   vertex.givenNormal = vertex.normal;
   vertex.givenTangent = vertex.tangent.xyz;

@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_memory_scope_semantics : require
 
-// Instances that the GPU chooses: which of them are visible and have something new to show. In the first pass a workgroup goes over
-// the instances of one group and moves the records of those that stay to the front, in their order (a prefix sum); in the second
-// one goes over the groups of one dispatch, and writes how many workgroups it takes. With ONE_OUTPUT there are no results (4
-// storage buffers in all).
+// Chooses, among the instances that are culled on the GPU, those that are visible and have something new to show. In the first pass
+// (VISIBILITY_CHOOSES) a workgroup processes the instances of one group, and moves the records of the chosen ones to the front, in
+// their order (a prefix sum). In the second pass (VISIBILITY_COUNTS) a workgroup processes the groups of one dispatch, and writes
+// the number of its workgroups. With ONE_OUTPUT there are no results, and four storage buffers in all.
 
 #define TABLES_ARE_WRITTEN
 #include "results.glsl"
@@ -22,8 +22,8 @@ layout(push_constant) uniform Push { VisibilityPush push; };
 const uint MOST_INVOCATIONS = 128u;
 shared uint kept[MOST_INVOCATIONS];
 
-// As barrier(), and what invocations have read of storage buffers before it others may overwrite behind it: barrier() orders
-// shared memory only.
+// Like barrier(), but it also orders storage buffers: after it, invocations may overwrite what others have read before it.
+// barrier() orders shared memory only.
 void barrierOfBuffers() {
   controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
                  gl_SemanticsAcquireRelease);
@@ -31,11 +31,11 @@ void barrierOfBuffers() {
 
 uint wordOfInstance(uint number) { return push.instances + number * INSTANCE_WORDS; }
 
-// Whether an instance has to be looked at by the skin kernel, and how: `instance.joints`.
+// Whether the skin kernel must process an instance. The flags in `instance.joints` say how.
 //
-// The history of a slot that another instance had before does no harm: no two instances share a version, so that what is new is
-// skinned; and a new instance restarts its motion in the first frame that asks for it here. Where it is not visible in that frame,
-// the slot's last visible frame lies before it, and motion restarts when it is seen.
+// A slot may have the history of an earlier instance. This does no harm. No two instances have the same version, so a new instance
+// is skinned. It restarts its motion in the first frame in which it is listed here. If it is not visible then, the last visible
+// frame of the slot is an earlier one, so motion restarts when it becomes visible.
 bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
   uint slot = candidate.slot;
   if (visibility[slot] == 0u) return false;
@@ -46,13 +46,13 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
     history[slot].version = candidate.version;
     atomicAdd(counters.skinned, 1u);
     if ((instance.joints & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
-    // What an instance showed before it was out of view is no motion.
+    // If the instance was out of view, its old positions are not the previous ones.
     if (!wasVisible && (instance.joints & INSTANCE_HAS_MOTION) != 0u) instance.joints |= INSTANCE_RESTARTS;
-    // Where motion restarts nothing is left to settle.
+    // If motion restarts, previous positions are equal to positions: there is nothing to settle.
     history[slot].moves = (instance.joints & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
     return true;
   }
-  // It rests where it was, in view or since it was: its previous positions become the current ones, once.
+  // The instance has not changed: its previous positions are set to the current ones, once.
   if (history[slot].moves == 0u) return false;
   history[slot].moves = 0u;
   atomicAdd(counters.settled, 1u);
@@ -74,7 +74,7 @@ void keepChosen(uint word) {
       stays = choose(loadCandidate(push.candidates + (number - push.firstInstance) * CANDIDATE_WORDS), instance);
     }
     kept[own] = stays ? 1u : 0u;
-    // All records of this stretch, and the group's, have been read.
+    // Now all invocations have read their records, and the record of the group.
     barrierOfBuffers();
     for (uint step = 1u; step < size; step *= 2u) {
       uint before = own >= step ? kept[own - step] : 0u;
@@ -82,7 +82,7 @@ void keepChosen(uint word) {
       kept[own] += before;
       barrier();
     }
-    // Those that stay go to places in this stretch, or before it.
+    // The chosen ones are written to places that have been read.
     if (stays) storeInstance(wordOfInstance(group.firstInstance + total + kept[own] - 1u), instance);
     total += kept[size - 1u];
     barrier();
@@ -105,7 +105,7 @@ void countWorkgroups(uint word, uint arguments) {
     storeGroup(place, group);
   }
   uint most = push.mostWorkgroups;
-  // `most` may be 2³² − 1; workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
+  // `most` may be 2³² − 1. Workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
   uint rows = workgroups / most + (workgroups % most != 0u ? 1u : 0u);
   storeIndirect(arguments, IndirectRecord(rows == 0u ? 0u : (workgroups + rows - 1u) / rows, rows, 1u, 0u));
   atomicAdd(counters.workgroups, workgroups);
