@@ -9,7 +9,11 @@
 #include <barrier>
 #include <cstring>
 #include <functional>
+#include <map>
+#include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "buffer.h"
 #include "dermis/vulkan/context.h"
@@ -115,12 +119,16 @@ class ThreadsTest : public DeviceTest {
   }
 
   Result<vulkan::Bindings> bind(const Work& work, const samples::MappedBuffer& meshes) {
-    return context().createBindings({meshes.range(),
-                                     work.matrices.range(),
-                                     work.tables.range(),
-                                     work.palettes.range(),
-                                     vulkan::OutputBuffers::oneBuffer(work.output.range()),
-                                     {}});
+    return bind(work, meshes, context());
+  }
+  static Result<vulkan::Bindings> bind(const Work& work, const samples::MappedBuffer& meshes,
+                                       const vulkan::Context& context) {
+    return context.createBindings({meshes.range(),
+                                   work.matrices.range(),
+                                   work.tables.range(),
+                                   work.palettes.range(),
+                                   vulkan::OutputBuffers::oneBuffer(work.output.range()),
+                                   {}});
   }
 
   /// All but the bindings.
@@ -198,6 +206,68 @@ TEST_F(ThreadsTest, ManyRecordWhileOnePrepares) {
   EXPECT_TRUE(isSameOutput(works[1], works[2]));
   EXPECT_TRUE(isSameOutput(works[1], works[3]));
   EXPECT_FALSE(isSameOutput(works[0], works[1]));
+}
+
+// Kernels are swapped, for the same ones, in every frame that others record and prepare.
+TEST_F(ThreadsTest, ManyRecordWhileOneReplacesKernels) {
+  using Words = std::vector<std::uint32_t>;
+  std::map<std::string, Words, std::less<>> modules;
+  vulkan::DeviceDescription description = device().description();
+  description.kernelSource = {&modules, [](void* user, std::string_view name) -> Result<Words> {
+                                return static_cast<decltype(modules)*>(user)->find(name)->second;
+                              }};
+  const vulkan::Context reloaded = must(vulkan::Context::create(description));
+  OwnedMesh mesh = randomMesh(1, 500, 10, 4);
+  const PackedMesh packed = *pack(mesh.view(), 10);
+  const samples::MappedBuffer meshes = upload(packed);
+  std::array<Work, threadCount> works;
+  for (std::size_t i = 0; i < threadCount; ++i) {
+    prepareWork(works[i], packed, i == 0 ? 1 : 2);
+    works[i].bindings.emplace(must(bind(works[i], meshes, reloaded)));
+  }
+  for (const Variant& variant : works[0].plan.variants()) {
+    const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, reloaded.limits());
+    modules.try_emplace(vulkan::kernelName(variant, reloaded.limits()), spirv.begin(), spirv.end());
+  }
+  must(reloaded.prepare(works[0].plan.variants()));
+
+  std::atomic<int> failures = 0;
+  constexpr std::uint64_t frames = 2;
+  std::atomic<std::uint64_t> replacedPipelines = 0;
+  std::thread replacing([&] {
+    std::vector<vulkan::KernelModule> all;
+    for (const auto& [name, words] : modules) all.push_back({name, words});
+    // No frame is complete before what the others record has been executed.
+    for (std::uint64_t frame = 1; frame <= frames; ++frame) {
+      const Result<std::uint32_t> replaced = reloaded.replaceKernels(all, frame, 0);
+      if (!replaced) ++failures;
+      replacedPipelines += replaced ? *replaced : 0;
+    }
+  });
+  std::thread preparing([&] {
+    for (std::uint8_t instances = 1; instances <= 4; ++instances) {
+      Variant variant = works[0].plan.variants().back();
+      variant.instancesPerInvocation = instances;
+      variant.workgroupSize = 16;
+      if (!reloaded.prepare({&variant, 1})) ++failures;
+    }
+  });
+  runOnThreads([&](std::size_t thread) {
+    Work& work = works[thread];
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      recordEdge(work.commands.buffer);
+      if (!reloaded.record(work.commands.buffer, work.plan, *work.bindings)) ++failures;
+    }
+  });
+  replacing.join();
+  preparing.join();
+  EXPECT_EQ(failures, 0);
+  EXPECT_GE(replacedPipelines, frames * works[0].plan.variants().size());
+  execute(works);
+  EXPECT_TRUE(isSameOutput(works[1], works[2]));
+  EXPECT_TRUE(isSameOutput(works[1], works[3]));
+  EXPECT_FALSE(isSameOutput(works[0], works[1]));
+  EXPECT_EQ(must(reloaded.replaceKernels({}, frames + 1, frames)), 0u);
 }
 
 // Bindings come and go on every thread, with descriptors that are pushed and with descriptor sets.

@@ -209,4 +209,26 @@ Result<void> Context::prepare(std::span<const Variant> variants) const {
   return state_->prepare(variants);
 }
 
+Result<std::uint32_t> Context::replaceKernels(std::span<const KernelModule> modules,
+                                              std::uint64_t frame,
+                                              std::uint64_t completedFrame) const {
+  if (!modules.empty() && state_->kernelSource.get == nullptr) {
+    return Error{ErrorCode::invalidArgument,
+                 "replaceKernels needs DeviceDescription::kernelSource: later pipelines would have "
+                 "other kernels"};
+  }
+  for (const KernelModule& module : modules) {
+    if (module.spirv.empty()) {
+      return Error{ErrorCode::invalidArgument,
+                   "the new kernel '" + std::string(module.name) + "' is empty"};
+    }
+  }
+  if (completedFrame >= frame) {
+    return Error{ErrorCode::invalidArgument, "frame " + std::to_string(frame) +
+                                                 " is to be recorded, but frame " +
+                                                 std::to_string(completedFrame) + " is complete"};
+  }
+  return state_->pipelines->replace(modules, state_->pipelineLayout, frame, completedFrame);
+}
+
 }  // namespace dermis::vulkan

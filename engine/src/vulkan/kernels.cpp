@@ -75,8 +75,10 @@ bool isAgainstBulge(Method method) {
          method == Method::bulgeControlled;
 }
 
-/// The name that shaders/CMakeLists.txt gives the module for a variant.
-std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
+}  // namespace
+
+/// As shaders/CMakeLists.txt names it.
+std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (variant.kernel == Kernel::palette) {
     return variant.method == Method::linear      ? "palette_matrices"
@@ -99,10 +101,8 @@ std::string moduleName(const Variant& variant, const DeviceLimits& limits) {
   return name + (smallest == 4 ? "" : smallest == 2 ? "_halves" : "_bytes");
 }
 
-}  // namespace
-
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
-  return kernels::find(moduleName(variant, limits));
+  return kernels::find(kernelName(variant, limits));
 }
 
 SpecializationConstants specializationConstants(const Variant& variant) {

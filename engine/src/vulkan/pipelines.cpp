@@ -1,10 +1,11 @@
 #include "vulkan/pipelines.h"
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string>
-
-#include "dermis/vulkan/kernels.h"
+#include <string_view>
+#include <utility>
 
 namespace dermis::vulkan {
 
@@ -29,19 +30,111 @@ Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
 }  // namespace
 
 Pipelines::~Pipelines() {
-  for (const auto& [key, pipeline] : pipelines_)
-    table_.destroyPipeline(device_, pipeline, allocator_);
+  for (const auto& [key, built] : pipelines_)
+    table_.destroyPipeline(device_, built.pipeline, allocator_);
+  for (const Retired& retired : retired_)
+    table_.destroyPipeline(device_, retired.pipeline, allocator_);
 }
 
 Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
   if (find(variant) != VK_NULL_HANDLE) return {};
   if (Result<void> good = checkFeatures(variant, limits_); !good) return good;
+  while (true) {
+    const std::uint64_t began = generation();
+    // Not under the lock: a compile takes long, and `record` must not wait for it.
+    const Result<VkPipeline> pipeline = createFromSource(variant, layout);
+    if (!pipeline) return pipeline.error();
+
+    const std::unique_lock lock(mutex_);
+    if (generation_ == began &&
+        pipelines_.try_emplace(variant.key(), Built{variant, *pipeline}).second) {
+      return {};
+    }
+    table_.destroyPipeline(device_, *pipeline, allocator_);
+    if (generation_ == began) return {};  // another thread was faster
+    // Its kernel may have been replaced meanwhile.
+  }
+}
+
+Result<VkPipeline> Pipelines::createFromSource(const Variant& variant,
+                                               VkPipelineLayout layout) const {
+  if (kernelSource_.get != nullptr) {
+    const Result<std::vector<std::uint32_t>> spirv =
+        kernelSource_.get(kernelSource_.user, kernelName(variant, limits_));
+    if (!spirv) return spirv.error();
+    if (spirv->empty()) {
+      return Error{ErrorCode::missingFeature,
+                   "KernelSource::get gave no kernel '" + kernelName(variant, limits_) + "'"};
+    }
+    return create(variant, layout, *spirv);
+  }
   const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
   if (spirv.empty()) {
     return Error{ErrorCode::missingFeature, "this build of Dermis has no kernel for " +
                                                 std::string(methodName(variant.method)) +
                                                 " in that layout"};
   }
+  return create(variant, layout, spirv);
+}
+
+std::uint64_t Pipelines::generation() const {
+  const std::shared_lock lock(mutex_);
+  return generation_;
+}
+
+void Pipelines::destroy(std::span<const Built> pipelines) const {
+  for (const Built& built : pipelines) table_.destroyPipeline(device_, built.pipeline, allocator_);
+}
+
+Result<std::uint32_t> Pipelines::replace(std::span<const KernelModule> modules,
+                                         VkPipelineLayout layout, std::uint64_t frame,
+                                         std::uint64_t completedFrame) {
+  const auto moduleOf = [&](const Variant& variant) {
+    const std::string name = kernelName(variant, limits_);
+    return std::ranges::find(modules, std::string_view(name), &KernelModule::name);
+  };
+  std::vector<Built> replacements;
+  std::vector<VkPipeline> complete;
+  while (true) {
+    // What is to be replaced and has no replacement yet: `build` may add some meanwhile.
+    std::vector<Variant> missing;
+    {
+      const std::unique_lock lock(mutex_);
+      for (const auto& [key, built] : pipelines_) {
+        if (modules.empty() || moduleOf(built.variant) == modules.end()) continue;
+        const bool isThere = std::ranges::any_of(
+            replacements, [&](const Built& other) { return other.variant.key() == key; });
+        if (!isThere) missing.push_back(built.variant);
+      }
+      if (missing.empty()) {
+        if (!modules.empty()) ++generation_;
+        for (const Built& replacement : replacements) {
+          Built& built = pipelines_.at(replacement.variant.key());
+          retired_.push_back({std::exchange(built.pipeline, replacement.pipeline), frame});
+        }
+        std::erase_if(retired_, [&](const Retired& retired) {
+          if (retired.frame > completedFrame) return false;
+          complete.push_back(retired.pipeline);
+          return true;
+        });
+        break;
+      }
+    }
+    for (const Variant& variant : missing) {
+      const Result<VkPipeline> pipeline = create(variant, layout, moduleOf(variant)->spirv);
+      if (!pipeline) {
+        destroy(replacements);
+        return pipeline.error();
+      }
+      replacements.push_back({variant, *pipeline});
+    }
+  }
+  for (const VkPipeline pipeline : complete) table_.destroyPipeline(device_, pipeline, allocator_);
+  return static_cast<std::uint32_t>(replacements.size());
+}
+
+Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout layout,
+                                     std::span<const std::uint32_t> spirv) const {
   VkShaderModuleCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
   info.codeSize = spirv.size_bytes();
@@ -51,15 +144,9 @@ Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
       result != VK_SUCCESS) {
     return vulkanError("vkCreateShaderModule", result);
   }
-  // Not under the lock: a compile takes long, and `record` must not wait for it.
   const Result<VkPipeline> pipeline = create(variant, layout, module);
   table_.destroyShaderModule(device_, module, allocator_);
-  if (!pipeline) return pipeline.error();
-
-  const std::unique_lock lock(mutex_);
-  if (!pipelines_.try_emplace(variant.key(), *pipeline).second)
-    table_.destroyPipeline(device_, *pipeline, allocator_);  // another thread was faster
-  return {};
+  return pipeline;
 }
 
 Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout layout,
@@ -100,7 +187,7 @@ Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout la
 VkPipeline Pipelines::find(const Variant& variant) const {
   const std::shared_lock lock(mutex_);
   const auto entry = pipelines_.find(variant.key());
-  return entry == pipelines_.end() ? VK_NULL_HANDLE : entry->second;
+  return entry == pipelines_.end() ? VK_NULL_HANDLE : entry->second.pipeline;
 }
 
 }  // namespace dermis::vulkan

@@ -3,12 +3,15 @@
 
 #include <mutex>
 #include <shared_mutex>
+#include <span>
 #include <unordered_map>
+#include <vector>
 
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/vulkan/kernels.h"
 #include "vulkan/dispatch_table.h"
 
 namespace dermis::vulkan {
@@ -21,6 +24,7 @@ class Pipelines {
         limits_(limits),
         device_(description.device),
         cache_(description.pipelineCache),
+        kernelSource_(description.kernelSource),
         allocator_(description.allocator) {}
   ~Pipelines();
   Pipelines(const Pipelines&) = delete;
@@ -30,22 +34,43 @@ class Pipelines {
   /// of Dermis, has no module for the variant.
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
 
+  /// `Context::replaceKernels`.
+  Result<std::uint32_t> replace(std::span<const KernelModule> modules, VkPipelineLayout layout,
+                                std::uint64_t frame, std::uint64_t completedFrame);
+
   /// VK_NULL_HANDLE where the variant has not been built.
   VkPipeline find(const Variant& variant) const;
 
   VkPipelineCache cache() const { return cache_; }
 
  private:
+  struct Built {
+    Variant variant;
+    VkPipeline pipeline = VK_NULL_HANDLE;
+  };
+  struct Retired {
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    std::uint64_t frame = 0;  ///< the last that may use it
+  };
+
+  Result<VkPipeline> create(const Variant& variant, VkPipelineLayout layout,
+                            std::span<const std::uint32_t> spirv) const;
   Result<VkPipeline> create(const Variant& variant, VkPipelineLayout layout,
                             VkShaderModule module) const;
+  Result<VkPipeline> createFromSource(const Variant& variant, VkPipelineLayout layout) const;
+  std::uint64_t generation() const;
+  void destroy(std::span<const Built> pipelines) const;
 
   const DispatchTable& table_;
   const DeviceLimits& limits_;
   VkDevice device_;
   VkPipelineCache cache_;
+  KernelSource kernelSource_;
   const VkAllocationCallbacks* allocator_;
   mutable std::shared_mutex mutex_;
-  std::unordered_map<std::uint64_t, VkPipeline> pipelines_;
+  std::unordered_map<std::uint64_t, Built> pipelines_;
+  std::vector<Retired> retired_;
+  std::uint64_t generation_ = 0;  ///< how often kernels have been replaced
 };
 
 }  // namespace dermis::vulkan

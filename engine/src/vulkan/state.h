@@ -22,6 +22,7 @@ struct ContextState {
         getInstanceProcAddr(description.getInstanceProcAddr),
         physicalDevice(description.physicalDevice),
         device(description.device),
+        kernelSource(description.kernelSource),
         allocator(description.allocator) {}
   ~ContextState();
 
@@ -49,6 +50,7 @@ struct ContextState {
   PFN_vkGetInstanceProcAddr getInstanceProcAddr;
   VkPhysicalDevice physicalDevice;
   VkDevice device;
+  KernelSource kernelSource;
   const VkAllocationCallbacks* allocator;
   float timestampPeriod = 1;  ///< nanoseconds
   DispatchTable table;

@@ -12,6 +12,7 @@
 #include "dermis/result.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/handles.h"
+#include "dermis/vulkan/kernels.h"
 
 namespace dermis::vulkan {
 
@@ -50,6 +51,8 @@ struct DeviceDescription {
   std::optional<bool> texelBuffers;
   /// What the engine promises about its meshes and poses. Promises reduce the number of pipelines.
   Promises promises;
+  /// Optional. Supplies the kernels instead of the library. Its `user` must outlive the Context.
+  KernelSource kernelSource;
   /// Optional. Used for every pipeline. The engine stores and loads it.
   VkPipelineCache pipelineCache{};
   /// Optional. Used for every object that Dermis creates. It must outlive the Context.
@@ -97,6 +100,23 @@ class DERMIS_VULKAN_API Context {
   /// Builds the pipelines of these variants. Pipelines that exist are skipped. For jobs whose
   /// attributes are not placed by a `VertexLayout`: `everyVariant` lists their variants.
   Result<void> prepare(std::span<const Variant> variants) const;
+
+  /// Swaps kernels between two frames: creates every existing pipeline of these modules again,
+  /// all or none, and returns their number. `record` uses them from then on. It does not wait for
+  /// the GPU. `kernelSource` must give the new modules from then on: pipelines that `prepare`
+  /// creates on another thread during the call are created again.
+  ///
+  /// `frame` and `completedFrame` are as for `SkinningSystem::beginFrame`, whether or not there is
+  /// a system: the frame that is recorded next, and the last one that the GPU has finished.
+  /// Replaced pipelines are destroyed by a later call, with or without modules, when `frame` is
+  /// complete. Command buffers that were recorded before must not be submitted again after `frame`.
+  /// Other threads may record during the call: what they record must belong to `frame` or an
+  /// earlier one, and each of its dispatches uses the old or the new kernel.
+  ///
+  /// Fails with `invalidArgument` (no `kernelSource`; an empty module; `completedFrame` is not
+  /// before `frame`) or `vulkanError`, and changes nothing then.
+  Result<std::uint32_t> replaceKernels(std::span<const KernelModule> modules, std::uint64_t frame,
+                                       std::uint64_t completedFrame) const;
 
   /// Makes the descriptor sets and buffer views for a set of buffers. Fails with
   /// - `invalidArgument` if a range is misaligned, or its size is 0 or not a multiple of 4;

@@ -23,11 +23,18 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "dermis/export.h"
 #include "dermis/plan.h"
+#include "dermis/result.h"
 
 namespace dermis::vulkan {
+
+/// The name of the module for a variant, on a device with these limits: "skin_texels".
+DERMIS_VULKAN_API std::string kernelName(const Variant& variant, const DeviceLimits& limits);
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
 /// memory is static, and variants of the same module get the same span. A module that stores fewer
@@ -46,5 +53,21 @@ struct SpecializationConstants {
 
 /// The specialization constants for a variant.
 DERMIS_VULKAN_API SpecializationConstants specializationConstants(const Variant& variant);
+
+/// Modules for a Context in place of those in the library: from `RuntimeCompiler::source`
+/// (runtime_compiler.h), or from the engine's own build of the kernels.
+struct KernelSource {
+  void* user = nullptr;
+  /// The SPIR-V of a module, by `kernelName`. `Context::prepare` calls it for each pipeline that it
+  /// creates, on its own thread: perhaps on several at once. It may fail; so does `prepare` then.
+  /// It throws nothing. Null: the library's modules.
+  Result<std::vector<std::uint32_t>> (*get)(void* user, std::string_view name) = nullptr;
+};
+
+/// A module by its `kernelName`. The memory is the caller's.
+struct KernelModule {
+  std::string_view name;
+  std::span<const std::uint32_t> spirv;
+};
 
 }  // namespace dermis::vulkan
