@@ -14,6 +14,7 @@ set(dermisHeaders_cpu cpu)
 set(dermisHeaders_verify verify)
 set(dermisHeaders_vulkan vulkan)
 set(dermisHeaders_shader_compiler shader_compiler.h)
+set(dermisHeaders_runtime_compiler runtime_compiler.h)
 set(dermisHeaders_gltf gltf.h memory_budget.h)
 
 get_property(dermisLibraries GLOBAL PROPERTY DERMIS_LIBRARIES)
@@ -32,7 +33,7 @@ foreach(library IN LISTS dermisLibraries)
 endforeach()
 
 set(excluded)
-foreach(component IN ITEMS cpu verify vulkan shader_compiler gltf)
+foreach(component IN ITEMS cpu verify vulkan shader_compiler runtime_compiler gltf)
   if(NOT component IN_LIST dermisComponents)
     foreach(header IN LISTS dermisHeaders_${component})
       list(APPEND excluded PATTERN dermis/${header} EXCLUDE)
@@ -74,7 +75,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
 install(FILES ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
         DESTINATION ${dermisPackageDir} COMPONENT dermis)
 
-# pkg-config: dermis is core and vulkan, dermis_NAME each of the libraries but shader_compiler. Paths count from the file.
+# pkg-config: dermis is core and vulkan, dermis_NAME each of the libraries but the two compilers. Paths count from the file.
 file(RELATIVE_PATH pkgConfigPrefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 set(pkgConfigFlags)
 if(BUILD_SHARED_LIBS)
@@ -91,7 +92,7 @@ function(dermis_pkg_config name requires library)
 endfunction()
 set(required)
 foreach(component IN LISTS dermisComponents)
-  if(NOT component STREQUAL "shader_compiler")
+  if(NOT component MATCHES "_compiler$")
     dermis_pkg_config(dermis_${component} "${pkgConfigRequires_${component}}" "-L\${libdir} -ldermis_${component}")
   endif()
   if(component MATCHES "^(core|vulkan)$")

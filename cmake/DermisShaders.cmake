@@ -67,6 +67,8 @@ endfunction()
 # dermis_embed_shaders(TARGET name
 #                      [NAMESPACE dermis::kernels]       # C++ namespace of the symbols
 #                      [ALLOW_CONTRACTION]               # do not demand `precise` everywhere
+#                      [RECIPES]                         # also NAME_recipes.h: what each module is compiled from, for
+#                                                        # dermis::runtime_compiler
 #                      KERNELS "skin.comp TEXELS" ...    # a file, relative to the current source folder (or .vert,
 #                                                        # .frag), and the macros that this module is compiled with;
 #                                                        # --scalar-block-layout among them: blocks may have that layout,
@@ -93,7 +95,7 @@ endfunction()
 # dermis_link_shaders(library name) puts the objects into a library. Its objects, and not the library,
 # because a static library that is exported must have all that it links exported too, even privately.
 function(dermis_embed_shaders)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "ALLOW_CONTRACTION" "TARGET;NAMESPACE"
+  cmake_parse_arguments(PARSE_ARGV 0 arg "ALLOW_CONTRACTION;RECIPES" "TARGET;NAMESPACE"
                         "KERNELS;INCLUDES;INCLUDE_FOLDERS;DEFINES")
   if(NOT arg_TARGET OR NOT arg_KERNELS OR arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "dermis_embed_shaders(TARGET name KERNELS file...): wrong arguments '${ARGN}'")
@@ -102,16 +104,74 @@ function(dermis_embed_shaders)
     set(arg_NAMESPACE dermis::kernels)
   endif()
 
+  # Of each module its name and source; macros_NAME, layoutFlags_NAME and unless_NAME of what it is compiled with.
+  set(names)
+  set(sources)
+  set(recipes)
+  foreach(entry IN LISTS arg_KERNELS)
+    separate_arguments(macros UNIX_COMMAND "${entry}")
+    list(POP_FRONT macros kernel)
+    set(layoutFlags)
+    set(isScalar false)
+    if("--scalar-block-layout" IN_LIST macros)
+      list(REMOVE_ITEM macros "--scalar-block-layout")
+      set(layoutFlags --scalar-block-layout)
+      set(isScalar true)
+    endif()
+    set(unless ${macros})
+    list(FILTER unless INCLUDE REGEX "^--unless=")
+    list(FILTER macros EXCLUDE REGEX "^--unless=")
+    list(TRANSFORM unless REPLACE "^--unless=" "")
+    cmake_path(GET kernel STEM LAST_ONLY stem)
+    cmake_path(GET kernel EXTENSION LAST_ONLY extension)
+    if(NOT extension STREQUAL ".comp")
+      string(APPEND stem ${extension})
+    endif()
+    list(JOIN macros "_" suffix)
+    if(suffix)
+      string(TOLOWER "_${suffix}" suffix)
+    endif()
+    string(MAKE_C_IDENTIFIER "${stem}${suffix}" name)
+    list(APPEND names ${name})
+    list(APPEND sources ${kernel})
+    set(macros_${name} ${macros})
+    set(layoutFlags_${name} ${layoutFlags})
+    set(unless_${name} ${unless})
+    string(APPEND recipes "    {\"${name}\", \"${kernel}\", \"${macros}\", ${isScalar}},\n")
+  endforeach()
+
+  set(folder ${CMAKE_CURRENT_BINARY_DIR}/${arg_TARGET})
+  file(MAKE_DIRECTORY ${folder})
+  if(arg_RECIPES)
+    string(REPLACE ";" " " recipes "${recipes}")
+    file(CONFIGURE OUTPUT ${folder}/${arg_TARGET}_recipes.h @ONLY CONTENT
+"// Made by cmake/DermisShaders.cmake.
+#pragma once
+
+namespace @arg_NAMESPACE@ {
+
+struct Recipe {
+  const char* name;    // of the module
+  const char* source;  // the file
+  const char* macros;  // that it is compiled with, separated by blanks
+  bool scalarBlockLayout;
+};
+
+inline constexpr Recipe recipes[] = {
+@recipes@};
+
+}  // namespace @arg_NAMESPACE@
+")
+  endif()
+
   if(DERMIS_EMBEDDED_SHADERS AND EXISTS ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.cpp)
     add_library(${arg_TARGET} OBJECT ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.cpp ${DERMIS_EMBEDDED_SHADERS}/${arg_TARGET}.h)
     dermis_configure_target(${arg_TARGET})
-    target_include_directories(${arg_TARGET} INTERFACE ${DERMIS_EMBEDDED_SHADERS})
+    target_include_directories(${arg_TARGET} INTERFACE ${DERMIS_EMBEDDED_SHADERS} ${folder})
     return()
   endif()
 
   dermis_shader_tool(tool toolDepends)
-  set(folder ${CMAKE_CURRENT_BINARY_DIR}/${arg_TARGET})
-  file(MAKE_DIRECTORY ${folder})
   set(flags)
   if(NOT arg_ALLOW_CONTRACTION)
     list(APPEND flags --require-no-contraction)
@@ -126,43 +186,20 @@ function(dermis_embed_shaders)
 
   set(modules)
   set(moduleFlags)
-  set(sources)
-  foreach(entry IN LISTS arg_KERNELS)
-    separate_arguments(macros UNIX_COMMAND "${entry}")
-    list(POP_FRONT macros kernel)
-    list(APPEND sources ${kernel})
-    set(ownFlags ${flags})
-    set(layoutFlags)
-    if("--scalar-block-layout" IN_LIST macros)
-      list(REMOVE_ITEM macros "--scalar-block-layout")
-      set(layoutFlags --scalar-block-layout)
-    endif()
-    set(unless ${macros})
-    list(FILTER unless INCLUDE REGEX "^--unless=")
-    list(FILTER macros EXCLUDE REGEX "^--unless=")
-    list(TRANSFORM unless REPLACE "^--unless=" "")
-    foreach(macro IN LISTS macros)
+  foreach(name kernel IN ZIP_LISTS names sources)
+    set(ownFlags ${flags} ${layoutFlags_${name}})
+    foreach(macro IN LISTS macros_${name})
       list(APPEND ownFlags --define ${macro})
     endforeach()
     cmake_path(ABSOLUTE_PATH kernel BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
-    cmake_path(GET kernel STEM LAST_ONLY stem)
-    cmake_path(GET kernel EXTENSION LAST_ONLY extension)
-    if(NOT extension STREQUAL ".comp")
-      string(APPEND stem ${extension})
-    endif()
-    list(JOIN macros "_" suffix)
-    if(suffix)
-      string(TOLOWER "_${suffix}" suffix)
-    endif()
-    string(MAKE_C_IDENTIFIER "${stem}${suffix}" name)
     set(module ${folder}/${name}.spv)
     # Only a module that spirv-val accepts gets its name: a failed build does not leave one behind.
     set(unchecked ${folder}/${name}.unchecked.spv)
     add_custom_command(
       OUTPUT ${module}
-      COMMAND ${tool} compile --input ${kernel} --output ${unchecked} ${ownFlags} ${layoutFlags}
+      COMMAND ${tool} compile --input ${kernel} --output ${unchecked} ${ownFlags}
               --depfile ${module}.d --depfile-target ${module}
-      COMMAND ${DERMIS_SPIRV_VAL} ${layoutFlags} --target-env vulkan1.1 ${unchecked}
+      COMMAND ${DERMIS_SPIRV_VAL} ${layoutFlags_${name}} --target-env vulkan1.1 ${unchecked}
       COMMAND ${CMAKE_COMMAND} -E rename ${unchecked} ${module}
       DEPENDS ${toolDepends} ${kernel}
       DEPFILE ${module}.d
@@ -170,7 +207,7 @@ function(dermis_embed_shaders)
       VERBATIM)
     list(APPEND modules ${module})
     list(APPEND moduleFlags --module ${name}=${module})
-    foreach(macro IN LISTS unless)
+    foreach(macro IN LISTS unless_${name})
       list(APPEND moduleFlags --unless ${macro})
     endforeach()
   endforeach()

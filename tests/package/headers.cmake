@@ -4,6 +4,9 @@ include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 set(core dermis/dermis.h dermis/cpu/skinning_system.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
     dermis/shader_compiler.h)
 set(vulkan dermis/vulkan/vulkan.h)
+if(runtimeCompiler)
+  list(APPEND vulkan dermis/runtime_compiler.h)
+endif()
 set(loaders dermis/vulkan/vertex_input.h dermis/vulkan/acceleration_structure.h)
 set(create "int main() { return static_cast<int>(vkCreateInstance(nullptr, nullptr, nullptr)); }")
 

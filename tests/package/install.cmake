@@ -9,7 +9,11 @@ file(RENAME "${staging}" "${prefix}")
 
 say("Compare the list of files")
 set(expected)
-foreach(component IN ITEMS core cpu gltf shader_compiler verify vulkan)
+set(components core cpu gltf shader_compiler verify vulkan)
+if(runtimeCompiler)
+  list(APPEND components runtime_compiler)
+endif()
+foreach(component IN LISTS components)
   list(APPEND expected ${libFolder}/libdermis_${component}.a
        ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
 endforeach()
@@ -24,6 +28,9 @@ file(GLOB_RECURSE documents RELATIVE "${sourceFolder}" "${sourceFolder}/docs/*" 
 list(TRANSFORM documents PREPEND ${dataFolder}/doc/dermis/)
 list(APPEND expected ${documents})
 file(GLOB_RECURSE headers RELATIVE "${sourceFolder}/engine/include" "${sourceFolder}/engine/include/*.h")
+if(NOT runtimeCompiler)
+  list(REMOVE_ITEM headers dermis/runtime_compiler.h)
+endif()
 list(TRANSFORM headers PREPEND ${includeFolder}/)
 file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
      "${sourceFolder}/shaders/*.comp")

@@ -42,6 +42,16 @@ function(build_consumer source)
   set(BUILD "${build}" PARENT_SCOPE)
 endfunction()
 
+# list_compiler_symbols(OUTPUT PROGRAM): what glslang and SPIRV-Tools have in a program.
+function(list_compiler_symbols output program)
+  run(symbols "List the symbols of ${program}" "${nm}" -C "${program}")
+  if(NOT symbols MATCHES " main")
+    wrong("${nm} does not list main:\n${symbols}")
+  endif()
+  string(REGEX MATCHALL "[^\n]*(glslang|spvtools|spvOptimizer|spvValidate)[^\n]*" found "${symbols}")
+  set(${output} "${found}" PARENT_SCOPE)
+endfunction()
+
 # build_with_pkg_config(PREFIX PROGRAM FLAGS...): compiles the program of consumers/vulkan with what pkg-config says of the package in
 # PREFIX, and nothing else. FLAGS come first.
 function(build_with_pkg_config prefix program)

@@ -18,6 +18,12 @@ build_consumer("${engine}" -DDERMIS_COMPARISON_METHODS=OFF -DDERMIS_SUBWORD_STOR
 run(printed "Run engine" "${BUILD}/engine")
 say("${printed}")
 
+# DERMIS_RUNTIME_COMPILER is OFF.
+list_compiler_symbols(compiler "${BUILD}/engine")
+if(compiler)
+  wrong("the engine has a shader compiler: ${compiler}")
+endif()
+
 file(GLOB_RECURSE modules "${BUILD}/*.spv")
 list(FILTER modules EXCLUDE REGEX "unchecked")
 set(bytes 0)

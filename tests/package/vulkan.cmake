@@ -8,3 +8,7 @@ run(dynamic "Look at what it is linked with" "${readelf}" -d "${BUILD}/vulkan_co
 if(dynamic MATCHES "vulkan")
   wrong("it is linked with a Vulkan loader:\n${dynamic}")
 endif()
+list_compiler_symbols(compiler "${BUILD}/vulkan_consumer")
+if(compiler)
+  wrong("it has a shader compiler: ${compiler}")
+endif()

@@ -18,6 +18,9 @@
 #include "dermis/plan.h"
 #include "dermis/shader_compiler.h"
 #include "dermis/verify/reference.h"
+#ifdef HAS_RUNTIME_COMPILER
+#include "dermis/runtime_compiler.h"
+#endif
 
 namespace {
 
@@ -125,6 +128,14 @@ int main(int argc, char** argv) {
   const auto refused = compiler.compile(broken);
   if (refused || refused.error().code != ErrorCode::shaderError) return 3;
   std::printf("%s\n", refused.error().message.c_str());
+
+#ifdef HAS_RUNTIME_COMPILER
+  const Result<RuntimeCompiler> runtime = RuntimeCompiler::create({argv[1], {}});
+  if (!runtime) return fail(runtime.error());
+  const vulkan::KernelSource source = runtime->source();
+  if (const auto palette = source.get(source.user, "palette"); !palette)
+    return fail(palette.error());
+#endif
 
   const Result<bool> right = skinTriangle();
   if (!right) return fail(right.error());
