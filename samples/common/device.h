@@ -47,6 +47,7 @@ struct DeviceOptions {
   bool graphics = false;        ///< the queue draws too; fails where the device has none that does
   bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
                                     ///< them
+  vulkan::KernelSource kernels;     ///< of the context; none: the library's
   /// The instance extensions that a window's surface needs. Where there are any, the device must
   /// have VK_KHR_swapchain, and it is enabled.
   std::vector<std::string> surfaceExtensions;

@@ -7,7 +7,9 @@ namespace dermis::samples {
 Result<OpenDevice> openDevice(const DeviceOptions& options) {
   Result<std::unique_ptr<Device>> device = Device::create(options);
   if (!device) return device.error();
-  Result<vulkan::Context> context = vulkan::Context::create((*device)->description());
+  vulkan::DeviceDescription description = (*device)->description();
+  description.kernelSource = options.kernels;
+  Result<vulkan::Context> context = vulkan::Context::create(description);
   if (!context) return context.error();
   return OpenDevice{std::move(*device), std::move(*context)};
 }

@@ -17,6 +17,7 @@ ImU32 color(std::uint32_t rgb, float alpha = 1);
 ImU32 heatColor(float value);
 
 inline constexpr std::uint32_t accentColor = 0x4FC3B4, warmColor = 0xFFB454, textColor = 0xE8ECF0,
-                               dimColor = 0x93A0AD, badColor = 0xE5604D, panelColor = 0x171C22;
+                               dimColor = 0x93A0AD, badColor = 0xE5604D, errorColor = 0xFFB9AE,
+                               panelColor = 0x171C22;
 
 }  // namespace dermis::viewer

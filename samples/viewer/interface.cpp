@@ -149,6 +149,18 @@ void drawTimes(const Facts& facts) {
   sayDim(facts.device);
 }
 
+void drawKernels(const Facts& facts) {
+  heading("Kernels");
+  sayDim(facts.kernels);
+  sayDim(facts.kernelsSummary);
+  if (facts.kernelsUpdate.empty()) return;
+  ImGui::PushStyleColor(ImGuiCol_Text, color(facts.kernelsAreBroken ? errorColor : textColor));
+  ImGui::PushTextWrapPos(0);
+  say(facts.kernelsUpdate);
+  ImGui::PopTextWrapPos();
+  ImGui::PopStyleColor();
+}
+
 void drawPanel(const Facts& facts, float height, State& state) {
   ImGui::SetNextWindowPos({0, 0});
   ImGui::SetNextWindowSize({panelWidth, height});
@@ -164,6 +176,7 @@ void drawPanel(const Facts& facts, float height, State& state) {
     drawLooks(facts, state);
     drawTimes(facts);
   }
+  if (!facts.kernels.empty()) drawKernels(facts);
   const float line = ImGui::GetTextLineHeight();
   ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), height - line - 16));
   ImGui::TextDisabled("H shows the keys");
@@ -260,7 +273,7 @@ void drawError(const Area& picture, State& state) {
                    ImGuiWindowFlags_NoFocusOnAppearing);
   ImGui::PopStyleColor();
   ImGui::PushTextWrapPos(0);
-  ImGui::PushStyleColor(ImGuiCol_Text, color(0xFFB9AE));
+  ImGui::PushStyleColor(ImGuiCol_Text, color(errorColor));
   say(state.error);
   ImGui::PopStyleColor();
   ImGui::PopTextWrapPos();

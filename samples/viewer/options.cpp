@@ -61,6 +61,14 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
       ->check(CLI::Range(64u, largestSide));
   app.add_option("--device", options.device,
                  "auto, a number of 'dermis devices', or part of a name");
+#ifdef DERMIS_RUNTIME_COMPILER
+  CLI::Option* shaders = app.add_option(
+      "--shaders", options.shaders,
+      "Compile the kernels from this folder of GLSL, and again whenever a file changes");
+  app.add_option("--shader-cache", options.shaderCache,
+                 "The folder to keep compiled kernels in, for the next time")
+      ->needs(shaders);
+#endif
   app.add_option("--frames", options.frames, "End after so many frames");
   app.add_option("--screenshot", options.screenshot, "Write the window's last picture: a .png");
   app.add_flag("--validation", options.validates,

@@ -19,6 +19,8 @@ struct Options {
   bool isPaused = false;
   std::uint32_t width = 1280, height = 800;  ///< of the window
   std::string device = "auto";
+  std::string shaders;      ///< the folder that kernels are compiled from; empty: the library's
+  std::string shaderCache;  ///< where compiled ones are kept; empty: nowhere
   std::optional<std::uint32_t> frames;  ///< End after so many.
   std::string screenshot;               ///< written at the end; empty: none
   bool validates = false;

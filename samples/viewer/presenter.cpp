@@ -43,6 +43,14 @@ Result<void> Presenter::open(const Options& options) {
   deviceOptions.validation = options.validates;
   deviceOptions.graphics = true;
   deviceOptions.surfaceExtensions = *extensions;
+#ifdef DERMIS_RUNTIME_COMPILER
+  if (!options.shaders.empty()) {
+    Result<std::unique_ptr<KernelFolder>> kernels = openKernelFolder(options);
+    if (!kernels) return kernels.error();
+    kernels_ = std::move(*kernels);
+    deviceOptions.kernels = kernels_->source();
+  }
+#endif
   Result<samples::OpenDevice> device = samples::openDevice(deviceOptions);
   if (!device) return device.error();
   device_.emplace(std::move(*device));

@@ -7,6 +7,7 @@
 
 #include "canvas.h"
 #include "gui.h"
+#include "kernel_folder.h"
 #include "open_device.h"
 #include "options.h"
 #include "swapchain.h"
@@ -31,6 +32,8 @@ class Presenter {
   ~Presenter();
 
   samples::OpenDevice& device() { return *device_; }
+  /// Null: the kernels are the library's.
+  KernelFolder* kernels() const { return kernels_.get(); }
   const Window& window() const { return window_; }
   Gui& gui() { return gui_; }
 
@@ -51,6 +54,7 @@ class Presenter {
 
   // What is declared later goes first.
   Window window_;
+  std::unique_ptr<KernelFolder> kernels_;
   std::optional<samples::OpenDevice> device_;
   Surface surface_;
   std::optional<Swapchain> swapchain_;

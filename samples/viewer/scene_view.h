@@ -66,6 +66,9 @@ class SceneView {
   /// Shows them from now on, where errors are to be seen.
   void setErrors(CheckResult result);
 
+  /// The next picture skins everything: kernels are other ones.
+  void skinAgain() { posed_.reset(); }
+
   /// Skins what has changed and draws it, in one command buffer. `copiesPositions`: then
   /// `skinned` has them. Where the scene does not allow a method it fails with `invalidArgument`.
   Result<void> record(VkCommandBuffer commandBuffer, const Shot& shot, const Quality& quality,

@@ -47,6 +47,10 @@ struct Facts {
   std::array<Method, 2> methods{};
   std::vector<std::string> notes;  ///< what was found wrong in it, or left out
   std::string device;
+  std::string kernels;         ///< the folder that they are compiled from; empty: the library's
+  std::string kernelsSummary;  ///< how many were compiled
+  std::string kernelsUpdate;   ///< what the last change of a file led to; empty: none so far
+  bool kernelsAreBroken = false;
   bool isLoading = false;
   std::string loading;  ///< what is being done meanwhile
   const CheckResult* errors = nullptr;

@@ -183,6 +183,7 @@ void Viewer::update() {
   const double step = std::min(seconds(now - lastUpdate_), longestStep);
   lastUpdate_ = now;
   openFiles();
+  reloadKernels();
   if (!state_.notice.empty() && now > noticeEnd_) {
     state_.notice.clear();
     framesToDraw_ = framesAfterEvent;
@@ -207,6 +208,26 @@ void Viewer::openFiles() {
   if (!loaded) return;
   framesToDraw_ = framesAfterEvent;
   adopt(std::move(*loaded));
+}
+
+void Viewer::reloadKernels() {
+  KernelFolder* kernels = presenter_->kernels();
+  if (kernels == nullptr) return;
+  const Result<std::optional<KernelUpdate>> update = kernels->reload(presenter_->device().context);
+  if (!update) {
+    kernelError_ = update.error().message;
+    kernelsUpdate_ = "the old ones are used: " + kernelError_;
+    return fail(samples::ExitStatus::badInput, kernelError_);
+  }
+  if (!*update) return;
+  if (state_.error == kernelError_) state_.error.clear();
+  kernelError_.clear();
+  kernelsUpdate_ = (*update)->text;
+  tell(kernelsUpdate_);
+  if (!(*update)->isOther || view_ == nullptr) return;
+  view_->skinAgain();
+  drawn_.reset();
+  errors_.reset();
 }
 
 void Viewer::adopt(LoadedScene loaded) {
@@ -375,6 +396,12 @@ Facts Viewer::facts() const {
   facts.notes = notes_;
   facts.methods = methods_;
   facts.device = presenter_->device().device->info().name;
+  if (const KernelFolder* kernels = presenter_->kernels(); kernels != nullptr) {
+    facts.kernels = options_.shaders;
+    facts.kernelsSummary = kernels->summary();
+    facts.kernelsUpdate = kernelsUpdate_;
+    facts.kernelsAreBroken = !kernelError_.empty();
+  }
   if (const LoadRequest* current = loader_.current(); current != nullptr) {
     facts.isLoading = true;
     facts.loading = view_ != nullptr && current->path == path_

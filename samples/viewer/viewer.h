@@ -37,6 +37,7 @@ class Viewer {
   // What follows from it
   void update();
   void openFiles();
+  void reloadKernels();
   void adopt(LoadedScene loaded);
   Result<void> adoptScene(const std::string& path, cli::Scene scene);
   void beginWith(const std::string& path);
@@ -70,7 +71,8 @@ class Viewer {
   std::vector<std::string> notes_;
   bool hasSoughtCenters_ = false;    ///< those of rotation, in the view's file
   std::array<Method, 2> methods_{};  ///< that are shown
-  bool hasBegun_ = false;            ///< The first model has been read, or could not be.
+  std::string kernelsUpdate_, kernelError_;
+  bool hasBegun_ = false;  ///< The first model has been read, or could not be.
 
   Pace pace_;
   std::optional<Shot> drawn_;

@@ -15,6 +15,7 @@
 
 #include "display.h"
 #include "pictures.h"
+#include "shader_folder.h"
 #include "test_device.h"
 #include "test_paths.h"
 
@@ -275,6 +276,34 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithAFileAndGoesOn) {
   EXPECT_EQ(viewer_->wait(), 0);
   EXPECT_EQ(errors().find("Validation"), std::string::npos) << errors();
 }
+
+#ifdef DERMIS_RUNTIME_COMPILER
+TEST_F(ViewerTest, ReloadsKernelsThatAreEdited) {
+  const ShaderFolder shaders("viewer");
+  open({sampleModel("figure"), "--paused", "--time", "0.3", "--shaders", shaders.path().string(),
+        "--shader-cache", folder_ + "/cache"});
+  const Picture first = screenshot();
+  EXPECT_FALSE(std::filesystem::is_empty(folder_ + "/cache"));
+  shaders.edit("skin.comp", ShaderFolder::storedPosition, ShaderFolder::movedPosition);
+  ASSERT_TRUE(waitUntil([&] { return changes(first, screenshot(), scene) > 3000; }));
+  const Picture moved = screenshot();
+  EXPECT_GT(changes(first, moved, wholePanel), 100) << "what was done";
+
+  const std::string line = std::to_string(
+      shaders.edit("skin.comp", ShaderFolder::movedPosition, ShaderFolder::brokenPosition));
+  ASSERT_TRUE(
+      waitUntil([&] { return errors().find("skin.comp:" + line + ": ") != std::string::npos; }));
+  const Picture told = screenshot();
+  EXPECT_GT(changes(moved, told, {340, 50, 920, 120}), 5000) << "a message over the picture";
+  EXPECT_LT(changes(moved, told, {300, 200, width, 500}), 50) << "of the old kernels";
+
+  shaders.edit("skin.comp", ShaderFolder::brokenPosition, ShaderFolder::storedPosition);
+  EXPECT_TRUE(waitUntil([&] { return changes(first, screenshot(), scene) < 50; }));
+  press({"q"});
+  EXPECT_EQ(viewer_->wait(), 0);
+  EXPECT_EQ(errors().find("Validation"), std::string::npos) << errors();
+}
+#endif
 
 // However many keys come within one frame.
 TEST_F(ViewerTest, ReadsHastyFingers) {
