@@ -132,6 +132,7 @@ class Allocator {
 constexpr VkMemoryPropertyFlags mappedMemory =
     VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
+// [callbacks]
 Result<vulkan::CreatedBuffer> createForDermis(void* user, const vulkan::BufferRequest& request) {
   vulkan::CreatedBuffer created;
   auto* allocation = new Allocation;
@@ -149,6 +150,7 @@ void destroyForDermis(void* user, const vulkan::CreatedBuffer& created) {
   static_cast<Allocator*>(user)->destroyBuffer(created.buffer, *allocation);
   delete allocation;
 }
+// [/callbacks]
 
 void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
   const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
@@ -195,6 +197,7 @@ int main() {
   vulkan::Context context = must(vulkan::Context::create(device));
 
   // -- Dermis: its outputs go to a part of the vertex buffer that the engine has for everything.
+  // [range]
   vulkan::SkinningSystemDescription description;
   description.context = &context;
   description.buffers = {&allocator, createForDermis, destroyForDermis};
@@ -209,6 +212,7 @@ int main() {
   must(allocator.createBuffer(vertexInfo, mappedMemory, vertexBuffer, vertexMemory));
   const VkDeviceSize begin = (300'000 / needed.alignment + 1) * needed.alignment;
   description.output = {vertexBuffer, begin, needed.size};
+  // [/range]
 
   int status = 1;
   {
@@ -240,6 +244,7 @@ int main() {
       barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput) |
                                         vulkan::outputScope(vulkan::Consumer::hostRead));
       must(vkEndCommandBuffer(engine.commandBuffer));
+      // [lost-frame]
       if (frame == lostFrame) {
         // As after VK_ERROR_OUT_OF_DATE_KHR: the commands are not submitted.
         must(scene.abandonFrame(frame));
@@ -251,6 +256,7 @@ int main() {
       must(vkQueueSubmit(engine.queue, 1, &submit, VK_NULL_HANDLE));
       must(vkQueueWaitIdle(engine.queue));
       submitted = frame;
+      // [/lost-frame]
     }
 
     // -- The proof: the pose of the lost frame, by the frame after it.

@@ -258,6 +258,7 @@ int main() {
   figure.mesh = must(scene.addMesh(must(pack(mesh, jointCount))));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
   must(scene.prepare(pipelineNeeds(figure)));
+  // [add]
   std::vector<PoseHandle> handles(figureCount);
   must(scene.addPoses(handles, jointCount, {.writer = PoseWriter::gpu}));
   std::vector<InstanceHandle> figures;
@@ -267,12 +268,14 @@ int main() {
   }
   const vulkan::BufferRange first = must(scene.poseRange(handles[0]));
   const Animation animation(engine, {first.buffer, first.offset, first.size * figureCount});
+  // [/add]
 
   // -- Each frame.
   for (std::uint32_t frame = 1; frame <= frameCount; ++frame) {
     must(scene.beginFrame(frame, frame - 1));
     auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
+    // [frame]
     // The last frame may still read the poses.
     barrier(engine.commandBuffer, vulkan::overwriteScope(vulkan::Writer::compute));
     animation.record(engine.commandBuffer, static_cast<float>(frame));
@@ -281,6 +284,7 @@ int main() {
                                       vulkan::inputScope(vulkan::PreviousUse::vertexInput));
     must(scene.record(engine.commandBuffer));
     barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
+    // [/frame]
     // An engine draws here.
     must(vkEndCommandBuffer(engine.commandBuffer));
     submit(engine);

@@ -106,11 +106,13 @@ Engine makeEngine(std::uint32_t readBackSize) {
   return engine;
 }
 
+// [barrier]
 void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
   const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
   vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
                        &memory, 0, nullptr, 0, nullptr);
 }
+// [/barrier]
 
 // -- The character: a strip of two joints.
 
@@ -133,6 +135,7 @@ int main() {
   Engine engine = makeEngine(vertexCount * 24);
 
   // -- Dermis: while loading.
+  // [mesh]
   InfluenceSet influences;
   influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
   influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
@@ -142,7 +145,9 @@ int main() {
   mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
   mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
+  // [/mesh]
 
+  // [load]
   vulkan::DeviceDescription device;
   device.instance = engine.instance;
   device.physicalDevice = engine.physicalDevice;
@@ -160,6 +165,7 @@ int main() {
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
   must(scene.prepare(figure));
   const InstanceHandle instance = must(scene.addInstance(figure));
+  // [/load]
 
   // -- Each frame.
   std::vector<JointMatrix> pose(2);
@@ -168,14 +174,16 @@ int main() {
     pose[1] = {{{std::cos(angle), 0, std::sin(angle), 0},
                 {0, 1, 0, 0},
                 {-std::sin(angle), 0, std::cos(angle), 0}}};
-    must(scene.beginFrame(frame, frame - 1));
-    std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
-
     auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
+    // [frame]
+    // `frame - 1`: the newest frame that the GPU has completed. This program waits for each.
+    must(scene.beginFrame(frame, frame - 1));
+    std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
     barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
     must(scene.record(engine.commandBuffer));
     barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+    // [/frame]
     // An engine draws here. This one copies the vertices, to look at them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
     vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), engine.readBack, 1, &copy);
@@ -190,11 +198,13 @@ int main() {
   }
 
   // -- The proof: every vertex against the reference in double precision.
+  // [compare]
   SkinnedView skinned;
   skinned.positions = {engine.vertices, vertexCount, 24, VertexFormat::float32x3};
   skinned.normals = {engine.vertices + 3, vertexCount, 24, VertexFormat::float32x3};
   const auto expected = must(reference::skin(mesh, pose, Method::dualQuaternion));
   const Comparison comparison = must(compareWithReference(expected, skinned));
+  // [/compare]
   std::printf("%u vertices, %u frames: %s, worst error %.0f %% of its bound\n", vertexCount,
               frameCount, comparison.passed() ? "every vertex is right" : "WRONG",
               100 * comparison.worstPosition);
