@@ -88,7 +88,8 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
     useDevice(pushDescriptors);
     if (device_ == nullptr) return;
     for (const Arrangement arrangement : {Arrangement::interleaved, Arrangement::planar}) {
-      if (!pushDescriptors && arrangement == Arrangement::planar) continue;  // see README.md
+      if (!pushDescriptors && arrangement == Arrangement::planar)
+        continue;  // DeviceLimits::separateRanges
       InterceptedDevice small(device().description());
       small.changeLimits(
           [](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = 256 << 10; });

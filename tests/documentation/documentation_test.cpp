@@ -1,0 +1,209 @@
+// Documents agree with the code: what they show is compiled or printed, and their links lead
+// somewhere.
+//
+// With DERMIS_UPDATE_DOCUMENTS in the environment the test writes what is held to a source into the
+// documents (tests/documentation/regenerate.sh).
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "documents.h"
+#include "generated_parts.h"
+#include "test_paths.h"
+
+namespace dermis::test {
+namespace {
+
+bool isUpdating() {
+  return std::getenv("DERMIS_UPDATE_DOCUMENTS") != nullptr;
+}
+
+/// Lines from the one with `first` to the one with `last`.
+std::ptrdiff_t linesBetween(const std::string& text, const std::string& first,
+                            const std::string& last) {
+  const std::size_t begin = text.find(first), end = text.find(last, begin);
+  if (begin == std::string::npos || end == std::string::npos) return -1;
+  return 1 + std::count(text.begin() + static_cast<std::ptrdiff_t>(begin),
+                        text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+}
+
+/// The names that docs/integration.md lists, all of which stand in the code.
+int namesToLearn(const std::string& code, const std::string& sample) {
+  const std::string page = readText("docs/integration.md");
+  const std::size_t begin = page.find("`" + sample + "` names");
+  if (begin == std::string::npos) return -1;
+  std::string list = page.substr(begin, page.find("\n\n", begin) - begin);
+  list = list.substr(list.find(':'));
+  int count = 0;
+  for (std::size_t place = list.find('`'); place != std::string::npos;
+       place = list.find('`', place)) {
+    const std::size_t close = list.find('`', place + 1);
+    const std::string name = list.substr(place + 1, close - place - 1);
+    EXPECT_NE(code.find(name), std::string::npos) << name;
+    ++count;
+    place = close + 1;
+  }
+  return count;
+}
+
+/// As GitHub names a heading in a link: "What is not due" is #what-is-not-due.
+std::string anchor(const std::string& heading) {
+  std::string name;
+  for (const char letter : heading) {
+    const auto byte = static_cast<unsigned char>(letter);
+    if (letter == ' ') {
+      name += '-';
+    } else if (std::isalnum(byte) != 0 || letter == '-' || letter == '_' || byte >= 0x80) {
+      name += static_cast<char>(std::tolower(byte));
+    }
+  }
+  return name;
+}
+
+/// Of all headings. Lines in blocks of code are none.
+std::set<std::string> anchors(const std::string& text) {
+  std::set<std::string> names;
+  std::istringstream lines(text);
+  bool isCode = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) isCode = !isCode;
+    const std::size_t title = line.find_first_not_of('#');
+    if (!isCode && title != 0 && title != std::string::npos && line[title] == ' ')
+      names.insert(anchor(line.substr(title + 1)));
+  }
+  return names;
+}
+
+/// What stands between "](" and ")", outside of blocks of code.
+std::vector<std::string> links(const std::string& text) {
+  std::vector<std::string> found;
+  std::istringstream lines(text);
+  bool isCode = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) isCode = !isCode;
+    if (isCode) continue;
+    for (std::size_t place = line.find("]("); place != std::string::npos;
+         place = line.find("](", place + 1))
+      found.push_back(line.substr(place + 2, line.find(')', place) - place - 2));
+  }
+  return found;
+}
+
+TEST(DocumentationTest, LinksLeadSomewhere) {
+  std::map<std::string, std::set<std::string>> headings;
+  for (const Document& document : allDocuments()) headings[document.path] = anchors(document.text);
+  const std::filesystem::path root = sourceFolder;
+  std::size_t checked = 0;
+  for (const Document& document : allDocuments()) {
+    for (const std::string& link : links(document.text)) {
+      if (link.find("://") != std::string::npos) continue;
+      const std::string file = link.substr(0, link.find('#'));
+      const std::filesystem::path folder = std::filesystem::path(document.path).parent_path();
+      const std::string target =
+          file.empty() ? document.path : (folder / file).lexically_normal().generic_string();
+      EXPECT_TRUE(std::filesystem::exists(root / target)) << document.path << ": " << link;
+      if (const std::size_t hash = link.find('#'); hash != std::string::npos) {
+        EXPECT_TRUE(headings[target].contains(link.substr(hash + 1)))
+            << document.path << ": " << link;
+      }
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 50u);
+}
+
+TEST(DocumentationTest, WhatIsShownIsWhatItsSourceSays) {
+  for (const Document& document : allDocuments()) {
+    std::string text = document.text;
+    const std::vector<HeldPart> parts = heldParts(text);
+    // From the last on, so that those before it stay where they are.
+    for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
+      SCOPED_TRACE(document.path + ": " + part->kind + ": " + part->source);
+      const std::string expected = generate(*part), shown = text.substr(part->begin, part->size);
+      ASSERT_FALSE(expected.empty());
+      if (part->kind == "help" ? withoutLayout(expected) == withoutLayout(shown)
+                               : expected == shown)
+        continue;
+      if (isUpdating()) {
+        text.replace(part->begin, part->size, expected);
+      } else {
+        EXPECT_EQ(shown, expected) << "tests/documentation/regenerate.sh mends it";
+      }
+    }
+    if (text != document.text)
+      std::ofstream(std::string(sourceFolder) + "/" + document.path) << text;
+  }
+}
+
+/// Blocks of C++ that no source is named for.
+TEST(DocumentationTest, AllCodeIsCompiled) {
+  std::size_t blocks = 0;
+  for (const Document& document : allDocuments()) {
+    const std::vector<HeldPart> parts = heldParts(document.text);
+    const std::string fence = "```cpp\n";
+    for (std::size_t place = document.text.find(fence); place != std::string::npos;
+         place = document.text.find(fence, place + 1)) {
+      EXPECT_TRUE(std::ranges::any_of(parts,
+                                      [&](const HeldPart& part) {
+                                        return part.kind == "code" &&
+                                               part.begin == place + fence.size();
+                                      }))
+          << document.path << ": " << document.text.substr(place, 200);
+      ++blocks;
+    }
+  }
+  EXPECT_GE(blocks, 10u);
+}
+
+/// The manual of the command has a section for each subcommand.
+TEST(DocumentationTest, TheManualIsComplete) {
+  const std::string overview = generate({"help", "dermis"}), manual = readText("docs/command.md");
+  const std::size_t list = overview.rfind(":\n");  // the heading above the subcommands
+  ASSERT_NE(list, std::string::npos);
+  std::istringstream lines(overview.substr(list + 2));
+  int commands = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("  ") || line.starts_with("   ")) continue;  // continued
+    const std::string name = line.substr(2, line.find(' ', 2) - 2);
+    EXPECT_NE(manual.find("<!-- help: dermis " + name + " -->\n```"), std::string::npos) << name;
+    ++commands;
+  }
+  EXPECT_EQ(commands, 7);
+}
+
+// How long the first page and the smallest programs are, and how much of the interface they need.
+TEST(DocumentationTest, WhatIsReadFirstIsShort) {
+  const std::string readme = readText("README.md");
+  EXPECT_LE(std::ranges::count(readme, '\n'), 170);
+
+  const std::string code = readText("samples/minimal/main.cpp");
+  const std::ptrdiff_t all = linesBetween(code, "vkCreateInstance", "comparison.passed()");
+  EXPECT_GT(all, 0);
+  EXPECT_LE(all, 150);
+  std::ptrdiff_t shown = 0;
+  for (const HeldPart& part : heldParts(readme)) {
+    if (part.source.starts_with("samples/minimal/main.cpp"))
+      shown +=
+          std::count(readme.begin() + static_cast<std::ptrdiff_t>(part.begin),
+                     readme.begin() + static_cast<std::ptrdiff_t>(part.begin + part.size), '\n');
+  }
+  EXPECT_GT(shown, 30);
+  EXPECT_LE(shown, 60);
+
+  EXPECT_EQ(namesToLearn(code, "samples/minimal"), 13);
+  EXPECT_EQ(namesToLearn(readText("samples/embed/main.cpp"), "samples/embed"), 20);
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,218 @@
+// Code that the documents show and no sample has.
+
+#include <gtest/gtest.h>
+#include <vulkan/vulkan.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "dermis/cpu/skinning_system.h"
+#include "dermis/pack.h"
+#include "dermis/scene.h"
+#include "dermis/validate.h"
+#include "dermis/vulkan/vertex_input.h"
+
+using namespace dermis;
+
+namespace {
+
+/// What the draw below said to Vulkan.
+struct Drawn {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0;
+  std::uint32_t indices = 0;
+};
+Drawn drawn;
+
+}  // namespace
+
+// In place of a driver.
+VKAPI_ATTR void VKAPI_CALL vkCmdBindVertexBuffers(VkCommandBuffer, std::uint32_t, std::uint32_t,
+                                                  const VkBuffer* buffers,
+                                                  const VkDeviceSize* offsets) {
+  drawn.buffer = buffers[0];
+  drawn.offset = offsets[0];
+}
+VKAPI_ATTR void VKAPI_CALL vkCmdBindIndexBuffer(VkCommandBuffer, VkBuffer, VkDeviceSize,
+                                                VkIndexType) {}
+VKAPI_ATTR void VKAPI_CALL vkCmdDrawIndexed(VkCommandBuffer, std::uint32_t indexCount,
+                                            std::uint32_t, std::uint32_t, std::int32_t,
+                                            std::uint32_t) {
+  drawn.indices = indexCount;
+}
+
+namespace {
+
+template <typename T>
+T must(Result<T> result) {
+  EXPECT_TRUE(result.ok()) << result.error().message;
+  return *std::move(result);
+}
+
+std::vector<std::string> logged;
+void logWarning(const std::string& message) {
+  logged.push_back(message);
+}
+
+// [own-arrays]
+/// A vertex as this engine stores it: interleaved, with normals and weights in integers.
+struct Vertex {
+  float position[3];
+  std::int16_t normal[4];  ///< snorm16; the fourth is not used
+  std::uint8_t joints[4];
+  std::uint8_t weights[4];  ///< unorm8
+};
+
+/// A view copies nothing: `vertices` must stay as they are until `pack` returns.
+Result<PackedMesh> packMesh(std::string_view name, std::span<const Vertex> vertices,
+                            std::uint32_t jointCount) {
+  const Vertex* first = vertices.data();
+  const auto count = static_cast<std::uint32_t>(vertices.size());
+  InfluenceSet influences;
+  influences.joints = {first->joints, count, sizeof(Vertex), ComponentType::uint8, 4};
+  influences.weights = {first->weights, count, sizeof(Vertex), ComponentType::unorm8, 4};
+  MeshView mesh;
+  mesh.name = name;  // for messages
+  mesh.vertexCount = count;
+  mesh.positions = {first->position, count, sizeof(Vertex), ComponentType::float32, 3};
+  mesh.normals = {first->normal, count, sizeof(Vertex), ComponentType::snorm16, 3};
+  mesh.influenceSets = {&influences, 1};
+
+  if (validate(mesh, jointCount).packable()) return pack(mesh, jointCount);
+  // For example, an influence names a joint that does not exist: `repair` drops it.
+  Result<RepairedMesh> repaired = repair(mesh, jointCount);
+  if (!repaired) return repaired.error();
+  for (const MeshFinding& finding : repaired->report().findings) logWarning(finding.message);
+  return pack(repaired->view(), jointCount);
+}
+// [/own-arrays]
+
+/// Two joints; the second moves the second vertex alone, and half of the third.
+std::vector<Vertex> threeVertices() {
+  return {{{0, 0, 0}, {0, 0, 32767, 0}, {0, 0, 0, 0}, {255, 0, 0, 0}},
+          {{1, 0, 0}, {0, 0, 32767, 0}, {1, 0, 0, 0}, {255, 0, 0, 0}},
+          {{0, 1, 0}, {0, 0, 32767, 0}, {0, 1, 0, 0}, {128, 127, 0, 0}}};
+}
+
+TEST(DocumentedExampleTest, AMeshIsMadeOfTheEnginesArrays) {
+  logged.clear();
+  std::vector<Vertex> vertices = threeVertices();
+  const MeshInfo info = must(packMesh("triangle", vertices, 2)).info();
+  EXPECT_EQ(info.vertexCount, 3u);
+  EXPECT_EQ(info.requiredJoints, 2u);
+  EXPECT_EQ(info.maxInfluences, 2u);
+  EXPECT_TRUE(info.hasNormals);
+  EXPECT_TRUE(logged.empty());
+
+  vertices[2].joints[1] = 9;
+  const MeshInfo mended = must(packMesh("triangle", vertices, 2)).info();
+  EXPECT_EQ(mended.maxInfluences, 1u);
+  ASSERT_FALSE(logged.empty());
+  EXPECT_NE(logged[0].find("'triangle', vertex 2"), std::string::npos) << logged[0];
+}
+
+/// One thread for each job.
+struct ThreadPool {
+  std::vector<std::thread> threads;
+  template <typename Work>
+  void run(Work work) {
+    threads.emplace_back(work);
+  }
+  void wait() {
+    for (std::thread& thread : threads) thread.join();
+    threads.clear();
+  }
+};
+
+TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
+  const std::vector<Vertex> vertices = threeVertices();
+  std::vector<JointMatrix> jointMatrices(2);
+  jointMatrices[1].m[0][3] = 2;  // moved by 2 along x
+  ThreadPool threadPool;
+
+  // [cpu-load]
+  cpu::SkinningSystem scene = must(cpu::SkinningSystem::create());
+  InstanceDescription figure;
+  figure.mesh = must(scene.addMesh(must(packMesh("triangle", vertices, 2))));
+  figure.pose = must(scene.addPose(2));
+  figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
+  const InstanceHandle instance = must(scene.addInstance(figure));
+  // [/cpu-load]
+
+  // [cpu-frame]
+  scene.beginFrame();
+  std::ranges::copy(jointMatrices, must(scene.writePose(figure.pose)).begin());
+  for (const cpu::PlannedJob& job : must(scene.jobs())) threadPool.run([&] { cpu::skin(job); });
+  threadPool.wait();
+  const InstanceOutput output = must(scene.output(instance));
+  const std::byte* skinned = scene.outputBytes().data() + output.offset;
+  // [/cpu-frame]
+
+  std::array<float, 18> floats{};
+  ASSERT_EQ(output.size, sizeof(floats));
+  std::memcpy(floats.data(), skinned, sizeof(floats));
+  EXPECT_FLOAT_EQ(floats[0], 0);
+  EXPECT_FLOAT_EQ(floats[6], 3);
+  EXPECT_NEAR(floats[12], 2 * 127.0 / 255, 1e-6);
+  EXPECT_FLOAT_EQ(floats[5], 1);
+}
+
+/// As a vulkan::SkinningSystem, without Vulkan.
+struct DrawnScene {
+  cpu::SkinningSystem system;
+  VkBuffer buffer;
+
+  Result<InstanceOutput> output(InstanceHandle instance) const { return system.output(instance); }
+  VkBuffer outputBuffer() const { return buffer; }
+};
+
+TEST(DocumentedExampleTest, AnInstanceIsDrawn) {
+  int something = 0;
+  DrawnScene scene{must(cpu::SkinningSystem::create()), reinterpret_cast<VkBuffer>(&something)};
+  InstanceDescription figure;
+  figure.mesh = must(scene.system.addMesh(must(packMesh("triangle", threeVertices(), 2))));
+  figure.pose = must(scene.system.addPose(2));
+  figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
+  must(scene.system.addInstance(figure));
+  const InstanceHandle instance = must(scene.system.addInstance(figure));
+  scene.system.beginFrame();
+  must(scene.system.jobs());
+  const VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
+  const VkBuffer indices = VK_NULL_HANDLE;
+  const std::uint32_t indexCount = 3;
+
+  // [vertex-input]
+  const vulkan::VertexInput input = must(vulkan::vertexInput(figure.layout));
+  VkPipelineVertexInputStateCreateInfo state{};  // of the pipeline that draws
+  state.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO;
+  state.vertexBindingDescriptionCount = input.bindingCount;
+  state.pVertexBindingDescriptions = input.bindings.data();
+  state.vertexAttributeDescriptionCount = input.attributeCount;
+  state.pVertexAttributeDescriptions = input.attributes.data();
+  // [/vertex-input]
+  // [draw]
+  const InstanceOutput output = must(scene.output(instance));
+  const VkBuffer vertices = scene.outputBuffer();
+  const auto offsets = vulkan::vertexBufferOffsets(figure.layout, output);
+  vkCmdBindVertexBuffers(commandBuffer, 0, 1, &vertices, offsets.data());
+  vkCmdBindIndexBuffer(commandBuffer, indices, 0, VK_INDEX_TYPE_UINT32);
+  vkCmdDrawIndexed(commandBuffer, indexCount, 1, 0, 0, 0);
+  // [/draw]
+
+  EXPECT_EQ(state.vertexBindingDescriptionCount, 1u);
+  EXPECT_EQ(state.vertexAttributeDescriptionCount, 2u);
+  EXPECT_EQ(state.pVertexAttributeDescriptions[1].offset, 12u);
+  EXPECT_EQ(drawn.buffer, scene.buffer);
+  EXPECT_EQ(drawn.offset, output.offset);
+  EXPECT_EQ(drawn.indices, 3u);
+}
+
+}  // namespace
