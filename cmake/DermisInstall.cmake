@@ -1,5 +1,5 @@
 # cmake --install: the libraries that were built, their headers, the kernels' sources, the CMake package `dermis`, and files for
-# pkg-config. The build folder is a CMake package, too, for an engine that uses Dermis from there.
+# pkg-config; and the command. The build folder is a CMake package, too, for an engine that uses Dermis from there.
 #
 # Each library is a component of the package with an export file of its own, dermis_NAME_targets.cmake, so that a consumer
 # of dermis::core needs none of what the others are linked with.
@@ -60,15 +60,11 @@ foreach(sample IN ITEMS minimal allocator gpu_poses)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples/${sample} DESTINATION ${dermisDocDir}/samples COMPONENT dermis)
 endforeach()
 
-configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake
-  INSTALL_DESTINATION ${dermisPackageDir} PATH_VARS dermisShaderDir NO_CHECK_REQUIRED_COMPONENTS_MACRO)
-set(installedShaderDir ${dermisShaderDir})
-set(dermisShaderDir shaders/include)
-configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/dermisConfig.cmake INSTALL_PREFIX ${PROJECT_BINARY_DIR}
-  INSTALL_DESTINATION ${PROJECT_BINARY_DIR} PATH_VARS dermisShaderDir NO_CHECK_REQUIRED_COMPONENTS_MACRO)
-set(dermisShaderDir ${installedShaderDir})
+# As it is installed, and as it lies in the build folder.
+file(RELATIVE_PATH shaderDirFromPackage /${dermisPackageDir} /${dermisShaderDir})
+configure_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake @ONLY)
+set(shaderDirFromPackage shaders/include)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in ${PROJECT_BINARY_DIR}/dermisConfig.cmake @ONLY)
 # While the version is 0.x, a minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
   VERSION ${PROJECT_VERSION} COMPATIBILITY SameMinorVersion)
@@ -101,3 +97,17 @@ foreach(component IN LISTS dermisComponents)
 endforeach()
 string(STRIP "${required}" required)
 dermis_pkg_config(dermis "${required}" "")
+
+if(TARGET dermis_cli)
+  install(TARGETS dermis_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dermis_command)
+  if(BUILD_SHARED_LIBS AND NOT APPLE)
+    file(RELATIVE_PATH librariesFromCommand /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
+    set_target_properties(dermis_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${librariesFromCommand}")
+  endif()
+endif()
+
+find_program(DERMIS_DPKG_DEB dpkg-deb DOC "Makes Debian packages")
+mark_as_advanced(DERMIS_DPKG_DEB)
+if(PROJECT_IS_TOP_LEVEL AND DERMIS_DPKG_DEB AND NOT BUILD_SHARED_LIBS AND NOT CMAKE_CROSSCOMPILING)
+  include(DermisPackage)
+endif()

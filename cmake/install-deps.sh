@@ -14,7 +14,7 @@ glslang-dev glslang-tools spirv-tools
 libhwy-dev
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
-pkg-config libvulkan-volk-dev
+pkg-config libvulkan-volk-dev dpkg-dev
 libpng-dev libstb-dev fonts-dejavu-core
 libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
@@ -23,6 +23,7 @@ doxygen
 if [ "${1:-}" = nightly ]; then
   packages="$packages
 clang ffmpeg blender python3-numpy
+debootstrap lintian
 "
   command -v npm >/dev/null 2>&1 || packages="$packages nodejs npm" # from wherever they are
   # libFuzzer and the sanitizers of the release's Clang.

@@ -1,13 +1,17 @@
 # Dermis without CMake: the source package's files of core and vulkan, compiled one by one with the include folders that
-# engine/README.md names, and linked into a program.
+# docs/building.md names, and linked into a program.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(source "${testFolder}/source_package/dermis-${version}")
 set(work "${testFolder}/${NAME}")
 file(REMOVE_RECURSE "${work}")
 file(MAKE_DIRECTORY "${work}")
+file(STRINGS "${sourceFolder}/docs/building.md" row REGEX "^[|] a list of files [|]")
+string(REGEX REPLACE ".*include folders" "" row "${row}")
+string(REGEX MATCHALL "`[^`]+`" named "${row}")
 set(folders)
-foreach(folder IN ITEMS engine/include engine/src engine/src/core shaders shaders/embedded)
+foreach(folder IN LISTS named)
+  string(REPLACE "`" "" folder "${folder}")
   list(APPEND folders -I "${source}/${folder}")
 endforeach()
 file(GLOB_RECURSE sources "${source}/engine/src/core/*.cpp" "${source}/engine/src/vulkan/*.cpp")

@@ -8,7 +8,7 @@ say("Move it to ${prefix}")
 file(RENAME "${staging}" "${prefix}")
 
 say("Compare the list of files")
-set(expected)
+set(expected bin/dermis)
 set(components core cpu gltf shader_compiler verify vulkan)
 if(runtimeCompiler)
   list(APPEND components runtime_compiler)

@@ -1,0 +1,90 @@
+# Debian packages: `cmake --build BUILD --target package`, or cpack, or from the start `cmake --workflow --preset debian`.
+#
+#   libdermis-dev   the libraries, their headers, the CMake package, pkg-config's files, the shaders, the documents
+#   dermis          the command, if the samples are built
+#
+# The libraries are static, so the package serves the release of Debian that it was built on. -DCPACK_PACKAGE_CONTACT names another
+# maintainer.
+
+set(notes ${PROJECT_BINARY_DIR}/install/debian)
+
+# copyright: LICENSE, in the format that Debian's tools read.
+file(READ ${PROJECT_SOURCE_DIR}/LICENSE license)
+string(REGEX MATCH "Copyright [(]c[)] ([^\n]*)\n+(.*)" ignored "${license}")
+set(holders "${CMAKE_MATCH_1}")
+string(STRIP "${CMAKE_MATCH_2}" license)
+string(REPLACE "\n\n" "\n.\n" license "${license}")
+string(REPLACE "\n" "\n " license "${license}")
+file(WRITE ${notes}/copyright "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
+Upstream-Name: ${PROJECT_NAME}
+
+Files: *
+Copyright: ${holders}
+License: Expat
+ ${license}
+")
+
+# changelog.Debian.gz: what the package is; what changed in Dermis is in CHANGELOG.md.
+if(NOT CPACK_PACKAGE_CONTACT)
+  set(CPACK_PACKAGE_CONTACT "The Dermis authors <dermis@packages.invalid>")
+endif()
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+file(WRITE ${notes}/changelog "dermis (${PROJECT_VERSION}-1) unstable; urgency=medium
+
+  * Built by CPack. What changed is in CHANGELOG.md.
+
+ -- ${CPACK_PACKAGE_CONTACT}  ${date}
+")
+execute_process(COMMAND gzip -9 -n -c changelog WORKING_DIRECTORY ${notes} OUTPUT_FILE ${notes}/changelog.Debian.gz
+                COMMAND_ERROR_IS_FATAL ANY)
+
+# dermis_debian_package(COMPONENT PACKAGE SECTION DESCRIPTION FIELD=VALUE...): its first line is the project's description.
+function(dermis_debian_package component package section description)
+  string(TOUPPER ${component} upper)
+  set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)
+  set(CPACK_COMPONENT_${upper}_DESCRIPTION "${description}" PARENT_SCOPE)
+  foreach(field IN LISTS ARGN)
+    string(REGEX MATCH "^([A-Z_]+)=(.*)$" ignored "${field}")
+    set(CPACK_DEBIAN_${upper}_${CMAKE_MATCH_1} "${CMAKE_MATCH_2}" PARENT_SCOPE)
+  endforeach()
+  install(FILES ${notes}/copyright ${notes}/changelog.Debian.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+          COMPONENT ${component} EXCLUDE_FROM_ALL)
+endfunction()
+
+set(CPACK_COMPONENTS_ALL)
+set(depends)
+set(suggests libglm-dev)  # dermis/glm.h
+if(vulkan IN_LIST dermisComponents)
+  list(APPEND depends libvulkan-dev)
+endif()
+if(cpu IN_LIST dermisComponents)
+  list(APPEND depends libhwy-dev)
+endif()
+if(shader_compiler IN_LIST dermisComponents)
+  list(APPEND suggests glslang-dev spirv-tools)
+endif()
+list(JOIN depends ", " depends)
+list(JOIN suggests ", " suggests)
+dermis_debian_package(dermis libdermis-dev libdevel "Dermis skins characters on the GPU that an engine lends it. This package
+has its static libraries, headers, shaders and documents."
+  PACKAGE_DEPENDS=${depends} PACKAGE_SUGGESTS=${suggests})
+if(TARGET dermis_cli)
+  dermis_debian_package(dermis_command dermis graphics "The command dermis skins and renders glTF models, compares skinning
+methods, and checks and times them on a Vulkan device."
+    PACKAGE_SHLIBDEPS=ON PACKAGE_DEPENDS=libvulkan1 "PACKAGE_RECOMMENDS=mesa-vulkan-drivers | vulkan-icd")
+endif()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+set(CPACK_PACKAGE_NAME dermis)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+# CPack would add a target package_source, which is not the source package.
+set(CPACK_SOURCE_OUTPUT_CONFIG_FILE ${PROJECT_BINARY_DIR}/install/CPackSourceConfig.cmake)
+include(CPack)

@@ -1,0 +1,38 @@
+# The Debian packages of this build: CPack makes them, they need what they should, and their files are a prefix that a program can be
+# built from. tests/nightly/debian.sh installs them in a clean system.
+include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
+
+set(work "${testFolder}/${NAME}.packages")
+file(REMOVE_RECURSE "${work}")
+file(MAKE_DIRECTORY "${work}")
+run(ignored "Make the packages" "${cpack}" --config "${buildFolder}/CPackConfig.cmake" -B "${work}")
+file(GLOB packages "${work}/*.deb")
+list(LENGTH packages count)
+if(NOT count EQUAL 2)
+  wrong("CPack made ${packages}")
+endif()
+
+# Unpacks PACKAGE and looks at its fields.
+function(unpack package)
+  file(GLOB file "${work}/${package}_${version}-1_*.deb")
+  run(ignored "Unpack ${package}" "${dpkgDeb}" -x "${file}" "${work}/root")
+  run(found "Look at its fields" "${dpkgDeb}" -f "${file}" Depends)
+  string(STRIP "${found}" found)
+  if(NOT found MATCHES "${ARGV1}")
+    wrong("${package} depends on '${found}'")
+  endif()
+  if(NOT EXISTS "${work}/root/usr/share/doc/${package}/copyright")
+    wrong("${package} has no copyright file")
+  endif()
+endfunction()
+unpack(libdermis-dev "^libvulkan-dev, libhwy-dev$")
+unpack(dermis "libvulkan1, libc6")
+run(printed "Run the command" "${work}/root/usr/bin/dermis" --version)
+if(NOT printed MATCHES "${version}")
+  wrong("it says '${printed}'")
+endif()
+
+set(prefix "${work}/root/usr")
+build_consumer("${prefix}/share/doc/dermis/samples/minimal" -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE)
+set(PROGRAM "${BUILD}/dermis_minimal")
+include(${CMAKE_CURRENT_LIST_DIR}/embed.cmake)
