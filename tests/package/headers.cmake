@@ -1,4 +1,4 @@
-# Dermis' headers before and after those of others. Programs are only compiled.
+# Dermis' headers before and after those of others, and whose headers they include. Programs are only compiled.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(core dermis/dermis.h dermis/cpu/skinning_system.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
@@ -38,3 +38,17 @@ compiles("Xlib last" "" ${core} ${vulkan} ${loaders} X11/Xlib.h)
 # After the standard library's, which do not bear them.
 compiles("macros of windows.h" "" algorithm array bit cmath cstddef cstdint filesystem functional limits memory optional span string
          string_view utility variant vector vulkan/vulkan.h windows_macros.h ${core} ${vulkan} ${loaders})
+
+# Only dermis/glm.h is for those who have GLM. What Dermis' sources include is not needed by those who use it.
+say("Look at what the public headers include")
+file(GLOB_RECURSE public RELATIVE "${prefix}/${includeFolder}" "${prefix}/${includeFolder}/dermis/*.h")
+list(REMOVE_ITEM public dermis/glm.h)
+set(text)
+foreach(header IN LISTS public)
+  string(APPEND text "#include <${header}>\n")
+endforeach()
+file(WRITE "${testFolder}/${NAME}.cpp" "${text}")
+run(files "List it" "${ownCompiler}" -std=c++20 -M -I "${prefix}/${includeFolder}" "${testFolder}/${NAME}.cpp")
+if(NOT files MATCHES "dermis/dermis[.]h" OR files MATCHES "/(glm|hwy|glslang|spirv-tools|nlohmann)/|tiny_gltf[.]h")
+  wrong("they include ${CMAKE_MATCH_0}:\n${files}")
+endif()

@@ -1,12 +1,19 @@
-# A program that is compiled with what pkg-config says, from the installed package.
+# A program that is compiled with what pkg-config says, from the installed package; and that pkg-config names all that each library
+# is linked with.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 build_with_pkg_config("${prefix}" "${testFolder}/${NAME}.program")
 run(printed "Run it" "${testFolder}/${NAME}.program")
 say("${printed}")
 foreach(name IN ITEMS core cpu verify vulkan gltf)
-  run(printed "Ask pkg-config for dermis_${name}" "${pkgConfig}" --cflags --libs dermis_${name})
-  say("${printed}")
+  run(flags "Ask pkg-config for dermis_${name}" "${pkgConfig}" --cflags --libs dermis_${name})
+  say("${flags}")
+  separate_arguments(flags UNIX_COMMAND "${flags}")
+  separate_arguments(own UNIX_COMMAND "${consumerFlags}")
+  # Whole, so that a symbol that nothing defines is an error.
+  run(ignored "Link the whole of it" "${ownCompiler}" -std=c++20 ${own} "${scriptFolder}/consumers/pkg_config/main.cpp"
+      -o "${testFolder}/${NAME}.whole" -Wl,--whole-archive ${flags} -Wl,--no-whole-archive)
+  run(ignored "Run it" "${testFolder}/${NAME}.whole")
 endforeach()
 run(folder "Ask pkg-config for the shaders" "${pkgConfig}" --variable=shaderdir dermis)
 string(STRIP "${folder}" folder)

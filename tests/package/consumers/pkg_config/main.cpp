@@ -1,0 +1,6 @@
+// A program with one library of Dermis, all of which is linked in.
+#include "dermis/version.h"
+
+int main() {
+  return dermis::libraryFitsHeaders() ? 0 : 1;
+}
