@@ -43,8 +43,8 @@ layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 
 // All attributes of a vertex, which stand one behind the other, by one store of RECORD bytes. Drivers that store lane by lane take
-// less time for it. Sizes are whole words, or 6 bytes and 2. They are constants: all of it is moves.
-void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
+// less time for it. `index` counts records. Sizes are whole words, or 6 bytes and 2. They are constants: all of it is moves.
+void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
   uint positions = formatBytes(POSITION_FORMAT);
   uint normals = formatBytes(NORMAL_FORMAT);
@@ -58,23 +58,23 @@ void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
   uvec4 high = uvec4(words[4], words[5], words[6], words[7]);
   switch (RECORD) {
     case 8u:
-      positionsVectors2[place / 8u] = low.xy;
+      positionsVectors2[index] = low.xy;
       break;
     case 12u:
-      positionsVectors3[place / 12u] = low.xyz;
+      positionsVectors3[index] = low.xyz;
       break;
     case 16u:
-      positionsVectors4[place / 16u] = low;
+      positionsVectors4[index] = low;
       break;
     case 24u:
-      records24[place / 24u] = u64vec3(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy));
+      records24[index] = u64vec3(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy));
       break;
     default:
-      records32[place / 32u] = u64vec4(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy), packUint2x32(high.zw));
+      records32[index] = u64vec4(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy), packUint2x32(high.zw));
   }
 }
 #else
-void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {}
+void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {}
 #endif
 
 #ifdef ONE_OUTPUT

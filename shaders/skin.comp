@@ -136,13 +136,18 @@ uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
 struct Instance {
   InstanceRecord record;
   uvec4 places;
+  uint recordIndex;  // of the first place, if vertices are stored as records of RECORD bytes
 };
+
+// Counted in records and not in bytes: lavapipe divides slowly.
+uint recordIndexOf(uint place) { return place / max(RECORD, 1u); }
 
 uvec4 placesOf(InstanceRecord r) { return uvec4(r.positions, r.normals, r.tangents, r.previousPositions); }
 
 Instance readInstance(uint word, uvec4 offsets) {
   InstanceRecord record = loadInstance(word);
-  return Instance(record, placesOf(record) + offsets);
+  uvec4 places = placesOf(record) + offsets;
+  return Instance(record, places, recordIndexOf(places.x));
 }
 
 // From one instance to the next where they are evenly spaced.
@@ -152,7 +157,7 @@ Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   step.joints = b.joints - a.joints;
   step.previousPalette = b.previousPalette - a.previousPalette;
   step.extension = b.extension - a.extension;
-  return Instance(step, placesOf(b) - placesOf(a));
+  return Instance(step, placesOf(b) - placesOf(a), recordIndexOf(b.positions) - recordIndexOf(a.positions));
 }
 
 void advance(inout Instance instance, Instance by) {
@@ -161,6 +166,7 @@ void advance(inout Instance instance, Instance by) {
   instance.record.previousPalette += by.record.previousPalette;
   instance.record.extension += by.record.extension;
   instance.places += by.places;
+  instance.recordIndex += by.recordIndex;
 }
 
 // What an invocation has read of its vertex, for all its instances.
@@ -217,7 +223,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
   uvec4 normal = NORMALS ? encodeNormal(NORMAL_FORMAT, skinned.normal) : uvec4(0u);
   uvec4 tangent = TANGENTS ? encodeTangent(TANGENT_FORMAT, skinned.tangent) : uvec4(0u);
   if (RECORD > RECORD_IN_PAIRS) {
-    storeRecord(instance.places.x, position, normal, tangent);
+    storeRecord(instance.recordIndex, position, normal, tangent);
   } else {
     if (RECORD == RECORD_IN_PAIRS) {
       storePositionAndNormal(instance.places.x, position.xyz, normal.xyz);
