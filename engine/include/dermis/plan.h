@@ -36,8 +36,8 @@ struct Promises {
 };
 
 /// The device limits and the promises that a plan is made for. `vulkan::Context::limits` returns
-/// them; an engine without a Context fills in the values of its device. The defaults are the
-/// minimum that Vulkan guarantees.
+/// them; an engine without a Context fills in the values of its device. The defaults are what
+/// Vulkan guarantees.
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes, a multiple of 4
   /// Bytes, a power of two. With `texelBuffers`, the larger of this and the alignment of uniform
@@ -101,9 +101,9 @@ struct PoseDescription {
   std::uint64_t matrixOffset = 0;  ///< bytes into the poses buffer, a multiple of 16
   /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
   /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
-  /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`.
-  /// `Method::linear` still applies scale and shear. Its normals and tangents are then right only
-  /// for scales between 2^-30 and 2^30.
+  /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`. But
+  /// `Method::linear` always applies them; if `mayScale` is false, its normals and tangents are
+  /// right only for scales between 2^-30 and 2^30.
   bool mayScale = true;
   /// Whether the engine's own shaders read the palette, by dermis_skin.glsl. If so, the pose is
   /// converted to dual quaternions even if no job uses it, and `Plan::paletteOffset` returns where
@@ -117,7 +117,7 @@ struct Job {
   MeshInfo mesh;                 ///< `PackedMesh::info`; its bytes are in the mesh buffer
   std::uint64_t meshOffset = 0;  ///< bytes, a multiple of `packedMeshAlignment`
   std::uint32_t pose = 0;        ///< index into `Batch::poses`
-  /// If `needsCentersOfRotation(method)`, the mesh must have centres of rotation.
+  /// If `needsCentersOfRotation(method)`, the mesh must have centers of rotation.
   Method method = Method::dualQuaternion;
 
   OutputAttribute positions;  ///< required; `isPositionFormat`

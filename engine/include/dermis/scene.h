@@ -130,10 +130,12 @@ struct InstanceDescription {
   /// interval are skinned in the same frames. Different poses are spread over the frames. A
   /// teleport, another mesh and coming back into view take effect at once.
   std::uint32_t updateInterval = 1;
-  /// The GPU decides in each frame whether the instance is skinned: it is if its word in the
-  /// visibility buffer is not 0. Its output must lie in one storage buffer range. An output of at
-  /// most 1/32 of such a range always does. If a larger one does not, because the output buffer is
-  /// larger than one range, `addInstance` and `change` fail with `limitExceeded`.
+  /// Whether the GPU decides in each frame if the instance is visible: it is if its word in the
+  /// visibility buffer is not 0. If it is not visible, it is neither skinned nor settled.
+  ///
+  /// The output of such an instance must lie in one storage buffer range. An output of at most 1/32
+  /// of a range always does. If a larger one does not, because the output buffer is larger than one
+  /// range, `addInstance` and `change` fail with `limitExceeded`.
   bool culledOnGpu = false;
 };
 
