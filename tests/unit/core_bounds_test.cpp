@@ -780,7 +780,7 @@ TEST(Bounds, WhatBreaksARuleIsRefused) {
   EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.pairs[0], b.pairs[1]); }));
   EXPECT_TRUE(refused([](JointBounds& b) { b.pairs[0].influences = 1; }));
   EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].extent.reach[0] = nan; }));
-  EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].leastSum = nan; }));
+  EXPECT_TRUE(refused([&](JointBounds& b) { b.pairs[0].minSum = nan; }));
   EXPECT_TRUE(refused([](JointBounds& b) { b.pairs[0].firstOverSecond[0] = -1; }));
   EXPECT_TRUE(refused([&](JointBounds& b) { b.trios.back()[2] = count; }));
   EXPECT_TRUE(refused([](JointBounds& b) { std::swap(b.trios[0][0], b.trios[0][1]); }));

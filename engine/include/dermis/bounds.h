@@ -54,12 +54,12 @@ struct JointBounds {
     /// influences of the vertex, w₁ and w₂ are the weights of the first and second joint.
     float firstOverSecond[2];
     float secondOverFirst[2];  ///< the same of b = w₂ / (w₁ (k − 1))
-    float leastSum;            ///< minimum of a + b
+    float minSum;              ///< minimum of a + b
   };
 
   static constexpr float infinity = std::numeric_limits<float>::infinity();
   /// Vertices with more influences than this add no trios.
-  static constexpr std::uint32_t mostInfluencesOfTrio = 8;
+  static constexpr std::uint32_t maxTrioInfluences = 8;
 
   std::vector<Joint> joints;  ///< by ascending index into the pose
   std::vector<Pair> pairs;    ///< by ascending `first`, then `second`

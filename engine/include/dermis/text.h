@@ -17,7 +17,7 @@ namespace dermis {
 DERMIS_CORE_API std::string oneLine(std::string_view text);
 
 /// The first characters of `oneLine(name)`, with "..." after them if there are more.
-DERMIS_CORE_API std::string shortName(std::string_view name, std::size_t mostCharacters = 80);
+DERMIS_CORE_API std::string shortName(std::string_view name, std::size_t maxCharacters = 80);
 
 /// `shortName` in single quotation marks.
 DERMIS_CORE_API std::string inQuotes(std::string_view name);

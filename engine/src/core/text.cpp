@@ -57,14 +57,14 @@ std::string oneLine(std::string_view text) {
   return shortName(text, std::numeric_limits<std::size_t>::max());
 }
 
-std::string shortName(std::string_view name, std::size_t mostCharacters) {
+std::string shortName(std::string_view name, std::size_t maxCharacters) {
   std::string line;
   std::size_t shown = 0;
   for (std::size_t place = 0; place < name.size();) {
     const Character character = characterAt(name, place);
     const std::string escape = escapeOf(character);
     shown += escape.empty() ? 1 : escape.size();
-    if (shown > mostCharacters) return line + "...";
+    if (shown > maxCharacters) return line + "...";
     line += escape.empty() ? name.substr(place, character.length) : std::string_view(escape);
     place += character.length;
   }

@@ -124,7 +124,7 @@ struct PairRange {
   Reach reach;
   double firstOverSecond[2] = {bounds::infinity, 0};
   double secondOverFirst[2] = {bounds::infinity, 0};
-  double leastSum = bounds::infinity;
+  double minSum = bounds::infinity;
 };
 
 /// What is stored may err by a few roundings: outward.
@@ -152,7 +152,7 @@ class Collector {
         addPair(influences[first], influences[second], influences.size(), reach);
       }
     }
-    if (influences.size() <= JointBounds::mostInfluencesOfTrio) addTrios(influences);
+    if (influences.size() <= JointBounds::maxTrioInfluences) addTrios(influences);
   }
 
   JointBounds take() const {
@@ -194,7 +194,7 @@ class Collector {
     pair.firstOverSecond[1] = std::max(pair.firstOverSecond[1], a);
     pair.secondOverFirst[0] = std::min(pair.secondOverFirst[0], b);
     pair.secondOverFirst[1] = std::max(pair.secondOverFirst[1], b);
-    pair.leastSum = std::min(pair.leastSum, a + b);
+    pair.minSum = std::min(pair.minSum, a + b);
   }
 
   void addTrios(const std::vector<Influence>& influences) {
@@ -216,7 +216,7 @@ class Collector {
             pair.reach.extent(),
             {below(pair.firstOverSecond[0]), above(pair.firstOverSecond[1])},
             {below(pair.secondOverFirst[0]), above(pair.secondOverFirst[1])},
-            below(pair.leastSum)};
+            below(pair.minSum)};
   }
 
   static_assert(maxPoseJoints <= 65536, "the keys below have 16 bits a joint");

@@ -271,7 +271,7 @@ class PoseBounds {
       splitIfTorn(joints_[a], joints_[b], joints_[c]);
     }
     for (const JointBounds::Pair& pair : bounds_.pairs) {
-      if (pair.influences <= JointBounds::mostInfluencesOfTrio) continue;
+      if (pair.influences <= JointBounds::maxTrioInfluences) continue;
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
       const double cosine = std::abs(math::dot(first.parts.real, second.parts.real));
       for (Posed* joint : {&first, &second}) {
@@ -350,7 +350,7 @@ class PoseBounds {
     const Affine difference = first.map - second.map;
     const double stretch = stretchBetween(first, second, pair.extent);
 
-    const double bulging = 1 / (static_cast<double>(pair.leastSum) + 2 * turn.cosine);
+    const double bulging = 1 / (static_cast<double>(pair.minSum) + 2 * turn.cosine);
     const Affine bulge = bulging * bounds::cross(difference, turn.axis);
     amplification_ = std::max(amplification_, 2 * bulging);
 

@@ -74,7 +74,7 @@ Result<void> checkPairs(const JointBounds& bounds) {
   for (const JointBounds::Pair& pair : bounds.pairs) {
     const std::uint64_t key = std::uint64_t{pair.first} << 32 | pair.second;
     const float ratios[] = {pair.firstOverSecond[0], pair.firstOverSecond[1],
-                            pair.secondOverFirst[0], pair.secondOverFirst[1], pair.leastSum};
+                            pair.secondOverFirst[0], pair.secondOverFirst[1], pair.minSum};
     if (pair.first >= pair.second || pair.second >= bounds.joints.size() || key < next ||
         pair.influences < 2 || hasNan(pair.extent.reach) || hasNan(ratios) ||
         std::ranges::any_of(ratios, [](float ratio) { return ratio < 0; }))
