@@ -169,10 +169,12 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
   instance.bounds = true;
   must(system.addInstance(instance));
-  expectRefused(system.addInstance(instance), "as many as there may be, 1");
+  expectRefused(system.addInstance(instance),
+                "1 instances have them already, which is the maximum");
   instance.bounds = false;
   must(system.addInstance(instance));
-  expectRefused(system.addInstance(instance), "as many instances as there may be, 2");
+  expectRefused(system.addInstance(instance),
+                "there are 2 instances already, which is the maximum");
   const MeshHandle none = {};
   EXPECT_FALSE(system.removeMesh(none).ok());
 }

@@ -163,7 +163,7 @@ TEST_F(RecordTest, WithFourStorageBuffersAllAttributesGoToOne) {
        {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
     BatchBuffers buffers = batch.buffers();
     const auto expectOtherRefused = [&] {
-      expectRefused(batch, buffers, ErrorCode::limitExceeded, "4 storage buffers a stage");
+      expectRefused(batch, buffers, ErrorCode::limitExceeded, "4 storage buffers per stage");
       buffers = batch.buffers();
     };
     (buffers.outputs.*member).buffer = bufferOf(BufferRole::results);

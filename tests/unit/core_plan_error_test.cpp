@@ -363,7 +363,7 @@ TEST_F(PlanErrors, EveryAttributeThatDoesNotFillWholeWordsNeedsThem) {
   }
 }
 
-// ---- Devices with four storage buffers a stage
+// ---- Devices with four storage buffers per stage
 
 TEST_F(PlanErrors, FewStorageBuffersMeanNoResults) {
   job().box = {{0, 0, 0}, {1, 1, 1}};

@@ -24,12 +24,12 @@ Result<void> checkLayout(const OutputAttribute& positions, VkFormat format,
   const std::uint32_t alignment = formatAlignment(positions.format);
   if (positions.stride % alignment != 0) {
     return invalid("the stride of " + std::to_string(positions.stride) +
-                   " bytes is no multiple of " + std::to_string(alignment) +
+                   " bytes is not a multiple of " + std::to_string(alignment) +
                    ", the size of a component of " + name);
   }
   if ((outputAddress + positions.offset) % alignment != 0) {
     return invalid("the address of the positions (offset " + std::to_string(positions.offset) +
-                   ") is no multiple of " + std::to_string(alignment) +
+                   ") is not a multiple of " + std::to_string(alignment) +
                    ", the size of a component of " + name);
   }
   return {};

@@ -19,7 +19,7 @@ Result<void> checkRange(const BufferRange& range, const char* name, const Device
   const std::string prefix = std::string("BatchBuffers::") + name;
   if (range.size == 0 || range.size == VK_WHOLE_SIZE || range.size % 4 != 0) {
     return Error{ErrorCode::invalidArgument,
-                 prefix + ": its size must be a number of bytes, a multiple of 4"};
+                 prefix + ": its size must be a multiple of 4 bytes, and not 0 or VK_WHOLE_SIZE"};
   }
   if (range.offset % limits.minStorageBufferOffsetAlignment != 0) {
     return Error{ErrorCode::invalidArgument,
@@ -273,7 +273,7 @@ Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers,
         return Error{ErrorCode::limitExceeded,
                      "BatchBuffers::outputs: on a device with " +
                          std::to_string(limits.maxStorageBuffersPerStage) +
-                         " storage buffers a stage all attributes go to one buffer"};
+                         " storage buffers per stage all attributes must go to one buffer"};
       }
     }
   }

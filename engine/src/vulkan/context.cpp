@@ -171,7 +171,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +
                      std::to_string(properties.limits.maxPerStageDescriptorStorageBuffers) +
-                     " storage buffers a stage, Dermis needs " +
+                     " storage buffers per stage, Dermis needs " +
                      std::to_string(abi::BINDING_COUNT_LEAST)};
   }
 

@@ -63,7 +63,7 @@ Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNum
     if (attribute.stride % formatAlignment(attribute.format) != 0) {
       return Error{ErrorCode::invalidArgument,
                    "the stride of " + std::to_string(attribute.stride) +
-                       " bytes is no multiple of " +
+                       " bytes is not a multiple of " +
                        std::to_string(formatAlignment(attribute.format)) +
                        ", the size of a component of " + name};
     }

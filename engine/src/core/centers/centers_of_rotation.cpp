@@ -177,9 +177,9 @@ Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
 
 Result<void> checkTriangles(const MeshView& mesh, std::span<const std::uint32_t> triangles) {
   if (triangles.size() % 3 != 0) {
-    return invalid(mesh, ErrorCode::invalidArgument,
-                   ": " + std::to_string(triangles.size()) +
-                       " vertex indices make no whole number of triangles");
+    return invalid(
+        mesh, ErrorCode::invalidArgument,
+        ": " + std::to_string(triangles.size()) + " vertex indices: not a multiple of 3");
   }
   if (triangles.size() / 3 > std::numeric_limits<std::uint32_t>::max()) {
     return invalid(
@@ -267,9 +267,9 @@ Result<void> CenterOfRotationSolver::solve(std::uint32_t firstVertex,
                                            std::span<float> centers) const {
   const std::size_t count = centers.size() / 3;
   if (centers.size() % 3 != 0) {
-    return Error{ErrorCode::invalidArgument, "centres have 3 floats each, of which " +
+    return Error{ErrorCode::invalidArgument, "centres have 3 floats each; " +
                                                  std::to_string(centers.size()) +
-                                                 " is no multiple"};
+                                                 " floats are not a multiple of that"};
   }
   if (firstVertex > vertexCount() || count > vertexCount() - firstVertex) {
     return Error{ErrorCode::invalidArgument,

@@ -40,9 +40,10 @@ Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index, con
                             const DeviceLimits& limits) {
   const std::uint8_t unit = storeUnit(streams[index]);
   if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
-    return Error{ErrorCode::missingFeature,
-                 placeOf(streams, index, subject) + " must be multiples of 4 on a device with " +
-                     std::to_string(limits.maxStorageBuffersPerStage) + " storage buffers a stage"};
+    return Error{ErrorCode::missingFeature, placeOf(streams, index, subject) +
+                                                " must be multiples of 4 on a device with " +
+                                                std::to_string(limits.maxStorageBuffersPerStage) +
+                                                " storage buffers per stage"};
   }
   if (unit == 2 && !limits.storage16Bit) {
     return Error{
@@ -87,7 +88,7 @@ Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStream
 Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStreams& streams,
                            const Subject& subject) {
   const auto name = [&] {
-    return subject.name() + ": its attributes stand one right behind the other, with a stride of " +
+    return subject.name() + ": its attributes are adjacent, with a stride of " +
            std::to_string(job.positions.stride);
   };
   if (!batch.outputs.isOneBuffer && standsTogether(streams))
@@ -256,7 +257,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
     return Error{ErrorCode::limitExceeded,
                  subject.name() + " wants bounds, or positions in snorm16: on a device with " +
                      std::to_string(limits.maxStorageBuffersPerStage) +
-                     " storage buffers a stage there are none"};
+                     " storage buffers per stage this is not possible"};
   }
   if (Result<void> good = checkTogether(batch, job, streams, subject); !good) return good;
   return checkStreams(batch, job, streams, subject, limits);
@@ -275,7 +276,7 @@ Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
                    subject.name() + ": its " + streamName(stream) +
                        " lie too far from the attribute before for a device " +
                        (hasFewBuffers ? "with " + std::to_string(limits.maxStorageBuffersPerStage) +
-                                            " storage buffers a stage"
+                                            " storage buffers per stage"
                                       : "that cannot bind another range of the output for each "
                                         "attribute (DeviceLimits::separateRanges)")};
     }

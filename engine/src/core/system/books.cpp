@@ -166,10 +166,10 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
           readBacks_, [&](const ReadBack& recorded) { return recorded.frame > completedFrame; })) {
     return Error{ErrorCode::invalidArgument,
                  "frame " + std::to_string(frame) + " begins while the GPU has completed frame " +
-                     std::to_string(completedFrame) + ": that makes more than the " +
+                     std::to_string(completedFrame) +
+                     ": more frames are in flight than framesInFlight, which is " +
                      std::to_string(description_.framesInFlight) +
-                     " frames in flight described; was one of them recorded and never submitted? "
-                     "Then abandonFrame must say so"};
+                     "; if one of them was recorded and not submitted, call abandonFrame"};
   }
   frame_ = frame;
   completed_ = completedFrame;
@@ -199,9 +199,7 @@ PosePlace SceneBooks::placeOf(const ScenePose& pose) {
 
 Result<void> SceneBooks::checkWrite(PoseHandle handle, PoseWriter writer) const {
   if (!hasBegun_) {
-    return invalid(
-        "a pose is written between beginFrame and record, so that it is known which memory the GPU "
-        "is done with");
+    return invalid("a pose can be written only between beginFrame and record");
   }
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);

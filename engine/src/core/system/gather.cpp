@@ -184,7 +184,7 @@ void SceneBooks::gatherResults() {
 
 Result<void> SceneBooks::plan(Plan& out) {
   if (!hasBegun_) {
-    return Error{ErrorCode::invalidArgument, "a frame is planned once after each beginFrame"};
+    return Error{ErrorCode::invalidArgument, "beginFrame must be called before each frame"};
   }
   ++planNumber_;
   isPlanned_ = false;
@@ -392,7 +392,8 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     needed = std::max(needed, copy.toOffset + copy.size);
   if (bytes.size() < needed) {
     return invalid("the read-back buffer of a frame has " + std::to_string(bytes.size()) +
-                   " bytes, fewer than the " + std::to_string(needed) + " that Plan::buffer said");
+                   " bytes, fewer than the " + std::to_string(needed) +
+                   " that Plan::buffer returned");
   }
   culling_ = {};
   culling_.frame = frame;

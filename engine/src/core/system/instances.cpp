@@ -48,13 +48,14 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   if (updateInterval == 0)
     return invalid("the instance's update interval is 1 or more frames, not 0");
   if (instance.layout.motion == Motion::reskinned)
-    return invalid("the instance's layout says Motion::reskinned, a scene has Motion::kept only");
+    return invalid(
+        "the instance's layout has Motion::reskinned; a scene supports Motion::kept only");
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
   if (!laidOut) return laidOut.error();
   const std::uint64_t most = description_.outputCapacity.maximum;
   if (laidOut->size > most) {
     return Error{ErrorCode::limitExceeded, "the instance takes " + std::to_string(laidOut->size) +
-                                               " bytes of output, at most there are " +
+                                               " bytes of output; the maximum is " +
                                                std::to_string(most)};
   }
   const PoseDescription own{pose->jointCount, 0, pose->mayScale};
@@ -71,8 +72,9 @@ Result<void> SceneBooks::takeResult(SceneInstance& instance) {
   if (!result) return result.error();
   if (!*result) {
     return Error{ErrorCode::limitExceeded,
-                 "the instance wants bounds, or positions in snorm16: as many as there may be, " +
-                     std::to_string(resultStore_.ranges.capacity()) + ", have them already"};
+                 "the instance wants bounds, or positions in snorm16: " +
+                     std::to_string(resultStore_.ranges.capacity()) +
+                     " instances have them already, which is the maximum"};
   }
   instance.extras.result = static_cast<std::uint32_t>((*result)->offset);
   return {};
@@ -206,8 +208,8 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   instance.bounds = description.bounds;
   if (Result<void> good = check(instance, description.updateInterval); !good) return good.error();
   if (!makeSlot()) {
-    return Error{ErrorCode::limitExceeded,
-                 "there are as many instances as there may be, " + std::to_string(slotCapacity_)};
+    return Error{ErrorCode::limitExceeded, "there are " + std::to_string(slotCapacity_) +
+                                               " instances already, which is the maximum"};
   }
   if (Result<void> good = reserveUnits(instance); !good) return good.error();
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);

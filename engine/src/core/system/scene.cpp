@@ -37,15 +37,15 @@ Result<void> checkDescription(const SceneDescription& description) {
       return invalid(std::string("the scene's ") + field.name + " is 0");
     if (capacity.maximum < capacity.initial) {
       return invalid(std::string("the scene's ") + field.name + " is " +
-                     std::to_string(capacity.initial) + " at first, more than its maximum, " +
+                     std::to_string(capacity.initial) + " initially, more than its maximum of " +
                      std::to_string(capacity.maximum));
     }
     if (capacity.initial <= field.most) continue;
-    return Error{ErrorCode::limitExceeded,
-                 std::string("the scene's ") + field.name + " of " +
-                     std::to_string(capacity.initial) +
-                     " makes a buffer larger than this device's storage buffer range of " +
-                     std::to_string(range) + " bytes; the most is " + std::to_string(field.most)};
+    return Error{
+        ErrorCode::limitExceeded,
+        std::string("the scene's ") + field.name + " of " + std::to_string(capacity.initial) +
+            " makes a buffer larger than this device's storage buffer range of " +
+            std::to_string(range) + " bytes; the maximum is " + std::to_string(field.most)};
   }
   if (description.outputOffset % outputRangeAlignment(description.limits) != 0 ||
       description.outputOffset > anySize / 2) {

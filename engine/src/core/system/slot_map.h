@@ -85,7 +85,7 @@ Error unknownHandle(const char* kind, Handle<Thing> handle) {
   return {ErrorCode::invalidArgument, "there is no " + std::string(kind) + " " +
                                           std::to_string(handle.index) + " of generation " +
                                           std::to_string(handle.generation) +
-                                          "; it was removed, or is another system's"};
+                                          "; it was removed, or belongs to another system"};
 }
 
 }  // namespace dermis

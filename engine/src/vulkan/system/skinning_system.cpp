@@ -26,12 +26,12 @@ Result<void> checkRange(const char* name, const BufferRange& range, std::uint64_
   }
   if (range.size < unit || range.size % 4 != 0) {
     return wrongField(std::string(name) + " has " + std::to_string(range.size) +
-                      " bytes, not a multiple of 4, at least " + std::to_string(unit));
+                      " bytes; it needs a multiple of 4, at least " + std::to_string(unit));
   }
   if (range.offset % alignment != 0) {
     return wrongField(std::string(name) + " begins at " + std::to_string(range.offset) +
                       " bytes, not at a multiple of " + std::to_string(alignment) +
-                      ", which SkinningSystem::requirement tells");
+                      " (SkinningSystem::requirement)");
   }
   return {};
 }
@@ -48,7 +48,7 @@ Result<void> checkRanges(const SkinningSystemDescription& description, const Dev
   }
   const MappedRange& poses = description.poses;
   if ((poses.range.buffer == VK_NULL_HANDLE) != (poses.mapped == nullptr))
-    return wrongField("poses has only one of a range and an address where it is mapped");
+    return wrongField("poses needs both a range and the address where it is mapped");
   return {};
 }
 
@@ -97,7 +97,7 @@ SkinningSystem::State::~State() {
 Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& description) {
   if (description.context == nullptr) return wrongField("context is null");
   if ((description.buffers.create == nullptr) != (description.buffers.destroy == nullptr))
-    return wrongField("buffers has one of its two functions only");
+    return wrongField("buffers needs both of its functions");
   ContextState& context = *description.context->state_;
   if (Result<void> good = checkRanges(description, context.limits); !good) return good.error();
   SceneDescription ofScene = sceneOf(description, context);
