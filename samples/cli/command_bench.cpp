@@ -126,24 +126,25 @@ ExitStatus bench(const BenchOptions& options) {
 Run addBench(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
-      "How many vertices a second a crowd is skinned at: by methods, formats and instances, "
-      "on a device and on the CPU, beside plain kernels");
+      "Measure how many vertices per second are skinned: by method, format and number of "
+      "instances, on a device and on the CPU, beside plain kernels");
   const auto options = std::make_shared<BenchOptions>();
   command->add_option(
       "MODEL", options->model,
-      "A .gltf or .glb file: all of its first skin [a figure of 10,000 vertices, 60 "
+      "A .gltf or .glb file, of which the first skin is used [a figure of 10,000 vertices, 60 "
       "joints and four influences everywhere]");
   command->add_option("--json", options->json, "Write the same numbers to a file");
-  command->add_option("-o,--output", options->output, "Draw them as bars: OUT.png");
+  command->add_option("-o,--output", options->output, "Draw the numbers as bars: OUT.png");
   command->add_option("--device", options->device,
                       "auto, cpu (the CPU alone), a number of 'dermis devices', or part of a name");
   command->add_option(
       "--instances", options->instances,
-      fmt::format("Of the crowd, each in a pose of its own [{}]", options->instances));
-  command->add_option("--rounds", options->rounds,
-                      fmt::format("In each of which every row is measured once; the best counts "
-                                  "[{}]",
-                                  options->rounds));
+      fmt::format("Number of instances, each with its own pose [{}]", options->instances));
+  command->add_option(
+      "--rounds", options->rounds,
+      fmt::format("Number of rounds; each measures every row once, and the best round counts "
+                  "[{}]",
+                  options->rounds));
   return [options] { return bench(*options); };
 }
 

@@ -237,26 +237,26 @@ ExitStatus compare(const CompareOptions& options) {
 Run addCompare(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "compare",
-      "What each method costs on the device, and what it does to a twist, a bend and a "
-      "model");
+      "Time each method on the device, and show what it does to a twist, a bend and a model");
   const auto options = std::make_shared<CompareOptions>();
-  command->add_option("MODEL", options->model,
-                      "A .gltf or .glb file [with -o: an arm that is built in]");
+  command->add_option("MODEL", options->model, "A .gltf or .glb file [with -o: a built-in arm]");
   CLI::Option* output = command->add_option(
       "-o,--output", options->output,
-      "Draw them side by side, with a twisted bar, a bent arm and a heat map of the difference: "
-      "OUT.png");
+      "Draw the methods side by side, with a twisted bar, a bent arm and a heat map of the "
+      "difference: OUT.png");
   command
-      ->add_option("--methods", options->methods,
-                   "The columns of the picture, with commas [those of the paper, and newer ones]")
+      ->add_option(
+          "--methods", options->methods,
+          "The columns of the picture, separated by commas [those of the paper, and newer ones]")
       ->delimiter(',')
       ->allow_extra_args(false)  // A model may follow.
       ->needs(output);
-  command->add_option("--width", options->width, fmt::format("Pixels [{}]", options->width))
+  command
+      ->add_option("--width", options->width, fmt::format("Width in pixels [{}]", options->width))
       ->needs(output);
   command->add_option("--animation", options->animation,
                       "A clip's number or name, or none for the rest pose [the first]");
-  command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");
+  command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   command->add_option("--device", options->device,
                       "auto, cpu (SIMD on one thread), reference (nothing is timed), a number of "
                       "'dermis devices', or part of a name");
@@ -264,7 +264,7 @@ Run addCompare(CLI::App& app) {
   command->add_option("--repetitions", options->repetitions,
                       fmt::format("Runs of each method [{}]", options->repetitions));
   command->add_option("--instances", options->instances,
-                      "How often a run skins the model [as often as makes some million vertices]");
+                      "Number of instances in a run [enough for some million vertices]");
   addShares(*command, options->shares);
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return compare(*options); };

@@ -109,10 +109,10 @@ ExitStatus info(const InfoOptions& options) {
 
 Run addInfo(CLI::App& app) {
   CLI::App* command =
-      app.add_subcommand("info", "Meshes, skins, influences, clips, and every problem found");
+      app.add_subcommand("info", "List meshes, skins, influences, clips and all problems");
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
-  command->add_flag("--json", options->json, "As JSON");
+  command->add_flag("--json", options->json, "Print JSON");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return info(*options); };
 }

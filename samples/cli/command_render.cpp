@@ -428,22 +428,21 @@ Run addRender(CLI::App& app) {
       "A clip's number or name, or none for the rest pose [the first; a crowd plays "
       "all of them]");
   command->add_option("--time", options->time, "Seconds into the clip [0]");
-  CLI::Option* frames = command->add_option("--frames", options->frames,
-                                            "Draw this many pictures, from --time on; the clip is "
-                                            "played again and again");
-  command->add_option("--fps", options->framesPerSecond, "Pictures a second [30]")->needs(frames);
+  CLI::Option* frames = command->add_option(
+      "--frames", options->frames, "Number of pictures, from --time on; the clip is repeated");
+  command->add_option("--fps", options->framesPerSecond, "Pictures per second [30]")->needs(frames);
   command->add_option("--instances", options->instances,
-                      "A crowd of so many, each ahead by some time of its own [1]");
+                      "Number of instances, each at a different time of the clip [1]");
   command->add_option("--method", options->method, methodNames("or") + " [dual_quaternion]");
   addShares(*command, options->shares);
-  command->add_option("--width", options->width, "Pixels [1280]");
-  command->add_option("--height", options->height, "Pixels [720]");
-  command->add_flag("--orthographic", options->isOrthographic, "Without perspective");
+  command->add_option("--width", options->width, "Width in pixels [1280]");
+  command->add_option("--height", options->height, "Height in pixels [720]");
+  command->add_flag("--orthographic", options->isOrthographic, "Draw without perspective");
   command->add_option(
       "--azimuth", options->azimuth,
-      "Degrees that the camera has gone around the model, from its front [30; a crowd: 20]");
+      "Angle of the camera around the model in degrees; 0 is the front [30; a crowd: 20]");
   command->add_option("--elevation", options->elevation,
-                      "Degrees that the camera stands above the ground [12; a crowd: 18]");
+                      "Angle of the camera above the ground in degrees [12; a crowd: 18]");
   command->add_option("--device", options->device,
                       "auto, a number of 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, strictHelp);

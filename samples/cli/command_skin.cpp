@@ -178,10 +178,10 @@ Run addSkin(CLI::App& app) {
       ->required();
   command->add_option("--animation", options->animation,
                       "A clip's number or name, or none for the rest pose [the first]");
-  command->add_option("--time", options->time, "Seconds into the clip, clamped to it [0]");
+  command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   CLI::Option* frames =
-      command->add_option("--frames", options->frames, "Write this many poses, from --time on");
-  command->add_option("--fps", options->framesPerSecond, "Poses a second [30]")->needs(frames);
+      command->add_option("--frames", options->frames, "Number of poses to write, from --time on");
+  command->add_option("--fps", options->framesPerSecond, "Poses per second [30]")->needs(frames);
   command->add_option("--method", options->method, methodNames("or") + " [dual_quaternion]");
   addShares(*command, options->shares);
   command->add_option(

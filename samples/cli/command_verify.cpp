@@ -208,19 +208,18 @@ ExitStatus verify(const VerifyOptions& options) {
 Run addVerify(CLI::App& app) {
   CLI::App* command = app.add_subcommand("verify",
                                          "Skin on the device with every method, format and way to "
-                                         "cut up the work, and compare with the reference");
+                                         "divide the work, and compare with the reference");
   const auto options = std::make_shared<VerifyOptions>();
-  command->add_option("MODEL", options->models,
-                      "A .gltf or .glb file, or several; none: random meshes");
+  command->add_option("MODEL", options->models, "One or more .gltf or .glb files [random meshes]");
   command->add_flag("--random", options->random,
-                    "Verify random meshes too: methods x inputs x outputs, by pairs");
+                    "Also verify random meshes: pairs of methods, inputs and outputs");
   command->add_option(
       "--device", options->device,
       "auto, cpu (SIMD on the CPU), a number of 'dermis devices', or part of a name");
-  command->add_option("--json", options->json, "Write every case with its errors");
-  command->add_option("--junit", options->junit, "Write the same as JUnit XML, for CI");
+  command->add_option("--json", options->json, "Write all cases with their errors as JSON");
+  command->add_option("--junit", options->junit, "Write all cases as JUnit XML, for CI");
   command->add_option("--threads", options->threads,
-                      "Verify in this many threads, each with a device of its own [all cores]");
+                      "Number of threads, each with its own device [all cores]");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return verify(*options); };
 }

@@ -13,13 +13,14 @@ void addShares(CLI::App& command, MethodShares& shares) {
   // An empty word would be taken for 0.
   command
       .add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
-                  fmt::format("blended: from 0, linear, to 1, dual quaternions [{}]",
+                  fmt::format("For blended: from 0 (linear) to 1 (dual quaternions) [{}]",
                               shares.dualQuaternionWeight))
       ->check(CLI::Number);
   command
-      .add_option("--bulge-strength", shares.bulgeStrength,
-                  fmt::format("bulge_controlled: from 0, as dual quaternions bulge, to 1 [{}]",
-                              shares.bulgeStrength))
+      .add_option(
+          "--bulge-strength", shares.bulgeStrength,
+          fmt::format("For bulge_controlled: from 0 (bulges like dual quaternions) to 1 [{}]",
+                      shares.bulgeStrength))
       ->check(CLI::Number);
 }
 

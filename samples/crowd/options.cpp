@@ -53,10 +53,11 @@ void addFilm(CLI::App& app, FilmRequest& film) {
       app.add_option("--film", film.output,
                      "Draw the crowd to a film, .mp4, .gif or .apng (with ffmpeg), to pictures, "
                      "frame%04d.png, or to one, .png");
-  app.add_option("--width", film.width, "Of the film, pixels [1280]")->needs(output);
-  app.add_option("--height", film.height, "Of the film, pixels [720]")->needs(output);
-  app.add_option("--fps", film.framesPerSecond, "Pictures a second [30]")->needs(output);
-  app.add_option("--time", film.start, "Seconds into the camera's flight, which takes 24 [0]")
+  app.add_option("--width", film.width, "Width of the film in pixels [1280]")->needs(output);
+  app.add_option("--height", film.height, "Height of the film in pixels [720]")->needs(output);
+  app.add_option("--fps", film.framesPerSecond, "Pictures per second [30]")->needs(output);
+  app.add_option("--time", film.start,
+                 "Start, in seconds of the camera flight, which takes 24 s [0]")
       ->needs(output);
 }
 
@@ -75,25 +76,26 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
   app.footer(samples::exitStatusHelp);
   bool skipsVerification = false;
   std::uint32_t outputMebibytes = 0;
-  app.add_option("--figures", options.figures, "How many there are [200]")
+  app.add_option("--figures", options.figures, "Number of figures [200]")
       ->check(CLI::Range(1u, mostFigures));
   const CLI::Option* frames =
-      app.add_option("--frames", options.frames, "How many are skinned [120; one picture: 1]")
+      app.add_option("--frames", options.frames, "Number of frames [120; for one picture 1]")
           ->check(CLI::Range(1u, mostFrames));
   app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
   app.add_option("--device", options.device,
                  "auto, cpu (without Vulkan), a number of 'dermis devices', or part of a name");
   const CLI::Option* inFlight = app.add_option("--frames-in-flight", options.crowd.framesInFlight,
-                                               "Frames that the CPU is ahead of the GPU [3]")
+                                               "Maximum frames in flight [3]")
                                     ->check(CLI::Range(1u, mostFramesInFlight));
   app.add_option("--output-budget", outputMebibytes,
-                 "MiB of skinned vertices; figures without room come later [enough for all]")
+                 "Memory for skinned vertices in MiB; figures without room are added later [enough "
+                 "for all]")
       ->check(CLI::Range(1u, mostMebibytes));
   app.add_option("--json", options.json, "Write the same numbers to a file");
   app.add_option("--check-every", options.checkInterval,
-                 "Compare every vertex in each frame of so many, and in the last [10]")
+                 "Compare all vertices of every N-th frame and of the last frame [10]")
       ->check(CLI::Range(1u, mostFrames));
-  app.add_flag("--no-verify", skipsVerification, "Do not read back: for times that count");
+  app.add_flag("--no-verify", skipsVerification, "Do not compare: use it for measurements");
   app.add_flag("--gpu-culling", options.crowd.culledOnGpu,
                "Let the GPU choose which instances are visible");
   addFilm(app, options.film);

@@ -49,15 +49,15 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
       app.add_option("MODEL", options.model, "A .gltf or .glb file [the sample figure]");
   CLI::Option* empty = app.add_flag("--empty", isEmpty, "Begin without a model")->excludes(model);
   app.add_option("--method", method, methodNames() + " [dual_quaternion]");
-  app.add_option("--compare", comparison, "Another method beside it");
+  app.add_option("--compare", comparison, "Show another method beside it");
   app.add_option("--animation", options.animation,
                  "A clip's number or name, or none for the rest pose [the first]")
       ->excludes(empty);
   app.add_option("--time", options.time, "Seconds into the clip [0]")->excludes(empty);
   app.add_flag("--paused", options.isPaused, "Begin with the clip stopped");
-  app.add_option("--width", options.width, "Of the window [1280]")
+  app.add_option("--width", options.width, "Width of the window [1280]")
       ->check(CLI::Range(64u, largestSide));
-  app.add_option("--height", options.height, "Of the window [800]")
+  app.add_option("--height", options.height, "Height of the window [800]")
       ->check(CLI::Range(64u, largestSide));
   app.add_option("--device", options.device,
                  "auto, a number of 'dermis devices', or part of a name");
@@ -69,10 +69,11 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
                  "The folder to keep compiled kernels in, for the next time")
       ->needs(shaders);
 #endif
-  app.add_option("--frames", options.frames, "End after so many frames");
-  app.add_option("--screenshot", options.screenshot, "Write the window's last picture: a .png");
+  app.add_option("--frames", options.frames, "End after this number of frames");
+  app.add_option("--screenshot", options.screenshot,
+                 "Write the last picture of the window to a .png file");
   app.add_flag("--validation", options.validates,
-               "Run with the Vulkan validation layer, and fail where it says anything");
+               "Run with the Vulkan validation layer, and fail if it reports anything");
   if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
   std::optional<Method> first;
   if (const auto status = readMethod("--method", method, first)) return status;
