@@ -38,13 +38,10 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #endif
 #include "stream.glsl"
 
-#ifdef WIDE
-layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
-layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
-
-// All attributes of a vertex, which stand one behind the other, by one store of RECORD bytes. Drivers that store lane by lane take
-// less time for it. `index` counts records. Sizes are whole words, or 6 bytes and 2. They are constants: all of it is moves.
-void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
+#if defined(WIDE) || defined(STAGED)
+// All attributes of a vertex, which stand one behind the other. Sizes are whole words, or 6 bytes and 2. They are constants: all of
+// it is moves.
+uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
   uint positions = formatBytes(POSITION_FORMAT);
   uint normals = formatBytes(NORMAL_FORMAT);
@@ -54,6 +51,20 @@ void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
     for (uint i = 0u; i < 4u; ++i) words[positions / 4u + i] = normal[i];
   }
   for (uint i = 0u; i < 4u; ++i) words[(positions + normals) / 4u + i] = tangent[i];
+  return words;
+}
+#endif
+
+#ifdef WIDE
+layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
+layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
+
+// `index` counts records: it is counted up from instance to instance, since lavapipe divides slowly.
+uint recordPlace(uint byte) { return byte / max(RECORD, 1u); }
+
+// By one store of RECORD bytes. Drivers that store lane by lane take less time for it.
+void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
+  uint words[12] = recordWords(position, normal, tangent);
   uvec4 low = uvec4(words[0], words[1], words[2], words[3]);
   uvec4 high = uvec4(words[4], words[5], words[6], words[7]);
   switch (RECORD) {
@@ -73,8 +84,49 @@ void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
       records32[index] = u64vec4(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy), packUint2x32(high.zw));
   }
 }
+#elif defined(STAGED)
+layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsUnits { uvec4 positionsUnits[]; };
+
+// A GPU stores memory by 32 or 64 bytes at a time: neighbours that store 4 bytes each of records of 24 would reach for all of them six
+// times. So the records of a workgroup are brought together first. There is room for them twice: those of the next instance may
+// come while these are being read, and one barrier for each is enough.
+const uint RECORD_WORDS = RECORD / 4u;
+const uint STAGED_WORDS = gl_WorkGroupSize.x * RECORD_WORDS + 3u;
+shared uint staged[STAGED_WORDS * 2u];
+uint stagedRecords;     // of this workgroup: at the end of a mesh fewer than invocations
+uint firstStaged = 0u;  // where the half begins that is filled next
+
+uint recordPlace(uint byte) { return byte; }
+
+void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
+  uint own = gl_LocalInvocationID.x;
+  uint begin = place / 4u - own * RECORD_WORDS;  // the word at which the workgroup's records begin
+  uint first = begin % 4u;                       // counted from the 16 bytes that it lies in
+  uint words[12] = recordWords(position, normal, tangent);
+  if (RECORD == 16u && first == 0u) {
+    if (own < stagedRecords) positionsUnits[place / 16u] = uvec4(words[0], words[1], words[2], words[3]);
+    return;
+  }
+  uint filled = firstStaged;
+  firstStaged = STAGED_WORDS - filled;
+  for (uint i = 0u; i < RECORD_WORDS; ++i) staged[filled + first + own * RECORD_WORDS + i] = words[i];
+  barrier();
+  uint end = first + stagedRecords * RECORD_WORDS;
+  for (uint word = own * 4u; word < end; word += gl_WorkGroupSize.x * 4u) {
+    uint from = filled + word;
+    uint to = begin - first + word;
+    if (word >= first && word + 4u <= end) {
+      positionsUnits[to / 4u] = uvec4(staged[from], staged[from + 1u], staged[from + 2u], staged[from + 3u]);
+    } else {
+      for (uint i = 0u; i < 4u; ++i) {
+        if (word + i >= first && word + i < end) positionsWords[to + i] = staged[from + i];
+      }
+    }
+  }
+}
 #else
-void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {}
+uint recordPlace(uint byte) { return 0u; }
+void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {}
 #endif
 
 #ifdef ONE_OUTPUT

@@ -13,6 +13,7 @@
 //   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
 //   PAIRS           positions and normals, float32x3 each, are stored together, 8 bytes at a time (needs 64-bit integers)
 //   WIDE            an attribute, or all of a vertex, by one store (needs scalar block layout and 64-bit integers)
+//   STAGED          all of a vertex by way of workgroup memory, from which neighbours store 16 bytes each, one behind the other
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #ifdef BYTES
@@ -53,7 +54,7 @@ layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
 layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 layout(constant_id = CONSTANT_FULL) const bool FULL = false;
-#if defined(PAIRS) || defined(WIDE)
+#if defined(PAIRS) || defined(WIDE) || defined(STAGED)
 layout(constant_id = CONSTANT_RECORD) const uint RECORD = RECORD_APART;
 #else
 const uint RECORD = RECORD_APART;
@@ -80,6 +81,9 @@ const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 #include "morph.glsl"
 #include "blend.glsl"
 #include "encode.glsl"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
 #include "output_access.glsl"
 #ifdef EXTRAS
 #include "results.glsl"
@@ -87,8 +91,6 @@ const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 void addToBounds(uint result, vec3 position) {}
 void countClamped(uint result) {}
 #endif
-
-layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
 layout(push_constant) uniform Push { SkinPush push; };
 
@@ -136,18 +138,15 @@ uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
 struct Instance {
   InstanceRecord record;
   uvec4 places;
-  uint recordIndex;  // of the first place, if vertices are stored as records of RECORD bytes
+  uint recordPlace;  // of storeRecord
 };
-
-// Counted in records and not in bytes: lavapipe divides slowly.
-uint recordIndexOf(uint place) { return place / max(RECORD, 1u); }
 
 uvec4 placesOf(InstanceRecord r) { return uvec4(r.positions, r.normals, r.tangents, r.previousPositions); }
 
 Instance readInstance(uint word, uvec4 offsets) {
   InstanceRecord record = loadInstance(word);
   uvec4 places = placesOf(record) + offsets;
-  return Instance(record, places, recordIndexOf(places.x));
+  return Instance(record, places, recordPlace(places.x));
 }
 
 // From one instance to the next where they are evenly spaced.
@@ -157,7 +156,7 @@ Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   step.joints = b.joints - a.joints;
   step.previousPalette = b.previousPalette - a.previousPalette;
   step.extension = b.extension - a.extension;
-  return Instance(step, placesOf(b) - placesOf(a), recordIndexOf(b.positions) - recordIndexOf(a.positions));
+  return Instance(step, placesOf(b) - placesOf(a), recordPlace(b.positions) - recordPlace(a.positions));
 }
 
 void advance(inout Instance instance, Instance by) {
@@ -166,7 +165,7 @@ void advance(inout Instance instance, Instance by) {
   instance.record.previousPalette += by.record.previousPalette;
   instance.record.extension += by.record.extension;
   instance.places += by.places;
-  instance.recordIndex += by.recordIndex;
+  instance.recordPlace += by.recordPlace;
 }
 
 // What an invocation has read of its vertex, for all its instances.
@@ -223,7 +222,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
   uvec4 normal = NORMALS ? encodeNormal(NORMAL_FORMAT, skinned.normal) : uvec4(0u);
   uvec4 tangent = TANGENTS ? encodeTangent(TANGENT_FORMAT, skinned.tangent) : uvec4(0u);
   if (RECORD > RECORD_IN_PAIRS) {
-    storeRecord(instance.recordIndex, position, normal, tangent);
+    storeRecord(instance.recordPlace, position, normal, tangent);
   } else {
     if (RECORD == RECORD_IN_PAIRS) {
       storePositionAndNormal(instance.places.x, position.xyz, normal.xyz);
@@ -282,7 +281,13 @@ void main() {
   // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
+#ifdef STAGED
+  // All invocations come to each barrier. Those without a vertex skin the last one again; nobody stores what they stage.
+  stagedRecords = min(group.vertexEnd - (vertex - gl_LocalInvocationID.x), gl_WorkGroupSize.x);
+  vertex = min(vertex, group.vertexEnd - 1u);
+#else
   if (vertex >= group.vertexEnd) return;
+#endif
   // Shares of equal size but for the last: of workgroups that take as long as each other, no thread gets the short ones.
   uint share = INSTANCES;
   if (INSTANCES > 1u) {

@@ -37,6 +37,16 @@ TEST_F(ProductTest, WithoutStoresOfLessThanAWord) {
   verify(*words, 4);
 }
 
+// As on discrete GPUs, of which vertices of every day go through workgroup memory.
+TEST_F(ProductTest, WithStagedStores) {
+  vulkan::DeviceDescription description = device().description();
+  description.texelBuffers = false;
+  description.stagedStores = true;
+  Result<vulkan::Context> staged = vulkan::Context::create(description);
+  ASSERT_TRUE(staged.ok()) << staged.error().message;
+  verify(*staged, 4);
+}
+
 TEST_F(ProductTest, WithTheFourStorageBuffersThatEveryDeviceHas) {
   InterceptedDevice few(device().description());
   few.changeLimits(

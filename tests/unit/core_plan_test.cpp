@@ -140,14 +140,13 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
   using Bytes = std::initializer_list<std::uint8_t>;
   using Shorts = std::initializer_list<std::uint16_t>;
   const auto addForms = [&] {
-    for (const bool wide : {false, true}) {
-      for (const bool full : {false, true}) {
-        for (const std::uint8_t bytes : Bytes{0, 8, 12, 16, 24, 32}) {
-          variant.wideStores = wide;
-          variant.fullInfluences = full;
-          variant.recordBytes = bytes;
-          keys.add(variant);
-        }
+    for (int flags = 0; flags < 8; ++flags) {
+      for (const std::uint8_t bytes : Bytes{0, 8, 12, 16, 24, 32}) {
+        variant.wideStores = flags % 2 != 0;
+        variant.staged = flags / 2 % 2 != 0;
+        variant.fullInfluences = flags / 4 != 0;
+        variant.recordBytes = bytes;
+        keys.add(variant);
       }
     }
   };

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "abi.h"
@@ -105,6 +106,42 @@ TEST(KernelTest, RecordsAreReadBeforeOthersOverwriteThem) {
     EXPECT_EQ(storesBefore, 0u);
     EXPECT_GT(storesBehind, 0u);
     EXPECT_GT(barriers, 1u);
+  }
+}
+
+/// All modules, by the names that shaders/CMakeLists.txt gives them.
+std::vector<std::string> moduleNames() {
+  std::vector<std::string> names{"palette",    "palette_matrices", "palette_logarithms",
+                                 "clear",      "visibility",       "visibility_one_output",
+                                 "skin_staged"};
+  for (const std::string family : {"skin", "skin_bulge", "skin_comparison"}) {
+    for (const std::string form :
+         {"", "_one_output", "_texels", "_texels_pairs", "_texels_wide", "_halves", "_bytes",
+          "_extras", "_extras_texels", "_extras_texels_wide", "_extras_halves", "_extras_bytes"})
+      names.push_back(family + form);
+  }
+  return names;
+}
+
+// What a device must have: a workgroup of any subgroup size, which may flush denormals. A kernel
+// that asked for more would not be portable, or slow where a driver has to pretend.
+TEST(KernelTest, AsksForNoSubgroupsAndNoFloatControls) {
+  constexpr std::uint32_t opCapability = 17, opExecutionMode = 16;
+  // Matrix, Shader, Int64, SampledBuffer, and storage of 16 and of 8 bits.
+  const std::set<std::uint32_t> allowed{0, 1, 11, 46, 4433, 4448};
+  constexpr std::uint32_t localSize = 17;
+  for (const std::string& name : moduleNames()) {
+    SCOPED_TRACE(name);
+    const std::span<const std::uint32_t> module = kernels::find(name);
+    ASSERT_FALSE(module.empty());
+    for (const auto& [opcode, operands] : instructionsOf(module)) {
+      if (opcode == opCapability) {
+        EXPECT_TRUE(allowed.contains(operands[0])) << operands[0];
+      }
+      if (opcode == opExecutionMode) {
+        EXPECT_EQ(operands[1], localSize);
+      }
+    }
   }
 }
 

@@ -73,6 +73,12 @@ struct DeviceLimits {
   /// store an attribute, or all of a vertex, at once, which is faster on lavapipe. Used with
   /// `texelBuffers` and `shaderInt64` only.
   bool scalarBlockLayout = false;
+  /// Whether kernels store interleaved vertices by way of workgroup memory, so that neighbouring
+  /// invocations store 16 bytes each, one behind the other. Used where positions, normals and
+  /// tangents stand one right behind the other without gaps, have 8, 12, 16, 24 or 32 bytes
+  /// together, and there are no previous positions or results; by `linear` and `dualQuaternion`;
+  /// and only without `texelBuffers`. Needs no feature of the device.
+  bool stagedStores = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
   Promises promises;  ///< what the engine promises
@@ -237,9 +243,11 @@ struct Variant {
   /// only if `wideStores` is set, too.
   bool pairs = false;
   /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
-  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `texels` and
+  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged`, or with `texels` and
   /// `DeviceLimits::scalarBlockLayout`.
   std::uint8_t recordBytes = 0;
+  /// Vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
+  bool staged = false;
   /// The kernel is of the module that can store more than 4 bytes at a time.
   bool wideStores = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.

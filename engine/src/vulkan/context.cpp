@@ -7,6 +7,7 @@
 #include "abi.h"
 #include "dermis_kernels.h"
 #include "plan/check.h"
+#include "vulkan/defaults.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {
@@ -68,6 +69,21 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
         break;
     }
   }
+}
+
+/// Reads through texel buffers where they can hold all that a storage buffer range must at least
+/// be able to. Ranges are no larger than they are then: NVIDIA has texel buffers of 512 MiB and
+/// ranges of 4 GiB.
+void chooseTexelBuffers(const VkPhysicalDeviceLimits& device, DeviceLimits& limits) {
+  const std::uint64_t most = std::uint64_t{device.maxTexelBufferElements} * 4;
+  if (limits.maxStorageBuffersPerStage < storageBuffersWanted ||
+      most < DeviceLimits().maxStorageBufferRange)
+    return;
+  limits.texelBuffers = true;
+  limits.maxStorageBufferRange = std::min(limits.maxStorageBufferRange, most);
+  limits.minStorageBufferOffsetAlignment =
+      std::max(limits.minStorageBufferOffsetAlignment,
+               static_cast<std::uint32_t>(device.minTexelBufferOffsetAlignment));
 }
 
 }  // namespace
@@ -150,23 +166,12 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
   state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
   state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
-  // A CPU has few invocations at a time: what counts is how seldom a vertex is read.
-  const bool isCpu = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  if (isCpu) {
-    state.tuning.instancesPerInvocation = 24;
-  } else {
-    state.tuning.minWorkgroups = 2048;  // a guess: a large GPU runs about as many at a time
-  }
+  const DeviceDefaults defaults = defaultsOf(properties.deviceType);
+  state.tuning = defaults.tuning;
   state.limits.promises = description.promises;
-  state.limits.texelBuffers =
-      description.texelBuffers.value_or(isCpu) &&
-      state.limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
-      state.limits.maxStorageBufferRange / 4 <= properties.limits.maxTexelBufferElements;
-  if (state.limits.texelBuffers) {
-    state.limits.minStorageBufferOffsetAlignment =
-        std::max(state.limits.minStorageBufferOffsetAlignment,
-                 static_cast<std::uint32_t>(properties.limits.minTexelBufferOffsetAlignment));
-  }
+  state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
+  if (description.texelBuffers.value_or(defaults.texelBuffers))
+    chooseTexelBuffers(properties.limits, state.limits);
   if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +

@@ -93,6 +93,7 @@ std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
   if (isAgainstBulge(variant.method)) name += "_bulge";
   if (oneOutput) return name + "_one_output";
   if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
+  if (variant.staged) return name + "_staged";
   if (variant.texels)
     return name + (variant.wideStores ? "_texels_wide"
                    : variant.pairs    ? "_texels_pairs"

@@ -43,7 +43,8 @@ std::string describe(const Variant& variant) {
   if (variant.morphs) text += ", morph targets";
   if (variant.bounds) text += ", bounds";
   if (variant.recordBytes != 0)
-    text += ", " + std::to_string(variant.recordBytes) + " bytes a store";
+    text += ", " + std::to_string(variant.recordBytes) +
+            (variant.staged ? " bytes by way of workgroup memory" : " bytes a store");
   if (variant.pairs) text += ", 8 bytes a store";
   text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
           (variant.influences == 0 ? std::string("any number of")

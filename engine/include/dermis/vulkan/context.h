@@ -46,9 +46,14 @@ struct DeviceDescription {
   const void* enabledFeatures = nullptr;
   /// Whether kernels read tables, meshes and palettes through uniform texel buffers, if the device
   /// supports it (`DeviceLimits::texelBuffers`). `Plan::buffer` then returns
-  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers. Results are the same to the bit.
-  /// If not set: true for CPU devices (measured on lavapipe), false for others (a guess).
+  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers, and `maxStorageBufferRange` of
+  /// `Context::limits` is at most what such a buffer can hold. Results are the same to the bit. If
+  /// not set: true for CPU devices (measured on lavapipe), false for others (a guess).
   std::optional<bool> texelBuffers;
+  /// Whether kernels may store interleaved vertices by way of workgroup memory
+  /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete
+  /// GPUs (a guess), false for others.
+  std::optional<bool> stagedStores;
   /// What the engine promises about its meshes and poses. Promises reduce the number of pipelines.
   Promises promises;
   /// Optional. Supplies the kernels instead of the library. Its `user` must outlive the Context.
@@ -87,7 +92,8 @@ class DERMIS_VULKAN_API Context {
   /// The limits for `makePlan`.
   const DeviceLimits& limits() const;
 
-  /// The recommended tuning for this device, for `makePlan`. The values for GPUs are guesses.
+  /// The recommended tuning for this class of device, for `makePlan`. The values for CPU devices
+  /// were measured on lavapipe; those for GPUs are guesses.
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with this method and layout can need, with any mesh, pose

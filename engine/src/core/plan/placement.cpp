@@ -1,6 +1,7 @@
 #include "plan/placement.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <span>
 
@@ -123,8 +124,19 @@ Variant withWideStores(const Job& job, const Variant& variant) {
   return storesWholeWords(wide) ? wide : variant;
 }
 
+/// Whether vertices can go through workgroup memory: without gaps, and in a kernel for every day.
+bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimits& limits) {
+  return limits.stagedStores && !limits.texelBuffers &&
+         limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
+         (job.method == Method::linear || job.method == Method::dualQuaternion) &&
+         job.motion == Motion::none && !hasResult(job) && isRecord(job) &&
+         job.positions.stride == recordSize(job) && job.positions.offset % 4 == 0 &&
+         (recordSize(job) == streams[0].size || standsTogether(streams));
+}
+
 /// Whether each attribute begins at a multiple of what one store writes.
 bool isAligned(const OutputStreams& streams, const Variant& variant) {
+  if (variant.staged) return true;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (variant.units[stream] > 4 && streams[stream].offset % variant.units[stream] != 0)
       return false;
@@ -138,6 +150,12 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
   Variant variant = outputVariant(job);
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
+  if (canBeStaged(job, outputStreams(job), limits)) {
+    variant.staged = true;
+    variant.recordBytes = static_cast<std::uint8_t>(recordSize(job));
+    variant.units.fill(4);
+    return variant;
+  }
   if (storesWidely(limits)) {
     if (areAligned) variant = withWideStores(job, variant);
     variant.wideStores = storesWholeWords(variant);
@@ -265,10 +283,11 @@ std::uint64_t Variant::key() const {
   add(pairs, 1);
   add(wideStores, 1);
   add(recordBytes / 4, 4);
+  add(staged, 1);
   add(influences, 3);
   add(fullInfluences, 1);
   add(instancesPerInvocation, 6);
-  add(workgroupSize, 8);
+  add(std::countr_zero(workgroupSize), 3);
   return key;
 }
 

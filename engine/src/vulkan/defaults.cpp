@@ -1,0 +1,31 @@
+#include "vulkan/defaults.h"
+
+namespace dermis::vulkan {
+
+// Each case says where it was measured, or that it is a guess; docs/gpus.md has the reasons.
+DeviceDefaults defaultsOf(VkPhysicalDeviceType type) {
+  DeviceDefaults defaults;
+  Tuning& tuning = defaults.tuning;
+  tuning.workgroupSize = 64;
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:  // measured on lavapipe (docs/performance.md)
+      defaults.texelBuffers = true;
+      tuning.instancesPerInvocation = 24;
+      break;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:  // a guess
+      defaults.stagedStores = true;
+      tuning.instancesPerInvocation = 4;
+      tuning.minWorkgroups = 2048;
+      break;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:  // a guess
+      tuning.instancesPerInvocation = 4;
+      tuning.minWorkgroups = 256;
+      break;
+    default:  // a guess
+      tuning.instancesPerInvocation = 4;
+      tuning.minWorkgroups = 2048;
+  }
+  return defaults;
+}
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,112 @@
+// Which vertices go through workgroup memory (`DeviceLimits::stagedStores`).
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core_plan_simulation.h"
+#include "dermis/plan.h"
+
+namespace dermis::test {
+namespace {
+
+DeviceLimits stagingLimits() {
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.storage16Bit = limits.storage8Bit = true;
+  limits.stagedStores = true;
+  return limits;
+}
+
+/// The skin kernel of one job: positions and normals, float32x3, but for what `change` changes.
+template <typename Change>
+Variant variantOf(Change change) {
+  OwnedBatch batch;
+  batch.addMesh(meshOf(100, 4, 4, MeshParts{true, true, 0}));
+  batch.addPose(4, false);
+  batch.addJob(0, 0, Method::dualQuaternion, true);
+  batch.outputSize = 1 << 20;
+  DeviceLimits limits = stagingLimits();
+  change(batch.jobs[0], limits);
+  Plan plan;
+  const Result<void> planned = makePlan(batch.batch(), limits, {}, plan);
+  EXPECT_TRUE(planned.ok()) << (planned ? "" : planned.error().message);
+  return planned ? plan.variants().back() : Variant{};
+}
+
+TEST(PlanStaged, EverydayVerticesWithoutGapsAreStaged) {
+  const Variant usual = variantOf([](Job&, DeviceLimits&) {});
+  EXPECT_TRUE(usual.staged);
+  EXPECT_EQ(usual.recordBytes, 24);
+  EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) { job.method = Method::linear; }).staged);
+  EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) {
+                job.positions.offset += 8;
+                job.normals.offset += 8;
+              }).staged);
+  const Variant alone = variantOf([](Job& job, DeviceLimits&) {
+    job.positions.stride = 12;
+    job.normals = {};
+  });
+  EXPECT_TRUE(alone.staged && alone.recordBytes == 12);
+  const Variant halves = variantOf([](Job& job, DeviceLimits&) {
+    job.positions = {job.positions.offset, 8, VertexFormat::float16x3};
+    job.normals = {job.positions.offset + 6, 8, VertexFormat::octahedral8x2};
+  });
+  EXPECT_TRUE(halves.staged && halves.recordBytes == 8);
+  EXPECT_EQ(halves.units, (std::array<std::uint8_t, streamCount>{4, 4, 4, 4}));
+}
+
+TEST(PlanStaged, OthersAreNot) {
+  using Limits = DeviceLimits;
+  const auto isStaged = [](auto change) { return variantOf(change).staged; };
+  EXPECT_FALSE(isStaged([](Job&, Limits& limits) { limits.stagedStores = false; }));
+  EXPECT_FALSE(isStaged([](Job&, Limits& limits) { limits.texelBuffers = true; }));
+  EXPECT_FALSE(isStaged([](Job&, Limits& limits) { limits.maxStorageBuffersPerStage = 4; }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.method = Method::blended; }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.method = Method::logMatrix; }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.bounds = true; }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {
+    job.motion = Motion::kept;
+    job.previousPositions = {1 << 19, 12, VertexFormat::none};
+  }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // a gap
+    job.positions.stride = job.normals.stride = 28;
+  }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // planar
+    job.positions.stride = job.normals.stride = 12;
+    job.normals.offset = 1 << 19;
+  }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // 20 bytes
+    job.positions.stride = job.normals.stride = 20;
+    job.normals.format = VertexFormat::float16x4;
+  }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // not at a word
+    job.positions = {job.positions.offset + 2, 8, VertexFormat::float16x3};
+    job.normals = {job.positions.offset + 6, 8, VertexFormat::octahedral8x2};
+  }));
+}
+
+// As many pipelines as without: a job at any offset of whole words uses one of them.
+TEST(PlanStaged, NeedNoFurtherPipelines) {
+  DeviceLimits limits = stagingLimits();
+  const auto count = [&limits] {
+    return everyVariant(PipelineNeeds{.layout = {.normals = VertexFormat::float32x3}}, limits, {})
+        ->size();
+  };
+  const std::size_t staged = count();
+  limits.stagedStores = false;
+  EXPECT_EQ(count(), staged);
+
+  Job job;
+  job.positions = {0, 24, VertexFormat::float32x3};
+  job.normals = {12, 24, VertexFormat::float32x3};
+  const std::vector<Variant> all = everyVariant(job, stagingLimits(), {});
+  for (std::uint64_t moved = 0; moved < 96; moved += 4) {
+    job.positions.offset = moved;
+    job.normals.offset = moved + 12;
+    EXPECT_EQ(everyVariant(job, stagingLimits(), {}), all) << moved;
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test
