@@ -106,14 +106,18 @@ Result<void> PlainBatches::make(const Crowd& crowd) {
 Result<void> PlainBatches::makeBuffers(const Crowd& crowd) {
   const std::uint64_t joints = std::uint64_t{crowd.instanceCount()} * crowd.jointCount();
   const std::uint64_t vertices = crowd.vertices.size();
-  for (const auto& [buffer, size] : {std::pair{&vertices_, vertices * sizeof(PlainVertex)},
-                                     {&matrices_, joints * sizeof(JointMatrix)},
-                                     {&palettes_, joints * 32},
-                                     {&output_, crowd.instanceCount() * vertices * outputStride}}) {
-    Result<MappedBuffer> made =
-        MappedBuffer::create(device_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+  const auto make = [this](auto& buffer, std::uint64_t size) -> Result<void> {
+    using Buffer = std::remove_reference_t<decltype(buffer)>;
+    Result<Buffer> made = Buffer::create(device_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
     if (!made) return made.error();
-    *buffer = std::move(*made);
+    buffer = std::move(*made);
+    return {};
+  };
+  for (const Result<void>& made :
+       {make(vertices_, vertices * sizeof(PlainVertex)),
+        make(matrices_, joints * sizeof(JointMatrix)), make(palettes_, joints * 32),
+        make(output_, crowd.instanceCount() * vertices * outputStride)}) {
+    if (!made) return made;
   }
   std::memcpy(vertices_.bytes().data(), crowd.vertices.data(), vertices * sizeof(PlainVertex));
   std::byte* place = matrices_.bytes().data();
@@ -246,13 +250,14 @@ Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel
                                           VkCommandBuffer commandBuffer) {
   const std::uint64_t instanceSize = std::uint64_t{crowd.vertexCount()} * outputStride;
   const std::uint64_t step = instancesTogether(maxRange_, instanceSize);
-  const MappedBuffer& joints = kernel == PlainKernel::dualQuaternion ? palettes_ : matrices_;
+  const vulkan::BufferRange joints =
+      kernel == PlainKernel::dualQuaternion ? palettes_.range() : matrices_.range();
   for (std::uint64_t first = 0; first < crowd.instanceCount(); first += step) {
     const std::uint64_t count = std::min(step, crowd.instanceCount() - first);
     const vulkan::BufferRange written{output_.range().buffer, first * instanceSize,
                                       count * instanceSize};
     if (Result<void> bound = bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)],
-                                  std::array{vertices_.range(), joints.range(), written});
+                                  std::array{vertices_.range(), joints, written});
         !bound)
       return bound;
     const bool copies = kernel == PlainKernel::copy;

@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "buffer.h"
 #include "crowd.h"
+#include "device_buffer.h"
 #include "open_device.h"
 #include "timestamps.h"
 
@@ -34,7 +36,7 @@ class PlainBatches {
   Result<double> skin(PlainKernel kernel);
 
   /// Position and normal of every vertex of every instance, interleaved.
-  std::span<const std::byte> output() const { return output_.bytes(); }
+  Result<std::vector<std::byte>> output() const { return output_.read(); }
 
  private:
   /// The entry points that the baselines need besides those of `Device`.
@@ -73,7 +75,8 @@ class PlainBatches {
   std::uint64_t maxRange_;
   Functions functions_;
   Timestamps timestamps_;
-  MappedBuffer vertices_, matrices_, palettes_, output_;
+  MappedBuffer vertices_, matrices_;
+  DeviceBuffer palettes_, output_;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;

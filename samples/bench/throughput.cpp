@@ -133,9 +133,9 @@ double largestCoordinate(const Box& box) {
   return largest;
 }
 
-Result<void> compare(const PlainBatches& plain, std::span<const std::byte> dermis, const Box& box,
-                     Method method) {
-  const double difference = greatestDifference(plain.output(), dermis, method == Method::linear);
+Result<void> compare(std::span<const std::byte> plain, std::span<const std::byte> dermis,
+                     const Box& box, Method method) {
+  const double difference = greatestDifference(plain, dermis, method == Method::linear);
   if (difference <= 1e-4 * largestCoordinate(box)) return {};
   return Error{ErrorCode::invalidData,
                "the plain kernel and Dermis are " + std::to_string(difference) + " apart by " +
@@ -294,12 +294,14 @@ class Rows : public Throughput {
   }
 
   Result<void> makeGpu(OpenDevice& open, const Crowd& crowd, const std::function<void()>& step) {
-    Result<TimedBatches> batches = TimedBatches::create(open);
+    Result<TimedBatches> batches = TimedBatches::create(*open.device, open.context);
     if (!batches) return batches.error();
     batches_ = std::make_unique<TimedBatches>(std::move(*batches));
     std::vector<Case> cases = gpuCases(crowd.instanceCount());
     const bool isRigid = crowd.isRigid();
-    const Box box = boxOf(plain_->output());
+    const Result<std::vector<std::byte>> plainOutput = plain_->output();
+    if (!plainOutput) return plainOutput.error();
+    const Box box = boxOf(*plainOutput);
     // The first one decides how large the output is.
     std::ranges::stable_sort(cases, std::greater<>(), [](const Case& one) {
       return std::pair(one.layout.motion != Motion::none, one.instances);
@@ -318,8 +320,11 @@ class Rows : public Throughput {
         const PlainKernel kernel =
             one.method == Method::linear ? PlainKernel::linear : PlainKernel::dualQuaternion;
         if (const Result<double> skinned = plain_->skin(kernel); !skinned) return skinned.error();
-        if (Result<void> same = compare(*plain_, batches_->output(), box, one.method); !same)
-          return same;
+        const Result<std::vector<std::byte>> expected = plain_->output();
+        if (!expected) return expected.error();
+        const Result<std::vector<std::byte>> output = batches_->output();
+        if (!output) return output.error();
+        if (Result<void> same = compare(*expected, *output, box, one.method); !same) return same;
       }
       add(
           one.name, one.section, one.instances, [this, number] { return batches_->skin(number); },

@@ -224,7 +224,8 @@ class MethodComparer {
     if (!instances) return instances.error();
     comparison_.instances = *instances;
     comparison_.repetitions = options_.repetitions;
-    Result<samples::TimedBatches> batches = samples::TimedBatches::create(open);
+    Result<samples::TimedBatches> batches =
+        samples::TimedBatches::create(*open.device, open.context);
     if (!batches) return batches.error();
     comparison_.clock = batches->hasTimestamps() ? Clock::timestamps : Clock::submission;
     std::vector<Variant> variants;

@@ -8,10 +8,11 @@
 
 namespace dermis::samples {
 
-Result<TimedBatches> TimedBatches::create(OpenDevice& open) {
+Result<TimedBatches> TimedBatches::create(Device& device, vulkan::Context& context) {
   TimedBatches batches;
-  batches.open_ = &open;
-  Result<Timestamps> timestamps = Timestamps::create(*open.device);
+  batches.device_ = &device;
+  batches.context_ = &context;
+  Result<Timestamps> timestamps = Timestamps::create(device);
   if (!timestamps) return timestamps.error();
   batches.timestamps_ = std::move(*timestamps);
   return batches;
@@ -19,23 +20,24 @@ Result<TimedBatches> TimedBatches::create(OpenDevice& open) {
 
 TimedBatches::~TimedBatches() {
   for (const std::unique_ptr<TimedBatch>& batch : batches_) {
-    if (batch->commandBuffer != VK_NULL_HANDLE)
-      open_->device->freeCommandBuffer(batch->commandBuffer);
+    if (batch->commandBuffer != VK_NULL_HANDLE) device_->freeCommandBuffer(batch->commandBuffer);
   }
 }
 
-Result<MappedBuffer> TimedBatches::makeBuffer(const Plan& plan, BufferRole role) {
+template <typename Buffer>
+Result<void> TimedBatches::makeBuffer(const Plan& plan, BufferRole role, Buffer& buffer) {
   const BufferRequirement requirement = plan.buffer(role);
-  return MappedBuffer::create(*open_->device, requirement.size, requirement.usage);
+  Result<Buffer> made = Buffer::create(*device_, requirement.size, requirement.usage);
+  if (!made) return made.error();
+  buffer = std::move(*made);
+  return {};
 }
 
 Result<void> TimedBatches::makeShared(const BatchLayout& layout, const Plan& plan) {
-  for (const auto& [buffer, role] : {std::pair{&meshes_, BufferRole::meshes},
-                                     {&matrices_, BufferRole::poses},
-                                     {&output_, BufferRole::positions}}) {
-    Result<MappedBuffer> made = makeBuffer(plan, role);
-    if (!made) return made.error();
-    *buffer = std::move(*made);
+  for (const Result<void>& made : {makeBuffer(plan, BufferRole::meshes, meshes_),
+                                   makeBuffer(plan, BufferRole::poses, matrices_),
+                                   makeBuffer(plan, BufferRole::positions, output_)}) {
+    if (!made) return made;
   }
   for (const auto& [mesh, offset] : layout.meshOffsets)
     std::memcpy(meshes_.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
@@ -47,17 +49,17 @@ Result<void> TimedBatches::makeShared(const BatchLayout& layout, const Plan& pla
 }
 
 Result<void> TimedBatches::record(TimedBatch& batch) {
-  const VulkanFunctions& functions = open_->device->functions();
+  const VulkanFunctions& functions = device_->functions();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  batch.commandBuffer = open_->device->allocateCommandBuffer();
+  batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
   const vulkan::Dependency edge = vulkan::inputScope(vulkan::PreviousUse::previousRecord);
   const VkMemoryBarrier barrier = vulkan::memoryBarrier(edge);
   functions.CmdPipelineBarrier(batch.commandBuffer, edge.source.stages, edge.destination.stages, 0,
                                1, &barrier, 0, nullptr, 0, nullptr);
   timestamps_.recordBegin(batch.commandBuffer);
-  const Result<void> done = open_->context.record(batch.commandBuffer, batch.plan, *batch.bindings);
+  const Result<void> done = context_->record(batch.commandBuffer, batch.plan, *batch.bindings);
   timestamps_.recordEnd(batch.commandBuffer);
   const vulkan::Dependency end = vulkan::outputScope(vulkan::Consumer::hostRead);
   const VkMemoryBarrier endBarrier = vulkan::memoryBarrier(end);
@@ -71,23 +73,21 @@ Result<void> TimedBatches::add(std::span<const SkinRequest> requests, const Outp
                                const Tuning& tuning) {
   const BatchLayout layout = layOutBatch(requests, output);
   auto batch = std::make_unique<TimedBatch>();
-  if (Result<void> planned = makePlan(layout.batch(), open_->context.limits(), tuning, batch->plan);
+  if (Result<void> planned = makePlan(layout.batch(), context_->limits(), tuning, batch->plan);
       !planned)
     return planned;
-  if (Result<void> ready = open_->context.prepare(batch->plan.variants()); !ready) return ready;
+  if (Result<void> ready = context_->prepare(batch->plan.variants()); !ready) return ready;
   if (batches_.empty()) {
     if (Result<void> made = makeShared(layout, batch->plan); !made) return made;
   }
-  for (const auto& [buffer, role] : {std::pair{&batch->tables, BufferRole::tables},
-                                     {&batch->palettes, BufferRole::palettes},
-                                     {&batch->results, BufferRole::results}}) {
-    Result<MappedBuffer> made = makeBuffer(batch->plan, role);
-    if (!made) return made.error();
-    *buffer = std::move(*made);
+  for (const Result<void>& made : {makeBuffer(batch->plan, BufferRole::tables, batch->tables),
+                                   makeBuffer(batch->plan, BufferRole::palettes, batch->palettes),
+                                   makeBuffer(batch->plan, BufferRole::results, batch->results)}) {
+    if (!made) return made;
   }
   if (Result<void> written = writeTables(batch->plan, batch->tables.bytes()); !written)
     return written;
-  Result<vulkan::Bindings> bindings = open_->context.createBindings(
+  Result<vulkan::Bindings> bindings = context_->createBindings(
       {meshes_.range(), matrices_.range(), batch->tables.range(), batch->palettes.range(),
        vulkan::OutputBuffers::oneBuffer(output_.range()), batch->results.range()});
   if (!bindings) return bindings.error();
@@ -101,7 +101,7 @@ Result<void> TimedBatches::add(std::span<const SkinRequest> requests, const Outp
 
 Result<double> TimedBatches::skin(std::size_t batch) {
   const auto begin = std::chrono::steady_clock::now();
-  if (Result<void> done = open_->device->submitAndWait(batches_[batch]->commandBuffer); !done)
+  if (Result<void> done = device_->submitAndWait(batches_[batch]->commandBuffer); !done)
     return done.error();
   if (hasTimestamps()) return timestamps_.seconds();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

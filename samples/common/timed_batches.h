@@ -10,7 +10,7 @@
 #include "batch_layout.h"
 #include "buffer.h"
 #include "dermis/vulkan/context.h"
-#include "open_device.h"
+#include "device_buffer.h"
 #include "timestamps.h"
 
 namespace dermis::samples {
@@ -18,8 +18,8 @@ namespace dermis::samples {
 /// Batches that differ in their methods only: meshes, poses and outputs are the same memory.
 class TimedBatches {
  public:
-  /// `open` must outlive this object. Fails with `vulkanError`.
-  static Result<TimedBatches> create(OpenDevice& open);
+  /// Both must outlive this object. Fails with `vulkanError`.
+  static Result<TimedBatches> create(Device& device, vulkan::Context& context);
   TimedBatches(TimedBatches&&) = default;
   TimedBatches& operator=(TimedBatches&&) = delete;
   ~TimedBatches();
@@ -37,25 +37,29 @@ class TimedBatches {
   bool hasTimestamps() const { return timestamps_.has(); }
 
   /// Of the batch that was skinned last.
-  std::span<const std::byte> output() const { return output_.bytes(); }
+  Result<std::vector<std::byte>> output() const { return output_.read(); }
 
   const Plan& plan(std::size_t batch) const { return batches_[batch]->plan; }
 
  private:
   struct TimedBatch {
     Plan plan;
-    MappedBuffer tables, palettes, results;
+    MappedBuffer tables;
+    DeviceBuffer palettes, results;
     std::optional<vulkan::Bindings> bindings;
     VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
   };
   TimedBatches() = default;
-  Result<MappedBuffer> makeBuffer(const Plan& plan, BufferRole role);
+  template <typename Buffer>
+  Result<void> makeBuffer(const Plan& plan, BufferRole role, Buffer& buffer);
   Result<void> makeShared(const BatchLayout& layout, const Plan& plan);
   Result<void> record(TimedBatch& batch);
 
-  OpenDevice* open_ = nullptr;
+  Device* device_ = nullptr;
+  vulkan::Context* context_ = nullptr;
   Timestamps timestamps_;
-  MappedBuffer meshes_, matrices_, output_;
+  MappedBuffer meshes_, matrices_;
+  DeviceBuffer output_;
   std::vector<std::unique_ptr<TimedBatch>> batches_;
 };
 
