@@ -27,7 +27,12 @@ struct VerifyOptions {
   std::string junit;
   std::optional<std::uint32_t> threads;
   bool random = false;
+  bool quick = false;
   bool strict = false;
+
+  samples::Coverage coverage() const {
+    return quick ? samples::Coverage::quick : samples::Coverage::full;
+  }
 };
 
 using Cases = Result<std::vector<VerifiedCase>>;
@@ -41,15 +46,15 @@ bool isSkinned(const Scene& scene) {
 class Verifier {
  public:
   /// `reports` are refused for a model that they would damage.
-  Verifier(samples::TargetPool& pool, bool strict,
+  Verifier(samples::TargetPool& pool, const VerifyOptions& options,
            std::span<const samples::RequestedOutput> reports)
-      : pool_(pool), reports_(reports) {
-    preparation_.strict = strict;
+      : pool_(pool), reports_(reports), coverage_(options.coverage()) {
+    preparation_.strict = options.strict;
     preparation_.centersOfRotation = true;
   }
 
   void verifyRandom() {
-    const std::vector<samples::RandomCase> cases = samples::randomCases(pool_.first());
+    const std::vector<samples::RandomCase> cases = samples::randomCases(pool_.first(), coverage_);
     samples::Progress progress("random meshes", cases.size());
     add("random meshes", verifyRandomMeshes(pool_, cases, [&progress] { progress.step(); }));
   }
@@ -84,7 +89,7 @@ class Verifier {
           fmt::format("{}: it has no skinned mesh with joints and weights in its scene", model));
     }
     const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
-    const SceneCases cases = casesOf(*scene, pool_.first(), poses.size());
+    const SceneCases cases = casesOf(*scene, pool_.first(), poses.size(), coverage_);
     samples::Progress progress(model, cases.batches.size());
     add(model, verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); }));
   }
@@ -115,6 +120,7 @@ class Verifier {
 
   samples::TargetPool& pool_;
   std::span<const samples::RequestedOutput> reports_;
+  samples::Coverage coverage_;
   std::string overwrites_;
   MeshPreparation preparation_;
   std::vector<ModelVerification> models_;
@@ -145,7 +151,7 @@ std::string notCovered(const samples::BatchTarget& target) {
 
 ExitStatus verifyOn(samples::TargetPool pool, const VerifyOptions& options,
                     std::span<const samples::RequestedOutput> outputFiles) {
-  Verifier verifier(pool, options.strict, outputFiles);
+  Verifier verifier(pool, options, outputFiles);
   if (options.random || options.models.empty()) verifier.verifyRandom();
   for (const std::string& model : options.models) {
     verifier.verify(model);
@@ -213,6 +219,9 @@ Run addVerify(CLI::App& app) {
   command->add_option("MODEL", options->models, "One or more .gltf or .glb files [random meshes]");
   command->add_flag("--random", options->random,
                     "Also verify random meshes: pairs of methods, inputs and outputs");
+  command->add_flag("--quick", options->quick,
+                    "Verify in seconds: all methods, but fewer formats, numbers of influences and "
+                    "sizes, by pairs");
   command->add_option(
       "--device", options->device,
       "auto, cpu (SIMD on the CPU), a number of 'dermis devices', or part of a name");

@@ -284,8 +284,9 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
   return poses;
 }
 
-std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target) {
-  const std::vector<samples::OutputCase> cases = samples::outputCases(target.limits());
+std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
+                                            samples::Coverage coverage) {
+  const std::vector<samples::OutputCase> cases = samples::outputCases(target.limits(), coverage);
   const std::vector<std::vector<Method>> methods =
       samples::shareOutMethods(cases, target.methods());
   std::vector<OutputToVerify> outputs;
@@ -294,9 +295,10 @@ std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target) 
   return outputs;
 }
 
-SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount) {
-  return sceneCases(figuresOf(scene, target.methods()), target.divisions(), outputsToVerify(target),
-                    poseCount);
+SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount,
+                   samples::Coverage coverage) {
+  return sceneCases(figuresOf(scene, target.methods()), target.divisions(),
+                    outputsToVerify(target, coverage), poseCount);
 }
 
 Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,

@@ -42,11 +42,14 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, two times within, and its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// The ways that a target has. Over all of them each of its methods meets every format.
-std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target);
+/// The ways that a target has. Over all of them each of its methods meets every format that is
+/// verified.
+std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
+                                            samples::Coverage coverage = samples::Coverage::full);
 
 /// What is verified of a scene in so many poses.
-SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount);
+SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount,
+                   samples::Coverage coverage = samples::Coverage::full);
 
 /// The cases of a scene, on all targets of the pool: the result is the same for any number of them.
 /// However the work is cut up, not a bit may change. Motion goes from the pose before, in the first

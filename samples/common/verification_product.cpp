@@ -10,28 +10,6 @@
 namespace dermis::samples {
 namespace {
 
-constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
-                                  Arrangement::separate};
-constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
-constexpr std::array motions{Motion::none, Motion::kept, Motion::reskinned};
-constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3}, {128, 16}}};
-
-constexpr std::array rigidities{Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
-                                Rigidity::mirrored, Rigidity::mirroredAlongOneAxis};
-constexpr std::array<std::uint32_t, 6> vertexCounts{1, 7, 64, 65, 257, 1234};
-constexpr std::array<std::uint32_t, 4> jointCounts{1, 3, 40, 300};
-constexpr std::array<std::uint32_t, 6> influenceCounts{1, 2, 4, 7, 17, 64};
-constexpr std::array<std::uint32_t, 3> morphCounts{0, 1, 5};
-constexpr std::array positionTypes{ComponentType::float32, ComponentType::float16,
-                                   ComponentType::snorm16, ComponentType::unorm16};
-constexpr std::array directionTypes{ComponentType::float32, ComponentType::float16,
-                                    ComponentType::snorm8, ComponentType::snorm16};
-constexpr std::array jointTypes{ComponentType::uint8, ComponentType::uint16, ComponentType::uint32};
-constexpr std::array weightTypes{ComponentType::float32, ComponentType::unorm8,
-                                 ComponentType::unorm16};
-constexpr std::array<std::uint32_t, 3> setSizes{1, 4, 5};
-constexpr std::array<std::uint32_t, 2> inputGaps{0, 3};
-
 /// Takes one value after another out of a combination.
 class Choice {
  public:
@@ -51,22 +29,119 @@ std::vector<std::uint32_t> countsOf(const Values&... values) {
   return {static_cast<std::uint32_t>(values.size())...};
 }
 
-std::vector<std::uint32_t> outputCounts() {
-  constexpr std::array<bool, 2> either{};
-  return countsOf(verifiedPositionFormats, verifiedNormalFormats, verifiedTangentFormats,
-                  arrangements, gaps, motions, either, tunings);
+/// What a way to store the result may be.
+struct OutputValues {
+  std::span<const VertexFormat> positions, normals, tangents;
+  std::span<const Arrangement> arrangements;
+  std::span<const std::uint32_t> gaps;
+  std::span<const Motion> motions;
+  std::span<const bool> bounds;
+  std::span<const Tuning> tunings;
+
+  std::vector<std::uint32_t> counts() const {
+    return countsOf(positions, normals, tangents, arrangements, gaps, motions, bounds, tunings);
+  }
+};
+
+/// What a random mesh may be.
+struct InputValues {
+  std::span<const Rigidity> rigidities;
+  std::span<const std::uint32_t> vertices, joints, influences, morphs;
+  std::span<const ComponentType> positionTypes, directionTypes, jointTypes, weightTypes;
+  std::span<const std::uint32_t> setSizes, gaps;
+
+  std::vector<std::uint32_t> counts() const {
+    return countsOf(rigidities, vertices, joints, influences, morphs, positionTypes, directionTypes,
+                    jointTypes, weightTypes, setSizes, gaps);
+  }
+};
+
+constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
+                                  Arrangement::separate};
+constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
+constexpr std::array motions{Motion::none, Motion::kept, Motion::reskinned};
+constexpr std::array either{false, true};
+constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3, 1000}, {128, 16}}};
+constexpr OutputValues allOutputs{verifiedPositionFormats,
+                                  verifiedNormalFormats,
+                                  verifiedTangentFormats,
+                                  arrangements,
+                                  gaps,
+                                  motions,
+                                  either,
+                                  tunings};
+
+constexpr std::array rigidities{Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
+                                Rigidity::mirrored, Rigidity::mirroredAlongOneAxis};
+constexpr std::array<std::uint32_t, 6> vertexCounts{1, 7, 64, 65, 257, 1234};
+constexpr std::array<std::uint32_t, 4> jointCounts{1, 3, 40, 300};
+constexpr std::array<std::uint32_t, 6> influenceCounts{1, 2, 4, 7, 17, 64};
+constexpr std::array<std::uint32_t, 3> morphCounts{0, 1, 5};
+constexpr std::array positionTypes{ComponentType::float32, ComponentType::float16,
+                                   ComponentType::snorm16, ComponentType::unorm16};
+constexpr std::array directionTypes{ComponentType::float32, ComponentType::float16,
+                                    ComponentType::snorm8, ComponentType::snorm16};
+constexpr std::array jointTypes{ComponentType::uint8, ComponentType::uint16, ComponentType::uint32};
+constexpr std::array weightTypes{ComponentType::float32, ComponentType::unorm8,
+                                 ComponentType::unorm16};
+constexpr std::array<std::uint32_t, 3> setSizes{1, 4, 5};
+constexpr std::array<std::uint32_t, 2> inputGaps{0, 3};
+constexpr InputValues allInputs{rigidities,  vertexCounts,  jointCounts,    influenceCounts,
+                                morphCounts, positionTypes, directionTypes, jointTypes,
+                                weightTypes, setSizes,      inputGaps};
+
+// Each method meets each value, which takes about as many pipelines, and pipelines take time. So
+// Coverage::quick has at most three of each: everyday formats, one of each encoding, and numbers of
+// influences with kernels of their own.
+constexpr std::array quickPositions{VertexFormat::float32x3, VertexFormat::float16x4,
+                                    VertexFormat::snorm16x4};
+constexpr std::array quickNormals{VertexFormat::float32x3, VertexFormat::none,
+                                  VertexFormat::octahedral16x2};
+constexpr std::array quickTangents{VertexFormat::none, VertexFormat::float32x4,
+                                   VertexFormat::octahedral8x2};
+constexpr std::array<std::uint32_t, 2> quickGaps{0, 1};
+constexpr std::array<Tuning, 2> quickTunings{{{64, 4}, {32, 3, 1000}}};
+constexpr std::array quickRigidities{Rigidity::rigid, Rigidity::shear, Rigidity::mirrored};
+constexpr std::array<std::uint32_t, 2> quickVertexCounts{65, 1234};
+constexpr std::array<std::uint32_t, 2> quickJointCounts{5, 300};
+constexpr std::array<std::uint32_t, 3> quickInfluenceCounts{1, 4, 7};
+constexpr std::array<std::uint32_t, 2> quickMorphCounts{0, 3};
+constexpr std::array quickTypes{ComponentType::float32, ComponentType::float16,
+                                ComponentType::snorm16};
+
+constexpr OutputValues outputValues(Coverage coverage) {
+  OutputValues values = allOutputs;
+  if (coverage == Coverage::full) return values;
+  values.positions = quickPositions;
+  values.normals = quickNormals;
+  values.tangents = quickTangents;
+  values.gaps = quickGaps;
+  values.tunings = quickTunings;
+  return values;
 }
 
-OutputCase chooseOutput(Choice& choice) {
+constexpr InputValues inputValues(Coverage coverage) {
+  InputValues values = allInputs;
+  if (coverage == Coverage::full) return values;
+  values.rigidities = quickRigidities;
+  values.vertices = quickVertexCounts;
+  values.joints = quickJointCounts;
+  values.influences = quickInfluenceCounts;
+  values.morphs = quickMorphCounts;
+  values.positionTypes = values.directionTypes = quickTypes;
+  return values;
+}
+
+OutputCase chooseOutput(Choice& choice, const OutputValues& values) {
   OutputCase output;
-  output.layout.positions = choice.of(verifiedPositionFormats);
-  output.layout.normals = choice.of(verifiedNormalFormats);
-  output.layout.tangents = choice.of(verifiedTangentFormats);
-  output.layout.arrangement = choice.of(arrangements);
-  output.layout.gap = choice.of(gaps);
-  output.layout.motion = choice.of(motions);
-  output.layout.bounds = choice.of(std::array{false, true});
-  output.tuning = choice.of(tunings);
+  output.layout.positions = choice.of(values.positions);
+  output.layout.normals = choice.of(values.normals);
+  output.layout.tangents = choice.of(values.tangents);
+  output.layout.arrangement = choice.of(values.arrangements);
+  output.layout.gap = choice.of(values.gaps);
+  output.layout.motion = choice.of(values.motions);
+  output.layout.bounds = choice.of(values.bounds);
+  output.tuning = choice.of(values.tunings);
   return output;
 }
 
@@ -143,41 +218,42 @@ std::string RandomCase::inputName() const {
   return text + ", " + poses[static_cast<std::size_t>(rigidity)];
 }
 
-std::vector<OutputCase> outputCases(const DeviceLimits& limits) {
+std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage) {
+  const OutputValues values = outputValues(coverage);
   std::vector<OutputCase> cases;
-  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(outputCounts())) {
+  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(values.counts())) {
     Choice choice(combination);
-    cases.push_back(storable(chooseOutput(choice), limits));
+    cases.push_back(storable(chooseOutput(choice, values), limits));
   }
   return cases;
 }
 
-std::vector<RandomCase> randomCases(const BatchTarget& target) {
+std::vector<RandomCase> randomCases(const BatchTarget& target, Coverage coverage) {
   const std::span<const Method> methods = target.methods();
-  std::vector<std::uint32_t> counts =
-      countsOf(methods, rigidities, vertexCounts, jointCounts, influenceCounts, morphCounts,
-               positionTypes, directionTypes, jointTypes, weightTypes, setSizes, inputGaps);
-  const std::vector<std::uint32_t> outputs = outputCounts();
-  counts.insert(counts.end(), outputs.begin(), outputs.end());
+  const InputValues inputs = inputValues(coverage);
+  const OutputValues outputs = outputValues(coverage);
+  std::vector<std::uint32_t> counts = countsOf(methods);
+  for (const std::vector<std::uint32_t>& others : {inputs.counts(), outputs.counts()})
+    counts.insert(counts.end(), others.begin(), others.end());
   std::vector<RandomCase> cases;
   for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(counts)) {
     Choice choice(combination);
     RandomCase random;
     random.method = choice.of(methods);
-    random.rigidity = choice.of(rigidities);
-    random.vertices = choice.of(vertexCounts);
-    random.joints = choice.of(jointCounts);
-    random.influences = choice.of(influenceCounts);
-    random.morphs = choice.of(morphCounts);
-    random.input.positions = choice.of(positionTypes);
-    random.input.directions = choice.of(directionTypes);
-    random.input.joints = choice.of(jointTypes);
-    random.input.weights = choice.of(weightTypes);
-    random.input.setSize = choice.of(setSizes);
-    random.input.gap = choice.of(inputGaps);
+    random.rigidity = choice.of(inputs.rigidities);
+    random.vertices = choice.of(inputs.vertices);
+    random.joints = choice.of(inputs.joints);
+    random.influences = choice.of(inputs.influences);
+    random.morphs = choice.of(inputs.morphs);
+    random.input.positions = choice.of(inputs.positionTypes);
+    random.input.directions = choice.of(inputs.directionTypes);
+    random.input.joints = choice.of(inputs.jointTypes);
+    random.input.weights = choice.of(inputs.weightTypes);
+    random.input.setSize = choice.of(inputs.setSizes);
+    random.input.gap = choice.of(inputs.gaps);
     if (random.input.joints == ComponentType::uint8)
       random.joints = std::min(random.joints, std::uint32_t{256});
-    random.output = storable(chooseOutput(choice), target.limits());
+    random.output = storable(chooseOutput(choice, outputs), target.limits());
     cases.push_back(random);
   }
   return cases;

@@ -35,9 +35,15 @@ struct OutputCase {
   std::string name() const;  ///< "float16x4, normals octahedral8x2, interleaved, ..."
 };
 
+/// How many values parameters have.
+enum class Coverage : std::uint8_t {
+  full,
+  quick,  ///< those of everyday use, and one of each kind
+};
+
 /// Ways in which every two values of two parameters meet, as far as a device with these limits can
 /// store them.
-std::vector<OutputCase> outputCases(const DeviceLimits& limits);
+std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage = Coverage::full);
 
 /// One instance to verify. Spans and views refer to the caller's memory.
 struct InstanceToVerify {
@@ -81,7 +87,7 @@ struct RandomCase {
 };
 
 /// With the methods of the target, and outputs that it can store.
-std::vector<RandomCase> randomCases(const BatchTarget& target);
+std::vector<RandomCase> randomCases(const BatchTarget& target, Coverage coverage = Coverage::full);
 
 /// Three instances of the case's mesh, each in a pose of its own.
 Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,

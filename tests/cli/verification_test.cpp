@@ -7,8 +7,11 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -16,6 +19,7 @@
 
 #include "dermis_command.h"
 #include "target_pool.h"
+#include "verification_product.h"
 
 namespace dermis::test {
 namespace {
@@ -122,6 +126,78 @@ void expectTheSameInThreads(std::vector<std::string> command) {
 TEST(VerificationTest, ThreadsChangeNothingOnADevice) {
   REQUIRE_DEVICE();
   expectTheSameInThreads({"verify", bar});
+}
+
+/// With the methods of a device, which it is not.
+struct EveryMethod : samples::CpuTarget {
+  std::span<const Method> methods() const override { return allMethods; }
+  DeviceLimits limits() const override { return {.storage16Bit = true, .storage8Bit = true}; }
+};
+
+/// How many values of another parameter a method meets.
+template <typename ValueOf>
+std::size_t valuesBeside(Method method, std::span<const samples::RandomCase> cases,
+                         ValueOf valueOf) {
+  std::set<decltype(valueOf(cases[0]))> values;
+  for (const samples::RandomCase& one : cases) {
+    if (one.method == method) values.insert(valueOf(one));
+  }
+  return values.size();
+}
+
+// What a kernel is chosen by, and what it branches on.
+TEST(VerificationTest, QuickCasesMeetEveryMethod) {
+  const EveryMethod target;
+  const std::vector<samples::RandomCase> quick =
+      samples::randomCases(target, samples::Coverage::quick);
+  EXPECT_LE(quick.size(), samples::randomCases(target).size() / 3);
+  for (const Method method : allMethods) {
+    SCOPED_TRACE(methodName(method));
+    using Case = samples::RandomCase;
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.output.layout.positions; }),
+              3u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.output.layout.normals; }),
+              3u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.output.layout.tangents; }),
+              3u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.output.layout.motion; }),
+              3u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.output.layout.bounds; }),
+              2u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.influences; }), 3u);
+    EXPECT_EQ(valuesBeside(method, quick, [](const Case& c) { return c.rigidity; }), 3u);
+    EXPECT_GT(valuesBeside(method, quick, [](const Case& c) { return c.morphs; }), 1u);
+  }
+}
+
+/// How many cases a report has of each method.
+std::map<std::string, std::size_t> casesByMethod(const std::string& json) {
+  std::map<std::string, std::size_t> count;
+  const nlohmann::json report = nlohmann::json::parse(readText(json));
+  for (const nlohmann::json& model : report.at("models")) {
+    for (const nlohmann::json& one : model.at("cases")) ++count[one.at("method")];
+  }
+  return count;
+}
+
+TEST(VerificationTest, QuickSkinsWithEveryMethodOfTheDevice) {
+  REQUIRE_DEVICE();
+  const std::string json = outFile("quick.json");
+  const CommandResult quick = dermis({"verify", "--quick", "--json", json});
+  EXPECT_EQ(quick.status, 0) << quick.output << quick.errors;
+  const std::map<std::string, std::size_t> count = casesByMethod(json);
+  for (const Method method : allMethods)
+    EXPECT_TRUE(count.contains(std::string(methodName(method)))) << methodName(method);
+}
+
+TEST(VerificationTest, QuickLeavesOutCasesOfAModelToo) {
+  const std::string json = outFile("all.json"), quickJson = outFile("quick_bar.json");
+  EXPECT_EQ(dermis({"verify", bar, "--device", "cpu", "--json", json}).status, 0);
+  EXPECT_EQ(dermis({"verify", bar, "--quick", "--device", "cpu", "--json", quickJson}).status, 0);
+  const std::map<std::string, std::size_t> all = casesByMethod(json),
+                                           quick = casesByMethod(quickJson);
+  ASSERT_EQ(quick.size(), all.size());
+  for (const auto& [method, count] : quick) EXPECT_LT(count, all.at(method)) << method;
 }
 
 TEST(VerificationTest, ThreadsChangeNothingOnTheCpu) {
