@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "batch_runner.h"
+#include "byte_model.h"
 #include "commands.h"
 #include "driver_version.h"
 #include "file_name.h"
@@ -32,6 +33,7 @@ struct BenchOptions {
   std::string device = "auto";
   std::uint32_t instances = 1000;
   std::uint32_t rounds = 10;
+  bool onPaper = false;
 };
 
 ExitStatus checkUsage(const BenchOptions& options) {
@@ -67,6 +69,10 @@ ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
 }
 
 ExitStatus bench(const BenchOptions& options) {
+  if (options.onPaper) {
+    return printByteModels() ? ExitStatus::done
+                             : reportError(ExitStatus::stopped, "SPIRV-Tools cannot read a kernel");
+  }
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   const std::array<samples::RequestedOutput, 2> outputs{
       {{"-o", options.output}, {"--json", options.json}}};
@@ -145,6 +151,8 @@ Run addBench(CLI::App& app) {
       fmt::format("Number of rounds; each measures every row once, and the best round counts "
                   "[{}]",
                   options->rounds));
+  command->add_flag("--on-paper", options->onPaper,
+                    "Measure nothing: print how many bytes a vertex takes, and what bounds GPUs");
   return [options] { return bench(*options); };
 }
 

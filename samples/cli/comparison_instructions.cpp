@@ -29,7 +29,9 @@ bool isCounted(std::uint32_t opcode) {
          within(opShiftRightLogical, opBitCount) || within(opAtomicLoad, opAtomicXor);
 }
 
-std::vector<std::uint32_t> specialize(const Variant& variant, const DeviceLimits& limits) {
+}  // namespace
+
+std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits) {
   const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
   const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> values;
@@ -47,11 +49,9 @@ std::vector<std::uint32_t> specialize(const Variant& variant, const DeviceLimits
   return specialized;
 }
 
-}  // namespace
-
 std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
                                                    const DeviceLimits& limits) {
-  const std::vector<std::uint32_t> words = specialize(variant, limits);
+  const std::vector<std::uint32_t> words = specializedSpirv(variant, limits);
   constexpr std::size_t headerWords = 5;
   std::uint64_t count = 0;
   bool inFunction = false;

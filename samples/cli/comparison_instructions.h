@@ -3,10 +3,15 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "dermis/plan.h"
 
 namespace dermis::cli {
+
+/// A kernel with its constants specialised, everything inlined, and without what they leave dead;
+/// nothing if SPIRV-Tools fail.
+std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
 
 /// The SPIR-V instructions of a kernel that calculate or touch memory, once its constants are
 /// specialised and what they leave dead is gone. One for a vector, and a loop's counted once.

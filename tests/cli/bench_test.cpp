@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,6 +45,39 @@ std::vector<std::string> cpuRows() {
   const std::string most = std::to_string(std::max(std::thread::hardware_concurrency(), 1u));
   return {"cpu/dual_quaternion/1", "cpu/linear/1", "cpu/dual_quaternion/" + most,
           "cpu/linear/" + most};
+}
+
+/// The numbers of a row of `bench --on-paper`: bytes written, bytes stored, bytes read of the mesh
+/// and of the palette, operations, fused ones.
+std::vector<double> onPaper(const std::string& output, const std::string& name) {
+  const std::size_t row = output.find("\n" + name);
+  if (row == std::string::npos) return {};
+  std::istringstream words(output.substr(row + 1 + name.size()));
+  std::vector<double> numbers(6);
+  for (double& number : numbers) words >> number;
+  return words ? numbers : std::vector<double>{};
+}
+
+// A record of 24 bytes: six stores of a word touch each of its sectors, one after the other.
+TEST(BenchTest, OnPaperNeedsNoDevice) {
+  const CommandResult result =
+      dermis({"bench", "--on-paper"}, {"VK_DRIVER_FILES=none", "VK_ICD_FILENAMES=none"});
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const std::string dual = "dual_quaternion, float32x3 + float32x3, ";
+  const std::vector<double> words = onPaper(result.output, dual + "words"),
+                            staged = onPaper(result.output, dual + "staged"),
+                            linear = onPaper(result.output, "linear, float32x3 + float32x3, words");
+  ASSERT_TRUE(words.size() == 6 && staged.size() == 6 && linear.size() == 6) << result.output;
+  EXPECT_EQ(std::vector<double>(words.begin(), words.begin() + 4),
+            (std::vector<double>{24, 6 * 24, 16, 4 * 32}));
+  EXPECT_EQ(std::vector<double>(staged.begin(), staged.begin() + 4),
+            (std::vector<double>{24, 24, 16, 4 * 32}));
+  EXPECT_EQ(linear[3], 4 * 48);
+  // At least four quaternions of eight numbers, each times its weight and added.
+  EXPECT_GT(words[4], 2 * 4 * 8);
+  EXPECT_LT(words[4], 1000);
+  EXPECT_LT(words[5], words[4]);
+  EXPECT_GT(words[5], words[4] / 2);
 }
 
 TEST(BenchTest, MeasuresMethodsFormatsAndInstancesBesidePlainKernels) {

@@ -1,0 +1,224 @@
+#include "byte_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "comparison_instructions.h"
+#include "dermis/layout.h"
+
+namespace dermis::cli {
+namespace {
+
+constexpr double sector = 32;  // bytes that a cache moves together
+constexpr std::uint32_t influences = 4, instancesEach = 4;
+
+// SPIR-V 1.3, section 3.32.
+constexpr std::uint32_t opExtInst = 12, opTypeFloat = 22, opTypeVector = 23, opLoopMerge = 246,
+                        opLabel = 248, opFunction = 54, opFNegate = 127, opFAdd = 129, opFSub = 131,
+                        opFMul = 133, opFDiv = 136, opFRem = 140, opFMod = 141,
+                        opVectorTimesScalar = 142;
+
+bool isArithmetic(std::uint32_t opcode) {
+  return opcode == opFNegate || opcode == opFAdd || opcode == opFSub || opcode == opFMul ||
+         opcode == opFDiv || opcode == opFRem || opcode == opFMod ||
+         opcode == opVectorTimesScalar || opcode == opExtInst;
+}
+
+bool isProduct(std::uint32_t opcode) {
+  return opcode == opFMul || opcode == opVectorTimesScalar;
+}
+
+struct Instruction {
+  std::uint32_t opcode = 0;
+  std::span<const std::uint32_t> operands;
+};
+
+std::vector<Instruction> instructionsOf(std::span<const std::uint32_t> words) {
+  constexpr std::size_t headerWords = 5;
+  std::vector<Instruction> all;
+  for (std::size_t place = headerWords; place < words.size();) {
+    const std::size_t length = words[place] >> 16;
+    if (length == 0 || length > words.size() - place) return {};
+    all.push_back({words[place] & 0xffffu, words.subspan(place + 1, length - 1)});
+    place += length;
+  }
+  return all;
+}
+
+struct Operations {
+  double all = 0, fused = 0;
+};
+
+/// Of a kernel with everything in `main`. Outside its loops over instances, two within each other,
+/// stands what an invocation does once; in loops within those, what it does for each influence but
+/// the first.
+Operations countOperations(std::span<const std::uint32_t> words) {
+  const std::vector<Instruction> instructions = instructionsOf(words);
+  std::unordered_map<std::uint32_t, double> floats;  // of types
+  std::unordered_map<std::uint32_t, int> uses;
+  std::unordered_set<std::uint32_t> products, summed;
+  for (const auto& [opcode, operands] : instructions) {
+    if (opcode == opTypeFloat) floats[operands[0]] = 1;
+    if (opcode == opTypeVector && floats.contains(operands[1]))
+      floats[operands[0]] = static_cast<double>(operands[2]) * floats[operands[1]];
+    if (isProduct(opcode)) products.insert(operands[1]);
+    for (std::size_t operand = 2; operand < operands.size(); ++operand) ++uses[operands[operand]];
+    if (opcode != opFAdd && opcode != opFSub) continue;
+    // One product of a sum can be part of it.
+    for (const std::uint32_t term : {operands[2], operands[3]}) {
+      if (!products.contains(term)) continue;
+      summed.insert(term);
+      break;
+    }
+  }
+  Operations operations;
+  std::vector<std::uint32_t> loops;
+  bool isInFunction = false;
+  for (const auto& [opcode, operands] : instructions) {
+    if (opcode == opFunction) isInFunction = true;
+    if (opcode == opLabel) {
+      while (!loops.empty() && std::ranges::find(loops, operands[0]) != loops.end())
+        loops.pop_back();
+    }
+    if (opcode == opLoopMerge) loops.push_back(operands[0]);
+    if (!isInFunction || !isArithmetic(opcode)) continue;
+    const auto type = floats.find(operands[0]);
+    if (type == floats.end()) continue;
+    const double times = loops.size() < 2   ? 1.0 / instancesEach
+                         : loops.size() > 2 ? influences - 1
+                                            : 1;
+    operations.all += times * type->second;
+    const bool isFused = summed.contains(operands[1]) && uses[operands[1]] == 1;
+    if (!isFused) operations.fused += times * type->second;
+  }
+  return operations;
+}
+
+struct Layout {
+  const char* name;
+  VertexFormat positions, normals;
+};
+
+/// Bytes of sectors that a subgroup's stores touch, for each of its vertices: if each store writes
+/// some bytes of every record, all sectors of all records.
+double storedBytes(const Variant& variant, double stride) {
+  if (variant.staged) return stride;
+  double stores = 0;
+  const std::array formats{variant.positions, variant.normals, variant.tangents};
+  for (std::size_t stream = 0; stream < formats.size(); ++stream)
+    stores += formatSize(formats[stream]) / static_cast<double>(variant.units[stream]);
+  if (variant.recordBytes != 0) stores = std::max(variant.recordBytes / 16.0, 1.0);
+  return stores * std::min(stride, sector);
+}
+
+std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char* way,
+                                 const DeviceLimits& limits) {
+  PipelineNeeds needs;
+  needs.method = method;
+  needs.layout.positions = layout.positions;
+  needs.layout.normals = layout.normals;
+  needs.mayScale = false;
+  needs.mesh = MeshInfo();
+  needs.mesh->minInfluences = needs.mesh->maxInfluences = influences;
+  Tuning tuning;
+  tuning.instancesPerInvocation = instancesEach;
+  const Result<std::vector<Variant>> variants = everyVariant(needs, limits, tuning);
+  if (!variants) return std::nullopt;
+  const Variant& variant = variants->back();
+  const std::vector<std::uint32_t> spirv = specializedSpirv(variant, limits);
+  if (spirv.empty()) return std::nullopt;
+  ByteModel model;
+  model.name = fmt::format("{}, {}, {}", methodName(method), layout.name, way);
+  model.written = formatSize(layout.positions) + formatSize(layout.normals);
+  model.stored = storedBytes(variant, model.written);
+  // Positions and normals 16 bytes each, an influence 8.
+  model.meshRead =
+      (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
+  model.paletteRead = influences * (method == Method::linear ? 48 : 32);
+  const Operations operations = countOperations(spirv);
+  model.operations = operations.all;
+  model.fusedOperations = operations.fused;
+  return model;
+}
+
+}  // namespace
+
+std::vector<GpuSpeed> gpuSpeeds() {
+  return {{"0.5 TB/s", 0.5, 2, 15, 15},
+          {"3.35 TB/s", 3.35, 5.5, 30, 33},
+          {"4.8 TB/s", 4.8, 5.5, 30, 33}};
+}
+
+ByteBound boundOf(const ByteModel& model, const GpuSpeed& gpu) {
+  const std::array<ByteBound, 5> bounds{{{gpu.memory * 1e12 / model.written, "memory"},
+                                         {gpu.cache * 1e12 / model.stored, "stores"},
+                                         {gpu.cache * 1e12 / model.meshRead, "mesh"},
+                                         {gpu.firstLevel * 1e12 / model.paletteRead, "palette"},
+                                         {gpu.operations * 1e12 / model.operations, "arithmetic"}}};
+  return *std::ranges::min_element(bounds, {}, &ByteBound::verticesPerSecond);
+}
+
+std::optional<std::vector<ByteModel>> byteModels() {
+  using enum VertexFormat;
+  DeviceLimits words;
+  words.maxStorageBuffersPerStage = storageBuffersWanted;
+  words.storage16Bit = true;
+  DeviceLimits staged = words;
+  staged.stagedStores = true;
+  DeviceLimits wide = words;
+  wide.texelBuffers = wide.shaderInt64 = wide.scalarBlockLayout = true;
+  std::vector<ByteModel> models;
+  for (const Method method : {Method::dualQuaternion, Method::linear}) {
+    for (const Layout& layout : {Layout{"float32x3 + float32x3", float32x3, float32x3},
+                                 {"float32x3 + octahedral16x2", float32x3, octahedral16x2},
+                                 {"float16x4 + octahedral16x2", float16x4, octahedral16x2},
+                                 {"float16x3 + octahedral8x2", float16x3, octahedral8x2},
+                                 {"float32x3", float32x3, none}}) {
+      for (const auto& [way, limits] :
+           {std::pair{"words", &words}, {"staged", &staged}, {"wide", &wide}}) {
+        std::optional<ByteModel> model = modelOf(layout, method, way, *limits);
+        if (!model) return std::nullopt;
+        models.push_back(std::move(*model));
+      }
+    }
+  }
+  return models;
+}
+
+bool printByteModels() {
+  const std::optional<std::vector<ByteModel>> models = byteModels();
+  if (!models) return false;
+  fmt::print("A vertex of an instance: four influences, rigid joints, {} instances an invocation\n",
+             instancesEach);
+  for (const GpuSpeed& gpu : gpuSpeeds()) {
+    fmt::print("{}: L2 {} TB/s, L1 {} TB/s, {} x 10^12 float32 operations a second (assumed)\n",
+               gpu.name, gpu.cache, gpu.firstLevel, gpu.operations);
+  }
+  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7} {:>7}", "method, formats, stores", "written",
+             "stored", "mesh", "palette", "ops", "fused");
+  for (const GpuSpeed& gpu : gpuSpeeds()) fmt::print(" {:>21}", gpu.name);
+  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7} {:>7}", "", "bytes", "bytes", "bytes", "bytes",
+             "", "");
+  for (std::size_t gpu = 0; gpu < gpuSpeeds().size(); ++gpu)
+    fmt::print(" {:>21}", "10^9 vertices/s");
+  fmt::print("\n");
+  for (const ByteModel& model : *models) {
+    fmt::print("{:<52} {:>8} {:>8} {:>6} {:>8} {:>7.0f} {:>7.0f}", model.name, model.written,
+               model.stored, model.meshRead, model.paletteRead, model.operations,
+               model.fusedOperations);
+    for (const GpuSpeed& gpu : gpuSpeeds()) {
+      const ByteBound bound = boundOf(model, gpu);
+      fmt::print(" {:>10.1f} {:<10}", bound.verticesPerSecond / 1e9, bound.by);
+    }
+    fmt::print("\n");
+  }
+  return true;
+}
+
+}  // namespace dermis::cli
