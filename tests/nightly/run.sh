@@ -11,6 +11,7 @@
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
+#   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
 #   exhaustive   every combination of methods and formats, and every real model, on the device
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
@@ -21,7 +22,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang arm64 fuzz mesa speed exhaustive golden programs"
+parts="asan asan-rest tsan clang arm64 fuzz mesa speed gpu exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -120,6 +121,15 @@ part_speed() {
   export $settings
   build/ci/samples/cli/dermis bench --json build/nightly/bench-mesa.json
   check_speed build/nightly/bench-mesa.json 1.2 1.4 0.5
+}
+
+part_gpu() {
+  build ci gpu_test
+  tests ci -R '^profile\.'
+  ./tests/bench/gpu.sh build/nightly/gpu build/ci
+  # In an environment with nothing of this build.
+  (cd build/nightly && env -i PATH="$PATH" HOME="$HOME" gpu/measure.sh gpu/out 10 50)
+  grep -q '"passed": true' build/nightly/gpu/out/gpu.json
 }
 
 part_exhaustive() {

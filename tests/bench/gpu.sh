@@ -1,0 +1,41 @@
+#!/bin/sh
+# Makes a folder of programs that measure and verify Dermis on another machine: a Linux with a Vulkan driver, and nothing else.
+#
+#   tests/bench/gpu.sh FOLDER [BUILD]
+#
+# BUILD: a build folder that exists; else build/release is configured. Then take FOLDER to the machine and start FOLDER/measure.sh
+# there (docs/gpus.md). The programs bring along all libraries but glibc, which must be as new as FOLDER/glibc says, and the driver's.
+set -eu
+cd "$(dirname "$0")/../.."
+folder=${1:?usage: tests/bench/gpu.sh FOLDER [BUILD]}
+build=${2:-build/release}
+if [ ! -f "$build/CMakeCache.txt" ]; then
+  ./cmake/install-deps.sh
+  cmake --preset release
+fi
+cmake --build "$build" --target dermis_cli dermis_gpu_benchmark dermis_system_benchmark
+
+rm -rf "$folder"
+mkdir -p "$folder/lib" "$folder/loader" "$folder/runtime"
+cp "$build/samples/cli/dermis" "$build/tests/bench/dermis_gpu_benchmark" "$build/tests/bench/dermis_system_benchmark" "$folder"
+cp tests/bench/gpu_measure.sh "$folder/measure.sh"
+strip "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_benchmark"
+git describe --always --dirty --abbrev=12 >"$folder/commit"
+
+# Where the machine has a compiler's run-time libraries, they are newer than these or older: the driver needs its own.
+ldd "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_benchmark" | awk '$2 == "=>" { print $3 }' | sort -u |
+  while read -r library; do
+    case $(basename "$library") in
+      libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | ld-linux*) ;;
+      libstdc++.so.* | libgcc_s.so.*) cp -L "$library" "$folder/runtime" ;;
+      *) cp -L "$library" "$folder/lib" ;;
+    esac
+  done
+# Not linked, but opened: for a machine with a driver and without a loader.
+loader=$(ldconfig -p | awk '/libvulkan\.so\.1 .*x86-64|libvulkan\.so\.1 .*AArch64/ { print $NF; exit }')
+cp -L "$loader" "$folder/loader/libvulkan.so.1"
+
+find "$folder" -type f -exec objdump -T {} + 2>/dev/null | grep -o "GLIBC_[0-9][0-9.]*" | sort -uV | tail -n 1 >"$folder/glibc"
+size=$(du -sk "$folder" | cut -f 1)
+[ "$size" -le 65536 ] || { echo "gpu.sh: $folder has $size KiB, more than 64 MiB" >&2; exit 1; }
+echo "$folder: $((size / 1024)) MiB, needs glibc $(cat "$folder/glibc")"
