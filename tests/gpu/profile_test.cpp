@@ -45,7 +45,7 @@ TEST_F(ProfileTest, TheDeviceLooksLikeIt) {
 
 TEST_F(ProfileTest, SomeCombinationsAreInsideTheirBounds) {
   samples::VulkanTarget target(device(), context());
-  verifyProduct(target, 9);
+  verifyProduct(target, 20);
 }
 
 // What a kind of device does if nobody says otherwise: reads, stores, and the tuning.
