@@ -15,7 +15,7 @@ libhwy-dev
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
 pkg-config libvulkan-volk-dev dpkg-dev
-libpng-dev libstb-dev fonts-dejavu-core
+libstb-dev fonts-dejavu-core
 libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
 doxygen

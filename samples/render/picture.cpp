@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <span>
 #include <string>
 #include <utility>
-
-#include <png.h>
 
 #include "stb_headers.h"
 
@@ -67,22 +67,23 @@ stbtt_fontinfo infoOf(const std::vector<unsigned char>& file) {
 }  // namespace
 
 Result<std::vector<std::byte>> encodePng(const Picture& picture) {
+  constexpr int channels = 3;
+  // stb counts in `int`, and stores a byte for each row beside the pixels.
+  const std::uint64_t rowBytes = std::uint64_t{picture.width} * channels + 1;
+  if (rowBytes > std::numeric_limits<int>::max() / std::max(picture.height, 1u))
+    return Error{ErrorCode::limitExceeded, "the picture is too large for a PNG"};
   std::vector<std::uint8_t> opaque;
-  opaque.reserve(picture.pixels.size() / 4 * 3);
+  opaque.reserve(picture.pixels.size() / 4 * channels);
   for (std::size_t i = 0; i + 3 < picture.pixels.size(); i += 4)
-    opaque.insert(opaque.end(), &picture.pixels[i], &picture.pixels[i] + 3);
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = picture.width;
-  image.height = picture.height;
-  image.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-  std::vector<std::byte> bytes(size);
-  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, opaque.data(), 0, nullptr) == 0) {
-    return Error{ErrorCode::limitExceeded,
-                 std::string("the picture cannot be written as PNG: ") + image.message};
-  }
-  bytes.resize(size);
+    opaque.insert(opaque.end(), &picture.pixels[i], &picture.pixels[i] + channels);
+  std::vector<std::byte> bytes;
+  const auto append = [](void* context, void* data, int size) {
+    const std::span more(static_cast<const std::byte*>(data), static_cast<std::size_t>(size));
+    static_cast<std::vector<std::byte>*>(context)->assign(more.begin(), more.end());
+  };
+  if (stbi_write_png_to_func(append, &bytes, static_cast<int>(picture.width),
+                             static_cast<int>(picture.height), channels, opaque.data(), 0) == 0)
+    return Error{ErrorCode::limitExceeded, "there is no memory to write the picture as PNG"};
   return bytes;
 }
 

@@ -5,10 +5,12 @@
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
 #define STBI_NO_STDIO
+#define STBI_WRITE_NO_STDIO
 
 // Before stb_truetype.h, which otherwise declares rectangles of its own: Dear ImGui, in a program
 // that has both, calls these functions with those of stb_rect_pack.h.
 #include <stb/stb_rect_pack.h>
 
 #include <stb/stb_image.h>
+#include <stb/stb_image_write.h>
 #include <stb/stb_truetype.h>
