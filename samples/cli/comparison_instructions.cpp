@@ -1,5 +1,7 @@
 #include "comparison_instructions.h"
 
+#ifndef DERMIS_NO_SPIRV_TOOLS
+
 #include <span>
 #include <spirv-tools/optimizer.hpp>
 #include <unordered_map>
@@ -68,3 +70,15 @@ std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
 }
 
 }  // namespace dermis::cli
+
+#else
+
+namespace dermis::cli {
+
+std::optional<std::uint64_t> spirvInstructionCount(const Variant&, const DeviceLimits&) {
+  return std::nullopt;
+}
+
+}  // namespace dermis::cli
+
+#endif

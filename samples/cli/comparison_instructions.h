@@ -15,7 +15,7 @@ std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const Device
 
 /// The SPIR-V instructions of a kernel that calculate or touch memory, once its constants are
 /// specialised and what they leave dead is gone. One for a vector, and a loop's counted once.
-/// Nothing where SPIRV-Tools fail.
+/// Nothing if SPIRV-Tools fail, or the command was built without them.
 std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
                                                    const DeviceLimits& limits);
 
