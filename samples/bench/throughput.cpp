@@ -191,7 +191,8 @@ class CpuCrowd {
       : crowd_(&crowd),
         mesh_(std::make_unique<cpu::Mesh>(std::move(mesh))),
         places_(places),
-        output_(places.size * crowd.instanceCount() / sizeof(CacheLine) + 1) {}
+        output_(static_cast<std::size_t>(places.size * crowd.instanceCount() / sizeof(CacheLine) +
+                                         1)) {}
 
   Result<void> skinSome(Method method, std::uint32_t first, std::uint32_t end) {
     std::array<cpu::Instance, instancesOfJob> instances;

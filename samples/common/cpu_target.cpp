@@ -38,7 +38,7 @@ void CpuRunner::makeOutputs() {
   const std::array<std::uint64_t, streamCount> all{sizes.positions, sizes.normals, sizes.tangents,
                                                    sizes.previousPositions};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const std::uint64_t size = layout_.oneOutput && stream > 0 ? 0 : all[stream];
+    const auto size = static_cast<std::size_t>(layout_.oneOutput && stream > 0 ? 0 : all[stream]);
     if (outputs_[stream].size() != size) outputs_[stream].assign(size, options_.poison);
   }
 }

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "cpu_engine.h"
@@ -191,6 +194,17 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
 }
 
 // What a neighbour finds out later does not take it away either.
+// On a 32-bit system these bytes would be counted modulo 2^32.
+TEST(CpuSceneCreationTest, MoreOutputThanAnObjectCanHoldIsRefused) {
+  cpu::SkinningSystemDescription description;
+  description.outputCapacity =
+      Capacity::fixed(std::uint64_t{std::numeric_limits<std::ptrdiff_t>::max()} + 64);
+  const auto system = cpu::SkinningSystem::create(description);
+  ASSERT_FALSE(system);
+  EXPECT_NE(system.error().message.find("outputCapacity"), std::string::npos)
+      << system.error().message;
+}
+
 TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
   VertexLayout layout = normalsToo();
   layout.motion = Motion::kept;

@@ -3,11 +3,14 @@
 #include <dermis/memory_budget.h>
 #include <unistd.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
+#include "gltf/failure.h"
 #include "gltf_builder.h"
 
 namespace dermis::test {
@@ -35,6 +38,19 @@ TEST(MemoryBudgetTest, ProductsDoNotWrap) {
   EXPECT_FALSE(budget.spend(~std::uint64_t{0}, 2));
   budget.addFile(~std::uint64_t{0});
   EXPECT_GT(budget.left(), std::uint64_t{1} << 61);
+}
+
+// However much the budget has: on a 32-bit system these sizes would be counted modulo 2^32.
+TEST(MemoryBudgetTest, NothingIsLargerThanAnObjectCanBe) {
+  constexpr std::uint64_t largest = std::numeric_limits<std::ptrdiff_t>::max();
+  for (const std::uint64_t bytesEach : {1u, 4u, 48u}) {
+    MemoryBudget budget;
+    budget.addFile(~std::uint64_t{0});
+    EXPECT_THROW(gltf::spend(budget, largest / bytesEach + 1, bytesEach, "it"), gltf::Failure);
+    if (sizeof(std::size_t) == 4) {
+      EXPECT_NO_THROW(gltf::spend(budget, largest / bytesEach, bytesEach, "it"));
+    }
+  }
 }
 
 /// A folder that goes away with the test.

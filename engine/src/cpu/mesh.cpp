@@ -29,22 +29,22 @@ class Reader {
         header(abi::load<abi::MeshHeader>(words_, 0)) {}
 
   std::span<const std::uint32_t> words() const { return words_; }
-  float word(std::uint32_t section, std::uint64_t vertex, std::uint32_t component,
+  float word(std::uint32_t section, std::size_t vertex, std::uint32_t component,
              std::uint32_t stride = abi::VERTEX_WORDS) const {
     return std::bit_cast<float>(words_[section + vertex * stride + component]);
   }
   std::vector<abi::InfluenceRecord> influences(std::uint32_t vertex) const {
     const auto begin = abi::load<abi::PositionRecord>(
-        words_, header.positions + std::uint64_t{vertex} * abi::VERTEX_WORDS);
+        words_, header.positions + std::size_t{vertex} * abi::VERTEX_WORDS);
     const auto end = abi::load<abi::PositionRecord>(
-        words_, header.positions + (std::uint64_t{vertex} + 1) * abi::VERTEX_WORDS);
+        words_, header.positions + (std::size_t{vertex} + 1) * abi::VERTEX_WORDS);
     const std::uint32_t count =
         (end.influences / 2 - begin.influences / 2) * 2 - begin.influences % 2;
     std::vector<abi::InfluenceRecord> all;
     for (std::uint32_t slot = 0; slot < count; ++slot) {
       all.push_back(abi::load<abi::InfluenceRecord>(
-          words_, header.influences + std::uint64_t{begin.influences / 2} * 4 +
-                      std::uint64_t{slot} * abi::INFLUENCE_WORDS));
+          words_, header.influences + std::size_t{begin.influences / 2} * 4 +
+                      std::size_t{slot} * abi::INFLUENCE_WORDS));
     }
     return all;
   }
@@ -121,8 +121,8 @@ class Slots {
     if (pairs_.size() + all > sectionPairs) endSection();
     if (data_.runs.empty() || isNewSection_ || data_.runs.back().influences != most) {
       const auto section = static_cast<std::uint32_t>(data_.sections.size());
-      data_.runs.push_back({section, block_, block_, static_cast<std::uint32_t>(most),
-                            static_cast<std::uint64_t>(data_.weights.size())});
+      data_.runs.push_back(
+          {section, block_, block_, static_cast<std::uint32_t>(most), data_.weights.size()});
       isNewSection_ = false;
     }
     for (const auto& vertex : vertices) addVertex(vertex, most);
@@ -205,10 +205,10 @@ std::uint32_t MeshData::runOf(std::uint32_t block) const {
 
 std::vector<abi::InfluenceRecord> MeshData::influencesOf(std::uint32_t vertex) const {
   const Run& run = runs[runOf(vertex / blockVertices)];
-  const std::uint64_t first =
-      run.slotOf(vertex / blockVertices) + std::uint64_t{vertex % blockVertices} * run.influences;
+  const std::size_t first =
+      run.slotOf(vertex / blockVertices) + std::size_t{vertex % blockVertices} * run.influences;
   std::vector<abi::InfluenceRecord> all;
-  for (std::uint64_t slot = first; slot < first + run.influences; ++slot) {
+  for (std::size_t slot = first; slot < first + run.influences; ++slot) {
     const std::uint32_t joint =
         joints[sections[run.section].firstJoint + jointNumbers[slot] / indexScale];
     if (weights[slot] != 0 && joint != stillJoint) all.push_back({weights[slot], joint});

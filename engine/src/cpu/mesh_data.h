@@ -51,10 +51,10 @@ struct Run {
   std::uint32_t section = 0;
   std::uint32_t firstBlock = 0, blockEnd = 0;
   std::uint32_t influences = 0;
-  std::uint64_t firstSlot = 0;
+  std::size_t firstSlot = 0;
 
-  std::uint64_t slotOf(std::uint32_t block) const {
-    return firstSlot + std::uint64_t{block - firstBlock} * blockVertices * influences;
+  std::size_t slotOf(std::uint32_t block) const {
+    return firstSlot + std::size_t{block - firstBlock} * blockVertices * influences;
   }
 };
 

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <string>
 #include <unordered_map>
@@ -33,9 +35,13 @@ constexpr std::uint32_t noResult = 0xffffffff;
 constexpr std::uint64_t instancesTogether = 4;
 
 /// As large as offsets in the tables allow.
+/// The largest size of an object, a multiple of 64. Sizes of buffers are below it, so that they fit
+/// `std::size_t` on 32-bit systems, too.
+constexpr std::uint64_t largestSize = std::numeric_limits<std::ptrdiff_t>::max() / 64 * 64;
+
 DeviceLimits limitsOfMemory() {
   DeviceLimits limits;
-  limits.maxStorageBufferRange = 0xfffffffc;
+  limits.maxStorageBufferRange = std::min<std::uint64_t>(0xfffffffc, largestSize);
   limits.minStorageBufferOffsetAlignment = 64;
   limits.maxWorkgroupCountX = limits.maxWorkgroupCountY = 0xffffffff;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
@@ -64,7 +70,7 @@ struct SkinningSystem::State {
   void addPoseBuffer(std::uint64_t bytes);
   std::span<JointMatrix> poseAt(const PosePlace& place) {
     return std::span(poseBuffers[place.poseBuffer])
-        .subspan(place.offset / sizeof(JointMatrix), place.jointCount);
+        .subspan(static_cast<std::size_t>(place.offset) / sizeof(JointMatrix), place.jointCount);
   }
 
   void readBackResults();
@@ -116,16 +122,17 @@ struct SkinningSystem::State {
 // -- Memory.
 
 void SkinningSystem::State::addPoseBuffer(std::uint64_t bytes) {
-  poseBuffers.emplace_back(bytes / sizeof(JointMatrix));
+  poseBuffers.emplace_back(static_cast<std::size_t>(bytes / sizeof(JointMatrix)));
 }
 
 Result<void> SkinningSystem::State::grow(const BufferGrowth& growth) {
   if (growth.role == BufferRole::poses) addPoseBuffer(growth.requirement.size);
   if (growth.role != BufferRole::positions) return {};
-  std::vector<CacheLine> larger(growth.requirement.size / sizeof(CacheLine) + 1);
+  const auto size = static_cast<std::size_t>(growth.requirement.size);
+  std::vector<CacheLine> larger(size / sizeof(CacheLine) + 1);
   std::memcpy(larger.data(), output.data(), output.size());
   ownOutput = std::move(larger);
-  output = std::as_writable_bytes(std::span(ownOutput)).first(growth.requirement.size);
+  output = std::as_writable_bytes(std::span(ownOutput)).first(size);
   return {};
 }
 
@@ -144,6 +151,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   ofScene.jointCapacity = description.jointCapacity;
   ofScene.outputCapacity =
       ownsOutput ? description.outputCapacity : Capacity::fixed(description.output.size() / 4 * 4);
+  ofScene.outputCapacity.maximum = std::min(ofScene.outputCapacity.maximum, largestSize);
   ofScene.instanceCapacity = description.instanceCapacity;
   ofScene.boundsCapacity = description.boundsCapacity;
   ofScene.limits = limitsOfMemory();
@@ -162,7 +170,7 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   for (std::uint32_t number = 0; number < state.scene.poseBufferCount(); ++number)
     state.addPoseBuffer(state.scene.poseBuffer(number).requirement.size);
   if (ownsOutput) {
-    const std::uint64_t size = state.scene.buffer(BufferRole::positions).size;
+    const auto size = static_cast<std::size_t>(state.scene.buffer(BufferRole::positions).size);
     state.ownOutput.resize(size / sizeof(CacheLine) + 1);
     state.output = std::as_writable_bytes(std::span(state.ownOutput)).first(size);
   } else {
@@ -287,7 +295,7 @@ Result<std::span<const PlannedJob>> SkinningSystem::jobs(std::uint32_t verticesP
     } else if (const auto* copy = std::get_if<CopyCommand>(&command);
                copy != nullptr && copy->to == BufferRole::positions) {
       std::memcpy(state.output.data() + copy->toOffset, state.output.data() + copy->fromOffset,
-                  copy->size);
+                  static_cast<std::size_t>(copy->size));
     }
   }
   state.finishTasks();
@@ -314,7 +322,8 @@ void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
     source.mayScale = dispatch.variant.scales;
     source.pose =
         std::span<const JointMatrix>(poseBuffers[dispatch.poseBuffer])
-            .subspan(record.matrices * unitBytes / sizeof(JointMatrix), record.jointCount);
+            .subspan(static_cast<std::size_t>(record.matrices * unitBytes) / sizeof(JointMatrix),
+                     record.jointCount);
     const PaletteForm form = paletteForm(dispatch.variant.method);
     source.end = record.place + paletteSize(form, record.jointCount, source.mayScale);
     auto first = palettes.lower_bound(record.place);
@@ -439,8 +448,9 @@ void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
       resultOf.push_back(std::uint32_t{resultOf[first + instance]});
     }
     const std::size_t from = isAgain ? instances.size() - count : first;
-    for (std::size_t instance = 0; instance < count; instance += each)
-      addTask(part, from + instance, std::min<std::size_t>(each, count - instance));
+    const auto together = static_cast<std::size_t>(std::min<std::uint64_t>(each, count));
+    for (std::size_t instance = 0; instance < count; instance += together)
+      addTask(part, from + instance, std::min(together, count - instance));
   }
 }
 
@@ -476,14 +486,16 @@ void SkinningSystem::State::readBackResults() {
     results[part.result] = {};
   }
   for (const Part& part : parts) addResult(results[part.result], part.found);
-  readBack.resize(plan.buffer(BufferRole::readBack).size);
+  readBack.resize(static_cast<std::size_t>(plan.buffer(BufferRole::readBack).size));
   for (const Command& command : plan.commands()) {
     const auto* copy = std::get_if<CopyCommand>(&command);
     if (copy == nullptr || copy->to != BufferRole::readBack) continue;
-    const std::uint64_t needed = (copy->fromOffset + copy->size) / sizeof(InstanceResult);
+    const auto size = static_cast<std::size_t>(copy->size);
+    const std::size_t needed =
+        (static_cast<std::size_t>(copy->fromOffset) + size) / sizeof(InstanceResult);
     if (results.size() < needed) results.resize(needed);
     std::memcpy(readBack.data() + copy->toOffset,
-                reinterpret_cast<const std::byte*>(results.data()) + copy->fromOffset, copy->size);
+                reinterpret_cast<const std::byte*>(results.data()) + copy->fromOffset, size);
   }
   static_cast<void>(scene.readBack(frame - 1, readBack).ok());  // it was committed last
 }

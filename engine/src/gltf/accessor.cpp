@@ -11,7 +11,7 @@
 namespace dermis::gltf {
 namespace {
 
-std::uint64_t sizeOfComponent(int componentType) {
+std::uint32_t sizeOfComponent(int componentType) {
   switch (componentType) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
@@ -291,7 +291,7 @@ std::span<const std::byte> Source::viewBytes(std::uint64_t view, const std::stri
   if (view >= content().bufferViews.size()) failInvalid(where, ": there is no bufferView ", view);
   const auto size = sizeOf(static_cast<int>(view));
   if (size == 0) failInvalid(where, ": bufferView ", view, " has no bytes");
-  return {viewData(static_cast<int>(view)), size};
+  return {viewData(static_cast<int>(view)), static_cast<std::size_t>(size)};
 }
 
 void Source::leaveOut(std::size_t mesh, std::size_t primitive, const std::string& attribute) {
@@ -397,7 +397,7 @@ void Source::forEachComponent(int index, Visit visit) {
   const std::size_t component = sizeOfComponent(accessor.componentType);
   if (accessor.bufferView >= 0) {
     const std::byte* element = viewData(accessor.bufferView) + accessor.byteOffset;
-    const std::size_t stride = strideOf(accessor);
+    const auto stride = static_cast<std::size_t>(strideOf(accessor));
     for (std::size_t i = 0; i < accessor.count; ++i) {
       for (std::size_t j = 0; j < width; ++j) {
         visit(i * width + j, element + i * stride + j * component);

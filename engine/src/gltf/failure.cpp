@@ -1,6 +1,9 @@
 #include "gltf/failure.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
+#include <limits>
 
 #include "strict_floating_point.h"
 
@@ -18,7 +21,12 @@ void fail(ErrorCode code, std::string message) {
 
 void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
            std::string_view where) {
-  if (budget.spend(count, bytesEach)) return;
+  // No object is larger, and sizes in `std::size_t` do not wrap below it: that is for 32-bit
+  // systems.
+  constexpr std::uint64_t largestSize = std::numeric_limits<std::ptrdiff_t>::max();
+  if (count <= largestSize / std::max<std::uint64_t>(bytesEach, 1) &&
+      budget.spend(count, bytesEach))
+    return;
   fail(ErrorCode::limitExceeded,
        join(where, ": more memory is wanted than a file of this size justifies"));
 }

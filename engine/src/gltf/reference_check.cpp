@@ -241,7 +241,7 @@ class ReferenceCheck {
     return integer(object, property, where, 0);
   }
 
-  std::uint64_t sizeOf(const char* section) const {
+  std::size_t sizeOf(const char* section) const {
     const auto found = root_.find(section);
     return found == root_.end() ? 0 : found->size();
   }
@@ -651,7 +651,7 @@ class ReferenceCheck {
     }
     const std::string& path = target["path"].get_ref<const std::string&>();
     if (path == "translation" || path == "rotation" || path == "scale" || path == "weights")
-      usedSamplers[sampler] = true;
+      usedSamplers[static_cast<std::size_t>(sampler)] = true;
   }
 
   static constexpr const char* unknownPath = "";

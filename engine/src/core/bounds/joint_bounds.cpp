@@ -174,8 +174,10 @@ class Collector {
                 return a.first != b.first ? a.first < b.first : a.second < b.second;
               });
     for (const std::uint64_t key : trios_) {
-      result.trios.push_back(
-          {compact[key >> 32], compact[key >> 16 & 0xffffu], compact[key & 0xffffu]});
+      const auto joint = [&](int shift) {
+        return compact[static_cast<std::size_t>(key >> shift & 0xffffu)];
+      };
+      result.trios.push_back({joint(32), joint(16), joint(0)});
     }
     std::sort(result.trios.begin(), result.trios.end());
     return result;

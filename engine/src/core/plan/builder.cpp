@@ -23,7 +23,7 @@ std::uint32_t wordsOf(const std::vector<std::uint32_t>& tables) {
 
 /// Records begin at multiples of four words.
 void alignToUnit(std::vector<std::uint32_t>& tables) {
-  tables.resize(divideUp(tables.size(), 4) * 4);
+  tables.resize((tables.size() + 3) / 4 * 4);
 }
 
 using abi::store;
@@ -141,7 +141,7 @@ std::uint32_t& Groups::headOf(const GroupKey& key) {
   const std::uint64_t hash =
       key.mesh * odd[0] + key.variant * odd[1] +
       ((std::uint64_t{key.windows[0]} << 32 | key.strides[0]) ^ key.firstVertex) * odd[2];
-  return heads_[(hash >> 32) & (heads_.size() - 1)];
+  return heads_[static_cast<std::size_t>(hash >> 32) & (heads_.size() - 1)];
 }
 
 void Groups::growHeads() {

@@ -271,7 +271,7 @@ Result<void> SceneBooks::commit() {
   committed_ = planned_;
   const bool culls = planned_.culledCandidates != 0;
   if (culls) clearHistory_ = static_cast<std::uint32_t>(slotCapacity_);
-  ReadBack& readBack = readBacks_[record_ % readBacks_.size()];
+  ReadBack& readBack = readBacks_[static_cast<std::size_t>(record_ % readBacks_.size())];
   readBack.swap(abandonable_.readBack);
   readBack.frame = frame_;
   readBack.hasCounters = culls;
@@ -368,7 +368,7 @@ Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
   for (const Conversion& conversion : conversions_) {
     if (ScenePose* pose = poses_.find(conversion.pose)) pose->forms[conversion.form].version = 0;
   }
-  readBacks_[record_ % readBacks_.size()].swap(abandonable_.readBack);
+  readBacks_[static_cast<std::size_t>(record_ % readBacks_.size())].swap(abandonable_.readBack);
   clearHistory_ = abandonable_.clearHistory;
   recordedFrame_ = abandonable_.recordedFrame;
   --record_;
@@ -408,10 +408,11 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
   // A frame that found nothing out about an instance does not take away what an earlier one did.
   if (!found->results.empty()) latestResultsFrame_ = frame;
   for (const CopyCommand& copy : found->results) {
-    const std::size_t first = copy.fromOffset / sizeof(InstanceResult);
-    latestResults_.resize(
-        std::max(latestResults_.size(), first + copy.size / sizeof(InstanceResult)));
-    std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, copy.size);
+    // All of it is in `bytes`.
+    const auto first = static_cast<std::size_t>(copy.fromOffset / sizeof(InstanceResult));
+    const auto size = static_cast<std::size_t>(copy.size);
+    latestResults_.resize(std::max(latestResults_.size(), first + size / sizeof(InstanceResult)));
+    std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
   }
   return {};
 }
