@@ -1,5 +1,6 @@
 // Stops a build whose flags let the compiler take NaN, infinities or signs of zeros for impossible,
 // or change the order of operations: checks would pass silently, and error bounds would not hold.
+// The x87 unit of 32-bit x86 would round to `float` only when a value is stored.
 // CMake's targets switch these flags off; a build from the list of files must do so itself.
 // Included by Dermis' sources only. Flush-to-zero is not looked for: it is set when a program is
 // linked or runs, and subnormal numbers are within the error bounds.
@@ -9,4 +10,10 @@
     defined(_M_FP_FAST) || defined(__NO_SIGNED_ZEROS__) || defined(__ASSOCIATIVE_MATH__) ||   \
     defined(__RECIPROCAL_MATH__)
 #error "Dermis: compile without -ffast-math, -ffinite-math-only, -fno-signed-zeros, /fp:fast"
+#endif
+
+// 0: each type is calculated as itself. 16: so is a 16-bit type.
+#if (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16) || \
+    (defined(_M_IX86_FP) && _M_IX86_FP < 2)
+#error "Dermis: compile for SSE2 and not for the x87 unit: -msse2 -mfpmath=sse, /arch:SSE2"
 #endif

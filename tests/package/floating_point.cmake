@@ -12,6 +12,15 @@ foreach(flag IN ITEMS -ffast-math -Ofast -ffinite-math-only -D_M_FP_FAST)
     wrong("validate.cpp compiled, or failed for another reason:\n${printed}")
   endif()
 endforeach()
+say("Compile as for the x87 unit")
+set(x87 -U__FLT_EVAL_METHOD__ -D__FLT_EVAL_METHOD__=2)
+execute_process(COMMAND "${ownCompiler}" ${flags} ${x87} "${coreFolder}/validate.cpp" RESULT_VARIABLE status OUTPUT_QUIET
+                ERROR_VARIABLE printed)
+if(status EQUAL 0 OR NOT printed MATCHES "Dermis: compile for SSE2")
+  wrong("validate.cpp compiled, or failed for another reason:\n${printed}")
+endif()
+run(ignored "Compile a program of an engine for it" "${ownCompiler}" ${flags} ${x87} -include
+    "${sourceFolder}/engine/include/dermis/dermis.h" -x c++ /dev/null)
 run(ignored "Compile a program of an engine with -ffast-math" "${ownCompiler}" ${flags} -ffast-math -include
     "${sourceFolder}/engine/include/dermis/dermis.h" -x c++ /dev/null)
 run(ignored "Compile without" "${ownCompiler}" ${flags} "${coreFolder}/validate.cpp")
