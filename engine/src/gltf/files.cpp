@@ -1,5 +1,9 @@
 #include "gltf/files.h"
 
+#ifdef _WIN32
+#include <windows.h>
+#endif
+
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
@@ -33,8 +37,11 @@ std::filesystem::path relativePath(std::string_view uri, const std::string& wher
     fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a file beside this one"));
   }
   const std::string text = decodePercent(uri, where);
+  // There a colon names a drive, or another stream of a file.
+  constexpr bool isWindows = std::filesystem::path::preferred_separator != '/';
   const bool hostile = text.empty() || text.find('\0') != std::string::npos ||
-                       text.find('\\') != std::string::npos || hasScheme(text);
+                       text.find('\\') != std::string::npos || hasScheme(text) ||
+                       (isWindows && text.find(':') != std::string::npos);
   const std::filesystem::path relative(std::u8string(text.begin(), text.end()));
   const bool outside = hostile || relative.is_absolute() || relative.has_root_path() ||
                        std::find(relative.begin(), relative.end(), "..") != relative.end();
@@ -51,7 +58,31 @@ bool isInside(const std::filesystem::path& file, const std::filesystem::path& fo
 }
 
 std::string inFull(const std::filesystem::path& path) {
-  return join("'", oneLine(path.string()), "'");
+  return join("'", oneLine(utf8(path)), "'");
+}
+
+/// With all links followed.
+std::filesystem::path realPath(const std::filesystem::path& path, std::error_code& error) {
+#ifdef _WIN32
+  // Not std::filesystem::canonical: that of GCC does not know the links of Windows.
+  const HANDLE file =
+      CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
+                  OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, nullptr);
+  std::wstring name(32768, L'\0');  // the longest that Windows has
+  DWORD length = 0;
+  if (file != INVALID_HANDLE_VALUE) {
+    length = GetFinalPathNameByHandleW(file, name.data(), static_cast<DWORD>(name.size()),
+                                       FILE_NAME_NORMALIZED);
+  }
+  error = {};
+  if (length == 0 || length >= name.size())
+    error = {static_cast<int>(GetLastError()), std::system_category()};
+  if (file != INVALID_HANDLE_VALUE) CloseHandle(file);
+  name.resize(error ? 0 : length);
+  return name;
+#else
+  return std::filesystem::canonical(path, error);
+#endif
 }
 
 std::ifstream open(const FileToRead& file, const std::string& where) {
@@ -80,6 +111,11 @@ void checkSize(std::uint64_t size, const std::string& where) {
 }
 
 }  // namespace
+
+std::string utf8(const std::filesystem::path& path) {
+  const std::u8string text = path.u8string();
+  return std::string(text.begin(), text.end());
+}
 
 FileToRead findFile(const std::filesystem::path& path, const std::string& where) {
   std::error_code error;
@@ -113,15 +149,14 @@ SideFiles::SideFiles(std::filesystem::path folder, MemoryBudget& budget)
 
 FileToRead SideFiles::find(std::string_view uri, const std::string& where) const {
   const std::filesystem::path relative = relativePath(uri, where);
-  const std::string name = inQuotes(relative.string());
+  const std::string name = inQuotes(utf8(relative));
   if (folder_.empty())
     fail(ErrorCode::ioError, join(where, ": ", name, " cannot be read without a folder"));
   const FileToRead named = findFile(folder_ / relative, where + ": ");
   // Links are followed here, once, and what is opened has none: it must still be in the folder.
   std::error_code error;
-  const std::filesystem::path folder = std::filesystem::canonical(folder_, error);
-  const std::filesystem::path real =
-      error ? std::filesystem::path() : std::filesystem::canonical(named.path, error);
+  const std::filesystem::path folder = realPath(folder_, error);
+  const std::filesystem::path real = error ? std::filesystem::path() : realPath(named.path, error);
   if (error) {
     fail(ErrorCode::ioError, join(where, ": ", name, " cannot be opened: ", error.message()));
   }

@@ -25,6 +25,10 @@ struct FileToRead {
   std::uint64_t size = 0;
 };
 
+/// A path for messages: `string` is in the code page of the machine with some standard libraries on
+/// Windows, and throws where that lacks a character.
+std::string utf8(const std::filesystem::path& path);
+
 /// Throws `Failure` with `ioError`: there is no such file, it is a folder, it may not be looked at.
 /// `where` says what names it, with a colon behind it, or nothing.
 FileToRead findFile(const std::filesystem::path& path, const std::string& where = {});

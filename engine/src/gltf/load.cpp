@@ -74,7 +74,7 @@ Result<Model> load(const std::filesystem::path& path, const LoadOptions& options
     try {
       return readModel(readModelFile(file), folder, options);
     } catch (Failure& failure) {
-      failure.error.message = join(inQuotes(path.filename().string()), ": ", failure.error.message);
+      failure.error.message = join(inQuotes(utf8(path.filename())), ": ", failure.error.message);
       throw;
     }
   });
