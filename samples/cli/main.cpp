@@ -46,5 +46,5 @@ ExitStatus run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return dermis::samples::runProgram("dermis", [&] { return run(argc, argv); });
+  return dermis::samples::runProgram("dermis", argc, argv, run);
 }

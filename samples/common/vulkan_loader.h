@@ -11,7 +11,8 @@ namespace dermis::samples {
 
 class VulkanLoader {
  public:
-  /// Opens libvulkan.so.1. Fails with `missingFeature` where there is none.
+  /// Opens libvulkan.so.1, or vulkan-1.dll on Windows. Fails with `missingFeature` where there is
+  /// none.
   static Result<std::shared_ptr<VulkanLoader>> open();
   ~VulkanLoader();
   VulkanLoader(const VulkanLoader&) = delete;

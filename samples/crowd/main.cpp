@@ -275,12 +275,14 @@ ExitStatus run(const Options& options) {
   return reportOn((*show)->report, (*show)->check.totals(), options, complaint);
 }
 
+ExitStatus run(int argc, char** argv) {
+  Options options;
+  const std::optional<ExitStatus> ended = readOptions(argc, argv, options);
+  return ended ? *ended : run(options);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  return samples::runProgram("dermis_crowd", [&] {
-    Options options;
-    const std::optional<ExitStatus> ended = readOptions(argc, argv, options);
-    return ended ? *ended : run(options);
-  });
+  return samples::runProgram("dermis_crowd", argc, argv, run);
 }

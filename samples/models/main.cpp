@@ -30,5 +30,5 @@ ExitStatus run(int argumentCount, char** arguments) {
 }  // namespace
 
 int main(int argumentCount, char** arguments) {
-  return samples::runProgram("dermis-models", [&] { return run(argumentCount, arguments); });
+  return samples::runProgram("dermis-models", argumentCount, arguments, run);
 }

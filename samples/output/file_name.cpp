@@ -1,9 +1,15 @@
 #include "file_name.h"
 
 #include <fmt/format.h>
+
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <sys/stat.h>
+#endif
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
@@ -32,22 +38,36 @@ std::optional<Place> nextPlace(std::string_view name, std::size_t from) {
   return std::nullopt;
 }
 
-using FileIdentity = std::pair<dev_t, ino_t>;
+/// The device or volume, and the number of the file there.
+using FileIdentity = std::pair<std::uint64_t, std::uint64_t>;
 
 /// Nothing if there is no file.
 std::optional<FileIdentity> identityOf(const std::filesystem::path& path) {
+#ifdef _WIN32
+  const HANDLE file =
+      CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
+                  OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, nullptr);
+  if (file == INVALID_HANDLE_VALUE) return std::nullopt;
+  BY_HANDLE_FILE_INFORMATION information{};
+  const bool isKnown = GetFileInformationByHandle(file, &information) != 0;
+  CloseHandle(file);
+  if (!isKnown) return std::nullopt;
+  return FileIdentity(information.dwVolumeSerialNumber,
+                      std::uint64_t{information.nFileIndexHigh} << 32 | information.nFileIndexLow);
+#else
   struct stat file {};
   if (stat(path.c_str(), &file) != 0) return std::nullopt;
-  return std::pair(file.st_dev, file.st_ino);
+  return FileIdentity(file.st_dev, file.st_ino);
+#endif
 }
 
 /// The file of that name, or its name where there is none yet; nothing for devices and FIFOs, which
 /// take what several write.
 std::optional<std::string> writtenFile(const std::filesystem::path& path) {
-  struct stat file {};
-  if (stat(path.c_str(), &file) == 0) {
-    if (!S_ISREG(file.st_mode)) return std::nullopt;
-    return fmt::format("{} {}", file.st_dev, file.st_ino);
+  if (const std::optional<FileIdentity> file = identityOf(path)) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+    return fmt::format("{} {}", file->first, file->second);
   }
   std::error_code unknown;
   const std::filesystem::path whole = std::filesystem::weakly_canonical(path, unknown);

@@ -4,7 +4,8 @@
 // Until then, whatever goes wrong, what stood at the target is untouched. Symbolic links are
 // followed: the link stays, and the file that it names is replaced. A new file gets the permissions
 // that the umask leaves, a replaced one keeps those that it had. What is not a regular file
-// (devices, FIFOs) and standard output are written through.
+// (devices, FIFOs) and standard output are written through. On Windows a replaced file gets the
+// permissions of a new one, and a link is replaced.
 #pragma once
 
 #include <cstddef>

@@ -29,7 +29,7 @@ class PictureWriter {
 /// PNG files: OUT, or OUT with the number of each in the place for it.
 std::unique_ptr<PictureWriter> writePngs(const std::string& output);
 
-/// Fails with `missingFeature` if there is no ffmpeg in the PATH, which films need.
+/// Fails with `missingFeature` if there is no ffmpeg in the PATH, which films need, and on Windows.
 Result<void> checkFilmProgram(const std::string& output);
 
 /// A film of pictures of one size. It replaces what stands at OUT when it is finished, and not

@@ -1,8 +1,15 @@
 #include "program.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
+
+#ifdef _WIN32
+#include <windows.h>
+// After windows.h.
+#include <shellapi.h>
+#else
+#include <fcntl.h>
 #include <unistd.h>
+#endif
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -11,7 +18,9 @@
 #include <exception>
 #include <new>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "unfinished.h"
 
@@ -58,6 +67,29 @@ std::string complaintAbout(std::span<char* const> arguments, const CLI::App& com
   return {};
 }
 
+#ifdef _WIN32
+std::string toUtf8(const wchar_t* text) {
+  const int size = WideCharToMultiByte(CP_UTF8, 0, text, -1, nullptr, 0, nullptr, nullptr);
+  std::string utf8(static_cast<std::size_t>(std::max(size, 1)), '\0');
+  WideCharToMultiByte(CP_UTF8, 0, text, -1, utf8.data(), size, nullptr, nullptr);
+  utf8.pop_back();  // the zero at the end
+  return utf8;
+}
+
+/// The arguments of `main` are in the code page of the machine, which lacks most characters.
+ExitStatus runWithArguments(int, char**, ExitStatus (*run)(int, char**)) {
+  SetConsoleOutputCP(CP_UTF8);
+  int count = 0;
+  wchar_t** const wide = CommandLineToArgvW(GetCommandLineW(), &count);
+  std::vector<std::string> arguments;
+  for (int i = 0; i < count; ++i) arguments.push_back(toUtf8(wide[i]));
+  LocalFree(wide);
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  return run(count, pointers.data());
+}
+#else
 /// Without this the next file that is opened would become standard output or error. Reading what
 /// is only written to, and the reverse, fails as it does for a stream that is closed.
 void fillClosedStreams() {
@@ -66,6 +98,12 @@ void fillClosedStreams() {
       (void)open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }
 }
+
+ExitStatus runWithArguments(int argc, char** argv, ExitStatus (*run)(int, char**)) {
+  fillClosedStreams();
+  return run(argc, argv);
+}
+#endif
 
 }  // namespace
 
@@ -92,13 +130,12 @@ std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv) {
   return std::nullopt;
 }
 
-int runProgram(const char* name, const std::function<ExitStatus()>& run) {
-  fillClosedStreams();
+int runProgram(const char* name, int argc, char** argv, ExitStatus (*run)(int argc, char** argv)) {
   handleSignals();
   setProgramName(name);
   ExitStatus status = ExitStatus::stopped;
   try {
-    status = run();
+    status = runWithArguments(argc, argv, run);
   } catch (const std::bad_alloc&) {
     status = reportError(ExitStatus::stopped, "out of memory");
   } catch (const std::exception& error) {

@@ -1,7 +1,6 @@
 // From the command line to the exit status.
 #pragma once
 
-#include <functional>
 #include <optional>
 
 #include "exit_status.h"
@@ -21,6 +20,7 @@ inline constexpr const char* exitStatusHelp =
 std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv);
 
 /// What `main` returns. What `run` throws, and standard output that cannot be written, is reported.
-int runProgram(const char* name, const std::function<ExitStatus()>& run);
+/// `run` gets the arguments in UTF-8, on Windows too.
+int runProgram(const char* name, int argc, char** argv, ExitStatus (*run)(int argc, char** argv));
 
 }  // namespace dermis::samples

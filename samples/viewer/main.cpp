@@ -36,5 +36,5 @@ ExitStatus run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return samples::runProgram("dermis_viewer", [&] { return run(argc, argv); });
+  return samples::runProgram("dermis_viewer", argc, argv, run);
 }
