@@ -2,9 +2,9 @@
 # Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). Does nothing, and needs no
 # rights, where all of it is there. On another system it lists what is needed and ends with an error.
 #
-#   cmake/install-deps.sh [nightly|arm64]
+#   cmake/install-deps.sh [nightly|windows|x86|arm64|libcxx]
 #
-# nightly: also what only tests/run.sh nightly needs. arm64: also what it needs to cross-build for arm64.
+# nightly: also what only tests/run.sh nightly needs. The others: also what its part of that name needs.
 set -eu
 
 packages="
@@ -33,13 +33,16 @@ debootstrap lintian
   fi
 fi
 
-architecture=
-if [ "${1:-}" = arm64 ]; then
-  architecture=arm64
-  packages="$packages
-g++-aarch64-linux-gnu qemu-user libhwy-dev:arm64 libgtest-dev:arm64
-"
-fi
+case ${1:-} in
+  windows) packages="$packages googletest g++-mingw-w64-x86-64-posix wine wine64" ;;
+  x86) packages="$packages googletest g++-i686-linux-gnu" ;;
+  arm64) packages="$packages googletest g++-aarch64-linux-gnu qemu-user" ;;
+  libcxx) # 16 is the first that has all that Dermis uses; Debian 12's own is 14, Debian 13's is newer
+    version=
+    if apt-cache show clang-16 >/dev/null 2>&1; then version=-16; fi
+    packages="$packages googletest clang$version libc++$version-dev libc++abi$version-dev"
+    ;;
+esac
 
 if ! command -v dpkg-query >/dev/null 2>&1; then
   echo "install-deps: this is not Debian; Dermis needs the equivalents of these packages:" >&2
@@ -68,7 +71,6 @@ fi
 
 echo "install-deps: installing$missing"
 export DEBIAN_FRONTEND=noninteractive
-[ -z "$architecture" ] || $as_root dpkg --add-architecture "$architecture"
 $as_root apt-get update -q
 # shellcheck disable=SC2086 # a list of words
 $as_root apt-get install -y -q --no-install-recommends $missing

@@ -7,7 +7,10 @@
 #   asan-rest    all other tests under them
 #   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
-#   arm64        the CPU path built for arm64, its tests run by qemu
+#   windows      the engine and the command built by MinGW-w64; tests and the command run by Wine
+#   x86          the same for 32-bit x86, run by this machine
+#   arm64        the same for arm64, run by qemu
+#   libcxx       the same by Clang with libc++
 #   fuzz         each fuzzer for a minute
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
@@ -22,7 +25,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang arm64 fuzz mesa speed gpu exhaustive golden programs"
+parts="asan asan-rest tsan clang windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -72,12 +75,72 @@ part_clang() {
   tests clang -R '^package\.'
 }
 
+# tests/cross: the tests that need no device, models made, skinned and verified by the command; the vertices must be, to the bit,
+# those that it skins here. Kernels are those of build/ci, but for arm64, whose build compiles them by the host's compiler.
+cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross
+  system=$1
+  emulator=${2:-}
+  folder=build/cross/$system
+  kernels=
+  ./cmake/install-deps.sh "$system"
+  ./tests/cross/unpack_highway.sh build/cross/highway
+  build ci dermis_cli dermis_sample_models dermis_gpu_poses_shaders
+  if [ "$system" != arm64 ]; then
+    kernels=$PWD/build/cross/kernels
+    mkdir -p "$kernels"
+    for made in shaders/dermis_kernels samples/bench/plain_kernels samples/render/dermis_render_shaders \
+      samples/gpu_poses/dermis_gpu_poses_shaders; do
+      cp "build/ci/$made/"*.h "build/ci/$made/"*.cpp "$kernels"
+    done
+  fi
+  cmake -S tests/cross -B "$folder" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$PWD/tests/cross/$system.cmake" \
+    -DDERMIS_HIGHWAY_SOURCES="$PWD/build/cross/highway" -DDERMIS_EMBEDDED_SHADERS="$kernels"
+  cmake --build "$folder" --target cross_tests dermis_sample_models
+  outcome=0
+  ctest --test-dir "$folder" --output-on-failure --no-tests=error --timeout 900 >"$folder/tests.log" 2>&1 || outcome=$?
+  tail -n 20 "$folder/tests.log"
+  awk '/: Skipped$/ { getline reason } /^\[  SKIPPED \] .* ms\)$/ { print "Skipped: " $4 ": " reason }' \
+    "$folder/Testing/Temporary/LastTest.log" | sort -u
+  [ "$outcome" -eq 0 ] || { cat "$folder/tests.log"; return "$outcome"; }
+
+  figure=build/ci/samples/models/figure.glb
+  build/ci/samples/cli/dermis skin "$figure" --device cpu -o "$folder/here.ply"
+  $emulator "$(dermis_of "$system")" skin "$figure" --device cpu -o "$folder/there.ply"
+  cmp "$folder/here.ply" "$folder/there.ply"
+  $emulator "$(dermis_of "$system")" verify "$folder/dermis/samples/models/bar.glb" --device cpu
+}
+
+dermis_of() { # SYSTEM: the command
+  program=build/cross/$1/dermis/samples/cli/dermis
+  if [ "$1" = windows ]; then program=$program.exe; fi
+  echo "$program"
+}
+
+# Wine looks for a screen before it gives a program Vulkan: lavapipe of this system.
+part_windows() {
+  export WINEDEBUG=-all WINEPREFIX="$PWD/build/cross/wine"
+  wine=$(PATH=/usr/lib/wine:$PATH command -v wine64 || command -v wine)
+  cross windows "$wine"
+  xvfb-run -a "$wine" "$(dermis_of windows)" devices
+  xvfb-run -a "$wine" "$(dermis_of windows)" verify build/ci/samples/models/bar.glb
+  # File names are UTF-8.
+  name=$(printf 'build/cross/windows/gr\303\274n \346\227\245')
+  cp build/ci/samples/models/bar.glb "$name.glb"
+  "$wine" "$(dermis_of windows)" skin "$name.glb" --device cpu -o "$name.ply"
+  [ -s "$name.ply" ]
+}
+
+part_x86() {
+  cross x86
+}
+
 part_arm64() {
-  ./cmake/install-deps.sh arm64
-  cmake -S tests/arm64 -B build/arm64 -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
-    -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ -DCMAKE_LIBRARY_ARCHITECTURE=aarch64-linux-gnu
-  cmake --build build/arm64 --target arm64_test
-  qemu-aarch64 build/arm64/arm64_test --gtest_brief=1
+  cross arm64 qemu-aarch64
+}
+
+part_libcxx() {
+  cross libcxx
+  "$(dermis_of libcxx)" verify build/ci/samples/models/bar.glb
 }
 
 part_fuzz() {

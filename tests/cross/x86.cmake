@@ -1,0 +1,7 @@
+# 32-bit x86, by Debian's cross compiler. That Dermis' targets use SSE2 and not the x87 unit is for its own CMake files to see to.
+# Linked statically: this machine runs it without the C library of that architecture.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR i686)
+set(CMAKE_CXX_COMPILER i686-linux-gnu-g++)
+set(CMAKE_C_COMPILER i686-linux-gnu-gcc)
+set(CMAKE_EXE_LINKER_FLAGS_INIT -static)
