@@ -54,7 +54,8 @@ ExitStatus checkUsage(const BenchOptions& options) {
 ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
                  const std::vector<samples::ThroughputRow>& rows) {
   if (!options.json.empty()) {
-    if (Result<void> written = writeJsonThroughput(options.json, title, rows); !written)
+    if (Result<void> written = writeJsonThroughput(samples::pathOf(options.json), title, rows);
+        !written)
       return reportError(ExitStatus::stopped, written.error().message);
   }
   if (options.output.empty()) return ExitStatus::done;
@@ -63,7 +64,7 @@ ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
   const Result<std::vector<std::byte>> file =
       samples::render::encodePng(drawThroughput(title, rows, font ? &*font : nullptr));
   if (!file) return reportError(ExitStatus::stopped, file.error().message);
-  if (Result<void> written = samples::writeFile(options.output, *file); !written)
+  if (Result<void> written = samples::writeFile(samples::pathOf(options.output), *file); !written)
     return reportError(ExitStatus::stopped, written.error().message);
   return ExitStatus::done;
 }
@@ -78,9 +79,9 @@ ExitStatus bench(const BenchOptions& options) {
       {{"-o", options.output}, {"--json", options.json}}};
   if (const ExitStatus kept = checkInput(options.model, outputs); kept != ExitStatus::done)
     return kept;
-  const Result<samples::Crowd> crowd = options.model.empty()
-                                           ? samples::longFigure(figureVertices, options.instances)
-                                           : samples::loadCrowd(options.model, options.instances);
+  const Result<samples::Crowd> crowd =
+      options.model.empty() ? samples::longFigure(figureVertices, options.instances)
+                            : samples::loadCrowd(samples::pathOf(options.model), options.instances);
   if (!crowd) return reportModelError(crowd.error());
 
   ThroughputTitle title;

@@ -104,7 +104,7 @@ MeshPreparation preparationFor(const CompareOptions& options) {
 
 /// The model, with something to skin.
 ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) {
-  Result<Scene> scene = loadScene(options.model, preparationFor(options));
+  Result<Scene> scene = loadScene(samples::pathOf(options.model), preparationFor(options));
   if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
   if (std::ranges::none_of(scene->parts,
@@ -172,7 +172,7 @@ ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& 
   for (const std::string& note : notes) reportNote(note);
   const Result<std::vector<std::byte>> file = samples::render::encodePng(*picture);
   if (!file) return reportError(ExitStatus::stopped, file.error().message);
-  if (Result<void> written = samples::writeFile(options.output, *file); !written)
+  if (Result<void> written = samples::writeFile(samples::pathOf(options.output), *file); !written)
     return reportError(ExitStatus::stopped, written.error().message);
   return ExitStatus::done;
 }
@@ -224,7 +224,9 @@ ExitStatus compare(const CompareOptions& options) {
                : reportDeviceError(comparison.error());
   }
   if (!options.json.empty()) {
-    if (Result<void> written = writeJsonComparison(options.json, title, *comparison); !written)
+    if (Result<void> written =
+            writeJsonComparison(samples::pathOf(options.json), title, *comparison);
+        !written)
       return reportError(ExitStatus::stopped, written.error().message);
   }
   printComparison(title, *comparison);

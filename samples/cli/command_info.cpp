@@ -93,7 +93,7 @@ void printText(const Json& json) {
 }
 
 ExitStatus info(const InfoOptions& options) {
-  const Result<Scene> scene = loadScene(options.model, {.strict = options.strict});
+  const Result<Scene> scene = loadScene(samples::pathOf(options.model), {.strict = options.strict});
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene);
   if (options.json) {

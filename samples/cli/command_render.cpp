@@ -386,7 +386,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
-  const Result<Scene> scene = loadScene(options.model, preparation);
+  const Result<Scene> scene = loadScene(samples::pathOf(options.model), preparation);
   if (!scene) return reportModelError(scene.error());
   const samples::RequestedOutput output = requestedOutput(options);
   if (const ExitStatus kept = checkSideFiles(*scene->model, {&output, 1}); kept != ExitStatus::done)

@@ -112,7 +112,7 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
       reportWarning(message);
     }
     const std::string name = samples::frameName(options.output, frame).value_or(options.output);
-    if (Result<void> written = writeMesh(name, format, mesh); !written) {
+    if (Result<void> written = writeMesh(samples::pathOf(name), format, mesh); !written) {
       return reportError(ExitStatus::stopped, written.error().message);
     }
     progress.step();
@@ -132,7 +132,7 @@ ExitStatus skin(const SkinOptions& options) {
   preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
   preparation.bulgeStrength = static_cast<float>(options.shares.bulgeStrength);
-  const Result<Scene> scene = loadScene(options.model, preparation);
+  const Result<Scene> scene = loadScene(samples::pathOf(options.model), preparation);
   if (!scene) return reportModelError(scene.error());
   if (const ExitStatus kept = checkSideFiles(*scene->model, {&output, 1}); kept != ExitStatus::done)
     return kept;

@@ -75,7 +75,7 @@ class Verifier {
 
  private:
   void verifyModel(const std::string& model) {
-    const Result<Scene> scene = loadScene(model, preparation_);
+    const Result<Scene> scene = loadScene(samples::pathOf(model), preparation_);
     if (!scene) return refuse(model, ExitStatus::badInput, scene.error().message);
     if (const Result<void> kept = samples::checkOutputFiles(reports_, scene->model->sideFiles);
         !kept) {
@@ -134,8 +134,8 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
   const auto keep = [&status](const Result<void>& written) {
     if (!written) status = reportError(ExitStatus::stopped, written.error().message);
   };
-  if (!options.json.empty()) keep(writeJsonReport(options.json, device, models));
-  if (!options.junit.empty()) keep(writeJunitReport(options.junit, models));
+  if (!options.json.empty()) keep(writeJsonReport(samples::pathOf(options.json), device, models));
+  if (!options.junit.empty()) keep(writeJunitReport(samples::pathOf(options.junit), models));
   return status;
 }
 
@@ -194,7 +194,8 @@ ExitStatus verify(const VerifyOptions& options) {
   if (options.threads == 0u) return reportWrongUsage("--threads must be at least 1");
   const std::array<samples::RequestedOutput, 2> outputFiles{
       {{"--json", options.json}, {"--junit", options.junit}}};
-  const std::vector<std::filesystem::path> inputs(options.models.begin(), options.models.end());
+  std::vector<std::filesystem::path> inputs;
+  for (const std::string& model : options.models) inputs.push_back(samples::pathOf(model));
   if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
     return reportWrongUsage(kept.error().message);
   const auto makeTarget = [&options]() -> Result<std::shared_ptr<samples::BatchTarget>> {

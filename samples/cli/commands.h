@@ -26,7 +26,7 @@ using samples::reportWrongUsage;
 /// Reports wrong usage if an output would overwrite the model.
 inline ExitStatus checkInput(const std::string& model,
                              std::span<const samples::RequestedOutput> outputs) {
-  const std::filesystem::path input = model;
+  const std::filesystem::path input = samples::pathOf(model);
   const Result<void> kept = samples::checkOutputFiles(outputs, {&input, 1});
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
 }

@@ -1,6 +1,7 @@
 // dermis-models OUTDIR: writes bar.glb, arm.glb and figure.glb into an existing folder.
 #include <string>
 
+#include "file_name.h"
 #include "models.h"
 #include "output_file.h"
 #include "program/program.h"
@@ -21,7 +22,8 @@ ExitStatus run(int argumentCount, char** arguments) {
                {"arm.glb", models::makeArm},
                {"figure.glb", models::makeFigure}};
   for (const auto& [name, make] : files) {
-    if (Result<void> written = samples::writeFile(folder + "/" + name, make()); !written)
+    if (Result<void> written = samples::writeFile(samples::pathOf(folder + "/" + name), make());
+        !written)
       return samples::reportError(ExitStatus::stopped, written.error().message);
   }
   return ExitStatus::done;

@@ -76,6 +76,10 @@ std::optional<std::string> writtenFile(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::filesystem::path pathOf(std::string_view name) {
+  return std::u8string(name.begin(), name.end());
+}
+
 bool hasEnding(std::string_view name, std::string_view ending) {
   return name.size() > ending.size() &&
          std::equal(ending.begin(), ending.end(),
@@ -106,13 +110,13 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
   std::map<std::string, std::string_view> written;  // single files, and by which option
   const auto check = [&](std::string_view option, const std::string& name,
                          bool isFrame) -> Result<void> {
-    const std::optional<FileIdentity> identity = identityOf(name);
+    const std::optional<FileIdentity> identity = identityOf(pathOf(name));
     if (identity && read.contains(*identity)) {
       return Error{ErrorCode::invalidArgument,
                    fmt::format("{} {} would overwrite a file that is read", option, name)};
     }
     if (isFrame && written.empty()) return {};
-    const std::optional<std::string> file = writtenFile(name);
+    const std::optional<std::string> file = writtenFile(pathOf(name));
     if (!file) return {};
     const auto other = written.find(*file);
     if (other != written.end()) {

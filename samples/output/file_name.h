@@ -12,6 +12,10 @@
 
 namespace dermis::samples {
 
+/// Of a name in UTF-8, as programs take them from the command line. What `std::filesystem::path`
+/// makes of a `std::string` depends on the standard library on Windows.
+std::filesystem::path pathOf(std::string_view name);
+
 /// Whether something stands before that ending, which is given in lower case, in any case.
 bool hasEnding(std::string_view name, std::string_view ending);
 

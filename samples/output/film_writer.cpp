@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "file_name.h"
 #include "output_file.h"
 #include "picture_writer.h"
 
@@ -163,7 +164,7 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
                                                  double framesPerSecond) {
   if (Result<void> checked = checkFilmProgram(output); !checked) return checked.error();
   const std::string program = findProgram("ffmpeg").value_or("ffmpeg");
-  Result<std::unique_ptr<OutputFile>> file = OutputFile::create(output);
+  Result<std::unique_ptr<OutputFile>> file = OutputFile::create(pathOf(output));
   if (!file) return file.error();
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "file_name.h"
 #include "output_file.h"
 
 namespace dermis::samples {
@@ -98,7 +99,7 @@ std::string temporaryNameIn(const std::filesystem::path& folder) {
 Result<std::unique_ptr<OutputFile>> OutputFile::createFor(const OutputTarget& target) {
   std::unique_ptr<OutputFile> made(
       new OutputFile(target, temporaryNameIn(target.path.parent_path())));
-  made->file_ = openFile(made->temporary_, CREATE_NEW);
+  made->file_ = openFile(pathOf(made->temporary_), CREATE_NEW);
   if (made->file_ < 0) return cannotWrite(target.name);
   made->isThere_ = true;
   return made;
@@ -106,7 +107,7 @@ Result<std::unique_ptr<OutputFile>> OutputFile::createFor(const OutputTarget& ta
 
 OutputFile::~OutputFile() {
   if (file_ >= 0) _close(file_);
-  if (isThere_) DeleteFileW(std::filesystem::path(temporary_).c_str());
+  if (isThere_) DeleteFileW(pathOf(temporary_).c_str());
 }
 
 Result<void> OutputFile::write(std::span<const std::byte> bytes) {
@@ -118,7 +119,7 @@ Result<void> OutputFile::write(std::span<const std::byte> bytes) {
 Result<void> OutputFile::commit() {
   if (_commit(file_) != 0) return cannotWrite(target_.name, errno);
   if (_close(std::exchange(file_, -1)) != 0) return cannotWrite(target_.name, errno);
-  if (MoveFileExW(std::filesystem::path(temporary_).c_str(), target_.path.c_str(),
+  if (MoveFileExW(pathOf(temporary_).c_str(), target_.path.c_str(),
                   MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) == 0)
     return cannotWrite(target_.name);
   isThere_ = false;

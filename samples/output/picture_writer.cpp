@@ -18,7 +18,7 @@ class PngWriter final : public PictureWriter {
   Result<void> write(const Picture& picture) override {
     const Result<std::vector<std::byte>> bytes = render::encodePng(picture);
     if (!bytes) return bytes.error();
-    return writeFile(frameName(output_, frame_++).value_or(output_), *bytes);
+    return writeFile(pathOf(frameName(output_, frame_++).value_or(output_)), *bytes);
   }
 
   Result<void> finish() override { return {}; }

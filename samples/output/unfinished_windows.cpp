@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <mutex>
 
+#include "file_name.h"
 #include "unfinished.h"
 
 namespace dermis::samples {
@@ -31,7 +32,7 @@ UnfinishedFile::UnfinishedFile(const std::string& path) {
   const std::scoped_lock lock(mutex);
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     if (!slots[slot].empty()) continue;
-    slots[slot] = path;
+    slots[slot] = pathOf(path);
     slot_ = static_cast<int>(slot);
     return;
   }

@@ -25,7 +25,8 @@ class GltfBuffer : public testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   void write(const std::string& name, const std::vector<std::byte>& bytes) const {
-    std::ofstream stream(folder_ / name, std::ios::binary);
+    const std::filesystem::path path = folder_ / std::u8string(name.begin(), name.end());
+    std::ofstream stream(path, std::ios::binary);
     stream.write(reinterpret_cast<const char*>(bytes.data()),
                  static_cast<std::streamsize>(bytes.size()));
   }
@@ -80,12 +81,15 @@ TEST_F(GltfBuffer, OpensNothingOutsideTheFolder) {
   for (const std::string& uri :
        {std::string("../outside.bin"), std::string("%2e%2e/outside.bin"),
         std::string("%2e%2e%2foutside.bin"), std::string("deeper/../../outside.bin"),
-        std::string("..\\outside.bin"), "%2f" + absolute.substr(1), std::string(""),
-        std::string("plain.bin%00")}) {
+        std::string("..\\outside.bin"), std::string(""), std::string("plain.bin%00")}) {
     expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
                 "outside the file's folder");
   }
   // C:\outside.bin has a scheme.
+  if (!isWindows) {
+    expectError(withUri("%2f" + absolute.substr(1)).load(folder_ / "inside"), ErrorCode::ioError,
+                "outside the file's folder");
+  }
   expectError(withUri(absolute).load(folder_ / "inside"), ErrorCode::ioError,
               isWindows ? "is not a file beside this one" : "outside the file's folder");
   for (const char* uri : {"file:///etc/passwd", "http://example.com/a.bin", "C:/a.bin"}) {
