@@ -21,10 +21,13 @@ class KernelReloadTest : public SystemTest {
     SystemTest::SetUp();
     if (IsSkipped() || HasFatalFailure()) return;
     folder_.emplace(::testing::UnitTest::GetInstance()->current_test_info()->name());
+    // [create]
+    // The folder of the GLSL files, and one for compiled modules (here none).
     compiler_.emplace(must(RuntimeCompiler::create({folder_->path(), {}})));
     vulkan::DeviceDescription description = device().description();
     description.kernelSource = compiler_->source();
     context_.emplace(must(vulkan::Context::create(description)));
+    // [/create]
   }
 
   KernelReload reload() {
