@@ -103,7 +103,7 @@ function(dermis_add_library name)
       target_link_options(dermis_${name} PRIVATE -Wl,--no-undefined)
     endif()
   endif()
-  if(name STREQUAL "core" OR DERMIS_BUILD_${upperName})  # and not only as a tool of the build
+  if(name MATCHES "^(core|runtime_compiler)$" OR DERMIS_BUILD_${upperName})  # and not only as a tool of the build
     set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})
   endif()
 endfunction()
