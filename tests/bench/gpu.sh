@@ -35,7 +35,7 @@ ldd "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_bench
 loader=$(ldconfig -p | awk '/libvulkan\.so\.1 .*x86-64|libvulkan\.so\.1 .*AArch64/ { print $NF; exit }')
 cp -L "$loader" "$folder/loader/libvulkan.so.1"
 
-find "$folder" -type f -exec objdump -T {} + 2>/dev/null | grep -o "GLIBC_[0-9][0-9.]*" | sort -uV | tail -n 1 >"$folder/glibc"
+objdump -T "$folder"/dermis* "$folder"/lib/* | grep -o 'GLIBC_[0-9][0-9.]*' | sort -uV | tail -n 1 | cut -d _ -f 2 >"$folder/glibc"
 size=$(du -sk "$folder" | cut -f 1)
 [ "$size" -le 65536 ] || { echo "gpu.sh: $folder has $size KiB, more than 64 MiB" >&2; exit 1; }
 echo "$folder: $((size / 1024)) MiB, needs glibc $(cat "$folder/glibc")"

@@ -131,7 +131,12 @@ TEST(VerificationTest, ThreadsChangeNothingOnADevice) {
 /// With the methods of a device, which it is not.
 struct EveryMethod : samples::CpuTarget {
   std::span<const Method> methods() const override { return allMethods; }
-  DeviceLimits limits() const override { return {.storage16Bit = true, .storage8Bit = true}; }
+  DeviceLimits limits() const override {
+    DeviceLimits limits;
+    limits.maxStorageBuffersPerStage = storageBuffersWanted;
+    limits.storage16Bit = limits.storage8Bit = true;
+    return limits;
+  }
 };
 
 /// How many values of another parameter a method meets.
