@@ -98,12 +98,8 @@ endforeach()
 string(STRIP "${required}" required)
 dermis_pkg_config(dermis "${required}" "")
 
-if(TARGET dermis_cli)
+if(TARGET dermis_cli AND NOT BUILD_SHARED_LIBS)
   install(TARGETS dermis_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dermis_command)
-  if(BUILD_SHARED_LIBS AND NOT APPLE)
-    file(RELATIVE_PATH librariesFromCommand /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
-    set_target_properties(dermis_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${librariesFromCommand}")
-  endif()
 endif()
 
 find_program(DERMIS_DPKG_DEB dpkg-deb DOC "Makes Debian packages")

@@ -7,6 +7,7 @@
 #   asan-rest    all other tests under them
 #   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
+#   debian       the Debian packages and the source package on clean systems, Debian 12 and 13, programs built and run there
 #   windows      the engine and the command built by MinGW-w64; tests and the command run by Wine
 #   x86          the same for 32-bit x86, run by this machine
 #   arm64        the same for arm64, run by qemu
@@ -25,7 +26,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden programs"
+parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
 
@@ -73,6 +74,19 @@ part_clang() {
   build clang
   tests clang -L sanitized
   tests clang -R '^package\.'
+}
+
+part_debian() {
+  rm -f build/debian/*.deb build/debian/*.tar.gz
+  cmake --workflow --preset debian
+  cmake --build build/debian --target source_package
+  own=$(. /etc/os-release && echo "$VERSION_CODENAME")
+  for release in bookworm trixie; do
+    set --
+    [ "$release" != "$own" ] || set -- build/debian/*.deb
+    ./tests/nightly/debian.sh build/nightly/debian build/debian/dermis-*.tar.gz "$release" "$@"
+  done
+  lintian --fail-on error build/debian/*.deb
 }
 
 # tests/cross: the tests that need no device, models made, skinned and verified by the command; the vertices must be, to the bit,
