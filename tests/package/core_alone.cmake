@@ -10,6 +10,7 @@ endforeach()
 
 list(TRANSFORM coreSources PREPEND "${coreFolder}/")
 file(GLOB headers "${sourceFolder}/engine/include/dermis/*.h")
+list(FILTER headers EXCLUDE REGEX "/runtime_compiler.h$")  # it is for a Context
 file(GLOB_RECURSE privateHeaders "${sourceFolder}/engine/src/core/*.h")
 # Preprocessed only: the poison is #error, and the build compiles them.
 run(ignored "Preprocess the sources" "${ownCompiler}" ${flags} -M ${coreSources})

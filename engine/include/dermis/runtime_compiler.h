@@ -2,9 +2,9 @@
 // file changes: for those who work on kernels. Built with DERMIS_RUNTIME_COMPILER=ON; links
 // glslang.
 //
-//   RuntimeCompiler compiler = *RuntimeCompiler::create({DERMIS_SHADER_DIR, cacheFolder});
+//   RuntimeCompiler compiler = must(RuntimeCompiler::create({DERMIS_SHADER_DIR, cacheFolder}));
 //   description.kernelSource = compiler.source();
-//   Context context = *Context::create(description);
+//   Context context = must(Context::create(description));
 //
 //   // Between two frames:
 //   if (Result<KernelReload> reload = compiler.reload(context, frame, completedFrame); !reload)
@@ -24,8 +24,9 @@
 
 namespace dermis {
 
+/// Folders of a `RuntimeCompiler`.
 struct RuntimeCompilerOptions {
-  /// DERMIS_SHADER_DIR, or a copy of that folder. Only reading.
+  /// DERMIS_SHADER_DIR, or a copy of that folder. It is only read.
   std::filesystem::path shaderFolder;
   /// Where compiled modules are kept between runs: `ShaderCompilerOptions::cacheFolder`.
   std::filesystem::path cacheFolder;
@@ -85,6 +86,7 @@ class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
   Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
                               std::uint64_t completedFrame);
 
+  /// How many modules were compiled, and how many came from the cache.
   RuntimeCompilerStatistics statistics() const;
 
   /// What was wrong with the cache folder since the last call, a sentence each: an entry that was
