@@ -282,7 +282,7 @@ void main() {
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED
-  // All invocations come to each barrier. Those without a vertex skin the last one again; nobody stores what they stage.
+  // All invocations reach each barrier. Those without a vertex skin the last vertex again; what they stage is never stored.
   stagedRecords = min(group.vertexEnd - (vertex - gl_LocalInvocationID.x), gl_WorkGroupSize.x);
   vertex = min(vertex, group.vertexEnd - 1u);
 #else

@@ -10,7 +10,7 @@
 namespace dermis::samples {
 namespace {
 
-// The handler runs in a thread of its own.
+// The handler runs in its own thread.
 std::mutex mutex;
 std::array<std::filesystem::path, 8> slots;  // empty: unused
 

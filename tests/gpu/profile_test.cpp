@@ -48,7 +48,7 @@ TEST_F(ProfileTest, SomeCombinationsAreInsideTheirBounds) {
   verifyProduct(target, 20);
 }
 
-// What a kind of device does if nobody says otherwise: reads, stores, and the tuning.
+// Defaults of a kind of device: reads, stores, and the tuning.
 TEST_F(ProfileTest, DefaultsChangeNoBit) {
   OwnedMesh mesh = randomMesh(1, 333, 20, 4);
   const PackedMesh packed = *pack(mesh.view(), 20);
