@@ -202,7 +202,8 @@ struct GroupRecord {
   uint normalStride;
   uint tangentStride;
   uint previousStride;
-  // 1 if each word of the instance records increases by the same value from record to record.
+  // 1 if each word of the instance records increases by the same value from record to record. With
+  // snorm16 positions, also all boxes must be equal.
   uint evenlySpaced;
 };
 DERMIS_CONSTANT GROUP_WORDS = 12u;
@@ -336,6 +337,7 @@ struct SkinPush {
   uint workgroupCount;
   uint instances;               // word offset of the instance records
   uint instancesPerInvocation;  // 1 to CONSTANT_INSTANCES
+  uint verticesPerInvocation;   // used only with texel buffers
 };
 struct VisibilityPush {
   uint pass;            // VISIBILITY_CHOOSES or VISIBILITY_COUNTS

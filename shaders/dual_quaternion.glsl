@@ -39,8 +39,10 @@ Blend blendJoints(Influences influences, Pose pose) {
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      InfluenceRecord further = loadInfluence(influences, slot);
-      blend = addJoint(blend, pivot, further.weight, pose, further.joint);
+      InfluencePair two = loadInfluences(influences, slot);
+      blend = addJoint(blend, pivot, two.first.weight, pose, two.first.joint);
+      if (++slot >= influences.count) break;
+      blend = addJoint(blend, pivot, two.second.weight, pose, two.second.joint);
     } while (++slot < influences.count);
   }
   return blend;
@@ -65,8 +67,10 @@ ScaleShear blendScaleShear(Influences influences, Pose pose) {
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      InfluenceRecord further = loadInfluence(influences, slot);
-      blend = addScaleShear(blend, pivot, further.weight, pose, further.joint);
+      InfluencePair two = loadInfluences(influences, slot);
+      blend = addScaleShear(blend, pivot, two.first.weight, pose, two.first.joint);
+      if (++slot >= influences.count) break;
+      blend = addScaleShear(blend, pivot, two.second.weight, pose, two.second.joint);
     } while (++slot < influences.count);
   }
   return blend;

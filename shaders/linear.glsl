@@ -51,8 +51,10 @@ Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNorm
   if (hasFurther(influences)) {
     uint slot = LOADED_INFLUENCES;
     do {
-      InfluenceRecord further = loadInfluence(influences, slot);
-      blend = addMatrix(blend, further.weight, pose, further.joint);
+      InfluencePair two = loadInfluences(influences, slot);
+      blend = addMatrix(blend, two.first.weight, pose, two.first.joint);
+      if (++slot >= influences.count) break;
+      blend = addMatrix(blend, two.second.weight, pose, two.second.joint);
     } while (++slot < influences.count);
   }
   return throughMatrix(vertex, blend.r0, blend.r1, blend.r2, withNormal, withTangent);

@@ -107,6 +107,17 @@ InfluenceRecord loadInfluence(Influences influences, uint slot) {
   return slot % 2u == 0u ? InfluenceRecord(uintBitsToFloat(two.x), two.y) : InfluenceRecord(uintBitsToFloat(two.z), two.w);
 }
 
+struct InfluencePair {
+  InfluenceRecord first;
+  InfluenceRecord second;
+};
+
+// The influences `slot`, which is even, and `slot` + 1: they are in one unit.
+InfluencePair loadInfluences(Influences influences, uint slot) {
+  uvec4 two = meshUnit(influences.unit + slot / 2u);
+  return InfluencePair(InfluenceRecord(uintBitsToFloat(two.x), two.y), InfluenceRecord(uintBitsToFloat(two.z), two.w));
+}
+
 // Whether a vertex has more than the loaded influences. The constant false if INFLUENCES is not 0.
 bool hasFurther(Influences influences) { return INFLUENCES == 0u && influences.count > LOADED_INFLUENCES; }
 

@@ -120,18 +120,16 @@ Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   return bind;
 }
 
-// A position as it is stored; snorm16 is relative to the box of the instance.
-uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
-  vec4 v = vec4(position, 1.0);
-  if (isSnormPosition(POSITION_FORMAT)) {
-    ExtensionRecord record = loadExtension(extension);
-    precise vec3 relative = (position - vec3(record.centreX, record.centreY, record.centreZ)) *
-                            vec3(record.inverseX, record.inverseY, record.inverseZ);
-    v.xyz = relative;
-    // A vertex of the engine's own box may stand a rounding outside.
-    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) countClamped(record.result);
-  }
-  return encodeComponents(POSITION_FORMAT, v);
+// The box that snorm16 positions are relative to.
+struct BoxScale {
+  vec3 center;
+  vec3 inverse;  // 1 / half of the size
+};
+
+BoxScale boxOf(InstanceRecord instance) {
+  if (!isSnormPosition(POSITION_FORMAT)) return BoxScale(vec3(0.0), vec3(0.0));
+  ExtensionRecord r = loadExtension(instance.extension);
+  return BoxScale(vec3(r.centreX, r.centreY, r.centreZ), vec3(r.inverseX, r.inverseY, r.inverseZ));
 }
 
 // An instance, and the bytes at which this invocation's vertex goes: positions, normals, tangents, previous positions.
@@ -139,6 +137,7 @@ struct Instance {
   InstanceRecord record;
   uvec4 places;
   uint recordPlace;  // of storeRecord
+  BoxScale box;
 };
 
 uvec4 placesOf(InstanceRecord r) { return uvec4(r.positions, r.normals, r.tangents, r.previousPositions); }
@@ -146,17 +145,18 @@ uvec4 placesOf(InstanceRecord r) { return uvec4(r.positions, r.normals, r.tangen
 Instance readInstance(uint word, uvec4 offsets) {
   InstanceRecord record = loadInstance(word);
   uvec4 places = placesOf(record) + offsets;
-  return Instance(record, places, recordPlace(places.x));
+  return Instance(record, places, recordPlace(places.x), boxOf(record));
 }
 
-// From one instance to the next where they are evenly spaced.
+// From one instance to the next where they are evenly spaced: such instances have the same box.
 Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   InstanceRecord step = a;
   step.palette = b.palette - a.palette;
   step.joints = b.joints - a.joints;
   step.previousPalette = b.previousPalette - a.previousPalette;
   step.extension = b.extension - a.extension;
-  return Instance(step, placesOf(b) - placesOf(a), recordPlace(b.positions) - recordPlace(a.positions));
+  return Instance(step, placesOf(b) - placesOf(a), recordPlace(b.positions) - recordPlace(a.positions),
+                  BoxScale(vec3(0.0), vec3(0.0)));
 }
 
 void advance(inout Instance instance, Instance by) {
@@ -166,6 +166,20 @@ void advance(inout Instance instance, Instance by) {
   instance.record.extension += by.record.extension;
   instance.places += by.places;
   instance.recordPlace += by.recordPlace;
+}
+
+// A position as it is stored.
+uvec4 encodePosition(vec3 position, Instance instance, bool mayCount) {
+  vec4 v = vec4(position, 1.0);
+  if (isSnormPosition(POSITION_FORMAT)) {
+    precise vec3 relative = (position - instance.box.center) * instance.box.inverse;
+    v.xyz = relative;
+    // A vertex of the engine's own box may be outside by a rounding error.
+    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) {
+      countClamped(loadExtension(instance.record.extension).result);
+    }
+  }
+  return encodeComponents(POSITION_FORMAT, v);
 }
 
 // What an invocation has read of its vertex, for all its instances.
@@ -189,7 +203,7 @@ uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
   uint palette = instance.record.previousPalette;
   Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
   before = skinVertex(before, work.influences, work.inputs, pose, false, false);
-  return encodePosition(before.position, instance.record.extension, false);
+  return encodePosition(before.position, instance, false);
 }
 #endif
 
@@ -211,7 +225,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
   Pose pose = Pose(instance.record.palette, instance.record.joints & INSTANCE_JOINTS, scales);
   Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
   if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
-  uvec4 position = encodePosition(skinned.position, instance.record.extension, true);
+  uvec4 position = encodePosition(skinned.position, instance, true);
 #ifdef HAS_MOTION
   // Those that were kept stand where the new ones will.
   if (MOTION == MOTION_KEPT) {
@@ -278,8 +292,13 @@ void main() {
   uint local = index == 0u ? number : number - loadGroup(word - GROUP_WORDS).workgroupEnd;
   GroupRecord group = loadGroup(word);
 
+#ifdef TEXELS
+  uint vertices = push.verticesPerInvocation;
+#else
+  const uint vertices = 1u;
+#endif
   // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
-  uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+  uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x * vertices + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED
   // All invocations reach each barrier. Those without a vertex skin the last vertex again; what they stage is never stored.
@@ -299,32 +318,38 @@ void main() {
   if (firstInstance >= group.instanceCount) return;
   uint count = min(share, group.instanceCount - firstInstance);
 
-  Work work;
-  work.mesh = group.mesh;
-  work.vertex = vertex;
-  Sections sections = sectionsOf(group.mesh);
-  uint firstInfluence;
-  work.bind = bindVertex(sections, vertex, firstInfluence);
-  if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
-  work.inputs = methodInputsOf(group.mesh, vertex);
-  work.influences = influencesOf(sections, vertex, firstInfluence);
-
-  // Outside the loop, because lavapipe reads a push constant each time it is named.
+  // Outside the loops, because lavapipe reads a push constant each time it is named.
   uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
-  uvec4 offsets = run * uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
+  uvec4 strides = uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
   uint left = 0xffffffffu >> (32u - count);  // a bit an instance
   bool even = group.evenlySpaced != 0u;
   Instance by = stepBetween(loadInstance(records), loadInstance(records + min(1u, count - 1u) * INSTANCE_WORDS));
+  uint scaling = 0u;
   if (APART) {
-    uint scaling = 0u;
     uint i = 0u;
     do {
       if (paletteScales(loadInstance(records + i * INSTANCE_WORDS).palette)) scaling |= 1u << i;
     } while (++i < count);
-    uint rigid = left & ~scaling;
-    if (rigid != 0u) skinInstances(rigid, records, offsets, even, by, work, false);
-    left = scaling;
-    if (left == 0u) return;
+    left &= ~scaling;
   }
-  skinInstances(left, records, offsets, even, by, work, APART);
+  Sections sections = sectionsOf(group.mesh);
+#ifdef TEXELS
+  do {
+#endif
+    Work work;
+    work.mesh = group.mesh;
+    work.vertex = vertex;
+    uint firstInfluence;
+    work.bind = bindVertex(sections, vertex, firstInfluence);
+    if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
+    work.inputs = methodInputsOf(group.mesh, vertex);
+    work.influences = influencesOf(sections, vertex, firstInfluence);
+    uvec4 offsets = run * strides;
+    if (!APART || left != 0u) skinInstances(left, records, offsets, even, by, work, false);
+    if (APART && scaling != 0u) skinInstances(scaling, records, offsets, even, by, work, true);
+#ifdef TEXELS
+    run += gl_WorkGroupSize.x;
+    vertex += gl_WorkGroupSize.x;
+  } while (--vertices != 0u && vertex < group.vertexEnd);
+#endif
 }

@@ -411,6 +411,49 @@ INSTANTIATE_TEST_SUITE_P(Plan, PlanTuning,
                                             ::testing::Values(1u, 2u, 3u, 4u, 16u),
                                             ::testing::Values(0u, 100u)));
 
+TEST(Plan, InvocationsWithFewInstancesSkinSeveralVertices) {
+  DeviceLimits limits;
+  limits.texelBuffers = limits.shaderInt64 = true;
+  Plan out;
+  std::set<std::uint32_t> used;
+  for (const std::uint32_t size : {8u, 64u}) {
+    for (const std::uint32_t instances : {1u, 4u, 24u}) {
+      for (const std::uint32_t vertices : {1u, 2u, 8u, 16u}) {
+        for (const std::uint32_t jobs : {1u, 20u, 60u}) {
+          const OwnedBatch batch = randomBatch(jobs, jobs);
+          ASSERT_NO_FATAL_FAILURE(
+              expectPlanned(batch, limits, {size, instances, 0, vertices}, out));
+          for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
+            if (dispatch.variant.kernel == Kernel::skin)
+              used.insert(dispatch.skinPush().verticesPerInvocation);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(used, (std::set<std::uint32_t>{1, 2, 4, 8, 16}));
+}
+
+TEST(Plan, InstancesWithDifferentBoxesAreNotCountedUp) {
+  const auto isEven = [](float size) {
+    OwnedBatch batch;
+    addMeshes(batch);
+    addPoses(batch);
+    for (std::uint32_t number = 0; number < 5; ++number) {
+      Job job = batch.jobOf(0, 0, Method::dualQuaternion);
+      job.positions.format = VertexFormat::snorm16x4;
+      job.box = {{-1, -1, -1}, {1, number == 3 ? size : 1, 1}};
+      batch.place(job, Arrangement::interleaved);
+    }
+    Plan out;
+    expectPlanned(batch, richLimits(), {}, out);
+    const PlannedDispatch skin = dispatchesOf(out).back();
+    return abi::load<abi::GroupRecord>(tablesOf(out), skin.skinPush().groups).evenlySpaced;
+  };
+  EXPECT_EQ(isEven(1), 1u);
+  EXPECT_EQ(isEven(2), 0u);
+}
+
 TEST(Plan, Truth20_TheOrderOfJobsChangesNothingForThem) {
   OwnedBatch batch = randomBatch(5, 40);
   Plan out;

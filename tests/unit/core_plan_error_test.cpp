@@ -568,6 +568,15 @@ TEST_F(PlanErrors, Tunings) {
     tuning.instancesPerInvocation = instances;
     expectInvalid({"tuning", "instances"});
   }
+  tuning = {};
+  for (const std::uint32_t vertices : {1u, 2u, 16u}) {
+    tuning.verticesPerInvocation = vertices;
+    expectGood();
+  }
+  for (const std::uint32_t vertices : {0u, 3u, 32u, 0x80000000u}) {
+    tuning.verticesPerInvocation = vertices;
+    expectInvalid({"tuning", "vertices"});
+  }
 }
 
 TEST_F(PlanErrors, TooManyWorkgroups) {

@@ -226,6 +226,7 @@ class Simulation {
     const abi::SkinPush push = dispatch.skinPush();
     ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
     ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
+    ASSERT_EQ(push.verticesPerInvocation, verticesWanted(push));
     ASSERT_EQ(push.instancesPerInvocation, instancesWanted(push));
     for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       // The first group whose end lies behind the workgroup's number.
@@ -240,6 +241,25 @@ class Simulation {
       ASSERT_NO_FATAL_FAILURE(
           runWorkgroup(dispatch, push.groups + index * abi::GROUP_WORDS, number - begin));
     }
+  }
+
+  /// By the rule of `Tuning::verticesPerInvocation`.
+  std::uint32_t verticesWanted(const abi::SkinPush& push) const {
+    if (!limits_.texelBuffers) return 1;
+    std::uint32_t vertices = tuning_.verticesPerInvocation;
+    const auto isRight = [&] {
+      std::uint64_t workgroups = 0, instances = 0;
+      for (std::uint32_t index = 0; index < push.groupCount; ++index) {
+        const auto group = groupAt(push.groups + index * abi::GROUP_WORDS);
+        instances += group.instanceCount;
+        workgroups += divideUp(group.vertexEnd - group.firstVertex,
+                               std::uint64_t{tuning_.workgroupSize} * vertices);
+      }
+      return workgroups >= 32 && instances * vertices <= std::uint64_t{push.groupCount} *
+                                                             tuning_.instancesPerInvocation;
+    };
+    while (vertices > 1 && !isRight()) vertices /= 2;
+    return vertices;
   }
 
   /// By the rule of `Tuning::minWorkgroups`.
@@ -272,6 +292,18 @@ class Simulation {
         isEven = isEven && word(instance, index) == word(0, index) + instance * step;
       }
     }
+    // The kernel reads the box of snorm16 positions from the first extension only.
+    const VertexFormat positions = dispatch.variant.positions;
+    if (positions == VertexFormat::snorm16x3 || positions == VertexFormat::snorm16x4) {
+      constexpr std::uint32_t box = offsetof(abi::ExtensionRecord, centreX) / 4;
+      constexpr std::uint32_t extension = offsetof(abi::InstanceRecord, extension) / 4;
+      for (std::uint32_t instance = 1; instance < count; ++instance) {
+        for (std::uint32_t index = box; index < box + 6; ++index) {
+          isEven = isEven && tables_.at(word(instance, extension) + index) ==
+                                 tables_.at(word(0, extension) + index);
+        }
+      }
+    }
     ASSERT_EQ(groupAt(group).evenlySpaced, isEven ? 1u : 0u);
   }
 
@@ -286,10 +318,11 @@ class Simulation {
     const std::uint32_t firstInstance = local / vertexGroups * instancesEach;
     const std::uint32_t instanceCount = groupAt(group).instanceCount;
     ASSERT_LT(firstInstance, instanceCount) << "an idle workgroup";
-    const std::uint32_t firstRun = local % vertexGroups * dispatch.variant.workgroupSize;
+    const std::uint32_t size =
+        dispatch.variant.workgroupSize * dispatch.skinPush().verticesPerInvocation;
+    const std::uint32_t firstRun = local % vertexGroups * size;
     ASSERT_LT(firstVertex + firstRun, vertexEnd) << "an idle workgroup";
-    const std::uint32_t runEnd =
-        std::min(firstRun + dispatch.variant.workgroupSize, vertexEnd - firstVertex);
+    const std::uint32_t runEnd = std::min(firstRun + size, vertexEnd - firstVertex);
     for (std::uint32_t instance = firstInstance;
          instance < std::min(firstInstance + instancesEach, instanceCount); ++instance) {
       const std::uint64_t record = std::uint64_t{dispatch.skinPush().instances} +

@@ -99,6 +99,11 @@ struct Tuning {
   /// until it has enough workgroups or one instance per invocation. 0: always
   /// `instancesPerInvocation`. Needs no other pipeline.
   std::uint32_t minWorkgroups = 0;
+  /// Maximum vertices that one invocation skins, one after the other: a power of two from 1 to 16.
+  /// A dispatch uses the largest power of two with which vertices × mean instances of a group are
+  /// at most `instancesPerInvocation`, and which leaves at least 32 workgroups. Used only with
+  /// `DeviceLimits::texelBuffers`. Needs no other pipeline.
+  std::uint32_t verticesPerInvocation = 1;
 };
 
 /// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.

@@ -11,6 +11,7 @@ DeviceDefaults defaultsOf(VkPhysicalDeviceType type) {
     case VK_PHYSICAL_DEVICE_TYPE_CPU:  // measured on lavapipe (docs/performance.md)
       defaults.texelBuffers = true;
       tuning.instancesPerInvocation = 24;
+      tuning.verticesPerInvocation = 8;
       break;
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:  // a guess
       defaults.stagedStores = true;

@@ -1,7 +1,10 @@
 #include "plan/builder.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstring>
+#include <span>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -317,9 +320,33 @@ Result<void> PlanBuilder::addClearDispatch() {
                      abi::ClearPush{first, static_cast<std::uint32_t>(cleared_.size()), 0});
 }
 
-/// Workgroups that cover the vertices of a group once.
+/// Workgroups that process each vertex of a group once.
 std::uint64_t PlanBuilder::vertexGroupsOf(const Group& group) const {
-  return divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
+  return divideUp(group.key.vertexEnd - group.key.firstVertex,
+                  std::uint64_t{tuning_.workgroupSize} * verticesPerInvocation_);
+}
+
+/// For one dispatch, given its groups. An invocation with few instances skins several vertices, so
+/// that what is the same for all vertices of a group is read less often.
+void PlanBuilder::chooseVerticesPerInvocation(std::span<const std::uint32_t> groups) {
+  // Enough for the threads of a CPU. A guess: measured with two threads only.
+  constexpr std::uint64_t minWorkgroups = 32;
+  verticesPerInvocation_ = 1;
+  if (!limits_.texelBuffers) return;
+  std::uint64_t instances = 0;
+  for (const std::uint32_t group : groups) instances += planGroups_[group].instances;
+  const auto workgroups = [&] {
+    std::uint64_t count = 0;
+    for (const std::uint32_t group : groups) count += vertexGroupsOf(planGroups_[group]);
+    return count;
+  };
+  while (verticesPerInvocation_ * 2 <= tuning_.verticesPerInvocation &&
+         instances * verticesPerInvocation_ * 2 <= groups.size() * tuning_.instancesPerInvocation) {
+    verticesPerInvocation_ *= 2;
+    if (workgroups() >= minWorkgroups) continue;
+    verticesPerInvocation_ /= 2;
+    break;
+  }
 }
 
 /// Of one dispatch, given its groups: fewer than the tuning says if it has too few workgroups.
@@ -359,6 +386,7 @@ Result<void> PlanBuilder::addDispatches() {
   for (std::size_t begin = 0; begin < order_.size();) {
     std::size_t end = begin;
     while (end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin])) ++end;
+    chooseVerticesPerInvocation(std::span(order_).subspan(begin, end - begin));
     const std::uint32_t instancesEach =
         instancesPerInvocation(std::span(order_).subspan(begin, end - begin));
     std::uint64_t workgroups = 0;
@@ -386,8 +414,11 @@ Result<void> PlanBuilder::addDispatches() {
     const Group& group = planGroups_[order_[begin]];
     const Variant& variant = group.variant;
     const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
-                             static_cast<std::uint32_t>(end - begin), 0, instanceRecords,
-                             instancesEach};
+                             static_cast<std::uint32_t>(end - begin),
+                             0,
+                             instanceRecords,
+                             instancesEach,
+                             verticesPerInvocation_};
     if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
     Dispatch& dispatch = dispatches_.back();
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
@@ -465,18 +496,33 @@ void PlanBuilder::writeInstances() {
 
 namespace {
 
-/// Whether each word of the records rises by the same from one to the next.
-bool areEvenlySpaced(const std::uint32_t* records, std::uint32_t count) {
-  constexpr std::size_t words = abi::INSTANCE_WORDS;
-  if (count < 2) return false;
-  std::array<std::uint32_t, words> expected, step;
-  for (std::size_t word = 0; word < words; ++word) {
-    expected[word] = records[words + word];
-    step[word] = records[words + word] - records[word];
+using RecordWords = std::array<std::uint32_t, abi::INSTANCE_WORDS>;
+
+/// Whether each word of the records increases by the same value from one to the next.
+bool areEvenlySpaced(std::span<const std::uint32_t> records) {
+  if (records.size() < 2 * abi::INSTANCE_WORDS) return false;
+  RecordWords expected, step;
+  for (std::size_t word = 0; word < expected.size(); ++word) {
+    expected[word] = records[expected.size() + word];
+    step[word] = records[expected.size() + word] - records[word];
   }
-  for (std::uint32_t record = 2; record < count; ++record) {
-    for (std::size_t word = 0; word < words; ++word) expected[word] += step[word];
-    if (std::memcmp(expected.data(), records + record * words, sizeof(expected)) != 0) return false;
+  for (std::size_t record = 2; record < records.size() / expected.size(); ++record) {
+    for (std::size_t word = 0; word < expected.size(); ++word) expected[word] += step[word];
+    if (std::memcmp(expected.data(), &records[record * expected.size()], sizeof(expected)) != 0)
+      return false;
+  }
+  return true;
+}
+
+/// Whether the instances have the same box for positions in snorm16.
+bool haveOneBox(std::span<const std::uint32_t> tables, std::span<const std::uint32_t> records) {
+  constexpr std::size_t box = offsetof(abi::ExtensionRecord, centreX) / 4, boxWords = 6;
+  const auto boxOf = [&](std::size_t record) {
+    const auto instance = abi::load<abi::InstanceRecord>(records, record);
+    return tables.subspan(instance.extension + box, boxWords);
+  };
+  for (std::size_t record = 0; record < records.size(); record += abi::INSTANCE_WORDS) {
+    if (!std::ranges::equal(boxOf(record), boxOf(0))) return false;
   }
   return true;
 }
@@ -489,8 +535,14 @@ void PlanBuilder::markEvenlySpaced(std::uint32_t firstRecord) {
   const std::size_t groups = firstRecord - planGroups_.size() * abi::GROUP_WORDS;
   for (std::size_t place = 0; place < order_.size(); ++place) {
     const Group& group = planGroups_[order_[place]];
-    const std::size_t first = firstRecord + std::size_t{group.firstInstance} * abi::INSTANCE_WORDS;
-    if (group.key.isCulled || !areEvenlySpaced(&tables[first], group.instances)) continue;
+    if (group.key.isCulled) continue;
+    const auto records =
+        std::span(std::as_const(tables))
+            .subspan(firstRecord + std::size_t{group.firstInstance} * abi::INSTANCE_WORDS,
+                     std::size_t{group.instances} * abi::INSTANCE_WORDS);
+    if (!areEvenlySpaced(records)) continue;
+    // The kernel reads the box once for all instances that it counts up.
+    if (isSnormPosition(group.variant.positions) && !haveOneBox(tables, records)) continue;
     const std::size_t word = groups + place * abi::GROUP_WORDS;
     auto record = abi::load<abi::GroupRecord>(tables, word);
     record.evenlySpaced = 1;

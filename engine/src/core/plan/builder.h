@@ -280,6 +280,7 @@ class PlanBuilder {
                                   std::uint32_t buffer);
   Result<void> addClearDispatch();
   std::uint64_t vertexGroupsOf(const Group& group) const;
+  void chooseVerticesPerInvocation(std::span<const std::uint32_t> groups);
   std::uint32_t instancesPerInvocation(std::span<const std::uint32_t> groups) const;
   Result<void> addDispatches();
   template <typename Push>
@@ -298,7 +299,8 @@ class PlanBuilder {
   Groups* groups_ = nullptr;
   DeviceLimits limits_;
   Tuning tuning_;
-  std::uint64_t number_ = 0;  ///< of the plan, among those of this builder
+  std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
+  std::uint64_t number_ = 0;                 ///< of the plan, among those of this builder
   std::uint32_t paletteCount_ = 0;
   std::vector<PaletteLists> palettes_;  ///< by pose buffer
   std::vector<std::uint32_t> cleared_;

@@ -330,6 +330,10 @@ Result<void> checkTuning(const Tuning& tuning) {
     return invalid("tuning: an invocation skins 1 to 32 instances, not " +
                    std::to_string(tuning.instancesPerInvocation));
   }
+  if (!std::has_single_bit(tuning.verticesPerInvocation) || tuning.verticesPerInvocation > 16) {
+    return invalid("tuning: an invocation skins a power of two of vertices from 1 to 16, not " +
+                   std::to_string(tuning.verticesPerInvocation));
+  }
   return {};
 }
 
