@@ -1,5 +1,5 @@
-// What a kernel has to move and to calculate for a vertex of an instance, on paper: for GPUs that
-// nobody has measured yet.
+// The bytes and operations that a kernel needs for a vertex of an instance, on paper: an estimate
+// for GPUs, on which nothing has been measured yet.
 #pragma once
 
 #include <optional>

@@ -57,7 +57,7 @@ vulkan::SkinningSystemDescription capacities(const Character& character, std::ui
 Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
                             const Character& character, const Figures& script,
                             const CrowdOptions& options) {
-  // How much there will be, in bytes, joints and instances: then nothing has to grow later.
+  // Capacities in bytes, joints and instances, so that nothing has to grow later.
   vulkan::SkinningSystemDescription description = capacities(character, script.count(), options);
   description.context = &context;
   description.framesInFlight = options.framesInFlight;
@@ -106,7 +106,7 @@ Result<void> Crowd::add(CrowdFigure& figure) {
   return {};
 }
 
-/// At any time: what frames in flight still draw from stays until they are complete.
+/// May be called at any time: vertices that frames in flight draw stay until these are complete.
 Result<void> Crowd::remove(CrowdFigure& figure) {
   for (const InstanceHandle instance : std::exchange(figure.instances, {})) {
     if (Result<void> removed = system_.removeInstance(instance); !removed) return removed;
@@ -153,7 +153,7 @@ Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
     description.visibility = *visibility;
   }
 
-  // This program copies the vertices, to look at them; one that draws says vertexInput, twice.
+  // This program copies the vertices to check them. To draw them, use vertexInput in both.
   recordBarrier(*device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
   if (Result<void> done = system.record(commandBuffer, description); !done) return done;
   recordBarrier(*device_, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
@@ -171,7 +171,7 @@ Result<void> Crowd::moveAll(std::uint64_t frame) {
 
 Result<void> Crowd::move(const CrowdFigure& figure) {
   const FigureFrame& now = figure.now;
-  // Where it is the CPU that knows who is out of view, he need not be animated.
+  // If the CPU culls, a figure that is out of view need not be animated.
   const bool isAnimated = now.isInView || options_.culledOnGpu;
   for (std::uint32_t skin = 0; isAnimated && skin < figure.poses.size(); ++skin) {
     const Result<std::span<JointMatrix>> pose = system_.writePose(figure.poses[skin]);

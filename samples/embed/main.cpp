@@ -158,15 +158,15 @@ std::vector<JointMatrix> posesOf(std::uint32_t frame) {
 // -- Dermis.
 
 // [needs]
-/// A vertex as the engine's shaders read it. Dermis writes the first two attributes, and leaves the
-/// bytes behind them alone.
+/// A vertex as the engine's shaders read it. Dermis writes the first two attributes and never the
+/// bytes after them.
 struct SkinnedVertex {
   float position[3];
   std::int16_t normal[2];  ///< octahedral
   float textureCoordinate[2];
 };
 
-/// What is written for each vertex, and by which rule: known while loading, so pipelines are, too.
+/// Layout and method are known while loading, so all pipelines can be built then.
 const PipelineNeeds needs{.layout = {.positions = VertexFormat::float32x3,
                                      .normals = VertexFormat::octahedral16x2,
                                      .stride = sizeof(SkinnedVertex)}};
@@ -196,7 +196,7 @@ int main() {
   mesh.influenceSets = {&influences, 1};
 
   // [set-up]
-  // Lends Dermis a VkDevice, and says what is enabled on it. Nothing else is made or used.
+  // Lends the VkDevice to Dermis. Optional features that are enabled on it would be listed here.
   vulkan::DeviceDescription device;
   device.instance = engine.instance;
   device.physicalDevice = engine.physicalDevice;
@@ -206,7 +206,7 @@ int main() {
   const auto packed = must(pack(mesh, jointCount));
   must(context.prepare(needs));
 
-  // Who is skinned by which pose, and to where: planned again only if that changes.
+  // The pose and the output of each instance. Plan again only if these change.
   constexpr std::uint64_t poseSize = jointCount * sizeof(JointMatrix);
   constexpr std::uint64_t instanceSize = vertexCount * sizeof(SkinnedVertex);
   std::vector<PoseDescription> descriptions(instanceCount);
@@ -228,8 +228,8 @@ int main() {
   Plan plan;
   must(makePlan(batch, context.limits(), context.tuning(), plan));
 
-  // The plan says what buffers to make. Poses, tables and palettes are needed once for each frame
-  // in flight; here there is one.
+  // The plan lists the buffers to create. Poses, tables and palettes need one buffer for each frame
+  // in flight; this program has one.
   const auto make = [&](BufferRole role, VkBufferUsageFlags ownUsage = 0) {
     const auto needed = plan.buffer(role);
     return makeBuffer(engine, needed.size, needed.usage | ownUsage);
@@ -255,10 +255,10 @@ int main() {
     // [frame]
     std::ranges::copy(std::as_bytes(std::span(matrices)), poses.bytes().begin());
     must(writeTables(plan, tables.bytes()));
-    // The barriers at the edges are the engine's: only it knows what stands before and after.
+    // The engine records the barriers around `record`: only it knows how else it uses the buffers.
     barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
     must(context.record(engine.commandBuffer, plan, bindings));
-    // This program reads the vertices; one that draws them says Consumer::vertexInput.
+    // This program reads the vertices on the CPU. To draw them, use Consumer::vertexInput.
     barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
     // [/frame]
     must(vkEndCommandBuffer(engine.commandBuffer));

@@ -23,9 +23,9 @@ class CompiledFolder : public KernelFolder {
   Result<std::optional<KernelUpdate>> reload(const vulkan::Context& context) override {
     ++frame_;
     // [reload]
-    // Between two frames, with the frame that comes next and the newest that is complete.
+    // Called between two frames, with the next frame and the newest complete one.
     const Result<KernelReload> done = compiler_.reload(context, frame_, frame_ - 1);
-    if (!done) return done.error();  // a message of glslang, to show
+    if (!done) return done.error();  // glslang's message, to show
     // [/reload]
     if (done->compiled == 0) return std::optional<KernelUpdate>();
     KernelUpdate update;
