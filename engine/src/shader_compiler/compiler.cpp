@@ -131,7 +131,8 @@ Result<std::vector<std::uint32_t>> ShaderCompiler::compileFile(
   try {
     const std::optional<ShaderStage> stage = stageOfEnding(path);
     if (!stage) {
-      return invalidArgument("shader '" + path.string() + "' ends in none of .comp, .vert, .frag");
+      return invalidArgument("shader '" + path.string() +
+                             "' does not end in .comp, .vert or .frag");
     }
     std::optional<std::string> text = readFile(path);
     if (!text) return Error{ErrorCode::ioError, "cannot read shader '" + path.string() + "'"};

@@ -184,10 +184,10 @@ Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint
   if (options.optimize) InliningChoice{input};
   std::vector<std::uint32_t> optimized;
   if (!optimizer.Run(input.data(), input.size(), &optimized, runOptions)) {
-    return message.asError(name, "the SPIR-V cannot be optimised");
+    return message.asError(name, "the SPIR-V cannot be optimized");
   }
   forgetInliningChoice(optimized);
-  if (const auto valid = validate(optimized, scalar, name, "the optimiser made invalid SPIR-V");
+  if (const auto valid = validate(optimized, scalar, name, "the optimizer made invalid SPIR-V");
       !valid) {
     return valid.error();
   }

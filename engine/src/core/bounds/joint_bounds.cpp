@@ -107,7 +107,7 @@ class Displacements {
       if (vertex >= mesh.vertexCount || !std::isfinite(whole.x + whole.y + whole.z)) {
         return invalid(mesh, ErrorCode::invalidMesh,
                        name + ", element " + std::to_string(element) +
-                           ": its vertex is outside the mesh, or it is not finite");
+                           ": its vertex is outside the mesh, or the displacement is not finite");
       }
       const math::Vec3 low = static_cast<double>(range.min) * whole;
       const math::Vec3 high = static_cast<double>(range.max) * whole;

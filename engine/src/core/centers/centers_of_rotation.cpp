@@ -267,15 +267,15 @@ Result<void> CenterOfRotationSolver::solve(std::uint32_t firstVertex,
                                            std::span<float> centers) const {
   const std::size_t count = centers.size() / 3;
   if (centers.size() % 3 != 0) {
-    return Error{ErrorCode::invalidArgument, "centres have 3 floats each; " +
+    return Error{ErrorCode::invalidArgument, "centers have 3 floats each; " +
                                                  std::to_string(centers.size()) +
-                                                 " floats are not a multiple of that"};
+                                                 " floats are not a multiple of 3"};
   }
   if (firstVertex > vertexCount() || count > vertexCount() - firstVertex) {
     return Error{ErrorCode::invalidArgument,
                  "vertices " + std::to_string(firstVertex) + " to " +
                      std::to_string(std::uint64_t{firstVertex} + count) +
-                     " (excluded) are not all in the mesh, which has " +
+                     " (exclusive) are not all in the mesh, which has " +
                      std::to_string(vertexCount())};
   }
   for (std::size_t i = 0; i < count; ++i) {

@@ -243,7 +243,7 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
 
   if (wordsNeeded(mesh) > mostWords) {
     return Error{ErrorCode::limitExceeded,
-                 "mesh " + inQuotes(mesh.name) + ": packed, it might be larger than 16 GiB"};
+                 "mesh " + inQuotes(mesh.name) + ": the packed mesh might be larger than 16 GiB"};
   }
 
   PackedMesh packed;

@@ -75,10 +75,11 @@ Result<void> Groups::place(const Job& job, const OutputStreams& streams, const P
     }
   }
   if (placing.isCulled && vertexRuns_.size() > 1) {
-    return Error{ErrorCode::limitExceeded,
-                 placing.subject.name() +
-                     " is culled on the GPU and needs more than one output range: the GPU would "
-                     "choose each part for itself"};
+    return Error{
+        ErrorCode::limitExceeded,
+        placing.subject.name() +
+            " is culled on the GPU, so its output must lie in one storage buffer range, but it "
+            "does not"};
   }
   chooseVariant(job, streams, placing.mayScale, limits, tuning);
   GroupKey key;
@@ -226,7 +227,7 @@ Result<void> PlanBuilder::finish(const FrameWork* frame) {
   }
   if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
     return Error{ErrorCode::limitExceeded,
-                 "the tables of the batch are larger than a storage buffer range; split it"};
+                 "the tables of the batch are larger than a storage buffer range; split the batch"};
   }
   plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
   plan_->candidateCount = static_cast<std::uint32_t>(candidates_.size());
@@ -262,7 +263,7 @@ Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t work
                             maxWorkgroups)) {
     return Error{ErrorCode::limitExceeded,
                  "the batch needs " + std::to_string(workgroups) +
-                     " workgroups in one dispatch, more than the device can count; split it"};
+                     " workgroups in one dispatch, more than the device allows; split the batch"};
   }
   DispatchCommand& dispatch = dispatches_.emplace_back().command;
   dispatch.variant = variant;
@@ -554,7 +555,8 @@ Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
   if (most > limits_.maxWorkgroupCountX) {
     return Error{ErrorCode::limitExceeded,
                  "instances that are culled on the GPU have " + std::to_string(most) +
-                     " meshes and layouts, more than the device can count workgroups"};
+                     " combinations of mesh and layout, but the device allows at most " +
+                     std::to_string(limits_.maxWorkgroupCountX) + " workgroups"};
   }
   culled_.frame = frame;
   culled_.mostWorkgroups = limits_.maxWorkgroupCountX;
