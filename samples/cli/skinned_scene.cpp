@@ -77,7 +77,7 @@ class Preparer {
     if (mesh != nullptr) return mesh;
     if (!PreparedMesh::spend(primitive, model.budget)) {
       return Error{ErrorCode::limitExceeded,
-                   fmt::format("mesh '{}' for {} joints: more memory is wanted than a file of this "
+                   fmt::format("mesh '{}' for {} joints: it needs more memory than a file of this "
                                "size justifies",
                                primitive.name, joints)};
     }

@@ -566,7 +566,7 @@ TEST_F(BadInput, TruncatedOrHostileGltfEndsWithAClearErrorAndNeverWithMore) {
   std::ofstream(truncated, std::ios::binary)
       .write(reinterpret_cast<const char*>(glb.data()),
              static_cast<std::streamsize>(glb.size() - 5));
-  expectRefusedSoon(truncated, " bytes, the file has " + std::to_string(glb.size() - 5));
+  expectRefusedSoon(truncated, " bytes, but the file has " + std::to_string(glb.size() - 5));
 
   const auto expectHostile = [](const std::string& expected, auto change) {
     FileBuilder file = fox();
@@ -622,7 +622,7 @@ TEST_F(BadInput, FilesThatAreNoModelsAreRefusedBeforeTheyAreRead) {
   std::error_code error;
   std::filesystem::resize_file(sparse, std::uint64_t{1} << 40, error);
   if (error) GTEST_SKIP() << "no sparse files here";
-  expectRefusedSoon(sparse, "at most 4294967295 of a file are read");
+  expectRefusedSoon(sparse, "the maximum is 4294967295");
   std::filesystem::remove(sparse);
 }
 
