@@ -119,7 +119,7 @@ std::vector<float> solve(const CenterOfRotationSolver& solver) {
 
 Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
   return Error{ErrorCode::limitExceeded,
-               fmt::format("the centres of rotation of mesh {} take {}: they are left out, and so "
+               fmt::format("the centers of rotation of mesh {} take {}: they are left out, and so "
                            "are the methods that need them",
                            inQuotes(mesh.name), what)};
 }

@@ -11,7 +11,7 @@
 
 namespace dermis::cli {
 
-/// Finds the centres of rotation of meshes of one file, each once.
+/// Finds the centers of rotation of meshes of one file, each once.
 class MeshCenters {
  public:
   /// `mostTerms`: of the sums of all meshes together, some 4 ns each. The budget, which must

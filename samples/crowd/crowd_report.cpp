@@ -214,25 +214,24 @@ void CrowdReport::printTotals() const {
   if (!title_.culledOnGpu) {
     fmt::print("\nskinned   {} vertices in {} frames", sums.vertices, frames_.size());
     if (sums.verticesPerSecond)
-      fmt::print(", {:.1f} million a second of {}", *sums.verticesPerSecond * 1e-6,
-                 title_.isOnCpu ? "the jobs' time" : "GPU time");
+      fmt::print(", {:.1f} million per second of {}", *sums.verticesPerSecond * 1e-6,
+                 title_.isOnCpu ? "job time" : "GPU time");
     fmt::print("\n");
   } else {
     fmt::print("\n");
   }
-  fmt::print(
-      "instances {} of them skinned; left out: {} out of view, {} until their interval is "
-      "over\n",
-      share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
-      share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
+  fmt::print("instances {} of them skinned; left out: {} out of view, {} not due yet\n",
+             share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
+             share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
   if (sums.refusals != 0) fmt::print("refused   a figure {} times\n", sums.refusals);
   if (title_.isOnCpu) {
     fmt::print("memory    MiB: outputs {}\n", mebibytes(memory_.outputs));
     return;
   }
-  fmt::print("memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of the device in all\n",
-             mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
-             static_cast<double>(memory_.deviceMemory) / mebibyte);
+  fmt::print(
+      "memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of device memory in total\n",
+      mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
+      static_cast<double>(memory_.deviceMemory) / mebibyte);
 }
 
 void CrowdReport::printCheck(const CheckTotals& check) const {

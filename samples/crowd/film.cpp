@@ -131,7 +131,7 @@ void Film::loadFont() {
   if (font) {
     panel_.emplace(std::move(*font));
   } else {
-    samples::reportNote(font.error().message + "; the film is without statistics");
+    samples::reportNote(font.error().message + "; the film has no statistics");
   }
 }
 

@@ -132,11 +132,11 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
 std::string verdict(const CrowdCheck& check, const ShownPoses& shown) {
   const CheckTotals& totals = check.totals();
   if (totals.failures != 0) {
-    return fmt::format("{} of {} instances are not as they must be; the first: {}", totals.failures,
+    return fmt::format("{} of {} instances are wrong; the first: {}", totals.failures,
                        totals.instances, totals.firstFailure);
   }
   if (shown.overdue() != 0) {
-    return fmt::format("{} times an instance was not skinned although it was due", shown.overdue());
+    return fmt::format("{} times an instance was due but was not skinned", shown.overdue());
   }
   return {};
 }

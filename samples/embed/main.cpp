@@ -4,7 +4,7 @@
 //
 //   dermis_embed
 //
-// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
 
 #include <vulkan/vulkan.h>
 

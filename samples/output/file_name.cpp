@@ -113,7 +113,7 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
     const std::optional<FileIdentity> identity = identityOf(pathOf(name));
     if (identity && read.contains(*identity)) {
       return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} {} would overwrite a file that is read", option, name)};
+                   fmt::format("{} {} would overwrite an input file", option, name)};
     }
     if (isFrame && written.empty()) return {};
     const std::optional<std::string> file = writtenFile(pathOf(name));
@@ -121,7 +121,7 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
     const auto other = written.find(*file);
     if (other != written.end()) {
       return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} {} is the file that {} writes", option, name, other->second)};
+                   fmt::format("{} {} is also the output of {}", option, name, other->second)};
     }
     if (!isFrame) written.emplace(*file, option);
     return {};

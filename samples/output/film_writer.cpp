@@ -154,8 +154,8 @@ pid_t spawnFfmpeg(const std::string& program, std::vector<std::string> arguments
 Result<void> checkFilmProgram(const std::string& output) {
   if (findProgram("ffmpeg")) return {};
   return Error{ErrorCode::missingFeature,
-               fmt::format("{} takes the program ffmpeg, which is not in the PATH; numbered "
-                           "pictures need none: name them like frame%04d.png",
+               fmt::format("{} needs the program ffmpeg, which is not in the PATH; numbered "
+                           "pictures do not need it: name them like frame%04d.png",
                            output)};
 }
 
@@ -168,7 +168,7 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
   if (!file) return file.error();
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-    return Error{ErrorCode::ioError, "no socket can be made for ffmpeg"};
+    return Error{ErrorCode::ioError, "cannot create a socket for ffmpeg"};
   const pid_t child = spawnFfmpeg(
       program, ffmpegArguments((*file)->temporaryName(), kind, width, height, framesPerSecond),
       ends[1]);

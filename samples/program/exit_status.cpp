@@ -51,7 +51,7 @@ void reportNote(std::string_view message) {
 
 ExitStatus reportWrongUsage(std::string_view message) {
   return reportError(ExitStatus::wrongUsage,
-                     fmt::format("{} ({}{}{} --help tells more)", message, name,
+                     fmt::format("{} (see {}{}{} --help)", message, name,
                                  subcommand.empty() ? "" : " ", subcommand));
 }
 

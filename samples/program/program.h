@@ -13,8 +13,8 @@ namespace dermis::samples {
 
 /// Of a program that ends with any of them; the last word of its --help.
 inline constexpr const char* exitStatusHelp =
-    "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable device,\n"
-    "5 anything else that stopped it.";
+    "Exit status: 0 success, 1 verification failed, 2 wrong usage, 3 bad input,\n"
+    "4 no usable device, 5 any other error.";
 
 /// Nothing where the program is to go on; otherwise help was printed, or what is wrong.
 std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv);
