@@ -125,7 +125,7 @@ uvec4 encodePosition(vec3 position, uint extension, bool mayCount) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
     ExtensionRecord record = loadExtension(extension);
-    precise vec3 relative = (position - vec3(record.centreX, record.centreY, record.centreZ)) *
+    precise vec3 relative = (position - vec3(record.centerX, record.centerY, record.centerZ)) *
                             vec3(record.inverseX, record.inverseY, record.inverseZ);
     v.xyz = relative;
     // A vertex of the engine's own box may stand a rounding outside.

@@ -406,7 +406,7 @@ class Simulation {
     if (job.positions.format != VertexFormat::snorm16x3 &&
         job.positions.format != VertexFormat::snorm16x4)
       return;
-    const std::array<float, 3> centre{extension.centreX, extension.centreY, extension.centreZ};
+    const std::array<float, 3> centre{extension.centerX, extension.centerY, extension.centerZ};
     const std::array<float, 3> inverse{extension.inverseX, extension.inverseY, extension.inverseZ};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = static_cast<double>(job.box.min[axis]);

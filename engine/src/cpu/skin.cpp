@@ -117,7 +117,7 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
                  at(instance.output.previousPositions, places.previousPositions)};
   if (isSnormPosition(places.positions.format)) {
     const BoxScale scale = boxScale(instance.box);
-    std::ranges::copy(scale.centre, own.boxCentre);
+    std::ranges::copy(scale.center, own.boxCenter);
     std::ranges::copy(scale.inverse, own.boxInverse);
   }
   return own;

@@ -103,7 +103,7 @@ class Source {
   std::vector<bool> isFaulty_;  ///< Accessors that may not be read; nothing skinned uses them.
 };
 
-/// The name of a component type and normalisation: "normalized unsigned byte".
+/// The name of a component type and normalization: "normalized unsigned byte".
 std::string formatName(Format format);
 
 }  // namespace dermis::gltf

@@ -21,7 +21,7 @@ void checkMatrix(const std::array<double, 16>& matrix, std::size_t index, Notes&
   notes.broken(NoteKind::matrix, "node ", index, ": the fourth row of its matrix is not 0 0 0 1");
 }
 
-// Returns whether the rotation had to be normalised.
+// Returns whether the rotation had to be normalized.
 bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node, Notes& notes) {
   if (!source.matrix.empty()) {
     std::copy(source.matrix.begin(), source.matrix.end(), node.matrix.emplace().begin());

@@ -42,7 +42,7 @@ Result<void> validate(std::span<const std::uint32_t> words, bool scalarBlockLayo
 }
 
 // -- Which functions are inlined. Drivers inline all of them. If that is done before a module is
-// optimised, it becomes three times as large; if nothing is, drivers take longer for each pipeline.
+// optimized, it becomes three times as large; if nothing is, drivers take longer for each pipeline.
 
 /// Maximum instructions of a function with several callers that is inlined. Measured on lavapipe
 /// with 40: pipelines are built in 0.83 of the time that no inlining takes, as with any larger

@@ -172,12 +172,12 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
   if (description.texelBuffers.value_or(defaults.texelBuffers))
     chooseTexelBuffers(properties.limits, state.limits);
-  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
+  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::MIN_BINDING_COUNT) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +
                      std::to_string(properties.limits.maxPerStageDescriptorStorageBuffers) +
                      " storage buffers per stage, but Dermis needs " +
-                     std::to_string(abi::BINDING_COUNT_LEAST)};
+                     std::to_string(abi::MIN_BINDING_COUNT)};
   }
 
   if (Result<void> good = state.createLayouts(); !good) return good.error();

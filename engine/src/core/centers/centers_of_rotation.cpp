@@ -1,4 +1,4 @@
-// Centres of rotation: what they depend on is read from the mesh's views, then each vertex is
+// Centers of rotation: what they depend on is read from the mesh's views, then each vertex is
 // solved by itself.
 
 #include "dermis/centers_of_rotation.h"
@@ -204,7 +204,7 @@ Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
                    ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
-  // Centres that the mesh has already, good or bad, have no say.
+  // Centers that the mesh has already, good or bad, have no say.
   MeshView bare = mesh;
   bare.centersOfRotation = {};
   if (Result<void> accepted = validate(bare, jointCount).accepted(); !accepted) return accepted;

@@ -30,9 +30,9 @@ using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
   const BoxScale scale = boxScale(box);
-  extension.centreX = scale.centre[0];
-  extension.centreY = scale.centre[1];
-  extension.centreZ = scale.centre[2];
+  extension.centerX = scale.center[0];
+  extension.centerY = scale.center[1];
+  extension.centerZ = scale.center[2];
   extension.inverseX = scale.inverse[0];
   extension.inverseY = scale.inverse[1];
   extension.inverseZ = scale.inverse[2];
@@ -559,7 +559,7 @@ Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
                      std::to_string(limits_.maxWorkgroupCountX) + " workgroups"};
   }
   culled_.frame = frame;
-  culled_.mostWorkgroups = limits_.maxWorkgroupCountX;
+  culled_.maxWorkgroups = limits_.maxWorkgroupCountX;
   for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
     DispatchCommand& dispatch = visibility_[pass];
     dispatch.variant = visibilityVariant(tuning_);

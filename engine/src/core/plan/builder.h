@@ -102,7 +102,7 @@ class Groups {
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> heads_;  ///< a hash table: a power of two of lists of entries
-  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbours mostly belong together
+  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbors mostly belong together
   LayoutNeeds lastLayout_;            ///< of the job that was placed last …
   FormNeeds lastForm_;
   Variant lastVariant_;        ///< … its variant …

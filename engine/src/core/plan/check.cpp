@@ -131,7 +131,7 @@ BoxScale boxScale(const Box& box) {
   BoxScale scale;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double least = double{box.min[axis]}, greatest = double{box.max[axis]};
-    scale.centre[axis] = static_cast<float>((least + greatest) / 2);
+    scale.center[axis] = static_cast<float>((least + greatest) / 2);
     scale.inverse[axis] = static_cast<float>(2 / (greatest - least));
   }
   return scale;

@@ -75,7 +75,7 @@ Variant visibilityVariant(const Tuning& tuning);
 /// The skin kernel for a job, but for its form. It depends on nothing else in the batch.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
-/// All that `layoutVariant` looks at, on one device with one tuning: neighbours mostly have the
+/// All that `layoutVariant` looks at, on one device with one tuning: neighbors mostly have the
 /// same.
 struct LayoutNeeds {
   LayoutNeeds() = default;
