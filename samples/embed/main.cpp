@@ -1,5 +1,5 @@
-// An engine that keeps the books itself: it has the buffers, the instances and their places, turns
-// them into a plan, and records it. A hundred instances of one mesh go into its vertex buffer, and
+// An engine that manages buffers and instances itself. It turns a batch of instances into a plan
+// and records the plan. A hundred instances of one mesh are skinned into its vertex buffer, and
 // every vertex of the last frame is compared with the reference.
 //
 //   dermis_embed
@@ -27,7 +27,7 @@ using namespace dermis;
 
 constexpr std::uint32_t vertexCount = 200, jointCount = 2, instanceCount = 100, frameCount = 4;
 
-/// The value, or the end of the program.
+/// Returns the value, or ends the program if there is none.
 template <typename T>
 T must(Result<T> result) {
   if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
@@ -37,7 +37,7 @@ void must(VkResult result) {
   if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
 }
 
-/// A Vulkan structure of which nothing but the type is set.
+/// Returns a Vulkan structure with sType set and all other members zero.
 template <typename T>
 T structure(VkStructureType type) {
   T made{};
@@ -45,7 +45,7 @@ T structure(VkStructureType type) {
   return made;
 }
 
-// -- What an engine has anyway.
+// -- What every engine already has.
 
 struct Engine {
   VkInstance instance;
@@ -86,7 +86,7 @@ Engine makeEngine() {
   return engine;
 }
 
-/// A buffer that the CPU sees.
+/// A buffer in memory that the CPU can access.
 struct Buffer {
   VkBuffer handle = VK_NULL_HANDLE;
   VkDeviceSize size = 0;
@@ -135,14 +135,14 @@ void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency
                        &memory, 0, nullptr, 0, nullptr);
 }
 
-// -- The mesh: a strip of two joints. The pose of each instance is another.
+// -- The mesh: a strip of two joints. Each instance has its own pose.
 
 struct Strip {
   float positions[vertexCount][3], normals[vertexCount][3], weights[vertexCount][2];
   std::uint8_t joints[vertexCount][2];
 };
 
-/// The joint's global transform × its inverse bind matrix, of all instances.
+/// Joint global transform × inverse bind matrix, for all joints of all instances.
 std::vector<JointMatrix> posesOf(std::uint32_t frame) {
   std::vector<JointMatrix> matrices;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
@@ -159,14 +159,14 @@ std::vector<JointMatrix> posesOf(std::uint32_t frame) {
 
 // [needs]
 /// A vertex as the engine's shaders read it. Dermis writes the first two attributes, and leaves the
-/// bytes behind them alone.
+/// bytes after them unchanged.
 struct SkinnedVertex {
   float position[3];
   std::int16_t normal[2];  ///< octahedral
   float textureCoordinate[2];
 };
 
-/// What is written for each vertex, and by which rule: known while loading, so pipelines are, too.
+/// The method and the vertex layout are known while loading, so the pipelines can be built then.
 const PipelineNeeds needs{.layout = {.positions = VertexFormat::float32x3,
                                      .normals = VertexFormat::octahedral16x2,
                                      .stride = sizeof(SkinnedVertex)}};
@@ -196,7 +196,7 @@ int main() {
   mesh.influenceSets = {&influences, 1};
 
   // [set-up]
-  // Lends Dermis a VkDevice, and says what is enabled on it. Nothing else is made or used.
+  // The device and what is enabled on it. Dermis uses nothing else.
   vulkan::DeviceDescription device;
   device.instance = engine.instance;
   device.physicalDevice = engine.physicalDevice;
@@ -206,7 +206,7 @@ int main() {
   const auto packed = must(pack(mesh, jointCount));
   must(context.prepare(needs));
 
-  // Who is skinned by which pose, and to where: planned again only if that changes.
+  // The pose of each instance, and where it is written. Plan again only if this changes.
   constexpr std::uint64_t poseSize = jointCount * sizeof(JointMatrix);
   constexpr std::uint64_t instanceSize = vertexCount * sizeof(SkinnedVertex);
   std::vector<PoseDescription> descriptions(instanceCount);
@@ -228,8 +228,8 @@ int main() {
   Plan plan;
   must(makePlan(batch, context.limits(), context.tuning(), plan));
 
-  // The plan says what buffers to make. Poses, tables and palettes are needed once for each frame
-  // in flight; here there is one.
+  // The plan tells which buffers are needed. Poses, tables and palettes are needed once for each
+  // frame in flight; here there is one.
   const auto make = [&](BufferRole role, VkBufferUsageFlags ownUsage = 0) {
     const auto needed = plan.buffer(role);
     return makeBuffer(engine, needed.size, needed.usage | ownUsage);
@@ -255,17 +255,17 @@ int main() {
     // [frame]
     std::ranges::copy(std::as_bytes(std::span(matrices)), poses.bytes().begin());
     must(writeTables(plan, tables.bytes()));
-    // The barriers at the edges are the engine's: only it knows what stands before and after.
+    // The engine records these barriers: only it knows the previous and the next use.
     barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
     must(context.record(engine.commandBuffer, plan, bindings));
-    // This program reads the vertices; one that draws them says Consumer::vertexInput.
+    // This program reads the vertices; a program that draws them uses Consumer::vertexInput.
     barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
     // [/frame]
     must(vkEndCommandBuffer(engine.commandBuffer));
     submit(engine);
   }
 
-  // -- The proof: every vertex against the reference in double precision.
+  // -- The check: every vertex is compared with the reference in double precision.
   double worst = 0;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
     const std::byte* skinnedInstance =
