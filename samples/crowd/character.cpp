@@ -13,7 +13,7 @@ using namespace dermis;
 namespace crowd {
 namespace {
 
-/// What a part takes: packed, with the views of it. A mesh may stand for many nodes.
+/// Spends the memory of a part: the packed mesh and its views. Many nodes may use one mesh.
 bool spendOnPart(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
   std::uint64_t displacements = 0;
   for (const gltf::MorphTarget& target : primitive.morphTargets)
@@ -77,7 +77,7 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
       std::round(duration * options.ticksPerSecond), 1.0, static_cast<double>(options.mostTicks)));
   std::uint64_t joints = 0;
   for (const std::uint32_t count : jointCounts_) joints += count;
-  // For each tick all nodes are placed, too, but not kept.
+  // Each tick also computes the transforms of all nodes, which are not kept.
   if (!model_->budget.spend(sampled.tickCount, joints * sizeof(JointMatrix) + model_->nodes.size()))
     return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {

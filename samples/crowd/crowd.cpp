@@ -14,7 +14,7 @@ using namespace dermis;
 namespace crowd {
 namespace {
 
-/// Gaps are closed by so many bytes a frame, so that no frame has to move much.
+/// Maximum bytes that `compact` moves in a frame, so that no frame moves many.
 constexpr std::uint64_t mostMovedBytes = std::uint64_t{1} << 20;
 
 VertexLayout layoutOf(const Part& part) {
@@ -25,7 +25,8 @@ VertexLayout layoutOf(const Part& part) {
   return layout;
 }
 
-/// What goes is free when the GPU is done with it: room for a quarter more than there are.
+/// Memory of removed objects is free only once the GPU has finished with it, so there is room for a
+/// quarter more.
 std::uint64_t withSlack(std::uint64_t count) {
   return count + count / 4 + 64;
 }
@@ -57,7 +58,7 @@ vulkan::SkinningSystemDescription capacities(const Character& character, std::ui
 Result<Crowd> Crowd::create(samples::Device& device, vulkan::Context& context,
                             const Character& character, const Figures& script,
                             const CrowdOptions& options) {
-  // How much there will be, in bytes, joints and instances: then nothing has to grow later.
+  // The expected bytes, joints and instances, so that no buffer has to grow later.
   vulkan::SkinningSystemDescription description = capacities(character, script.count(), options);
   description.context = &context;
   description.framesInFlight = options.framesInFlight;
@@ -106,7 +107,7 @@ Result<void> Crowd::add(CrowdFigure& figure) {
   return {};
 }
 
-/// At any time: what frames in flight still draw from stays until they are complete.
+/// May be called at any time: memory that frames in flight read stays until they are complete.
 Result<void> Crowd::remove(CrowdFigure& figure) {
   for (const InstanceHandle instance : std::exchange(figure.instances, {})) {
     if (Result<void> removed = system_.removeInstance(instance); !removed) return removed;
@@ -133,7 +134,7 @@ Result<void> Crowd::comeAndGo(std::uint64_t frame) {
     if (added) continue;
     if (Result<void> removed = remove(figure); !removed) return removed;
     if (added.error().code != ErrorCode::limitExceeded) return added;
-    ++refusals_;  // it comes when others have gone
+    ++refusals_;  // it is added when others have been removed
     break;
   }
   if (hasGaps) system_.compact(mostMovedBytes);
@@ -153,7 +154,7 @@ Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
     description.visibility = *visibility;
   }
 
-  // This program copies the vertices, to look at them; one that draws says vertexInput, twice.
+  // This program copies the vertices to compare them; one that draws uses vertexInput, twice.
   recordBarrier(*device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
   if (Result<void> done = system.record(commandBuffer, description); !done) return done;
   recordBarrier(*device_, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
@@ -171,7 +172,7 @@ Result<void> Crowd::moveAll(std::uint64_t frame) {
 
 Result<void> Crowd::move(const CrowdFigure& figure) {
   const FigureFrame& now = figure.now;
-  // Where it is the CPU that knows who is out of view, he need not be animated.
+  // If the CPU does the culling, figures that are out of view need not be animated.
   const bool isAnimated = now.isInView || options_.culledOnGpu;
   for (std::uint32_t skin = 0; isAnimated && skin < figure.poses.size(); ++skin) {
     const Result<std::span<JointMatrix>> pose = system_.writePose(figure.poses[skin]);
@@ -237,8 +238,8 @@ vulkan::SystemStatistics Crowd::statistics() const {
   return all;
 }
 
-/// A word for each instance. Here the CPU writes them to mapped memory before the submission, which
-/// needs no barrier.
+/// Writes a word for each instance. Here the CPU writes to mapped memory before the submission,
+/// which needs no barrier.
 Result<VkBuffer> Crowd::writeVisibility(std::uint64_t frame) {
   visibility_.resize(options_.framesInFlight);
   samples::MappedBuffer& buffer = visibility_[frame % options_.framesInFlight];

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double mebibyte = 1 << 20;
 
-/// The mean of what is known.
+/// The mean of the known values.
 class Mean {
  public:
   void add(std::optional<double> value) {
@@ -96,7 +96,7 @@ void CrowdReport::printTitle() const {
       title_.isOnCpu ? "jobs" : "GPU");
 }
 
-/// The CPU is not told how many the GPU chose until the frame is complete.
+/// If the GPU decides, the CPU learns the number only when the frame is complete.
 std::optional<std::uint32_t> CrowdReport::skinnedBy(const Frame& frame) const {
   if (!title_.culledOnGpu) return frame.cpu.skinnedInstances;
   return frame.gpu ? std::optional(frame.gpu->skinnedInstances) : std::nullopt;
@@ -187,7 +187,7 @@ void CrowdReport::finish(const Crowd& crowd) {
   printTotals();
 }
 
-/// Over the frames of which it is known what was skinned.
+/// Sums over the frames for which the number of skinned instances is known.
 void CrowdReport::sumUp() {
   std::uint64_t timedVertices = 0;
   double gpuSeconds = 0;

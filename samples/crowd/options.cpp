@@ -22,7 +22,7 @@ constexpr std::uint32_t mostMebibytes = 1u << 20;
 constexpr std::uint32_t smallestSide = 64, largestSide = 16384;
 constexpr double mostFramesPerSecond = 240, latestStart = 1e6;
 
-/// What is wrong with the film that is asked for; empty where nothing is.
+/// What is wrong with the options of the film; empty if nothing is.
 std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   const std::optional<samples::PictureKind> kind = samples::pictureKind(film.output);
   if (!kind)
@@ -47,7 +47,7 @@ std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   return {};
 }
 
-/// The options of the film, each of which needs one.
+/// Adds the options of the film. Each of them needs --film.
 void addFilm(CLI::App& app, FilmRequest& film) {
   CLI::Option* output = app.add_option(
       "--film", film.output,
