@@ -48,7 +48,7 @@ struct Summary {
   std::size_t failures = 0;
 };
 
-/// What was not held against a bound, where there is any.
+/// What was not held against a bound, if there is any.
 std::string exceptions(const Summary& summary) {
   std::string text;
   if (summary.exempt.onlyFinite != 0)

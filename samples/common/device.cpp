@@ -272,7 +272,7 @@ Result<void> Device::choose(const std::string& wanted) {
 }
 
 Result<void> Device::createDevice(const DeviceOptions& options) {
-  // Where there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
+  // If there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
   VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT;
   if (options.graphics) wanted |= VK_QUEUE_GRAPHICS_BIT;
   if (!findFamily(functions_, physicalDevice_, wanted, queueFamily_)) {

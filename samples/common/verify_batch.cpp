@@ -10,7 +10,7 @@
 namespace dermis::samples {
 namespace {
 
-/// The box of all that is finite.
+/// The box of all finite positions.
 Box boxOf(const std::vector<reference::Double3>& positions) {
   std::array<double, 3> low, high;
   low.fill(std::numeric_limits<double>::infinity());
@@ -40,7 +40,7 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
     box.max[axis] = std::clamp(box.max[axis], -1e37f, 1e37f);
     const float side = box.max[axis] - box.min[axis];
     const float margin = clamps ? -0.2f * side : 0.05f * side;
-    // What is added is not lost in the rounding of large numbers.
+    // The margin is large enough not to be lost in the rounding of large numbers.
     const float least = 0.01f + 1e-6f * std::max(std::abs(box.min[axis]), std::abs(box.max[axis]));
     box.min[axis] -= margin + least;
     box.max[axis] += margin + least;
@@ -96,7 +96,7 @@ class BatchVerifier {
     const Result<Frames> again = run(std::byte{0x5a}, all);
     if (!again) return again.error();
     for (const std::size_t index : all) {
-      // A byte that was not written would be as it was before, which differed.
+      // A byte that was not written would keep its old value, which differed.
       if (again->now.instances[index].streams != frames.now.instances[index].streams)
         fail(index, "a byte of an attribute was not written, or two runs wrote different values");
       const Result<Frames> own = run(std::byte{0xa5}, {&index, 1});

@@ -34,7 +34,7 @@ class Mean {
   std::uint32_t count_ = 0;
 };
 
-/// A number, or a dash where there is none.
+/// A number, or a dash if there is none.
 std::string cell(const std::optional<double>& value, int digits) {
   return value ? fmt::format("{:.{}f}", *value, digits) : "-";
 }

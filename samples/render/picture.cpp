@@ -22,7 +22,7 @@ constexpr std::array<const char*, 3> fontFiles{
     "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
 };
 
-/// Nothing where it cannot be read.
+/// Nothing if it cannot be read.
 std::vector<unsigned char> readBytes(const std::string& name) {
   std::ifstream stream(name, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};

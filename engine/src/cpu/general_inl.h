@@ -175,7 +175,7 @@ struct Slots {
   std::uint32_t influences;
 };
 
-/// Calls `sum` with the number of influences: as a constant, or 0 where it is too large to be one.
+/// Calls `sum` with the number of influences: as a constant, or 0 if it is too large to be one.
 template <class Sum>
 HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
   switch (influences) {

@@ -45,7 +45,7 @@ struct Tally {
   std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
 };
 
-// 0 where a channel has no effect: there are no weights to move.
+// 0 if a channel has no effect: there are no weights to move.
 std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
   switch (channel.path) {
     case ChannelPath::translation:
@@ -158,7 +158,7 @@ std::size_t normalizeRotations(Channel& channel, double tolerance) {
   return count;
 }
 
-// The channel, or nothing where it is left out.
+// The channel, or nothing if it is left out.
 std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
                                    const tinygltf::AnimationChannel& from, const std::string& where,
                                    Tally& tally) {

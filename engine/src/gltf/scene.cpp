@@ -33,7 +33,7 @@ std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::si
   return reachable;
 }
 
-// What the default scene holds: `scene`, or scene 0 where the file does not say (as three.js does),
+// What the default scene holds: `scene`, or scene 0 if the file does not say (as three.js does),
 // or all nodes where it has no scenes.
 std::vector<bool> findReachable(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();

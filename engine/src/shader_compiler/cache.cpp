@@ -65,7 +65,7 @@ std::string encodeEntry(const CacheKey& key, std::span<const std::uint32_t> word
   return header + module;
 }
 
-// What is wrong with an entry; null where nothing is.
+// What is wrong with an entry; null if nothing is.
 const char* findDamage(std::string_view bytes, const CacheKey& key) {
   if (bytes.size() < headerSize || !bytes.starts_with(magic)) return "is not a cache entry";
   if (wordAt(bytes, 4) != formatVersion) return "is of another version";

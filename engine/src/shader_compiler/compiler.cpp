@@ -94,7 +94,7 @@ class CacheUse {
 
   CacheLookup load() const { return cache_.load(key_); }
 
-  /// What kept the module from being stored; empty where nothing did. A module with an include that
+  /// What kept the module from being stored; empty if nothing did. A module with an include that
   /// is not in the key is not stored: its change would go unnoticed.
   std::string store(const FrontEndOutput& translated,
                     const std::vector<std::uint32_t>& words) const {

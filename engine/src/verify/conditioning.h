@@ -18,7 +18,7 @@ struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
                         ///< value of joint j
   double stretch = 1;   ///< max σ_j; 1 for a vertex without weight
-  double distance = 0;  ///< |p|, from the origin of the bind pose; where there is a center of
+  double distance = 0;  ///< |p|, from the origin of the bind pose; if there is a center of
                         ///< rotation c, |p| + 2 |c|
   double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels take for rigid as they are
   /// What the bind pose in float32 may be off by, in units of u: of the mesh's for p, of |n| and

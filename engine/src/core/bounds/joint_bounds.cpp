@@ -69,7 +69,7 @@ Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
   return {code, "mesh " + inQuotes(mesh.name) + what};
 }
 
-/// Where each vertex may be, relative to its bind position; empty where nothing displaces it.
+/// Where each vertex may be, relative to its bind position; empty if nothing displaces it.
 class Displacements {
  public:
   Result<void> gather(const MeshView& mesh, std::span<const MorphRange> ranges) {

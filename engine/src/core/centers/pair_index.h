@@ -54,7 +54,7 @@ class PairIndex {
     std::size_t first = 0, last = 0;
   };
 
-  /// Null where no group has both joints.
+  /// Null if no group has both joints.
   const Range* rangeOf(const Influence& first, const Influence& second) const;
 
   std::unordered_map<std::uint32_t, Range> ranges_;

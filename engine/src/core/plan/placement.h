@@ -10,7 +10,7 @@
 
 namespace dermis {
 
-/// One attribute of a job's output; `size` 0 where it is not wanted.
+/// One attribute of a job's output; `size` 0 if it is not wanted.
 struct OutputStream {
   std::uint64_t offset = 0;
   std::uint32_t stride = 0;

@@ -70,7 +70,7 @@ Result<void> SceneBooks::grow(Store& store, std::uint64_t least) {
   return {};
 }
 
-/// Nothing where the maximum is too small. Fails if growing does.
+/// Nothing if the maximum is too small. Fails if growing does.
 Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
                                               std::uint64_t alignment) {
   if (const std::optional<Range> range = store.ranges.allocate(size, alignment)) return range;
@@ -107,7 +107,7 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
 }
 
 /// Matrices one behind the other, in all slots, and their buffer: one more where none has room.
-/// Nothing where there may be no other.
+/// Nothing if there may be no other.
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);
