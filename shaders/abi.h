@@ -16,7 +16,7 @@ using uint = std::uint32_t;
 #endif
 
 // Storage buffers of descriptor set 0. On a device with fewer than BINDING_COUNT storage buffers
-// per stage, kernels have the first BINDING_COUNT_LEAST only: all attributes go to
+// per stage, kernels have the first MIN_BINDING_COUNT only: all attributes go to
 // BINDING_POSITIONS, and there are no results.
 DERMIS_CONSTANT BINDING_TABLES = 0u;
 DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
@@ -24,7 +24,7 @@ DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
 // joint matrices.
 DERMIS_CONSTANT BINDING_PALETTES = 2u;
 DERMIS_CONSTANT BINDING_POSITIONS = 3u;
-DERMIS_CONSTANT BINDING_COUNT_LEAST = 4u;
+DERMIS_CONSTANT MIN_BINDING_COUNT = 4u;
 DERMIS_CONSTANT BINDING_NORMALS = 4u;
 DERMIS_CONSTANT BINDING_TANGENTS = 5u;
 DERMIS_CONSTANT BINDING_PREVIOUS = 6u;
@@ -240,9 +240,9 @@ struct ExtensionRecord {
   uint reserved;
   uint reserved1;
   uint reserved2;
-  float centreX;  // center of the box of snorm16 positions
-  float centreY;
-  float centreZ;
+  float centerX;  // center of the box of snorm16 positions
+  float centerY;
+  float centerZ;
   float inverseX;  // 1 / half of the size of the box
   float inverseY;
   float inverseZ;
@@ -340,15 +340,15 @@ struct SkinPush {
   uint verticesPerInvocation;   // used only with texel buffers
 };
 struct VisibilityPush {
-  uint pass;            // VISIBILITY_CHOOSES or VISIBILITY_COUNTS
-  uint groups;          // word offset of the first group record
-  uint candidates;      // word offset of the candidate records
-  uint instances;       // word offset of the instance records
-  uint firstInstance;   // number of the first instance that is culled on the GPU
-  uint frame;           // number of this frame, counting the frames that were committed
-  uint dispatches;      // word offset of the CulledDispatchRecords
-  uint arguments;       // word offset of the IndirectRecords
-  uint mostWorkgroups;  // maximum workgroups in x
+  uint pass;           // VISIBILITY_CHOOSES or VISIBILITY_COUNTS
+  uint groups;         // word offset of the first group record
+  uint candidates;     // word offset of the candidate records
+  uint instances;      // word offset of the instance records
+  uint firstInstance;  // number of the first instance that is culled on the GPU
+  uint frame;          // number of this frame, counting the frames that were committed
+  uint dispatches;     // word offset of the CulledDispatchRecords
+  uint arguments;      // word offset of the IndirectRecords
+  uint maxWorkgroups;  // maximum workgroups in x
 };
 DERMIS_CONSTANT VISIBILITY_CHOOSES = 0u;  // one workgroup for each group
 DERMIS_CONSTANT VISIBILITY_COUNTS = 1u;   // one workgroup for each dispatch

@@ -46,7 +46,7 @@ endforeach()
 list(REMOVE_DUPLICATES names)
 set(text " ${text} ")
 foreach(name IN LISTS names)
-  # Twice: neighbours share the character between them.
+  # Twice: neighbors share the character between them.
   foreach(pass RANGE 1)
     string(REGEX REPLACE "([^A-Za-z0-9_])${name}([^A-Za-z0-9_])" "\\1dermis_${name}\\2" text "${text}")
   endforeach()

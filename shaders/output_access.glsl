@@ -87,7 +87,7 @@ void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
 #elif defined(STAGED)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsUnits { uvec4 positionsUnits[]; };
 
-// A GPU stores memory by 32 or 64 bytes at a time: neighbours that store 4 bytes each of records of 24 would reach for all of them six
+// A GPU stores memory by 32 or 64 bytes at a time: neighbors that store 4 bytes each of records of 24 would reach for all of them six
 // times. So the records of a workgroup are brought together first. There is room for them twice: those of the next instance may
 // come while these are being read, and one barrier for each is enough.
 const uint RECORD_WORDS = RECORD / 4u;

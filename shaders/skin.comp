@@ -129,7 +129,7 @@ struct BoxScale {
 BoxScale boxOf(InstanceRecord instance) {
   if (!isSnormPosition(POSITION_FORMAT)) return BoxScale(vec3(0.0), vec3(0.0));
   ExtensionRecord r = loadExtension(instance.extension);
-  return BoxScale(vec3(r.centreX, r.centreY, r.centreZ), vec3(r.inverseX, r.inverseY, r.inverseZ));
+  return BoxScale(vec3(r.centerX, r.centerY, r.centerZ), vec3(r.inverseX, r.inverseY, r.inverseZ));
 }
 
 // An instance, and the bytes at which this invocation's vertex goes: positions, normals, tangents, previous positions.

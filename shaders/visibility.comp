@@ -104,7 +104,7 @@ void countWorkgroups(uint word, uint arguments) {
     group.workgroupEnd = workgroups;
     storeGroup(place, group);
   }
-  uint most = push.mostWorkgroups;
+  uint most = push.maxWorkgroups;
   // `most` may be 2³² − 1. Workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
   uint rows = workgroups / most + (workgroups % most != 0u ? 1u : 0u);
   storeIndirect(arguments, IndirectRecord(rows == 0u ? 0u : (workgroups + rows - 1u) / rows, rows, 1u, 0u));

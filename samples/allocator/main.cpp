@@ -1,10 +1,10 @@
-// An engine with its own allocator and one global vertex buffer, which loses a frame: every buffer
-// of Dermis comes from the engine, and what was recorded in the frame that was never submitted is
-// recorded again.
+// An engine with its own allocator and one global vertex buffer. Every buffer of Dermis comes from
+// the engine. One frame is recorded but never submitted; its work is recorded again in the next
+// frame.
 //
 //   dermis_allocator
 //
-// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
 
 #include <vulkan/vulkan.h>
 
@@ -24,7 +24,7 @@ using namespace dermis;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 4, lostFrame = 3;
 
-/// The value, or the end of the program.
+/// Returns the value, or ends the program if there is none.
 template <typename T>
 T must(Result<T> result) {
   if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
@@ -34,7 +34,7 @@ void must(VkResult result) {
   if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
 }
 
-/// A Vulkan structure of which nothing but the type is set.
+/// Returns a Vulkan structure with sType set and all other members zero.
 template <typename T>
 T structure(VkStructureType type) {
   T made{};
@@ -42,7 +42,7 @@ T structure(VkStructureType type) {
   return made;
 }
 
-// -- What an engine has anyway.
+// -- What every engine already has.
 
 struct Engine {
   VkInstance instance;
@@ -119,8 +119,8 @@ class Allocator {
     vkFreeMemory(engine_.device, allocation.memory, nullptr);
   }
 
-  std::uint32_t buffers = 0;  ///< that there are
-  std::uint64_t bytes = 0;    ///< that were ever asked for
+  std::uint32_t buffers = 0;  ///< that exist now
+  std::uint64_t bytes = 0;    ///< that were ever allocated
 
  private:
   const Engine& engine_;
@@ -196,7 +196,7 @@ int main() {
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
   vulkan::Context context = must(vulkan::Context::create(device));
 
-  // -- Dermis: its outputs go to a part of the vertex buffer that the engine has for everything.
+  // -- Dermis: its output is a range of the vertex buffer that the engine uses for everything.
   // [range]
   vulkan::SkinningSystemDescription description;
   description.context = &context;
@@ -259,7 +259,7 @@ int main() {
       // [/lost-frame]
     }
 
-    // -- The proof: the pose of the lost frame, by the frame after it.
+    // -- The check: the frame after the lost one shows the pose of the lost frame.
     const InstanceOutput output = must(scene.output(instance));
     const auto* vertices = reinterpret_cast<const float*>(
         static_cast<const std::byte*>(vertexMemory.mapped) + output.offset);

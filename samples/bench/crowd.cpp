@@ -117,7 +117,7 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
     if (source.skin != skin) continue;
     const gltf::Primitive& primitive = model->meshes[source.mesh].primitives[source.primitive];
     if (primitive.normals.empty()) return refuse("has no normals");
-    if (primitive.influences.size() != 1) return refuse("has not four influences a vertex");
+    if (primitive.influences.size() != 1) return refuse("does not have four influences per vertex");
     for (std::size_t vertex = 0; vertex < primitive.vertexCount; ++vertex)
       crowd.vertices.push_back(plainVertex(primitive, vertex));
   }

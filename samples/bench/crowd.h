@@ -39,7 +39,7 @@ struct Crowd {
 };
 
 /// All primitives of a file that the first one's skin moves, as one mesh, so many times, each
-/// instance at another time of the file's first clip. Fails where the file has no skinned
+/// instance at another time of the file's first clip. Fails if the file has no skinned
 /// primitive, or one without normals or four influences a vertex.
 Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
 

@@ -30,8 +30,8 @@ struct ThroughputRow {
 class Throughput {
  public:
   /// Prepares all rows, and skins each once. Without a device, those of the CPU only. `open` and
-  /// `crowd` must outlive this object. `step` is called once a row. Fails where a device fails, and
-  /// with `invalidData` where plain kernels and Dermis skin differently: a baseline that does not
+  /// `crowd` must outlive this object. `step` is called once a row. Fails if a device fails, and
+  /// with `invalidData` if plain kernels and Dermis skin differently: a baseline that does not
   /// do the same work is none.
   static Result<std::unique_ptr<Throughput>> create(OpenDevice* open, const Crowd& crowd,
                                                     const std::function<void()>& step);

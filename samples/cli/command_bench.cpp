@@ -42,12 +42,12 @@ ExitStatus checkUsage(const BenchOptions& options) {
   if (options.instances == 0 || options.instances > mostInstances)
     return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostInstances));
   if (options.device == "reference")
-    return reportWrongUsage("--device reference is not timed: it is not made to be fast");
+    return reportWrongUsage("--device reference cannot be timed: it is not made to be fast");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
-    return reportWrongUsage("-o OUT has a place for a number; there is one picture only");
+    return reportWrongUsage("-o OUT has a place for a number, but there is only one picture");
   return ExitStatus::done;
 }
 
@@ -60,7 +60,7 @@ ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
   }
   if (options.output.empty()) return ExitStatus::done;
   Result<samples::render::Font> font = samples::render::Font::load();
-  if (!font) reportNote(font.error().message + ": the picture has no words");
+  if (!font) reportNote(font.error().message + ": the picture has no text");
   const Result<std::vector<std::byte>> file =
       samples::render::encodePng(drawThroughput(title, rows, font ? &*font : nullptr));
   if (!file) return reportError(ExitStatus::stopped, file.error().message);
@@ -138,12 +138,13 @@ Run addBench(CLI::App& app) {
   const auto options = std::make_shared<BenchOptions>();
   command->add_option(
       "MODEL", options->model,
-      "A .gltf or .glb file, of which the first skin is used [a figure of 10,000 vertices, 60 "
+      "A .gltf or .glb file; its first skin is used [a figure of 10,000 vertices, 60 "
       "joints and four influences everywhere]");
   command->add_option("--json", options->json, "Write the same numbers to a file");
   command->add_option("-o,--output", options->output, "Draw the numbers as bars: OUT.png");
-  command->add_option("--device", options->device,
-                      "auto, cpu (the CPU alone), a number of 'dermis devices', or part of a name");
+  command->add_option(
+      "--device", options->device,
+      "auto, cpu (the CPU only), a number from 'dermis devices', or part of a name");
   command->add_option(
       "--instances", options->instances,
       fmt::format("Number of instances, each with its own pose [{}]", options->instances));
@@ -153,7 +154,7 @@ Run addBench(CLI::App& app) {
                   "[{}]",
                   options->rounds));
   command->add_flag("--on-paper", options->onPaper,
-                    "Measure nothing: print how many bytes a vertex takes, and what bounds GPUs");
+                    "Measure nothing; print the bytes per vertex and what limits GPUs");
   return [options] { return bench(*options); };
 }
 

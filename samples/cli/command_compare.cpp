@@ -45,15 +45,14 @@ struct CompareOptions {
 
 ExitStatus checkPicture(const CompareOptions& options) {
   if (options.model.empty() && options.output.empty())
-    return reportWrongUsage(
-        "compare needs MODEL, or -o OUT.png for a picture of the built-in models");
+    return reportWrongUsage("compare needs MODEL, or -o OUT.png to draw the built-in models");
   if (options.model.empty() && (options.animation || options.time != 0))
-    return reportWrongUsage("--animation and --time are those of MODEL, and there is none");
+    return reportWrongUsage("--animation and --time need a MODEL");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
-    return reportWrongUsage("-o OUT has a place for a number; there is one picture only");
+    return reportWrongUsage("-o OUT has a place for a number, but there is only one picture");
   if (samples::needsNoVulkan(options.device)) {
     return reportWrongUsage(fmt::format(
         "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
@@ -63,8 +62,8 @@ ExitStatus checkPicture(const CompareOptions& options) {
         fmt::format("--width must be from {} to {} pixels", leastWidth, largestWidth));
   for (auto name = options.methods.begin(); name != options.methods.end(); ++name) {
     if (!methodFromName(*name))
-      return reportWrongUsage(fmt::format("--methods: there is no method '{}'; there are {}", *name,
-                                          methodNames("and")));
+      return reportWrongUsage(fmt::format("--methods: there is no method '{}'; the methods are {}",
+                                          *name, methodNames("and")));
     if (std::find(options.methods.begin(), name, *name) != name)
       return reportWrongUsage(fmt::format("--methods names {} twice", *name));
   }
@@ -145,9 +144,10 @@ Result<std::vector<Method>> chooseColumns(const CompareOptions& options, const S
   for (const std::string& name : options.methods) {
     columns.push_back(*methodFromName(name));
     if (allows(scene, columns.back())) continue;
-    return Error{ErrorCode::invalidArgument,
-                 fmt::format("{}: {} needs centres of rotation, which were too much work",
-                             options.model, name)};
+    return Error{
+        ErrorCode::invalidArgument,
+        fmt::format("{}: {} needs centers of rotation, which would take too long to compute",
+                    options.model, name)};
   }
   return columns.empty() ? usualColumns(scene) : columns;
 }
@@ -158,7 +158,7 @@ ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& 
   ComparisonSheet sheet = describeSheet(subject, columns, title, comparison);
   sheet.width = options.width;
   Result<samples::render::Font> font = samples::render::Font::load();
-  if (!font) reportNote(font.error().message + ": the picture has no words");
+  if (!font) reportNote(font.error().message + ": the picture has no text");
   std::vector<std::string> notes;
   const Result<samples::render::Picture> picture = [&] {
     samples::Progress progress("drawing", comparisonPictures(sheet));
@@ -193,8 +193,9 @@ ExitStatus compare(const CompareOptions& options) {
   const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
   if (!columns) return reportWrongUsage(columns.error().message);
   if (options.width < columns->size() * leastColumnWidth) {
-    return reportWrongUsage(fmt::format("{} methods side by side need a --width of {} pixels",
-                                        columns->size(), columns->size() * leastColumnWidth));
+    return reportWrongUsage(
+        fmt::format("{} methods side by side need a --width of at least {} pixels", columns->size(),
+                    columns->size() * leastColumnWidth));
   }
 
   ComparisonTitle title{options.device, {}, subject.name, subject.poseName};
@@ -247,9 +248,9 @@ Run addCompare(CLI::App& app) {
       "Draw the methods side by side, with a twisted bar, a bent arm and a heat map of the "
       "difference: OUT.png");
   command
-      ->add_option(
-          "--methods", options->methods,
-          "The columns of the picture, separated by commas [those of the paper, and newer ones]")
+      ->add_option("--methods", options->methods,
+                   "Methods for the columns of the picture, separated by commas [those of the "
+                   "paper, and newer ones]")
       ->delimiter(',')
       ->allow_extra_args(false)  // A model may follow.
       ->needs(output);
@@ -260,7 +261,7 @@ Run addCompare(CLI::App& app) {
                       "A clip's number or name, or none for the rest pose [the first]");
   command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   command->add_option("--device", options->device,
-                      "auto, cpu (SIMD on one thread), reference (nothing is timed), a number of "
+                      "auto, cpu (SIMD on one thread), reference (nothing is timed), a number from "
                       "'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write the same numbers to a file");
   command->add_option("--repetitions", options->repetitions,

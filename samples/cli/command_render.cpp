@@ -75,7 +75,7 @@ ExitStatus checkUsage(const RenderOptions& options) {
         fmt::format("-o OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
-    return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
+    return reportWrongUsage(fmt::format("--method: there is no method '{}'; the methods are {}",
                                         options.method, methodNames("and")));
   }
   if (samples::needsNoVulkan(options.device)) {
@@ -84,11 +84,9 @@ ExitStatus checkUsage(const RenderOptions& options) {
   }
   if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
   if (*kind != PictureKind::png)
-    return options.frames ? ExitStatus::done
-                          : reportWrongUsage("a film needs --frames, how many it has");
+    return options.frames ? ExitStatus::done : reportWrongUsage("a film needs --frames");
   if (samples::hasWrongPattern(options.output))
-    return reportWrongUsage(
-        "the place for a number in -o OUT is %01d to %09d, and there is one at most");
+    return reportWrongUsage("-o OUT may have one place for a number, from %01d to %09d");
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && !pattern) {
     return reportWrongUsage(
@@ -96,7 +94,7 @@ ExitStatus checkUsage(const RenderOptions& options) {
         ".gif or .apng");
   }
   if (!options.frames && pattern)
-    return reportWrongUsage("-o OUT has a place for a number; --frames says how many there are");
+    return reportWrongUsage("-o OUT has a place for a number, so --frames is required");
   return ExitStatus::done;
 }
 
@@ -355,9 +353,10 @@ ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {
                        fmt::format("{} has no skinned mesh in its scene", options.model));
   }
   if (!allows(scene, *methodFromName(options.method))) {
-    return reportError(ExitStatus::badInput,
-                       fmt::format("{}: {} needs centres of rotation, which were too much work",
-                                   options.model, options.method));
+    return reportError(
+        ExitStatus::badInput,
+        fmt::format("{}: {} needs centers of rotation, which would take too long to compute",
+                    options.model, options.method));
   }
   return ExitStatus::done;
 }
@@ -444,7 +443,7 @@ Run addRender(CLI::App& app) {
   command->add_option("--elevation", options->elevation,
                       "Angle of the camera above the ground in degrees [12; a crowd: 18]");
   command->add_option("--device", options->device,
-                      "auto, a number of 'dermis devices', or part of a name");
+                      "auto, a number from 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return renderModel(*options); };
 }

@@ -60,13 +60,13 @@ ExitStatus checkUsage(const SkinOptions& options) {
         fmt::format("-o OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
-    return reportWrongUsage(fmt::format("--method: there is no method '{}'; there are {}",
+    return reportWrongUsage(fmt::format("--method: there is no method '{}'; the methods are {}",
                                         options.method, methodNames("and")));
   }
   if (options.device == "cpu" && isForComparison(*methodFromName(options.method))) {
     return reportWrongUsage(fmt::format(
-        "--method {} is for comparison: --device cpu has the everyday methods, --device reference "
-        "and Vulkan devices have all",
+        "--method {} is for comparison; --device cpu does not have it, --device reference "
+        "and Vulkan devices do",
         options.method));
   }
   if (const ExitStatus shares = checkShares(options.shares); shares != ExitStatus::done)
@@ -76,8 +76,7 @@ ExitStatus checkUsage(const SkinOptions& options) {
     return reportWrongUsage("--fps must be a number above 0");
   }
   if (samples::hasWrongPattern(options.output)) {
-    return reportWrongUsage(
-        "the place for a number in -o OUT is %01d to %09d, and there is one at most");
+    return reportWrongUsage("-o OUT may have one place for a number, from %01d to %09d");
   }
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && *options.frames == 0)
@@ -87,7 +86,7 @@ ExitStatus checkUsage(const SkinOptions& options) {
         "--frames needs a place for the number in -o OUT, such as pose%04d.ply");
   }
   if (!options.frames && pattern) {
-    return reportWrongUsage("-o OUT has a place for a number; --frames says how many there are");
+    return reportWrongUsage("-o OUT has a place for a number, so --frames is required");
   }
   return ExitStatus::done;
 }
@@ -144,9 +143,10 @@ ExitStatus skin(const SkinOptions& options) {
                        fmt::format("{} has no skinned mesh in its scene", options.model));
   }
   if (!allows(*scene, method)) {
-    return reportError(ExitStatus::badInput,
-                       fmt::format("{}: {} needs centres of rotation, which were too much work",
-                                   options.model, options.method));
+    return reportError(
+        ExitStatus::badInput,
+        fmt::format("{}: {} needs centers of rotation, which would take too long to compute",
+                    options.model, options.method));
   }
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
@@ -187,7 +187,7 @@ Run addSkin(CLI::App& app) {
   command->add_option(
       "--device", options->device,
       "auto, cpu (SIMD on the CPU), reference (slow, in double precision), a number "
-      "of 'dermis devices', or part of a name");
+      "from 'dermis devices', or part of a name");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return skin(*options); };
 }

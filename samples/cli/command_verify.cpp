@@ -86,7 +86,7 @@ class Verifier {
     if (!isSkinned(*scene)) {
       return refuse(
           model, ExitStatus::badInput,
-          fmt::format("{}: it has no skinned mesh with joints and weights in its scene", model));
+          fmt::format("{}: its scene has no skinned mesh with joints and weights", model));
     }
     const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
     const SceneCases cases = casesOf(*scene, pool_.first(), poses.size(), coverage_);
@@ -189,7 +189,7 @@ Result<std::shared_ptr<samples::BatchTarget>> openTarget(const std::string& name
 ExitStatus verify(const VerifyOptions& options) {
   if (options.device == "reference") {
     return reportWrongUsage(
-        "--device reference would be compared with itself; name cpu or a Vulkan device");
+        "--device reference would be compared with itself; use cpu or a Vulkan device");
   }
   if (options.threads == 0u) return reportWrongUsage("--threads must be at least 1");
   const std::array<samples::RequestedOutput, 2> outputFiles{
@@ -225,7 +225,7 @@ Run addVerify(CLI::App& app) {
                     "sizes, by pairs");
   command->add_option(
       "--device", options->device,
-      "auto, cpu (SIMD on the CPU), a number of 'dermis devices', or part of a name");
+      "auto, cpu (SIMD on the CPU), a number from 'dermis devices', or part of a name");
   command->add_option("--json", options->json, "Write all cases with their errors as JSON");
   command->add_option("--junit", options->junit, "Write all cases as JUnit XML, for CI");
   command->add_option("--threads", options->threads,

@@ -142,7 +142,7 @@ Result<void> ComparedFigures::findBox() {
   return {};
 }
 
-/// Of each vertex; 0 where one is not finite.
+/// Of each vertex; 0 if one is not finite.
 std::vector<double> ComparedFigures::distances(std::size_t method, std::size_t part) const {
   const std::vector<float>&a = positions_[method][part], &b = positions_.back()[part];
   std::vector<double> found(a.size() / 3);

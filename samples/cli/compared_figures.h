@@ -21,7 +21,7 @@ struct FigureDifference {
 class ComparedFigures {
  public:
   /// Skins on the device, and waits for it. All must outlive it; the scene allows all methods.
-  /// Fails where the device does, and with `invalidData` where no vertex is finite.
+  /// Fails if the device does, and with `invalidData` if no vertex is finite.
   static Result<ComparedFigures> create(samples::OpenDevice& device,
                                         samples::render::Renderer& renderer, const Scene& scene,
                                         const ScenePose& pose, std::span<const Method> methods);
@@ -34,7 +34,7 @@ class ComparedFigures {
   float floor() const { return floor_; }
   /// The diagonal of the figure's box by dual quaternions; above 0.
   double size() const { return size_; }
-  /// A part's vertices as the device wrote them, 3 floats each; empty where no joint moves it.
+  /// A part's vertices as the device wrote them, 3 floats each; empty if no joint moves it.
   std::span<const float> positions(std::size_t method, std::size_t part) const {
     return positions_[method][part];
   }

@@ -22,7 +22,7 @@ struct ComparedMethod {
   std::optional<std::uint64_t> instructions;
   std::uint32_t bytesPerJoint = 0;  ///< of the palette, as the skin kernel reads it
   TubeComparison tube;
-  // Distances from `dualQuaternion` in the model's pose, as a share of its size. Nothing where no
+  // Distances from `dualQuaternion` in the model's pose, as a share of its size. Nothing if no
   // vertex is finite.
   std::optional<double> largestDifference;
   std::optional<double> meanSquareDifference;  ///< its root
@@ -60,7 +60,7 @@ std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTi
 
 /// Compares all methods on a scene that has a part with a mesh, each prepared with centres of
 /// rotation, in one pose. Without a timer nothing is timed. `step` is called after each step.
-/// Fails where the device does, with `invalidArgument` where so many instances have too many
+/// Fails if the device does, with `invalidArgument` if so many instances have too many
 /// vertices.
 Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
                                         const ComparisonTimer& timer,

@@ -195,7 +195,7 @@ class ComparisonDrawer {
     return numbers;
   }
 
-  /// Linear blending is what all know: its largest distance is the yardstick where there is one.
+  /// Linear blending is what all know: its largest distance is the yardstick if there is one.
   double hottest(const ComparedFigures& figures) const {
     double largest = 0, linear = 0;
     for (std::size_t column = 0; column < methods_.size(); ++column) {

@@ -46,7 +46,7 @@ std::size_t comparisonPictures(const ComparisonSheet& sheet);
 
 /// Draws on a device that was opened for graphics. `font` may be null: there are no words then.
 /// `step` is called after each picture. What of the materials could not be had is added to `notes`.
-/// Fails where the device does, and with `invalidData` where there is nothing to draw.
+/// Fails if the device does, and with `invalidData` if there is nothing to draw.
 Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
                                                 const ComparisonSheet& sheet,
                                                 const samples::render::Font* font,

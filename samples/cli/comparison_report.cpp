@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A number, or a dash where there is none.
+/// A number, or a dash if there is none.
 template <typename Value>
 std::string cell(const std::optional<Value>& value, fmt::format_string<const Value&> format) {
   return value ? fmt::format(format, *value) : "-";

@@ -86,7 +86,7 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
   const std::uint64_t all = joints * figures;
   if (!std::in_range<std::uint32_t>(all) ||
       !std::in_range<std::uint32_t>(std::uint64_t{instances} * figures)) {
-    return Error{ErrorCode::limitExceeded, "so many figures have too many joints"};
+    return Error{ErrorCode::limitExceeded, "this number of figures has too many joints"};
   }
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};

@@ -40,7 +40,7 @@ class DrawnScene {
   /// What draws a figure as it was last posed, its bind space moved by `transform`.
   Result<void> addDraws(std::uint32_t figure, const JointMatrix& transform,
                         std::vector<samples::render::Draw>& draws) const;
-  /// Around a figure as it was skinned in the last complete frame; nothing where no vertex of it is
+  /// Around a figure as it was skinned in the last complete frame; nothing if no vertex of it is
   /// finite. Call `beginFrame` before.
   Result<std::optional<Box>> bounds(std::uint32_t figure) const;
 
@@ -52,7 +52,7 @@ class DrawnScene {
  private:
   /// A part that no joint moves.
   struct FixedPart {
-    samples::MappedBuffer vertices;  ///< positions, then normals where there are any
+    samples::MappedBuffer vertices;  ///< positions, then normals if there are any
     Box box;
   };
   struct FigurePart {

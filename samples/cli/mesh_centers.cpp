@@ -110,7 +110,7 @@ class JoinedMesh {
 
 std::vector<float> solve(const CenterOfRotationSolver& solver) {
   constexpr std::uint32_t steps = 100;
-  samples::Progress bar("centres of rotation", steps);
+  samples::Progress bar("centers of rotation", steps);
   std::uint32_t shown = 0;
   return samples::solveCenters(solver, 0, [&](float fraction) {
     for (; shown < static_cast<std::uint32_t>(fraction * steps); ++shown) bar.step();
@@ -119,7 +119,7 @@ std::vector<float> solve(const CenterOfRotationSolver& solver) {
 
 Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
   return Error{ErrorCode::limitExceeded,
-               fmt::format("the centres of rotation of mesh {} take {}: they are left out, and so "
+               fmt::format("the centers of rotation of mesh {} take {}: they are left out, and so "
                            "are the methods that need them",
                            inQuotes(mesh.name), what)};
 }

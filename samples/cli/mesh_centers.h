@@ -11,7 +11,7 @@
 
 namespace dermis::cli {
 
-/// Finds the centres of rotation of meshes of one file, each once.
+/// Finds the centers of rotation of meshes of one file, each once.
 class MeshCenters {
  public:
   /// `mostTerms`: of the sums of all meshes together, some 4 ns each. The budget, which must
@@ -21,7 +21,7 @@ class MeshCenters {
 
   /// Those of a primitive, 3 floats a vertex. All primitives of a mesh count, so that they agree
   /// where they meet. `jointCount` is at most `namedJoints` of the mesh. Shows progress. Fails with
-  /// `limitExceeded` where they are too much work: dense meshes cost the square of their size.
+  /// `limitExceeded` if they are too much work: dense meshes cost the square of their size.
   Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                                 std::uint32_t jointCount);
 

@@ -25,7 +25,7 @@ std::string objFile(const OutputMesh& mesh);
 /// points, so that no vertex is lost, and leaves its tangents out. What glTF forbids is mended: a
 /// normal is made as long as 1 (0 0 1 where it is zero), a tangent likewise (square to the normal
 /// where it is zero or not finite) with a handedness of 1 or -1, colours and factors are clamped, a
-/// texture coordinate that is not finite is 0. Positions and normals must be finite. Empty where
+/// texture coordinate that is not finite is 0. Positions and normals must be finite. Empty if
 /// the file would be larger than 4 GiB.
 std::vector<std::byte> glbFile(const OutputMesh& mesh);
 

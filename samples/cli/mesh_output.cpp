@@ -53,7 +53,7 @@ Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
     const std::vector<std::byte> bytes = glbFile(mesh);
     if (!bytes.empty()) return samples::writeFile(path, bytes);
     return Error{ErrorCode::limitExceeded,
-                 fmt::format("{} would be larger than the 4 GiB of a GLB", path.string())};
+                 fmt::format("{} would be larger than 4 GiB, the limit of GLB", path.string())};
   }
   const std::string bytes = format == OutputFormat::ply ? plyFile(mesh) : objFile(mesh);
   return samples::writeFile(path, bytes);

@@ -35,7 +35,7 @@ enum class OutputFormat { ply, obj, glb };
 std::optional<OutputFormat> outputFormat(std::string_view fileName);
 
 /// What a part is called: its node's name, or its mesh's, or the node's number; and which of the
-/// mesh's primitives it is where there are several.
+/// mesh's primitives it is if there are several.
 std::string partName(const gltf::Model& model, const gltf::SkinnedPrimitive& source);
 
 /// Vertices with a position or normal that is NaN or infinite.
@@ -48,7 +48,7 @@ bool holdsNonFinite(OutputFormat format);
 /// Only GLB: for the others tangents need not be skinned.
 bool holdsTangents(OutputFormat format);
 
-/// Writes a file whole or not at all. Fails with `ioError`, and with `limitExceeded` where the
+/// Writes a file whole or not at all. Fails with `ioError`, and with `limitExceeded` if the
 /// format cannot hold so large a mesh. What is not finite must
 /// have been refused before, unless the format holds it.
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,

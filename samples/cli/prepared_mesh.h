@@ -45,11 +45,11 @@ using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 /// Not movable: its views point into it.
 class PreparedMesh {
  public:
-  /// Spends what `prepare` will take; false where that is more than there is.
+  /// Spends what `prepare` will take; false if that is more than there is.
   static bool spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget);
 
-  /// The primitive has influences, and outlives this object. Fails with `invalidMesh`, where
-  /// `strict` also for what could be repaired, and where `centers`, which is asked last, does.
+  /// The primitive has influences, and outlives this object. Fails with `invalidMesh`, if
+  /// `strict` also for what could be repaired, and if `centers`, which is asked last, does.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,

@@ -77,7 +77,7 @@ class Preparer {
     if (mesh != nullptr) return mesh;
     if (!PreparedMesh::spend(primitive, model.budget)) {
       return Error{ErrorCode::limitExceeded,
-                   fmt::format("mesh '{}' for {} joints: more memory is wanted than a file of this "
+                   fmt::format("mesh '{}' for {} joints: it needs more memory than a file of this "
                                "size justifies",
                                primitive.name, joints)};
     }
@@ -119,7 +119,7 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
   };
   if (!spendOnParts(model)) {
     return inFile({ErrorCode::limitExceeded,
-                   fmt::format("its nodes and primitives make {} parts, which take more memory "
+                   fmt::format("its nodes and primitives make {} parts, which need more memory "
                                "than a file of this size justifies",
                                model.skinnedPrimitives.size())});
   }
@@ -171,7 +171,7 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
   if (*wanted == "none") return gltf::none;
   if (const std::optional<std::uint32_t> clip = gltf::findClip(model, *wanted)) return *clip;
   return Error{ErrorCode::invalidArgument,
-               fmt::format("--animation: there is no animation {} among the {} of the file",
+               fmt::format("--animation: there is no animation {}; the file has {}",
                            inQuotes(*wanted), model.clips.size())};
 }
 

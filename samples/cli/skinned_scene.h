@@ -37,20 +37,20 @@ bool allows(const Scene& scene, Method method);
 
 /// Reads a model and packs its skinned primitives. Broken values are repaired with a warning, and
 /// broken rules noted; both are refused where the preparation is strict. Fails with `limitExceeded`
-/// where nodes, primitives and skins multiply to more memory than the file justifies.
+/// if nodes, primitives and skins multiply to more memory than the file justifies.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
 /// The same for a binary glTF file in memory; `name` is what messages call it.
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
                         const MeshPreparation& preparation);
 
 /// The clip that `--animation` means: a number, a name, "none" for the rest pose, nothing for clip
-/// 0 or the rest pose. Fails with `invalidArgument` where there is no such clip.
+/// 0 or the rest pose. Fails with `invalidArgument` if there is no such clip.
 Result<std::uint32_t> chooseClip(const gltf::Model& model,
                                  const std::optional<std::string>& wanted);
 
 /// A scene at one time.
 struct ScenePose {
-  std::vector<std::vector<JointMatrix>> poses;   ///< by skin; empty where no part uses it
+  std::vector<std::vector<JointMatrix>> poses;   ///< by skin; empty if no part uses it
   std::vector<std::vector<MorphWeight>> morphs;  ///< by part: the active morph targets
 
   const std::vector<JointMatrix>& pose(const ScenePart& part) const {

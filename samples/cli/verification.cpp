@@ -62,7 +62,7 @@ Result<void> checkReach(const ScenePart& part, const PoseToVerify& pose,
   for (const reference::VertexBounds& bounds : skinned.bounds) {
     if (bounds.undefined || !(bounds.scale > most)) continue;
     return Error{ErrorCode::invalidMesh,
-                 fmt::format("{}, {}: positions reach {:.3g}, which is too far for float32",
+                 fmt::format("{}, {}: positions reach {:.3g}, which is too large for float32",
                              part.name, pose.name, bounds.scale)};
   }
   return {};
@@ -206,7 +206,8 @@ class PoseVerifier {
       if (first == firsts_.end()) {
         firsts_[figure] = {&skinned, *comparison};
       } else {
-        verified.wrong = "the result is not to the bit that of " + cases_.divisions[0].name;
+        verified.wrong =
+            "the result does not have the same bits as that of " + cases_.divisions[0].name;
       }
     }
     return {};
@@ -252,7 +253,7 @@ std::string VerifiedCase::failure() const {
   std::string text;
   if (comparison.failures != 0) {
     text = fmt::format(
-        "{} vertices are outside their bound, the first is {}; positions reach {:.3g} of the bound "
+        "{} vertices are outside their bound; the first is {}. Positions reach {:.3g} of the bound "
         "(vertex {}), normals {:.3g} (vertex {}), tangents {:.3g} (vertex {})",
         comparison.failures, comparison.firstFailure, comparison.worstPosition,
         comparison.worstPositionVertex, comparison.worstNormal, comparison.worstNormalVertex,
@@ -261,8 +262,8 @@ std::string VerifiedCase::failure() const {
   const auto add = [&text](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };
   if (comparison.exempt != comparison.expectedExempt) {
     add(
-        fmt::format("{} vertices were only asked to be finite, {} should be; {} were left out, {} "
-                    "should be",
+        fmt::format("{} vertices were only required to be finite, expected {}; {} were skipped, "
+                    "expected {}",
                     comparison.exempt.onlyFinite, comparison.expectedExempt.onlyFinite,
                     comparison.exempt.skipped, comparison.expectedExempt.skipped));
   }

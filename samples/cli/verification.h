@@ -24,7 +24,7 @@ struct VerifiedCase {
   std::string variant;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
   Comparison comparison;
   std::optional<PoseStatus> status;
-  std::string wrong;  ///< what else is wrong; empty where nothing is
+  std::string wrong;  ///< what else is wrong; empty if nothing is
 
   bool passed() const {
     return comparison.passed() && wrong.empty() &&
@@ -53,7 +53,7 @@ SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t
 
 /// The cases of a scene, on all targets of the pool: the result is the same for any number of them.
 /// However the work is cut up, not a bit may change. Motion goes from the pose before, in the first
-/// from the last. `done` is called after each batch. Fails with `invalidMesh` where a pose has
+/// from the last. `done` is called after each batch. Fails with `invalidMesh` if a pose has
 /// positions that float32 cannot hold.
 Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,
                                               std::span<const PoseToVerify> poses,

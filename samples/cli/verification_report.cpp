@@ -48,17 +48,18 @@ struct Summary {
   std::size_t failures = 0;
 };
 
-/// What was not held against a bound, where there is any.
+/// What was not held against a bound, if there is any.
 std::string exceptions(const Summary& summary) {
   std::string text;
   if (summary.exempt.onlyFinite != 0)
-    text += fmt::format(", {} only asked to be finite", summary.exempt.onlyFinite);
+    text += fmt::format(", {} only required to be finite", summary.exempt.onlyFinite);
   if (summary.exempt.skipped != 0)
-    text += fmt::format(", {} left out: a joint is not finite", summary.exempt.skipped);
+    text += fmt::format(", {} skipped: a joint is not finite", summary.exempt.skipped);
   if (summary.onlyUnitNormals != 0)
-    text += fmt::format(", {} normals only asked to be of unit length", summary.onlyUnitNormals);
+    text += fmt::format(", {} normals only required to have unit length", summary.onlyUnitNormals);
   if (summary.onlyUnitTangents != 0)
-    text += fmt::format(", {} tangents only asked to be of unit length", summary.onlyUnitTangents);
+    text +=
+        fmt::format(", {} tangents only required to have unit length", summary.onlyUnitTangents);
   return text;
 }
 

@@ -1,4 +1,4 @@
-// Memory barriers as dermis/vulkan/scope.h words them.
+// Memory barriers from the dependencies of dermis/vulkan/scope.h.
 #pragma once
 
 #include "dermis/vulkan/scope.h"

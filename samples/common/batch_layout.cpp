@@ -7,7 +7,7 @@ namespace {
 
 using Attributes = std::array<OutputAttribute*, streamCount>;
 
-/// Puts the attributes of one instance behind what stands in the outputs already.
+/// Places the attributes of one instance after those that are in the outputs already.
 class OutputPlacer {
  public:
   OutputPlacer(const OutputLayout& output, OutputSizes& sizes) : output_(output), sizes_(sizes) {}
@@ -36,7 +36,7 @@ class OutputPlacer {
       }
     }
     if (output_.arrangement == Arrangement::interleaved) {
-      // Positions and normals in pairs begin at multiples of 8 bytes.
+      // Positions and normals that are stored in pairs begin at multiples of 8 bytes.
       sizes_.positions = (sizes_.positions + vertices * vertexSize + 7) / 8 * 8;
     }
   }

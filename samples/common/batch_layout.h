@@ -1,4 +1,4 @@
-// Where everything of a batch stands: meshes, poses, and skinned vertices in any format and
+// Lays out the buffers of a batch: meshes, poses, and skinned vertices in any format and
 // arrangement.
 #pragma once
 
@@ -20,8 +20,8 @@ struct SkinRequest {
   bool mayScale = true;
   Method method = Method::dualQuaternion;
   std::span<const MorphWeight> morphs = {};
-  Box box = {};  ///< where positions are stored as snorm16
-  // Where there is motion.
+  Box box = {};  ///< for snorm16 positions
+  // For motion.
   std::span<const JointMatrix> previousPose = {};  ///< empty: the same pose
   std::span<const MorphWeight> previousMorphs = {};
   bool restartsMotion = false;
@@ -34,7 +34,7 @@ enum class Arrangement : std::uint8_t {
   separate,     ///< in a buffer for each attribute
 };
 
-/// How skinned vertices are stored. Normals and tangents are written where a mesh has them.
+/// How skinned vertices are stored. Normals and tangents are written if the mesh has them.
 struct OutputLayout {
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::float32x3;
@@ -47,7 +47,7 @@ struct OutputLayout {
 
 struct BatchLayout {
   std::map<const PackedMesh*, std::uint64_t>
-      meshOffsets;  ///< Meshes that are one object stand once.
+      meshOffsets;  ///< A mesh that several requests share is stored once.
   std::vector<PoseDescription> poseDescriptions;
   std::vector<std::span<const JointMatrix>> poses;  ///< in the same order
   std::vector<Job> jobs;                            ///< of the requests
@@ -60,7 +60,7 @@ struct BatchLayout {
 
 BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output);
 
-/// An attribute of a job, by `Stream`; `none` where it is not written.
+/// An attribute of a job, by `Stream`; `none` if it is not written.
 OutputAttribute attributeOf(const Job& job, std::size_t stream);
 
 }  // namespace dermis::samples

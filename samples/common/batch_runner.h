@@ -1,5 +1,5 @@
-// Skins batches on a device, or on the CPU, and waits for them: for commands and tests, where an
-// engine would keep its buffers and go on.
+// Skins batches on a device or on the CPU, and waits for them. For commands and tests; an engine
+// would keep its buffers and not wait.
 #pragma once
 
 #include <array>
@@ -21,13 +21,13 @@
 
 namespace dermis::samples {
 
-/// What became of one request.
+/// The result of one request.
 struct SkinnedVertices {
-  std::vector<float> positions;      ///< 3 a vertex; empty where they are not stored as float32
-  std::vector<float> normals;        ///< likewise, or where the mesh has none
-  std::optional<PoseStatus> status;  ///< of a device; all 0 for linear
-  InstanceResult result;             ///< where it was asked for
-  /// The attributes as they are stored, tightly packed, by `Stream`.
+  std::vector<float> positions;      ///< 3 a vertex; empty if they are not stored as float32
+  std::vector<float> normals;        ///< likewise, or if the mesh has none
+  std::optional<PoseStatus> status;  ///< on a device; all 0 for linear
+  InstanceResult result;             ///< if it was requested
+  /// The stored attributes, tightly packed, by `Stream`.
   std::array<std::vector<std::byte>, streamCount> streams;
   std::array<VertexFormat, streamCount> formats{};
   Box box;
@@ -42,7 +42,7 @@ struct RunOptions {
   Tuning tuning;
   std::string instructions;  ///< of the CPU, one of `cpu::targetNames`; empty: the target's
   OutputLayout output;
-  std::byte poison{0xa5};  ///< what stands in the outputs before
+  std::byte poison{0xa5};  ///< initial contents of the outputs
   bool countUntouched = true;
 };
 
@@ -51,10 +51,10 @@ struct BatchResult {
   std::size_t dispatches = 0;
   std::uint64_t untouchedBytesChanged =
       0;  ///< bytes outside the attributes that are not as they were, where they are counted
-  std::string firstChanged;  ///< which is the first of them: "byte 12 of the positions' buffer"
+  std::string firstChanged;  ///< the first of them: "byte 12 of the positions' buffer"
 };
 
-/// Skins one batch after another into the same outputs, as an engine does frame by frame. Packed
+/// Skins one batch after another into the same outputs, as an engine does in each frame. Packed
 /// meshes must outlive it and not change.
 class BatchRunner {
  public:
@@ -62,12 +62,13 @@ class BatchRunner {
   BatchRunner(const BatchRunner&) = delete;
   BatchRunner& operator=(const BatchRunner&) = delete;
 
-  /// Outputs are as the last run left them where they are as large as they were; else poisoned.
+  /// Outputs keep the contents of the last run if their sizes are the same; otherwise they are
+  /// filled with `poison`.
   Result<BatchResult> run(std::span<const SkinRequest> requests);
 
  protected:
   explicit BatchRunner(const RunOptions& options) : options_(options) {}
-  /// Skins `layout_`. Of each instance it says what the outputs do not: status and result.
+  /// Skins `layout_`. Returns what is not in the outputs: status and result of each instance.
   virtual Result<BatchResult> skin() = 0;
   virtual std::span<const std::byte> outputBytes(std::size_t stream) const = 0;
   std::size_t outputOf(std::size_t stream) const { return layout_.oneOutput ? 0 : stream; }
@@ -80,7 +81,7 @@ class BatchRunner {
   void countChangedBytes(BatchResult& result) const;
 };
 
-/// A way to cut up the work, which must not change a bit.
+/// A way to divide the work. It must not change any bit of the result.
 struct Division {
   std::string name;
   Tuning tuning;
@@ -94,11 +95,11 @@ class BatchTarget {
   virtual std::string name() const = 0;
   virtual DeviceLimits limits() const = 0;
   virtual std::span<const Method> methods() const = 0;
-  /// The first is the usual one.
+  /// The first is the default.
   virtual std::vector<Division> divisions() const = 0;
   virtual std::unique_ptr<BatchRunner> runner(const RunOptions& options) = 0;
 
-  /// One batch on its own.
+  /// Runs a single batch.
   Result<BatchResult> run(std::span<const SkinRequest> requests, const RunOptions& options = {}) {
     return runner(options)->run(requests);
   }
@@ -124,7 +125,7 @@ inline bool needsNoVulkan(std::string_view device) {
   return device == "cpu" || device == "reference";
 }
 
-/// By dermis::cpu, with one of `cpu::targetNames`; empty: the best.
+/// Skins with dermis::cpu, with one of `cpu::targetNames`; empty: the best.
 class CpuTarget : public BatchTarget {
  public:
   explicit CpuTarget(std::string instructions = {}) : instructions_(std::move(instructions)) {}
@@ -138,7 +139,7 @@ class CpuTarget : public BatchTarget {
   std::string instructions_;
 };
 
-/// One batch on its own, on a device.
+/// Runs a single batch on a device.
 Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
                              std::span<const SkinRequest> requests, const RunOptions& options = {});
 

@@ -1,4 +1,4 @@
-// A buffer in memory that the CPU sees, mapped for as long as it lives.
+// A buffer in memory that the CPU can access; it stays mapped.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ class MappedBuffer {
 
   std::span<std::byte> bytes() const { return {mapped_, static_cast<std::size_t>(size_)}; }
   VkBuffer handle() const { return buffer_; }
-  /// All of it; a null buffer where it is empty.
+  /// The whole buffer; a null buffer if it is empty.
   vulkan::BufferRange range() const { return {buffer_, 0, size_}; }
 
  private:

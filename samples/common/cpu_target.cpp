@@ -28,7 +28,7 @@ class CpuRunner : public BatchRunner {
   std::vector<cpu::Job> cutUp(std::span<const cpu::Instance> instances) const;
 
   std::array<std::vector<std::byte>, streamCount> outputs_;
-  /// By where the layout places them; made once for as long as the batches have the same ones.
+  /// By offset in the layout. Made once, as long as batches have the same meshes.
   std::map<std::uint64_t, cpu::Mesh> meshes_;
   std::map<const PackedMesh*, std::uint64_t> made_;
 };
@@ -56,7 +56,8 @@ Result<void> CpuRunner::makeMeshes() {
   return {};
 }
 
-/// The attributes' own places are in its memory, so that instances of one job may differ in them.
+/// The offset of each attribute is added to its address here, so that instances of one job may have
+/// different offsets.
 cpu::Instance CpuRunner::instanceOf(const Job& job) {
   const auto memory = [&](std::size_t stream) -> void* {
     const OutputAttribute attribute = attributeOf(job, stream);
@@ -117,7 +118,7 @@ Result<BatchResult> CpuRunner::skin() {
   std::vector<std::vector<MorphWeight>> morphs;
   std::vector<cpu::Instance> instances;
   for (Job& job : layout_.jobs) {
-    // In the order of the targets.
+    // Sorted by target.
     for (std::span<const MorphWeight>* weights : {&job.morphs, &job.previousMorphs}) {
       std::vector<MorphWeight>& own = morphs.emplace_back(weights->begin(), weights->end());
       std::ranges::sort(own, {}, &MorphWeight::target);
@@ -151,7 +152,7 @@ std::string CpuTarget::name() const {
   const std::string best(cpu::targetNames().front());
   return "cpu (" + (instructions_.empty() ? best : instructions_) + ")";
 }
-/// It stores whatever is asked for.
+/// The CPU can store every format.
 DeviceLimits CpuTarget::limits() const {
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;

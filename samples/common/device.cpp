@@ -261,7 +261,7 @@ Result<void> Device::choose(const std::string& wanted) {
   }
   if (best == infos.size()) {
     return unusable("there is no Vulkan device '" + wanted + "'; 'dermis devices' lists the " +
-                    std::to_string(infos.size()) + " there are");
+                    std::to_string(infos.size()) + " devices of this machine");
   }
   if (!infos[best].unusable.empty()) {
     return unusable("device '" + infos[best].name + "' cannot be used: " + infos[best].unusable);
@@ -272,7 +272,7 @@ Result<void> Device::choose(const std::string& wanted) {
 }
 
 Result<void> Device::createDevice(const DeviceOptions& options) {
-  // Where there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
+  // If there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
   VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT;
   if (options.graphics) wanted |= VK_QUEUE_GRAPHICS_BIT;
   if (!findFamily(functions_, physicalDevice_, wanted, queueFamily_)) {
@@ -379,7 +379,7 @@ Result<std::uint32_t> Device::memoryType(std::uint32_t allowedTypes, VkMemoryPro
       }
     }
   }
-  return unusable("device '" + info_.name + "' has no memory of the kind that is needed");
+  return unusable("device '" + info_.name + "' has no memory of the required kind");
 }
 
 VkCommandBuffer Device::allocateCommandBuffer(VkCommandBufferLevel level) {

@@ -1,4 +1,4 @@
-// A Vulkan device without a window, for the samples and tests: what an engine brings along itself.
+// A Vulkan device without a window, for samples and tests. An engine has its own.
 #pragma once
 
 #include <cstdint>
@@ -31,41 +31,41 @@ struct DeviceInfo {
   bool accelerationStructures = false;
   bool rayQueries = false;
   bool pipelineStatistics = false;
-  std::string unusable;  ///< why Dermis cannot run on it; empty where it can
+  std::string unusable;  ///< why Dermis cannot run on it; empty if it can
 };
 
 struct DeviceOptions {
   /// "auto": the best that is usable, GPUs before CPUs; a number: that of `listDevices`; otherwise
   /// a part of a name, whatever its case.
   std::string device = "auto";
-  bool validation = false;      ///< with the Khronos layer, core and synchronisation checks; fails
-                                ///< where there is none
+  bool validation = false;      ///< with the Khronos layer, core and synchronization checks; fails
+                                ///< if there is none
   bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor where the device has it
   bool smallStorage = true;     ///< enable stores of 1 and 2 bytes where the device has them
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
-                                ///< queries where the device has them
-  bool graphics = false;        ///< the queue draws too; fails where the device has none that does
+                                ///< queries if the device has them
+  bool graphics = false;        ///< the queue draws too; fails if the device has none that does
   bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
                                     ///< them
   vulkan::KernelSource kernels;     ///< of the context; none: the library's
-  /// The instance extensions that a window's surface needs. Where there are any, the device must
+  /// The instance extensions that a window's surface needs. If there are any, the device must
   /// have VK_KHR_swapchain, and it is enabled.
   std::vector<std::string> surfaceExtensions;
 };
 
-/// Fails with `missingFeature` where there is no loader, or no instance can be made.
+/// Fails with `missingFeature` if there is no loader, or no instance can be made.
 Result<std::vector<DeviceInfo>> listDevices();
 
 class Device {
  public:
-  /// Fails with `missingFeature`: no loader, no device of that name, no compute queue or none that
-  /// draws, no validation layer.
+  /// Fails with `missingFeature` if there is no loader, no device of that name, no compute or
+  /// graphics queue, or no validation layer.
   static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
-  /// What Dermis is told about it; valid as long as this object lives.
+  /// The description for Dermis; valid as long as this object lives.
   vulkan::DeviceDescription description() const;
 
   const DeviceInfo& info() const { return info_; }
@@ -86,7 +86,7 @@ class Device {
   /// Submits and waits. Fails with `vulkanError`.
   Result<void> submitAndWait(VkCommandBuffer commandBuffer);
 
-  /// What the validation layer said so far, and forgets it.
+  /// Returns the messages of the validation layer so far, and clears them.
   std::vector<std::string> takeValidationMessages();
 
  private:

@@ -1,5 +1,5 @@
-// A buffer in the device's own memory, which the CPU does not see: for what only kernels write and
-// read. Many GPUs have no more than 256 MiB that both see.
+// A buffer in device-local memory that the CPU cannot access, for data that only kernels read and
+// write. On many GPUs the CPU can access only 256 MiB of device-local memory.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,9 @@ class DeviceBuffer {
   DeviceBuffer(DeviceBuffer&& other) noexcept { *this = std::move(other); }
   DeviceBuffer& operator=(DeviceBuffer&& other) noexcept;
 
-  /// All of it; a null buffer where it is empty.
+  /// The whole buffer; a null buffer if it is empty.
   vulkan::BufferRange range() const { return {buffer_, 0, size_}; }
-  /// What kernels that were submitted before have written; waits for them.
+  /// Waits for the kernels that were submitted before, and returns what they wrote.
   Result<std::vector<std::byte>> read() const;
 
  private:

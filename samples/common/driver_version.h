@@ -1,4 +1,4 @@
-// Which driver a device has, for those who compare measurements.
+// The driver of a device, so that measurements can be compared.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace dermis::samples {
 
-/// "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)" or, where the driver does not say so much, its number.
+/// "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)", or only a number if the driver does not report more.
 std::string driverVersion(const Device& device);
 
 }  // namespace dermis::samples

@@ -1,5 +1,4 @@
-// The container of binary glTF 2.0: what the sample models and the output of the command have in
-// common.
+// Writes the container of binary glTF 2.0, for the sample models and the output of the command.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +19,15 @@ enum class GlbComponent : int {
 /// What a bufferView is for.
 enum class GlbTarget : int { none = 0, vertices = 34962, indices = 34963 };
 
-/// The binary chunk of a file as it grows, with the bufferViews and accessors that describe it: one
-/// bufferView an accessor, each at a multiple of 4 bytes.
+/// Builds the binary chunk of a file, with the bufferViews and accessors that describe it: one
+/// bufferView for each accessor, each at a multiple of 4 bytes.
 class GlbBuffer {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Starts a bufferView; what is put until `end` is its content.
+  /// Begins a bufferView. Everything that is put before `end` is its contents.
   void begin();
-  /// The lowest bytes of the value, 1 to 4 of them.
+  /// Appends the 1 to 4 lowest bytes of the value.
   void put(std::uint32_t value, int byteCount);
   void putFloat(float value);
   void putFloats(std::span<const float> values);
@@ -36,7 +35,7 @@ class GlbBuffer {
   /// "VEC3", …
   int end(GlbComponent component, const char* type, std::size_t count, GlbTarget target);
 
-  /// For what an accessor may have besides: min, max, normalized.
+  /// Access to an accessor, to add min, max or normalized.
   Json& accessor(int index) { return accessors_[static_cast<std::size_t>(index)]; }
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
@@ -51,7 +50,7 @@ class GlbBuffer {
 };
 
 /// The bytes of the file. `document` is everything but accessors, bufferViews and buffers, which
-/// are added. Names that are not UTF-8 are mended. Empty where the file would be larger than the
+/// are added. Names that are not UTF-8 are mended. Empty if the file would be larger than the
 /// 4 GiB that its header can say.
 std::vector<std::byte> glbFile(nlohmann::ordered_json document, const GlbBuffer& buffer);
 

@@ -1,4 +1,4 @@
-// Which methods are verified in which way to store, where all in all would take too long.
+// Chooses which methods are verified with which output, if all combinations would take too long.
 #pragma once
 
 #include <cstdint>

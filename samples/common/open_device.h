@@ -9,7 +9,7 @@
 
 namespace dermis::samples {
 
-/// The context is declared last, so that it goes before the device.
+/// The context is declared last, so that it is destroyed before the device.
 struct OpenDevice {
   std::unique_ptr<Device> device;
   vulkan::Context context;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::uint32_t notChosen = 0xffffffffu;
 constexpr int candidates = 30;
 
-/// Which pairs have not met yet.
+/// The pairs that do not occur yet.
 class OpenPairs {
  public:
   explicit OpenPairs(std::span<const std::uint32_t> counts) : counts_(counts) {
@@ -102,8 +102,8 @@ std::uint32_t complete(std::vector<std::uint32_t>& combination, const OpenPairs&
 
 }  // namespace
 
-// Greedy, as in Cohen et al. 1997, "The AETG system": of some candidates that each begin with a
-// pair that has not met yet, the one in which most such pairs meet.
+// Greedy, as in Cohen et al. 1997, "The AETG system": each candidate begins with a pair that does
+// not occur yet, and the candidate with the most such pairs is chosen.
 std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
     std::span<const std::uint32_t> valueCounts) {
   OpenPairs pairs(valueCounts);

@@ -1,4 +1,5 @@
-// Choosing few of many combinations so that every pair of values still stands together in one.
+// Pairwise testing: chooses few of many combinations so that every pair of values still occurs in
+// one.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +8,9 @@
 
 namespace dermis::samples {
 
-/// For parameters with so many values each: combinations, one value's number a parameter, in which
-/// every two values of two parameters meet at least once. The same for the same arguments.
+/// For parameters with these numbers of values: combinations in which every two values of two
+/// parameters occur together at least once. A combination has the index of a value for each
+/// parameter. Deterministic.
 std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
     std::span<const std::uint32_t> valueCounts);
 

@@ -1,4 +1,4 @@
-// What a driver tells of the code that it makes of a kernel.
+// Statistics of a driver about the machine code of a kernel.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@
 
 namespace dermis::samples {
 
-/// A second device on the same hardware, since `Device` need not have what this takes:
+/// Uses a second device on the same hardware, since `Device` may lack the required extension,
 /// VK_KHR_pipeline_executable_properties.
 class PipelineStatistics {
  public:
-  /// Null where the driver has no such extension, or makes no device with it.
+  /// Null if the driver has no such extension, or makes no device with it.
   static std::unique_ptr<PipelineStatistics> create(const Device& device);
   ~PipelineStatistics();
   PipelineStatistics(const PipelineStatistics&) = delete;
   PipelineStatistics& operator=(const PipelineStatistics&) = delete;
 
-  /// The machine instructions of a kernel that stores whole words; nothing where the driver does
+  /// The machine instructions of a kernel that stores whole words; nothing if the driver does
   /// not count them.
   std::optional<std::uint64_t> instructionCount(const Variant& variant,
                                                 const DeviceLimits& limits) const;

@@ -1,4 +1,4 @@
-// Random meshes and poses, for verification and tests: the same for the same seed.
+// Random meshes and poses, for verification and tests. The same seed gives the same result.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct OwnedMorph {
   std::vector<float> positions, normals, tangents;
 };
 
-/// A mesh that owns its arrays. Views are valid while it lives and is neither moved nor changed.
+/// A mesh that owns its arrays. Views are valid until it is destroyed, moved or changed.
 struct OwnedMesh {
   std::string name = "random";
   std::uint32_t influencesPerVertex = 4;
@@ -36,7 +36,7 @@ enum class Rigidity { rigid, uniformScale, shear, mirrored, mirroredAlongOneAxis
 
 /// `influences` slots a vertex, of which a random number carry weight; one vertex in 50 carries
 /// none at all. What only some methods want is there too: dual-quaternion weights and bulge
-/// strengths, nothing and all among them, and random centres of rotation.
+/// strengths, nothing and all among them, and random centers of rotation.
 OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                      std::uint32_t influences, bool normals = true);
 

@@ -1,5 +1,4 @@
-// What a device has to be asked for so that acceleration structures can be built on it and, where
-// it can do so, traversed by ray queries.
+// The extensions and features to enable for acceleration structures and, if available, ray queries.
 #pragma once
 
 #include <vector>
@@ -12,9 +11,9 @@ namespace dermis::samples {
 
 class RayTracingFeatures {
  public:
-  /// Neither.
+  /// Enables nothing.
   RayTracingFeatures() = default;
-  /// What the device can do. It must have Vulkan 1.1.
+  /// Queries the features of the device, which must have Vulkan 1.1.
   RayTracingFeatures(const VulkanFunctions& functions, VkPhysicalDevice device,
                      const std::vector<VkExtensionProperties>& extensions);
 
@@ -22,7 +21,7 @@ class RayTracingFeatures {
   bool rayQueries() const { return queries_.rayQuery == VK_TRUE; }
 
   /// The names of the extensions to enable, and their features for VkDeviceCreateInfo::pNext; none
-  /// and null where the device has no acceleration structures. The chain is made of this object's
+  /// and null if the device has no acceleration structures. The chain is made of this object's
   /// members: it must stay where it is.
   std::vector<const char*> extensions() const;
   void* chain();

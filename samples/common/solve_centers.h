@@ -1,4 +1,5 @@
-// All centres of rotation of a mesh, found by several threads: how a tool drives a solver.
+// Computes all centers of rotation of a mesh with several threads: an example of how a tool uses
+// the solver.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +10,9 @@
 
 namespace dermis::samples {
 
-/// 3 floats a vertex. `threadCount`: threads at work, the calling thread among them; 0 means as
-/// many as the machine runs at once. The result is the same to the bit. `progress` is called on the
-/// calling thread with the part that is done: rising, and 1 at last.
+/// Returns 3 floats per vertex. `threadCount` includes the calling thread; 0 means one for each
+/// core. The result is the same to the bit for any number of threads. `progress` is called on the
+/// calling thread with the fraction that is done, ascending to 1.
 std::vector<float> solveCenters(const CenterOfRotationSolver& solver, std::uint32_t threadCount,
                                 const std::function<void(float)>& progress = {});
 

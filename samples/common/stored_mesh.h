@@ -1,4 +1,4 @@
-// A mesh in the formats in which meshes come: halves, normalised integers, any interleaving.
+// A mesh in the formats that assets use: float16, normalized integers, any interleaving.
 #pragma once
 
 #include <cstddef>

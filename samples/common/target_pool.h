@@ -16,7 +16,7 @@ namespace dermis::samples {
 
 class TargetPool {
  public:
-  /// Makes another target, on which everything comes out as on the first.
+  /// Creates another target that gives the same results as the first.
   using MakeTarget = std::function<Result<std::shared_ptr<BatchTarget>>()>;
   /// `first` is used as well. There are at most `threads` targets; others than the first are made
   /// when there is work for them, and if one cannot be made, the pool does without.
@@ -27,15 +27,15 @@ class TargetPool {
   using Task = std::function<Result<void>(std::size_t index, BatchTarget& target)>;
   struct Work {
     std::size_t tasks = 0;
-    /// Of as many first ones, each goes to the same target in every call, as long as the pool has
-    /// as many: it has the pipelines already.
+    /// The first `settled` tasks always run on the same targets in every call, as long as the pool
+    /// has the same number of targets: those have the pipelines already.
     std::size_t settled = 0;
     /// Called after each task that succeeded, by one thread at a time.
     std::function<void()> done = [] {};
   };
-  /// Calls `task` for each index below `work.tasks` and returns when all have ended. Where some
-  /// fail: with the error of the lowest index, and without those above it that had not begun. What
-  /// a task throws is thrown again.
+  /// Calls `task` for each index below `work.tasks`, and returns when all have ended. If tasks
+  /// fail, it returns the error with the lowest index, and does not start any task above that
+  /// index. Exceptions of a task are rethrown.
   Result<void> run(const Work& work, const Task& task);
 
  private:

@@ -1,4 +1,4 @@
-// Batches that stay on a device, to be skinned again and again against each other.
+// Batches that stay on a device and are skinned repeatedly, to compare their times.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace dermis::samples {
 
-/// Batches that differ in their methods only: meshes, poses and outputs are the same memory.
+/// Batches that differ in their methods only: they share the memory of meshes, poses and outputs.
 class TimedBatches {
  public:
   /// Both must outlive this object. Fails with `vulkanError`.
@@ -26,7 +26,7 @@ class TimedBatches {
 
   /// Adds a batch and skins it once, for the first time drivers compile, and memory is touched.
   /// But for the methods, requests are those of the batches before. What is skinned goes to one
-  /// buffer. Fails where the batch cannot be skinned.
+  /// buffer. Fails if the batch cannot be skinned.
   Result<void> add(std::span<const SkinRequest> requests, const OutputLayout& output,
                    const Tuning& tuning);
 
@@ -36,7 +36,7 @@ class TimedBatches {
 
   bool hasTimestamps() const { return timestamps_.has(); }
 
-  /// Of the batch that was skinned last.
+  /// The output of the batch that was skinned last.
   Result<std::vector<std::byte>> output() const { return output_.read(); }
 
   const Plan& plan(std::size_t batch) const { return batches_[batch]->plan; }

@@ -64,7 +64,7 @@ Timestamps& Timestamps::operator=(Timestamps&& other) noexcept {
 void Timestamps::recordBegin(VkCommandBuffer commandBuffer) const {
   if (!has()) return;
   device_->functions().CmdResetQueryPool(commandBuffer, pool_, 0, 2);
-  // Once everything before is done, for otherwise it would be timed too.
+  // After all earlier commands are complete; otherwise they would be timed, too.
   device_->functions().CmdWriteTimestamp(commandBuffer, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, pool_,
                                          0);
 }
@@ -83,7 +83,7 @@ Result<double> Timestamps::seconds() const {
       result != VK_SUCCESS) {
     return failed("vkGetQueryPoolResults", result);
   }
-  // The counter may have begun anew.
+  // The counter may have wrapped around.
   return static_cast<double>((ticks[1] - ticks[0]) & validBits_) * period_;
 }
 

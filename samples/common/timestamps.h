@@ -1,4 +1,4 @@
-// How long the device takes for what a command buffer does.
+// Measures the GPU time of a command buffer.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,11 @@
 
 namespace dermis::samples {
 
-/// Two timestamps, to be written by one command buffer again and again.
+/// Two timestamps, which one command buffer may write repeatedly.
 class Timestamps {
  public:
-  /// Where the device's queue has none, an object that `has` none. Fails with `vulkanError`.
+  /// If the queue of the device does not support timestamps, the object has none (`has`). Fails
+  /// with `vulkanError`.
   static Result<Timestamps> create(Device& device);
   Timestamps() = default;
   ~Timestamps();
@@ -23,11 +24,11 @@ class Timestamps {
 
   bool has() const { return pool_ != VK_NULL_HANDLE; }
 
-  /// Around what is timed. Without timestamps they record nothing.
+  /// Record these before and after the timed commands. Without timestamps they record nothing.
   void recordBegin(VkCommandBuffer commandBuffer) const;
   void recordEnd(VkCommandBuffer commandBuffer) const;
 
-  /// Seconds between them in the last submission, which is over. Fails with `vulkanError`.
+  /// Seconds between both in the last submission, which must be complete. Fails with `vulkanError`.
   Result<double> seconds() const;
 
  private:

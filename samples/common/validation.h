@@ -1,4 +1,4 @@
-// Asking the Khronos validation layer for core and synchronisation checks, whatever its version.
+// Asking the Khronos validation layer for core and synchronization checks, whatever its version.
 #pragma once
 
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace dermis::samples {
 
-/// What goes into VkInstanceCreateInfo. Must live until the instance is made.
+/// The structures for VkInstanceCreateInfo. Must live until the instance is created.
 class ValidationRequest {
  public:
-  /// Fails with `missingFeature` where the layer is not installed.
+  /// Fails with `missingFeature` if the layer is not installed.
   Result<void> prepare(PFN_vkGetInstanceProcAddr getInstanceProcAddr, const char* layer);
 
   const void* chain() const { return &features_; }

@@ -29,7 +29,7 @@ std::vector<std::uint32_t> countsOf(const Values&... values) {
   return {static_cast<std::uint32_t>(values.size())...};
 }
 
-/// What a way to store the result may be.
+/// Possible values of an output case.
 struct OutputValues {
   std::span<const VertexFormat> positions, normals, tangents;
   std::span<const Arrangement> arrangements;
@@ -43,7 +43,7 @@ struct OutputValues {
   }
 };
 
-/// What a random mesh may be.
+/// Possible values of a random mesh.
 struct InputValues {
   std::span<const Rigidity> rigidities;
   std::span<const std::uint32_t> vertices, joints, influences, morphs;
@@ -145,7 +145,7 @@ OutputCase chooseOutput(Choice& choice, const OutputValues& values) {
   return output;
 }
 
-/// Cuts a case down to what the device can store.
+/// Reduces a case to what the device can store.
 OutputCase storable(OutputCase output, const DeviceLimits& limits) {
   const bool fewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   const std::uint32_t unit = fewBuffers || !limits.storage16Bit ? 4 : !limits.storage8Bit ? 2 : 1;
@@ -268,7 +268,7 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
   const Result<PackedMesh> packed = pack(stored.view(), random.joints);
   if (!packed) return packed.error();
 
-  // Most targets rest.
+  // Most targets are not active.
   std::vector<MorphWeight> morphs, previousMorphs;
   if (random.morphs > 0) {
     morphs = {{random.morphs / 2, 0.7f}, {0, random.morphs > 2 ? -0.4f : 0.0f}};
@@ -288,7 +288,7 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
     verified.previousMorphs = previousMorphs;
     verified.method = random.method;
   }
-  // One that no morph target is at work on, beside two others.
+  // One instance without active morph targets, next to two with them.
   instances[1].morphs = {};
   std::array<reference::SkinnedMesh, 6> expected;
   for (std::size_t instance = 0; instance < 3; ++instance) {

@@ -1,4 +1,4 @@
-// Every way to skin, checked: the product of methods, inputs and outputs, by pairs.
+// Verifies every way to skin: combinations of methods, inputs and outputs, by pairs.
 #pragma once
 
 #include <array>
@@ -28,17 +28,17 @@ inline constexpr std::array verifiedTangentFormats{
     VertexFormat::snorm16x4,    VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
     VertexFormat::octahedral8x2};
 
-/// One way to store what is skinned, and to cut up the work.
+/// One way to store the skinned vertices, and to divide the work.
 struct OutputCase {
   OutputLayout layout;
   Tuning tuning;
   std::string name() const;  ///< "float16x4, normals octahedral8x2, interleaved, ..."
 };
 
-/// How many values parameters have.
+/// How many values of each parameter are verified.
 enum class Coverage : std::uint8_t {
   full,
-  quick,  ///< those of everyday use, and one of each kind
+  quick,  ///< common values, and one of each kind
 };
 
 /// Ways in which every two values of two parameters meet, as far as a device with these limits can
@@ -51,18 +51,18 @@ struct InstanceToVerify {
   std::span<const JointMatrix> pose, previousPose;
   std::span<const MorphWeight> morphs, previousMorphs;
   Method method = Method::dualQuaternion;
-  /// What must come out, in this pose and the previous one.
+  /// The expected result, in this pose and the previous one.
   const reference::SkinnedMesh* expected = nullptr;
   const reference::SkinnedMesh* expectedBefore = nullptr;
-  /// How many vertices of them may be left out.
+  /// How many of their vertices may be exempt.
   Exemptions exemptions = {}, exemptionsBefore = {};
 };
 
-/// What came out for one instance.
+/// The result for one instance.
 struct VerifiedInstance {
   Comparison comparison;  ///< of the skinned vertices
   std::optional<PoseStatus> status;
-  std::string wrong;  ///< what is wrong besides; empty where nothing is
+  std::string wrong;  ///< other errors; empty if there are none
 
   bool passed() const { return comparison.passed() && wrong.empty(); }
 };
@@ -70,7 +70,7 @@ struct VerifiedInstance {
 /// Skins a batch as the case says and holds all of it against the reference: attributes, previous
 /// positions (frames before and after too), bounds, clamped vertices; and that no byte outside the
 /// attributes was touched. Where it is to be thorough, also that every byte of them was written,
-/// and that each instance comes out to the bit when it is skinned without the others. Fails where
+/// and that each instance comes out to the bit when it is skinned without the others. Fails if
 /// the batch cannot be skinned.
 Result<std::vector<VerifiedInstance>> verifyBatch(BatchTarget& target,
                                                   std::span<const InstanceToVerify> instances,

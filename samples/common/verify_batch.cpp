@@ -10,7 +10,7 @@
 namespace dermis::samples {
 namespace {
 
-/// The box of all that is finite.
+/// The box of all finite positions.
 Box boxOf(const std::vector<reference::Double3>& positions) {
   std::array<double, 3> low, high;
   low.fill(std::numeric_limits<double>::infinity());
@@ -40,7 +40,7 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
     box.max[axis] = std::clamp(box.max[axis], -1e37f, 1e37f);
     const float side = box.max[axis] - box.min[axis];
     const float margin = clamps ? -0.2f * side : 0.05f * side;
-    // What is added is not lost in the rounding of large numbers.
+    // The margin is large enough not to be lost in the rounding of large numbers.
     const float least = 0.01f + 1e-6f * std::max(std::abs(box.min[axis]), std::abs(box.max[axis]));
     box.min[axis] -= margin + least;
     box.max[axis] += margin + least;
@@ -89,20 +89,20 @@ class BatchVerifier {
   void checkUntouched(const BatchResult& frame) {
     if (frame.untouchedBytesChanged == 0) return;
     fail(0, std::to_string(frame.untouchedBytesChanged) +
-                " bytes between attributes were changed, the first is " + frame.firstChanged);
+                " bytes between attributes were changed; the first is " + frame.firstChanged);
   }
 
   Result<void> repeat(const Frames& frames, std::span<const std::size_t> all) {
     const Result<Frames> again = run(std::byte{0x5a}, all);
     if (!again) return again.error();
     for (const std::size_t index : all) {
-      // A byte that was not written would be as it was before, which differed.
+      // A byte that was not written would keep its old value, which differed.
       if (again->now.instances[index].streams != frames.now.instances[index].streams)
-        fail(index, "a byte of an attribute was not written, or not twice the same");
+        fail(index, "a byte of an attribute was not written, or two runs wrote different values");
       const Result<Frames> own = run(std::byte{0xa5}, {&index, 1});
       if (!own) return own.error();
       if (own->now.instances[0].streams != frames.now.instances[index].streams)
-        fail(index, "alone, it is not skinned to the same bits");
+        fail(index, "skinned alone, it does not have the same bits");
     }
     return {};
   }
@@ -171,7 +171,7 @@ class BatchVerifier {
     const auto& now = frames.now.instances[index].streams;
     const auto& settled = frames.settled.instances[index].streams;
     if (before[previous] != before[positions])
-      fail(index, "on a first frame, previous positions are not the current ones");
+      fail(index, "in a first frame, previous positions are not the current ones");
     if (output_.layout.motion == Motion::kept && now[previous] != before[positions])
       fail(index, "previous positions are not those of the frame before");
     if (settled[positions] != now[positions] || settled[previous] != now[positions])
@@ -184,11 +184,11 @@ class BatchVerifier {
         compareWithReference(*instance.expectedBefore, view, instance.exemptionsBefore);
     if (!comparison) return comparison.error();
     if (comparison->exempt != comparison->expectedExempt)
-      fail(index, "of the previous positions, " + std::to_string(comparison->compared) +
-                      " were compared, which is not as many as should be");
+      fail(index, "the number of previous positions that were compared is " +
+                      std::to_string(comparison->compared) + ", which is not the expected number");
     if (comparison->failures != 0) {
       fail(index, std::to_string(comparison->failures) +
-                      " previous positions are outside their bound, the first is vertex " +
+                      " previous positions are outside their bound; the first is vertex " +
                       std::to_string(comparison->firstFailure));
     }
     return {};
@@ -256,8 +256,8 @@ class BatchVerifier {
     }
     const std::uint32_t counted = skinned.result.clampedVertices;
     if ((counted > outside ? counted - outside : outside - counted) > unsure) {
-      fail(index, std::to_string(counted) + " vertices were counted as clamped, " +
-                      std::to_string(outside) + " lie outside the box");
+      fail(index, std::to_string(counted) + " vertices were counted as clamped, but " +
+                      std::to_string(outside) + " are outside the box");
     }
   }
 

@@ -52,7 +52,7 @@ Result<std::shared_ptr<VulkanLoader>> VulkanLoader::open() {
 }
 
 VulkanLoader::~VulkanLoader() {
-  // Not closed: drivers leave threads and exit handlers behind that would run in unmapped code.
+  // Never closed: drivers leave threads and exit handlers whose code would be unmapped.
 }
 
 }  // namespace dermis::samples

@@ -11,7 +11,7 @@ namespace dermis::samples {
 
 class VulkanLoader {
  public:
-  /// Opens libvulkan.so.1, or vulkan-1.dll on Windows. Fails with `missingFeature` where there is
+  /// Opens libvulkan.so.1, or vulkan-1.dll on Windows. Fails with `missingFeature` if there is
   /// none.
   static Result<std::shared_ptr<VulkanLoader>> open();
   ~VulkanLoader();

@@ -131,7 +131,7 @@ Result<BatchResult> VulkanRunner::skin() {
   return result;
 }
 
-/// The first is the one that others must equal to the bit.
+/// The results of the others must be equal to those of the first, to the bit.
 constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
 
 }  // namespace

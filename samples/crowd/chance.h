@@ -1,12 +1,12 @@
-// Chance that is the same each time.
+// Reproducible pseudorandom numbers.
 #pragma once
 
 #include <cstdint>
 
 namespace crowd {
 
-/// A number from 0 to 1 that only depends on the figure and on what it is for (Wellons 2018,
-/// "Prospecting for hash functions").
+/// A number from 0 to 1 that depends only on the figure and the purpose (Wellons 2018, "Prospecting
+/// for hash functions").
 inline double chance(std::uint32_t figure, std::uint32_t purpose) {
   std::uint32_t bits = figure * 0x9e3779b9u + purpose * 0x85ebca6bu + 1;
   bits = (bits ^ (bits >> 16)) * 0x7feb352du;
@@ -14,7 +14,7 @@ inline double chance(std::uint32_t figure, std::uint32_t purpose) {
   return static_cast<double>(bits ^ (bits >> 16)) / 4294967296.0;
 }
 
-/// From -1 to 1.
+/// The same, from -1 to 1.
 inline double deviation(std::uint32_t figure, std::uint32_t purpose) {
   return 2 * chance(figure, purpose) - 1;
 }

@@ -13,7 +13,7 @@ using namespace dermis;
 namespace crowd {
 namespace {
 
-/// What a part takes: packed, with the views of it. A mesh may stand for many nodes.
+/// Spends the memory of a part: the packed mesh and its views. Many nodes may use one mesh.
 bool spendOnPart(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
   std::uint64_t displacements = 0;
   for (const gltf::MorphTarget& target : primitive.morphTargets)
@@ -37,7 +37,7 @@ Result<Character> Character::load(const std::filesystem::path& path,
   const gltf::Model& model = *character.model_;
 
   const Error tooMuch{ErrorCode::limitExceeded,
-                      fmt::format("{}: more memory is wanted than a file of this size justifies",
+                      fmt::format("{}: it needs more memory than a file of this size justifies",
                                   inQuotes(path.filename().string()))};
   std::vector<std::uint32_t> skins, numbers(model.skins.size(), gltf::none);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
@@ -77,7 +77,7 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
       std::round(duration * options.ticksPerSecond), 1.0, static_cast<double>(options.mostTicks)));
   std::uint64_t joints = 0;
   for (const std::uint32_t count : jointCounts_) joints += count;
-  // For each tick all nodes are placed, too, but not kept.
+  // Each tick also computes the transforms of all nodes, which are not kept.
   if (!model_->budget.spend(sampled.tickCount, joints * sizeof(JointMatrix) + model_->nodes.size()))
     return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {

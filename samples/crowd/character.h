@@ -1,5 +1,4 @@
-// The character that the crowd is made of: its meshes, packed, and its poses. An engine has both in
-// its assets.
+// The character of the crowd: its packed meshes and its poses. In an engine both are assets.
 #pragma once
 
 #include <compare>
@@ -36,21 +35,21 @@ struct PoseKey {
 
 struct CharacterOptions {
   double ticksPerSecond = 30;
-  std::uint32_t mostTicks = 120;  ///< of a clip; a longer one goes faster
-  bool images = false;            ///< read those of its materials
+  std::uint32_t mostTicks = 120;  ///< of a clip; a longer clip is played faster
+  bool images = false;            ///< whether to read the images of its materials
 };
 
 class Character {
  public:
-  /// Fails as `gltf::load` and `pack` do, with `invalidData` where nothing is skinned, and with
-  /// `limitExceeded` where what its nodes, primitives, skins and clips multiply to is more memory
-  /// than the file justifies.
+  /// Fails as `gltf::load` and `pack` do, with `invalidData` if nothing is skinned, and with
+  /// `limitExceeded` if its nodes, primitives, skins and clips together need more memory than the
+  /// size of the file justifies.
   static dermis::Result<Character> load(const std::filesystem::path& path,
                                         const CharacterOptions& options = {});
 
   const dermis::gltf::Model& model() const { return *model_; }
   const std::vector<Part>& parts() const { return parts_; }
-  /// By skin: of those that parts hang on. Parts of one skin share its pose.
+  /// For each skin that a part uses: its number of joints. Parts with the same skin share its pose.
   const std::vector<std::uint32_t>& jointCounts() const { return jointCounts_; }
   std::uint64_t vertexCount() const;  ///< of all parts
 
@@ -59,14 +58,14 @@ class Character {
   std::span<const dermis::JointMatrix> pose(PoseKey key, std::uint32_t skin) const;
 
  private:
-  /// Sampled once: figures that are in the same moment of a clip are in the same pose.
+  /// A clip, sampled once. Figures at the same tick of a clip have the same pose.
   struct Clip {
     std::uint32_t tickCount = 1;
     std::vector<std::vector<dermis::JointMatrix>> poses;  ///< by tick, then skin
   };
 
   Character() = default;
-  /// False where its poses take more memory than the file justifies.
+  /// Returns false if its poses need more memory than the size of the file justifies.
   bool sampleClip(std::uint32_t clip, std::span<const std::uint32_t> skins,
                   const CharacterOptions& options);
 

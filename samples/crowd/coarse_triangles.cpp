@@ -46,7 +46,7 @@ double longestSide(std::span<const Part> parts) {
   return side;
 }
 
-/// Points at which vertices of several parts stand.
+/// Points that vertices of several parts have in common.
 std::set<Point> sharedPoints(std::span<const Part> parts) {
   std::map<Point, std::size_t> firstPart;
   std::set<Point> shared;
@@ -69,8 +69,9 @@ double squareDistance(const Point& a, const Cell& cell, double size) {
   return sum;
 }
 
-/// By vertex: the one that stands for it. Of those in a cell the one nearest to its middle; but one
-/// that another part has too comes first, as that part then chooses the same.
+/// Returns the vertex that represents each vertex: the one of its cell that is nearest to the
+/// middle of the cell. Vertices that another part has, too, are preferred, so that both parts
+/// choose the same one.
 std::vector<std::uint32_t> representatives(const gltf::Primitive& primitive,
                                            const std::set<Point>& shared, double cellSize) {
   struct Choice {

@@ -14,7 +14,7 @@ using namespace dermis;
 namespace crowd {
 namespace {
 
-/// Gaps are closed by so many bytes a frame, so that no frame has to move much.
+/// Maximum bytes that `compact` moves in a frame, so that no frame moves many.
 constexpr std::uint64_t mostMovedBytes = std::uint64_t{1} << 20;
 
 VertexLayout layoutOf(const Part& part) {
@@ -25,7 +25,8 @@ VertexLayout layoutOf(const Part& part) {
   return layout;
 }
 
-/// What goes is free when the GPU is done with it: room for a quarter more than there are.
+/// Memory of removed objects is free only once the GPU has finished with it, so there is room for a
+/// quarter more.
 std::uint64_t withSlack(std::uint64_t count) {
   return count + count / 4 + 64;
 }
@@ -133,7 +134,7 @@ Result<void> Crowd::comeAndGo(std::uint64_t frame) {
     if (added) continue;
     if (Result<void> removed = remove(figure); !removed) return removed;
     if (added.error().code != ErrorCode::limitExceeded) return added;
-    ++refusals_;  // it comes when others have gone
+    ++refusals_;  // it is added when others have been removed
     break;
   }
   if (hasGaps) system_.compact(mostMovedBytes);
@@ -237,8 +238,8 @@ vulkan::SystemStatistics Crowd::statistics() const {
   return all;
 }
 
-/// A word for each instance. Here the CPU writes them to mapped memory before the submission, which
-/// needs no barrier.
+/// Writes a word for each instance. Here the CPU writes to mapped memory before the submission,
+/// which needs no barrier.
 Result<VkBuffer> Crowd::writeVisibility(std::uint64_t frame) {
   visibility_.resize(options_.framesInFlight);
   samples::MappedBuffer& buffer = visibility_[frame % options_.framesInFlight];

@@ -1,9 +1,9 @@
-// What an engine adds to skin a crowd: a SkinningSystem, and for each figure the handles of its
-// pose and its meshes.
+// The code that an engine adds to skin a crowd: a SkinningSystem, and for each figure the handles
+// of its poses and instances.
 //
-// Figures are skinned in the character's own space. Where one stands is a matter for its draw: a
-// transform that the vertex shader applies, so that whoever walks without moving a limb is not
-// skinned, and float32 is as exact far from the origin as near it.
+// Figures are skinned in the space of the character. The vertex shader that draws a figure applies
+// its transform. So a figure that moves without changing its pose is not skinned again, and float32
+// is as exact far from the origin as near it.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct CrowdOptions {
   bool measuresGpuTime = false;    ///< the queue has timestamps
 };
 
-/// A figure as the engine knows it.
+/// The handles of a figure.
 struct CrowdFigure {
   std::vector<dermis::PoseHandle> poses;          ///< by skin; empty: it is not there
   std::vector<dermis::InstanceHandle> instances;  ///< by part
@@ -42,7 +42,7 @@ class Crowd {
  public:
   static constexpr dermis::Method method = dermis::Method::dualQuaternion;
 
-  /// On a loading thread: it builds pipelines. What is passed must outlive the crowd.
+  /// Builds pipelines, so call it from a loading thread. The arguments must outlive the crowd.
   static dermis::Result<Crowd> create(dermis::samples::Device& device,
                                       dermis::vulkan::Context& context, const Character& character,
                                       const Figures& script, const CrowdOptions& options);
@@ -51,23 +51,24 @@ class Crowd {
   static dermis::Result<Crowd> createOnCpu(const Character& character, const Figures& script,
                                            const CrowdOptions& options);
 
-  /// Each frame, outside a render pass.
+  /// Call it in each frame, outside a render pass.
   dermis::Result<void> skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
                                  VkCommandBuffer commandBuffer);
-  /// Each frame, on all cores.
+  /// Call it in each frame. Uses all cores.
   dermis::Result<void> skinOnCpu(std::uint64_t frame);
 
-  /// After the last frame, for each that the GPU is then done with: its statistics are complete.
+  /// Call it after the last frame, for each frame that the GPU has completed, to complete its
+  /// statistics.
   dermis::Result<void> complete(std::uint64_t frame, std::uint64_t completedFrame) {
     return system_.onDevice()->beginFrame(frame, completedFrame);
   }
 
   const CrowdSystem& system() const { return system_; }
-  /// On the CPU, the time of the jobs stands for the GPU's.
+  /// On the CPU, the time of the jobs takes the place of the GPU time.
   dermis::vulkan::SystemStatistics statistics() const;
   std::span<const CrowdFigure> figures() const { return figures_; }
   bool isCulledOnGpu() const { return options_.culledOnGpu; }
-  /// How often a figure found no room; it comes when there is some.
+  /// How often there was no room for a figure. It is added when there is room.
   std::uint64_t refusals() const { return refusals_; }
 
  private:
@@ -96,7 +97,7 @@ class Crowd {
   double planSeconds_ = 0, jobSeconds_ = 0;  ///< of the last frame on the CPU
   std::vector<dermis::MeshHandle> meshes_;   ///< by part
   std::vector<CrowdFigure> figures_;
-  /// For culling on the GPU: what a culling kernel would write, one for each frame in flight.
+  /// For culling on the GPU: the words that a culling kernel would write, for each frame in flight.
   std::vector<dermis::samples::MappedBuffer> visibility_;
   std::uint64_t refusals_ = 0;
 };

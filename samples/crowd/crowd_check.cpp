@@ -104,7 +104,7 @@ Result<void> CrowdCheck::prepareReferences(const Capture& capture) {
   return references_.prepare(keys);
 }
 
-/// How far some of an attribute's positions are from a pose, all together.
+/// Sum of the distances of some positions of an attribute from those of a pose.
 double CrowdCheck::distanceFrom(PoseKey pose, std::uint32_t part, const Capture& capture,
                                 const OutputAttribute& attribute) const {
   constexpr std::size_t samples = 16;
@@ -121,7 +121,7 @@ double CrowdCheck::distanceFrom(PoseKey pose, std::uint32_t part, const Capture&
   return sum;
 }
 
-/// The poses that may stand there, the likeliest first.
+/// The poses that the output may show, the most likely first.
 std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
                                                 const Instance& instance) const {
   if (instance.shown.poses.size() < 2) return instance.shown.poses;
@@ -131,7 +131,7 @@ std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
     const double distance =
         distanceFrom(pose.current, part, capture, instance.output.positions) +
         distanceFrom(pose.previous, part, capture, instance.output.previousPositions);
-    // Not a number is no likely pose.
+    // A NaN is never a likely pose.
     ranked.emplace_back(std::isnan(distance) ? HUGE_VAL : distance, pose);
   }
   std::ranges::stable_sort(ranked, {}, &std::pair<double, ShownPose>::first);
@@ -141,7 +141,7 @@ std::vector<ShownPose> CrowdCheck::byLikelihood(const Capture& capture,
   return poses;
 }
 
-/// Whether one of the poses that may stand there does: all of one, not some vertices of another.
+/// Checks whether the output shows one of the possible poses, with all vertices in the same pose.
 CrowdCheck::MeshFinding CrowdCheck::check(const Capture& capture, const Instance& instance) const {
   MeshFinding likeliest;
   bool isFirst = true;
@@ -192,8 +192,8 @@ void CrowdCheck::count(const Capture& capture, const Instance& instance,
   }
   if (totals_.failures++ != 0) return;
   totals_.firstFailure = fmt::format(
-      "frame {}, instance {} of generation {}, part {}, vertex {}: {:.3g} of its bound from where "
-      "it must be",
+      "frame {}, instance {} of generation {}, part {}, vertex {}: its error is {:.3g} "
+      "times its bound",
       capture.frame, instance.shown.handle.index, instance.shown.handle.generation,
       instance.shown.part, finding.firstFailure, finding.worst);
 }

@@ -1,5 +1,5 @@
-// The proof: copies the output back, and holds every vertex of every instance on display against
-// the reference in double precision.
+// The check: copies the output back, and compares every vertex of every displayed instance with the
+// reference in double precision.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace crowd {
 struct CheckTotals {
   std::uint32_t frames = 0;
   std::uint64_t instances = 0;
-  std::uint64_t vertices = 0;  ///< held against their bound
+  std::uint64_t vertices = 0;  ///< compared with their bound
   std::uint64_t failures = 0;  ///< instances with a vertex outside its bound
   std::string firstFailure;    ///< a sentence
   double worst = 0;            ///< the largest error ÷ its bound
@@ -31,13 +31,13 @@ class CrowdCheck {
   CrowdCheck(dermis::samples::Device* device, const Character& character)
       : device_(device), character_(&character), references_(character) {}
 
-  /// Records a copy of the output, behind `Crowd::skinFrame`, and keeps what it must be.
+  /// Records a copy of the output, after `Crowd::skinFrame`, and keeps what is expected.
   dermis::Result<void> capture(const Crowd& crowd, const ShownPoses& shown, std::uint64_t frame,
                                VkCommandBuffer commandBuffer);
   /// Copies the output of the frame, on the CPU.
   dermis::Result<void> captureOnCpu(const Crowd& crowd, const ShownPoses& shown,
                                     std::uint64_t frame);
-  /// Compares what was captured in frames that the GPU is done with.
+  /// Compares what was captured in frames that the GPU has completed.
   dermis::Result<void> compareUpTo(std::uint64_t completedFrame);
 
   const CheckTotals& totals() const { return totals_; }
@@ -57,7 +57,7 @@ class CrowdCheck {
       return onCpu.empty() ? output.bytes() : std::span<const std::byte>(onCpu);
     }
   };
-  /// Of one instance.
+  /// The result for one instance.
   struct MeshFinding {
     dermis::Result<void> done;
     double worst = 0;

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double mebibyte = 1 << 20;
 
-/// The mean of what is known.
+/// The mean of the known values.
 class Mean {
  public:
   void add(std::optional<double> value) {
@@ -34,7 +34,7 @@ class Mean {
   std::uint32_t count_ = 0;
 };
 
-/// A number, or a dash where there is none.
+/// A number, or a dash if there is none.
 std::string cell(const std::optional<double>& value, int digits) {
   return value ? fmt::format("{:.{}f}", *value, digits) : "-";
 }
@@ -96,7 +96,7 @@ void CrowdReport::printTitle() const {
       title_.isOnCpu ? "jobs" : "GPU");
 }
 
-/// The CPU is not told how many the GPU chose until the frame is complete.
+/// If the GPU decides, the CPU learns the number only when the frame is complete.
 std::optional<std::uint32_t> CrowdReport::skinnedBy(const Frame& frame) const {
   if (!title_.culledOnGpu) return frame.cpu.skinnedInstances;
   return frame.gpu ? std::optional(frame.gpu->skinnedInstances) : std::nullopt;
@@ -187,7 +187,7 @@ void CrowdReport::finish(const Crowd& crowd) {
   printTotals();
 }
 
-/// Over the frames of which it is known what was skinned.
+/// Sums over the frames for which the number of skinned instances is known.
 void CrowdReport::sumUp() {
   std::uint64_t timedVertices = 0;
   double gpuSeconds = 0;
@@ -214,25 +214,24 @@ void CrowdReport::printTotals() const {
   if (!title_.culledOnGpu) {
     fmt::print("\nskinned   {} vertices in {} frames", sums.vertices, frames_.size());
     if (sums.verticesPerSecond)
-      fmt::print(", {:.1f} million a second of {}", *sums.verticesPerSecond * 1e-6,
-                 title_.isOnCpu ? "the jobs' time" : "GPU time");
+      fmt::print(", {:.1f} million per second of {}", *sums.verticesPerSecond * 1e-6,
+                 title_.isOnCpu ? "job time" : "GPU time");
     fmt::print("\n");
   } else {
     fmt::print("\n");
   }
-  fmt::print(
-      "instances {} of them skinned; left out: {} out of view, {} until their interval is "
-      "over\n",
-      share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
-      share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
+  fmt::print("instances {} of them skinned; left out: {} out of view, {} not due yet\n",
+             share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
+             share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
   if (sums.refusals != 0) fmt::print("refused   a figure {} times\n", sums.refusals);
   if (title_.isOnCpu) {
     fmt::print("memory    MiB: outputs {}\n", mebibytes(memory_.outputs));
     return;
   }
-  fmt::print("memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of the device in all\n",
-             mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
-             static_cast<double>(memory_.deviceMemory) / mebibyte);
+  fmt::print(
+      "memory    MiB: meshes {}, palettes {}, outputs {}; {:.1f} of device memory in total\n",
+      mebibytes(memory_.meshes), mebibytes(memory_.palettes), mebibytes(memory_.outputs),
+      static_cast<double>(memory_.deviceMemory) / mebibyte);
 }
 
 void CrowdReport::printCheck(const CheckTotals& check) const {

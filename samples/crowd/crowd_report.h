@@ -1,4 +1,4 @@
-// What the crowd cost, as a table and as JSON.
+// Reports the cost of the crowd as a table and as JSON.
 #pragma once
 
 #include <cstdint>
@@ -38,25 +38,26 @@ class CrowdReport {
 
   const ReportTitle& title() const { return title_; }
   void printTitle() const;
-  /// From now on nothing is printed before `finish`: standard error shows how far a film is.
+  /// From now on prints nothing before `finish`, since standard error shows the progress of a film.
   void printLater() { printsLater_ = true; }
-  /// After each record; prints a row when there are frames enough for one. `counts` is what
+  /// Call it after each record. Prints a row when there are enough frames for one. `counts` is what
   /// `ShownPoses` has counted so far.
   void add(const Crowd& crowd, const ShownCounts& counts);
-  /// What of complete frames is known since `Crowd::skinFrame` or `Crowd::complete`.
+  /// Adds the statistics of complete frames. Call it after `Crowd::skinFrame` or `Crowd::complete`.
   void addCompleted(const Crowd& crowd);
   /// Frames count from 1.
   const Frame& frame(std::uint64_t number) const { return frames_[number - 1]; }
-  /// Of its instances; nothing where the GPU chose, and has not yet said.
+  /// Number of skinned instances of a frame; empty if the GPU decided and the result is not known
+  /// yet.
   std::optional<std::uint32_t> skinnedBy(const Frame& frame) const;
-  /// The rest of the table, and the totals.
+  /// Prints the rest of the table and the totals.
   void finish(const Crowd& crowd);
   void printCheck(const CheckTotals& check) const;
-  /// `check` is null where nothing was compared. Fails with `ioError`.
+  /// `check` is null if nothing was compared. Fails with `ioError`.
   dermis::Result<void> writeJson(const std::filesystem::path& path, const CheckTotals* check) const;
 
  private:
-  /// Means of the frames that know the number; nothing where none does.
+  /// Means over the frames for which a value is known; empty if there are none.
   struct Row {
     std::uint64_t lastFrame = 0;
     double figures = 0, instances = 0, dispatches = 0, uploadedBytes = 0;

@@ -1,4 +1,4 @@
-// A SkinningSystem of either kind: their calls are the same.
+// A SkinningSystem of either kind, on the GPU or the CPU, with the calls that both have.
 #pragma once
 
 #include <utility>
@@ -14,7 +14,7 @@ class CrowdSystem {
   explicit CrowdSystem(dermis::vulkan::SkinningSystem system) : system_(std::move(system)) {}
   explicit CrowdSystem(dermis::cpu::SkinningSystem system) : system_(std::move(system)) {}
 
-  /// Only one of them is there.
+  /// Only one of them exists.
   const dermis::vulkan::SkinningSystem* onDevice() const {
     return std::get_if<dermis::vulkan::SkinningSystem>(&system_);
   }

@@ -7,19 +7,19 @@ namespace crowd {
 namespace {
 
 struct Place {
-  double x = 0, z = 0;  ///< metres
+  double x = 0, z = 0;  ///< meters
 };
 
-constexpr double spacing = 1.2;  ///< metres, about, from figure to figure
+constexpr double spacing = 1.2;  ///< meters, about, from figure to figure
 
-/// A sunflower's spiral: any number of figures, as dense everywhere (Vogel 1979).
+/// Sunflower spiral: any number of figures, equally dense everywhere (Vogel 1979).
 Place placeOf(std::uint32_t figure) {
   const double goldenAngle = std::numbers::pi * (3 - std::sqrt(5.0));
   const double radius = spacing * std::sqrt(figure + 0.5), angle = goldenAngle * figure;
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-/// It turns about itself in the middle of the crowd, and walks to the one side and the other.
+/// The camera turns in the middle of the crowd, and moves from side to side.
 struct Camera {
   Place place, forward;
 };
@@ -31,7 +31,8 @@ Camera cameraAt(std::uint64_t frame, double crowdRadius) {
   return {{0.5 * crowdRadius * std::sin(walk), 0}, {std::cos(turn), std::sin(turn)}};
 }
 
-/// Something that happens to a figure every so many frames, to each in frames of its own.
+/// The clock of an event that happens to a figure once in every period, in different frames for
+/// different figures.
 std::uint64_t clockOf(std::uint32_t figure, std::uint64_t frame, std::uint32_t spread) {
   return frame + std::uint64_t{figure} * spread;
 }
@@ -41,7 +42,7 @@ constexpr std::uint32_t jumpPeriod = 131, jumpSpread = 53;
 
 }  // namespace
 
-/// After it was away, and after a jump, it is in another clip or at another moment of it.
+/// When it returns, and after a jump, it is in another clip or at another time of the clip.
 PoseKey Drill::poseAt(std::uint32_t figure, std::uint64_t frame) const {
   const std::uint64_t comings = clockOf(figure, frame, awaySpread) / awayPeriod;
   const std::uint64_t jumps = clockOf(figure, frame, jumpSpread) / jumpPeriod;
@@ -57,7 +58,8 @@ FigureFrame Drill::at(std::uint32_t figure, std::uint64_t frame) const {
   now.pose = poseAt(figure, frame);
   now.teleports = clockOf(figure, frame, jumpSpread) % jumpPeriod == 0;
 
-  // Distances are told in radii of the crowd, so that one of any size has some of each.
+  // Distances are relative to the radius of the crowd, so that a crowd of any size has figures at
+  // each.
   const double radius = spacing * std::sqrt(static_cast<double>(count()));
   const Camera camera = cameraAt(frame, radius);
   const Place own = placeOf(figure);
@@ -65,7 +67,7 @@ FigureFrame Drill::at(std::uint32_t figure, std::uint64_t frame) const {
   const double distance = std::hypot(away.x, away.z) / radius;
   const double ahead = away.x * camera.forward.x + away.z * camera.forward.z;
   now.updateInterval = distance < 0.3 ? 1 : distance < 0.6 ? 2 : distance < 0.9 ? 4 : 8;
-  // Who stands just behind the camera may still throw a shadow into the picture.
+  // A figure just behind the camera may still cast a shadow into the picture.
   now.isInView = distance < 1.3 && ahead > -2 * spacing;
   return now;
 }

@@ -1,4 +1,4 @@
-// All that can happen to figures, and often: for a proof, not to be looked at.
+// Makes everything that can happen to figures happen often: for tests, not for show.
 #pragma once
 
 #include "character.h"

@@ -1,5 +1,5 @@
-// What the figures do, as a function of the frame: where they stand, how they move, what the camera
-// sees of them. An engine has its game for that.
+// What the figures do, as a function of the frame: position, motion, and visibility to the camera.
+// In an engine the game decides this.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace crowd {
 
-/// A figure in one frame.
+/// The state of a figure in one frame.
 struct FigureFrame {
   bool isPresent = false;  ///< figures come and go
   PoseKey pose;
-  bool teleports = false;            ///< its pose has nothing to do with that of the last frame
+  bool teleports = false;            ///< its pose is unrelated to the pose of the last frame
   bool isInView = false;             ///< neither behind the camera nor too far away
   std::uint32_t updateInterval = 1;  ///< by the distance to the camera
 };

@@ -22,23 +22,23 @@ namespace {
 
 namespace render = samples::render;
 
-/// Units of a flight plan.
+/// Height of a figure in units of the flight plan.
 constexpr double figureHeight = 1.75;
 
-/// Of the sun, degrees: it stands still while the camera flies.
+/// Direction of the sun in degrees. It does not move with the camera.
 constexpr float sunAzimuth = 205, sunElevation = 38;
 
-/// Of the grids that make coarser triangles, as shares of a figure's height.
+/// Cells of the grids for coarser triangles, as fractions of a figure's height.
 constexpr std::array coarseCells{0.009, 0.016, 0.03};
 
-/// Around all of the crowd in every frame: so that shadows do not crawl.
+/// A box around the whole crowd in all frames, so that shadows do not crawl.
 Box boxOf(const FlightPlan& plan, double height) {
   const auto side = static_cast<float>(plan.crowdRadius + plan.unit);
   return {{-side, 0, -side}, {side, static_cast<float>(1.3 * height), side}};
 }
 
-/// Each map draws all that is in view once more: large crowds get fewer, and finer ones, as their
-/// figures are small.
+/// Each shadow map draws everything in view again. Large crowds get fewer and finer maps, since
+/// their figures are small.
 render::ShadowSizes shadowSizes(std::uint64_t triangles) {
   render::ShadowSizes sizes;
   sizes.keyMap = 4096;
@@ -113,7 +113,8 @@ Result<void> Film::makeFrames() {
   return {};
 }
 
-/// Pictures are counted, and where there is but one, the passes that it takes, the skinning first.
+/// Progress counts pictures. If there is only one, it counts the passes of that picture, beginning
+/// with the skinning.
 Result<void> Film::makeProgress() {
   std::uint32_t steps = options_.frames;
   if (options_.frames == 1) {
@@ -131,7 +132,7 @@ void Film::loadFont() {
   if (font) {
     panel_.emplace(std::move(*font));
   } else {
-    samples::reportNote(font.error().message + "; the film is without statistics");
+    samples::reportNote(font.error().message + "; the film has no statistics");
   }
 }
 
@@ -142,16 +143,16 @@ render::View Film::viewAt(std::uint64_t frame) const {
   view.area.extent = {options_.width, options_.height};
   view.camera = stroll_->flight().camera(eye);
   view.casters = boxOf(plan, figureHeight * plan.unit);
-  // The haze begins half a radius before this distance.
+  // The haze begins half a radius in front of this distance.
   view.camera.distance = 0.5f * render::radiusOf(view.casters) + static_cast<float>(5 * plan.unit);
   view.style = styleAt(view.camera);
-  // A hair lower than soles, which are as flat as it is.
+  // Slightly below the soles, which are as flat as the ground.
   view.groundHeight = static_cast<float>(-0.004 * plan.unit);
   view.groundRadius = static_cast<float>(3 * plan.crowdRadius);
   return view;
 }
 
-/// What is near hides what is behind it before that is shaded.
+/// Near figures are drawn first, so that hidden ones are not shaded.
 std::vector<Film::Seen> Film::nearestFirst(const Crowd& crowd, std::uint64_t frame) const {
   const Eye eye = stroll_->eye(frame);
   std::vector<Seen> seen;
@@ -168,7 +169,7 @@ std::vector<Film::Seen> Film::nearestFirst(const Crowd& crowd, std::uint64_t fra
   return seen;
 }
 
-/// The coarsest that is nowhere farther than `error` from where it is to be.
+/// The coarsest geometry whose error is at most `error` everywhere.
 const render::Geometry* Film::geometryFor(const DrawnPart& part, double error) const {
   const render::Geometry* chosen = part.geometry;
   for (std::size_t level = 0; level < part.coarse.size(); ++level) {
@@ -226,7 +227,7 @@ Result<void> Film::record(const Crowd& crowd, std::uint64_t frame, VkCommandBuff
   recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
   if (Result<void> drawn = renderer_.record(commandBuffer, target, {&view, 1}, afterPass); !drawn)
     return drawn;
-  // The next frame skins over what this one has drawn.
+  // The next frame overwrites the vertices that this frame draws.
   recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
   target.target().recordReadBack(device, commandBuffer);
   recorded_ = frame;

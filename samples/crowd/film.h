@@ -1,5 +1,4 @@
-// Pictures of the crowd, drawn from the vertices where they were skinned to, in the command buffer
-// that skinned them.
+// Draws pictures of the crowd from the output buffer, in the command buffer that skinned it.
 #pragma once
 
 #include <cstdint>
@@ -31,19 +30,19 @@ struct FilmOptions {
 
 class Film {
  public:
-  /// `device`, made for graphics, `character` and `stroll` must outlive it.
+  /// `device` must support graphics. `device`, `character` and `stroll` must outlive the film.
   static dermis::Result<std::unique_ptr<Film>> create(
       dermis::samples::OpenDevice& device, const Character& character, const Stroll& stroll,
       const FilmOptions& options, std::unique_ptr<dermis::samples::PictureWriter> writer);
 
-  /// Records the picture, behind `Crowd::skinFrame`.
+  /// Records the picture, after `Crowd::skinFrame`.
   dermis::Result<void> record(const Crowd& crowd, std::uint64_t frame,
                               VkCommandBuffer commandBuffer);
-  /// Shows how far the only picture has come, until its submission is done with: a film counts
-  /// pictures instead, and returns at once.
+  /// Shows the progress of a single picture until its submission is complete. For a film it returns
+  /// at once, since a film counts pictures.
   dermis::Result<void> watch(VkFence submission);
-  /// Writes the pictures up to a frame that the GPU is done with, and that the report has been told
-  /// of. Before the next `record`.
+  /// Writes the pictures up to a frame that the GPU has completed and the report has counted. Call
+  /// it before the next `record`.
   dermis::Result<void> writeUpTo(std::uint64_t completedFrame, const CrowdReport& report);
   /// After the last picture.
   dermis::Result<void> finish();
@@ -63,16 +62,16 @@ class Film {
 
   struct DrawnPart {
     const dermis::samples::render::Geometry* geometry = nullptr;
-    /// With fewer and fewer triangles.
+    /// Each with fewer triangles than the one before it.
     std::vector<dermis::samples::render::Geometry> coarse;
     dermis::samples::render::Surface surface;
   };
-  /// A figure in the picture.
+  /// A figure that the picture shows.
   struct Seen {
     double distance = 0;  ///< from the camera
     std::uint32_t figure = 0;
   };
-  /// What is drawn in the picture, and into the shadow maps.
+  /// The draws of the picture and of the shadow maps.
   struct Draws {
     std::vector<dermis::samples::render::Draw> picture, shadows;
   };
@@ -98,7 +97,7 @@ class Film {
   std::vector<DrawnPart> parts_;
   bool isMirrored_ = false;
   std::vector<dermis::samples::render::RenderFrame> frames_;  ///< one for each in flight
-  std::uint64_t written_ = 0;                                 ///< the last frame that was
+  std::uint64_t written_ = 0;                                 ///< the last frame that was written
   std::uint64_t recorded_ = 0;
   std::optional<StatisticsPanel> panel_;
   std::optional<dermis::samples::render::PassCounter> passes_;  ///< of the only picture

@@ -16,14 +16,15 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-/// Of cylinders: degrees about the middle, and how far from it: 0 the middle, 1 the aisle, 2 the
-/// outermost; heights in metres of a figure of 1.75 m.
+/// A key of the camera flight in cylindrical coordinates: degrees about the middle, and the
+/// distance from it (0 the middle, 1 the aisle, 2 the outermost ring). Heights are in meters, for a
+/// figure of 1.75 m.
 struct Key {
   double angle, radius, height;
   double lookAngle, lookRadius, lookHeight;
 };
 
-/// Evenly over the flight's time. Angles go round once.
+/// Evenly spaced in time. Angles make one full turn.
 constexpr std::array keys{
     Key{20, 2.00, 4.2, 20, 0.85, 0.4},     // over the last rows, all of the crowd ahead
     Key{48, 1.62, 3.1, 60, 0.75, 0.2},     // low over heads
@@ -50,7 +51,7 @@ Vector normalized(const Vector& a) {
   return plus({}, a, 1 / std::sqrt(dot(a, a)));
 }
 
-/// Catmull and Rom 1974: through all points, without a jerk.
+/// Catmull and Rom 1974: a smooth curve through all points.
 double spline(const std::array<double, 4>& p, double t) {
   return p[1] +
          0.5 * t *
@@ -58,7 +59,7 @@ double spline(const std::array<double, 4>& p, double t) {
               t * (2 * p[0] - 5 * p[1] + 4 * p[2] - p[3] + t * (3 * (p[1] - p[2]) + p[3] - p[0])));
 }
 
-/// A member of the keys at a time; `turn` is what it grows by in a whole flight.
+/// Interpolates a member of the keys at a time. `turn` is its increase over a whole flight.
 double along(double Key::*member, double time, double turn = 0) {
   const double place = time / Flight::seconds * static_cast<double>(keys.size());
   const double first = std::floor(place);
@@ -78,7 +79,7 @@ Vector onCylinder(double degrees, double radius, double height) {
   return {radius * std::cos(angle), height, radius * std::sin(angle)};
 }
 
-/// The larger of two, but rounded where they are nearly equal.
+/// A smooth maximum: rounded where both are nearly equal.
 double smoothMax(double a, double b, double width) {
   const double near = std::max(width - std::abs(a - b), 0.0) / width;
   return std::max(a, b) + near * near * width * 0.25;
@@ -86,7 +87,7 @@ double smoothMax(double a, double b, double width) {
 
 }  // namespace
 
-/// How high the camera must be there: above all heads, but in the aisle at the height of eyes.
+/// Minimum height of the camera at this radius: above all heads, but at eye level in the aisle.
 double Flight::clearance(double radius) const {
   const double aside = std::abs(radius - plan_.aisleRadius) / plan_.unit;
   const double t = std::clamp((aside - 0.35) / (1.3 - 0.35), 0.0, 1.0);
@@ -98,7 +99,7 @@ Eye Flight::at(double time) const {
     return place < 1 ? place * plan_.aisleRadius
                      : plan_.aisleRadius + (place - 1) * (plan_.crowdRadius - plan_.aisleRadius);
   };
-  // A small crowd is looked at from as near as it is small.
+  // The camera is nearer to a smaller crowd.
   const double scale = std::clamp(plan_.crowdRadius / (24 * plan_.unit), 0.45, 3.0);
   const double radius = radiusOf(along(&Key::radius, time));
   const double wanted = along(&Key::height, time);
@@ -132,8 +133,8 @@ samples::render::Camera Flight::camera(const Eye& eye) const {
   return camera;
 }
 
-bool Flight::sees(const Eye& eye, const Vector& centre, double radius) const {
-  const Vector from = plus(centre, eye.place, -1);
+bool Flight::sees(const Eye& eye, const Vector& center, double radius) const {
+  const Vector from = plus(center, eye.place, -1);
   const double ahead = dot(from, eye.forward);
   if (ahead < -radius) return false;
   const auto isWithin = [&](const Vector& axis, double slope) {

@@ -1,5 +1,5 @@
-// The film's camera: round the crowd, down into the aisle between those who stand and those who
-// walk, and up again.
+// The camera of the film: around the crowd, down into the aisle between the standing and the
+// walking figures, and up again.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@
 
 namespace crowd {
 
-/// Where it flies. Lengths are those of the figures' world.
+/// Where the camera flies. Lengths are in world units.
 struct FlightPlan {
-  double unit = 1;         ///< what is a metre to someone of 1.75 m
+  double unit = 1;         ///< a meter, if a figure has a height of 1.75 m
   double aisleRadius = 5;  ///< the middle of the aisle
   double crowdRadius = 10;
   double aspect = 16.0 / 9;
@@ -31,9 +31,9 @@ class Flight {
   Eye at(double time) const;
   dermis::samples::render::Camera camera(const Eye& eye) const;
 
-  /// Whether a ball is in the picture, or near it.
-  bool sees(const Eye& eye, const std::array<double, 3>& centre, double radius) const;
-  /// What a pixel shows of something so far away.
+  /// Whether a sphere is in the picture or near it.
+  bool sees(const Eye& eye, const std::array<double, 3>& center, double radius) const;
+  /// Size of a pixel at this distance.
   double pixelSize(const Eye& eye, double distance) const;
 
   const FlightPlan& plan() const { return plan_; }

@@ -11,8 +11,8 @@
 
 namespace crowd {
 
-/// Frames count from 1. The CPU is ahead of the GPU by as many as may be in flight: it waits for
-/// the oldest, and only when the next one needs its place.
+/// Frames count from 1. The CPU may be ahead of the GPU by all frames in flight. It waits for the
+/// oldest frame only when the next one needs its slot.
 class FrameLoop {
  public:
   /// Fails with `vulkanError`.
@@ -23,12 +23,12 @@ class FrameLoop {
   FrameLoop(FrameLoop&& other) noexcept;
   FrameLoop& operator=(FrameLoop&&) = delete;
 
-  /// Waits until there is a place for the next frame, and begins its command buffer.
+  /// Waits until there is a slot for the next frame, and begins its command buffer.
   dermis::Result<VkCommandBuffer> begin();
   dermis::Result<void> submit();
-  /// Of the frame that was submitted last; the loop waits for it, too.
+  /// The fence of the frame that was submitted last. The loop waits for it, too.
   VkFence fence() const { return slots_[frame_ % slots_.size()].fence; }
-  /// Waits for all that has been submitted.
+  /// Waits for all submitted frames.
   dermis::Result<void> finish();
 
   std::uint64_t frame() const { return frame_; }          ///< the one that was begun last

@@ -46,8 +46,8 @@ Extent extentOf(const Points& points) {
   return extent;
 }
 
-/// How the character stands in the first tick of its first clip, and on which of its parts: of the
-/// others no vertex comes near the ground.
+/// How the character stands in the first tick of its first clip, and which parts touch the ground:
+/// the vertices of the others are all far above it.
 struct Stand {
   Extent extent;
   std::vector<const Part*> parts;
@@ -86,8 +86,8 @@ double lowestOf(std::span<const Points> ticks) {
   return lowest;
 }
 
-/// What touches the ground in two ticks stays where it is on it: so the character has moved the
-/// other way.
+/// A point that touches the ground in two ticks does not slide. So its displacement in the clip,
+/// reversed, is the movement of the character.
 ClipGait gaitOf(std::span<const Points> ticks, double height) {
   ClipGait gait;
   gait.ground = lowestOf(ticks);
@@ -103,7 +103,7 @@ ClipGait gaitOf(std::span<const Points> ticks, double height) {
     }
   }
   const double x = -median(movedX), z = -median(movedZ);
-  // In a whole clip someone who walks comes farther than a sway does.
+  // In a whole clip, walking moves the character farther than swaying.
   if (std::hypot(x, z) * static_cast<double>(ticks.size()) < 0.2 * height) return gait;
   gait.stepX = x;
   gait.stepZ = z;

@@ -1,4 +1,4 @@
-// How a character moves over the ground when it plays a clip on the spot, read off its soles.
+// Measures from its soles how a character moves over the ground when it plays a clip in place.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,9 @@
 namespace crowd {
 
 struct ClipGait {
-  /// Metres, or what the file takes for them, that the character comes forward in a tick; {0, 0}:
-  /// it stays.
+  /// Distance that the character moves in a tick, in the units of the file. {0, 0}: it stands.
   double stepX = 0, stepZ = 0;
-  double ground = 0;  ///< the height of what it stands on
+  double ground = 0;  ///< height of the ground that it stands on
 
   bool walks() const { return stepX != 0 || stepZ != 0; }
 };
@@ -19,7 +18,7 @@ struct ClipGait {
 struct Gait {
   double height = 0;                ///< of the character
   double length = 0;                ///< of its longer side, seen from above
-  double middleX = 0, middleZ = 0;  ///< what it stands above
+  double middleX = 0, middleZ = 0;  ///< the point below its middle
   std::vector<ClipGait> clips;
 };
 

@@ -1,4 +1,4 @@
-// A loop on all cores.
+// A loop over all cores.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace crowd {
 
-/// Calls `body(index)` for each index below `count`, in no order, from several threads; returns
-/// when all are done.
+/// Calls `body(index)` for each index below `count`, in any order and from several threads. Returns
+/// when all calls are done.
 template <typename Body>
 void inParallel(std::size_t count, const Body& body) {
   std::atomic<std::size_t> next = 0;

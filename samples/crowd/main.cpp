@@ -1,5 +1,5 @@
-// Plays the engine of crowd.h: figures in several meshes, each in a clip and phase of its own, that
-// come, go, jump and walk out of view while frames are in flight.
+// The engine that uses crowd.h. Figures of several meshes, each with its own clip and phase,
+// appear, disappear, jump and leave the view while frames are in flight.
 
 #include <fmt/format.h>
 
@@ -35,7 +35,8 @@ using samples::ExitStatus;
 using samples::reportDeviceError;
 using samples::reportError;
 
-/// The loop is declared last, so that it goes first: it waits for frames that use the others.
+/// The loop is the last member, so it is destroyed first: its destructor waits for frames that use
+/// the others.
 struct Show {
   Crowd crowd;
   ShownPoses shown;
@@ -69,7 +70,7 @@ Result<void> playFrame(Show& show, const Options& options) {
   return show.film != nullptr ? show.film->watch(show.loop.fence()) : Result<void>();
 }
 
-/// The pictures that were in flight when the last frame was submitted.
+/// Writes the pictures that were in flight when the last frame was submitted.
 Result<void> finishFilm(Show& show, const Options& options) {
   const std::uint64_t last = show.loop.frame(), inFlight = options.crowd.framesInFlight;
   for (std::uint64_t ahead = inFlight; ahead-- > 0;) {
@@ -128,20 +129,20 @@ Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Characte
                                      CrowdReport(std::move(title)), nullptr, std::move(*loop)});
 }
 
-/// What speaks against the result; empty where nothing does.
+/// What is wrong with the result; empty if nothing is.
 std::string verdict(const CrowdCheck& check, const ShownPoses& shown) {
   const CheckTotals& totals = check.totals();
   if (totals.failures != 0) {
-    return fmt::format("{} of {} instances are not as they must be; the first: {}", totals.failures,
+    return fmt::format("{} of {} instances are wrong; the first: {}", totals.failures,
                        totals.instances, totals.firstFailure);
   }
   if (shown.overdue() != 0) {
-    return fmt::format("{} times an instance was not skinned although it was due", shown.overdue());
+    return fmt::format("{} times an instance was due but was not skinned", shown.overdue());
   }
   return {};
 }
 
-/// Its ticks are the film's frames, so that feet and ground move in step.
+/// Ticks are the frames of the film, so that feet do not slide on the ground.
 CharacterOptions characterOptions(const Options& options) {
   CharacterOptions character;
   if (options.film.output.empty()) return character;
@@ -152,11 +153,11 @@ CharacterOptions characterOptions(const Options& options) {
   return character;
 }
 
-/// What the figures do: exercises for the proof, or a stroll for the film.
+/// What the figures do: a drill for the check, or a stroll for the film.
 struct Script {
   Gait gait;
   std::unique_ptr<Figures> figures;
-  const Stroll* stroll = nullptr;  ///< those figures, where there is a film
+  const Stroll* stroll = nullptr;  ///< `figures`, if there is a film
 };
 
 Result<std::unique_ptr<Script>> makeScript(const Character& character, const Options& options) {
@@ -199,7 +200,8 @@ ExitStatus addFilm(Show& show, samples::OpenDevice& open, const Character& chara
   return ExitStatus::done;
 }
 
-/// The proof of what was played, in words and in a file. `complaint` is empty if all is well.
+/// Reports the result of the check, as text and in a file. `complaint` is empty if there is no
+/// error.
 ExitStatus reportOn(const CrowdReport& report, const CheckTotals& check, const Options& options,
                     const std::string& complaint) {
   const CheckTotals* totals = options.verifies ? &check : nullptr;
@@ -212,7 +214,7 @@ ExitStatus reportOn(const CrowdReport& report, const CheckTotals& check, const O
                            : reportError(ExitStatus::verificationFailed, complaint);
 }
 
-/// The whole show without Vulkan.
+/// Runs the whole program without Vulkan.
 ExitStatus runOnCpu(const Character& character, const Figures& script, const Options& options) {
   Result<Crowd> crowd = Crowd::createOnCpu(character, script, options.crowd);
   if (!crowd) return reportDeviceError(crowd.error());

@@ -22,7 +22,7 @@ constexpr std::uint32_t mostMebibytes = 1u << 20;
 constexpr std::uint32_t smallestSide = 64, largestSide = 16384;
 constexpr double mostFramesPerSecond = 240, latestStart = 1e6;
 
-/// What is wrong with the film that is asked for; empty where nothing is.
+/// What is wrong with the options of the film; empty if nothing is.
 std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   const std::optional<samples::PictureKind> kind = samples::pictureKind(film.output);
   if (!kind)
@@ -39,7 +39,7 @@ std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
     return "--time must be a number of seconds, 0 or more";
   if (*kind != samples::PictureKind::png) return {};
   if (samples::hasWrongPattern(film.output))
-    return "the place for a number in --film is %01d to %09d, and there is one at most";
+    return "--film may have one place for a number, from %01d to %09d";
   if (hasFrames && !samples::frameName(film.output, 0)) {
     return "--frames needs a place for the number in --film, such as frame%04d.png, or a film: "
            ".mp4, .gif or .apng";
@@ -47,12 +47,12 @@ std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   return {};
 }
 
-/// The options of the film, each of which needs one.
+/// Adds the options of the film. Each of them needs --film.
 void addFilm(CLI::App& app, FilmRequest& film) {
-  CLI::Option* output =
-      app.add_option("--film", film.output,
-                     "Draw the crowd to a film, .mp4, .gif or .apng (with ffmpeg), to pictures, "
-                     "frame%04d.png, or to one, .png");
+  CLI::Option* output = app.add_option(
+      "--film", film.output,
+      "Draw the crowd as a film (.mp4, .gif or .apng, with ffmpeg), as numbered pictures "
+      "(frame%04d.png), or as one picture (.png)");
   app.add_option("--width", film.width, "Width of the film in pixels [1280]")->needs(output);
   app.add_option("--height", film.height, "Height of the film in pixels [720]")->needs(output);
   app.add_option("--fps", film.framesPerSecond, "Pictures per second [30]")->needs(output);
@@ -71,7 +71,7 @@ Result<void> checkOutputFiles(const Options& options,
 }
 
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
-  CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and proves every vertex right.",
+  CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and checks every vertex.",
                "dermis_crowd");
   app.footer(samples::exitStatusHelp);
   bool skipsVerification = false;
@@ -83,21 +83,22 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
           ->check(CLI::Range(1u, mostFrames));
   app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
   app.add_option("--device", options.device,
-                 "auto, cpu (without Vulkan), a number of 'dermis devices', or part of a name");
+                 "auto, cpu (without Vulkan), a number from 'dermis devices', or part of a name");
   const CLI::Option* inFlight = app.add_option("--frames-in-flight", options.crowd.framesInFlight,
                                                "Maximum frames in flight [3]")
                                     ->check(CLI::Range(1u, mostFramesInFlight));
-  app.add_option("--output-budget", outputMebibytes,
-                 "Memory for skinned vertices in MiB; figures without room are added later [enough "
-                 "for all]")
+  app.add_option(
+         "--output-budget", outputMebibytes,
+         "Memory for skinned vertices in MiB; figures that do not fit are added later [enough "
+         "for all]")
       ->check(CLI::Range(1u, mostMebibytes));
   app.add_option("--json", options.json, "Write the same numbers to a file");
   app.add_option("--check-every", options.checkInterval,
                  "Compare all vertices of every N-th frame and of the last frame [10]")
       ->check(CLI::Range(1u, mostFrames));
-  app.add_flag("--no-verify", skipsVerification, "Do not compare: use it for measurements");
+  app.add_flag("--no-verify", skipsVerification, "Do not compare; for measurements");
   app.add_flag("--gpu-culling", options.crowd.culledOnGpu,
-               "Let the GPU choose which instances are visible");
+               "Let the GPU decide which instances are visible");
   addFilm(app, options.film);
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
   if (const auto ended = samples::parseOptions(app, argc, argv)) return ended;
@@ -108,7 +109,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
                                         {options.validates, "--validate"}}) {
       if (isAsked) {
         return samples::reportWrongUsage(
-            fmt::format("{} needs a Vulkan device, and --device cpu is none", name));
+            fmt::format("{} needs a Vulkan device; --device cpu is not one", name));
       }
     }
   }

@@ -28,15 +28,15 @@ struct Options {
   CrowdOptions crowd;
   FilmRequest film;
   bool verifies = true;
-  std::uint32_t checkInterval = 10;  ///< frames from one that is compared to the next
+  std::uint32_t checkInterval = 10;  ///< every N-th frame is compared
   bool validates = false;            ///< with the validation layer
 };
 
-/// Fails with `invalidArgument` if an output would overwrite one of these files, which are read.
+/// Fails with `invalidArgument` if an output would overwrite one of these input files.
 dermis::Result<void> checkOutputFiles(const Options& options,
                                       std::span<const std::filesystem::path> inputs);
 
-/// Nothing where the program is to go on.
+/// Empty if the program should continue.
 std::optional<dermis::samples::ExitStatus> readOptions(int argc, char** argv, Options& options);
 
 }  // namespace crowd

@@ -1,4 +1,4 @@
-// The right answer for every mesh in every pose that was asked for, kept.
+// A cache of the reference result for every mesh and pose that was requested.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ class References {
  public:
   explicit References(const Character& character) : character_(&character) {}
 
-  /// Finds what is missing of them, on all cores.
+  /// Computes those that are missing, on all cores.
   dermis::Result<void> prepare(std::span<const ReferenceKey> keys);
-  /// Of a key that has been prepared.
+  /// The result for a key that has been prepared.
   const dermis::reference::SkinnedMesh& of(const ReferenceKey& key) const;
 
  private:

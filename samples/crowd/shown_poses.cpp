@@ -54,10 +54,10 @@ void ShownPoses::followInstance(const Crowd& crowd, const FigureFrame& now, Entr
 
 void ShownPoses::display(const FigureFrame& now, Entry& entry, std::uint64_t frame,
                          Skinned skinned) {
-  // What it showed before it was out of view is no motion; nor is what it jumped away from.
+  // Positions from before it left the view, or before a jump, do not count as motion.
   const bool restarts = entry.restarts || !entry.isDisplayed;
   const auto mayRest = [&](const ShownPose& pose) {
-    // A whole interval holds a frame in which it is skinned.
+    // In each complete interval there is a frame in which it is skinned.
     return !entry.restarts && std::min(frame - pose.since, frame - entry.intervalSince + 1) <
                                   std::uint64_t{entry.interval};
   };

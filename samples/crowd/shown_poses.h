@@ -1,5 +1,6 @@
-// What stands in the output, by the words of SkinningSystem's documentation and not by its code:
-// which pose each instance must show after a frame, and which one as its previous positions.
+// The expected contents of the output, derived from the documentation of SkinningSystem, not from
+// its code: which pose each instance must show after a frame, and which pose its previous positions
+// must show.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 
 namespace crowd {
 
-/// An instance's positions, and its previous positions.
+/// The poses of an instance's positions and previous positions.
 struct ShownPose {
   PoseKey current, previous;
   std::uint64_t since = 0;  ///< the frame in which it was skinned
@@ -19,11 +20,12 @@ struct ShownPose {
   friend bool operator==(const ShownPose&, const ShownPose&) = default;
 };
 
-/// An instance that is displayed by its own output.
+/// A displayed instance.
 struct ShownInstance {
   dermis::InstanceHandle handle;
   std::uint32_t part = 0;
-  /// One; several where the GPU chooses, as nobody tells the CPU in which frames it skinned.
+  /// One pose. Several if the GPU decides, since the CPU does not know in which frames the GPU
+  /// skinned the instance.
   std::vector<ShownPose> poses;
 };
 
@@ -38,13 +40,13 @@ class ShownPoses {
  public:
   explicit ShownPoses(const Character& character) : parts_(character.parts().size()) {}
 
-  /// After each record.
+  /// Call it after each record.
   void follow(const Crowd& crowd, std::uint64_t frame);
 
-  /// Those on display in the frame that was followed last.
+  /// The instances that are displayed in the last frame passed to `follow`.
   std::vector<ShownInstance> displayed() const;
   const ShownCounts& counts() const { return counts_; }
-  /// How often an instance was not skinned although its interval was over, or it was new.
+  /// How often an instance was not skinned although its interval had passed or it was new.
   std::uint64_t overdue() const { return overdue_; }
 
  private:

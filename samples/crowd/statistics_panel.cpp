@@ -16,10 +16,10 @@ namespace {
 
 using Color = std::array<std::uint8_t, 3>;
 
-constexpr Color ground{15, 18, 23}, white{244, 246, 248}, grey{158, 168, 180};
+constexpr Color ground{15, 18, 23}, white{244, 246, 248}, gray{158, 168, 180};
 constexpr Color skinnedColor{255, 176, 59}, notDueColor{88, 166, 214}, outOfViewColor{82, 91, 104};
 
-/// A rectangle between whole pixels.
+/// A rectangle of whole pixels.
 struct Area {
   int left = 0, top = 0, right = 0, bottom = 0;
 };
@@ -52,7 +52,7 @@ std::string orDash(const std::optional<std::uint64_t>& number) {
   return number ? grouped(*number) : "–";
 }
 
-/// As short as three digits allow.
+/// A duration with three digits.
 std::string duration(const std::optional<double>& seconds) {
   if (!seconds) return "–";
   const double milliseconds = *seconds * 1e3;
@@ -78,7 +78,7 @@ std::vector<Row> rowsOf(const PanelNumbers& numbers) {
   return rows;
 }
 
-/// The instances, as what becomes of them.
+/// A bar of the instances: skinned, not due, out of view.
 void drawBar(Picture& picture, const Area& area, const PanelNumbers& numbers) {
   const auto total = static_cast<double>(std::max<std::uint64_t>(numbers.instances, 1));
   fill(picture, area, outOfViewColor, 1);
@@ -94,7 +94,7 @@ void drawBar(Picture& picture, const Area& area, const PanelNumbers& numbers) {
   part(numbers.notDue.value_or(0), notDueColor);
 }
 
-/// A column of text: where the next line stands.
+/// A column of text, and the position of its next line.
 class Column {
  public:
   Column(Picture& picture, const Font& font, int left, int right, double top)
@@ -107,11 +107,11 @@ class Column {
     font_.draw(picture_, text, label(left_ + indent, height, color));
     top_ += height;
   }
-  /// At both ends of the same line.
+  /// Writes at both ends of the same line.
   void pair(const std::string& name, const std::string& value, double height, double indent) {
     const double width = font_.width(value, static_cast<float>(height));
     font_.draw(picture_, value, label(right_ - width, height, white));
-    line(name, height, grey, indent);
+    line(name, height, gray, indent);
   }
 
  private:
@@ -150,7 +150,7 @@ void StatisticsPanel::draw(Picture& picture, const PanelNumbers& numbers) const 
               1.4 * size, white);
   column.line(fmt::format("{} instances, {} vertices", grouped(numbers.instances),
                           grouped(numbers.figures * numbers.verticesOfFigure)),
-              0.8 * size, grey);
+              0.8 * size, gray);
   column.skip(0.55 * size);
   const int barTop = static_cast<int>(std::lround(column.top()));
   drawBar(picture, {left, barTop, right, barTop + static_cast<int>(std::lround(0.5 * size))},
@@ -166,7 +166,7 @@ void StatisticsPanel::draw(Picture& picture, const PanelNumbers& numbers) const 
     column.skip(rowHeight - size);
   }
   column.skip(0.35 * size);
-  column.line(numbers.device, 0.75 * size, grey);
+  column.line(numbers.device, 0.75 * size, gray);
 }
 
 }  // namespace crowd

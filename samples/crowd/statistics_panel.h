@@ -1,4 +1,4 @@
-// A frame's numbers, in a corner of its picture.
+// Draws the numbers of a frame in a corner of its picture.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@
 
 namespace crowd {
 
-/// What the panel says.
+/// The numbers that the panel shows.
 struct PanelNumbers {
   std::string device;
   std::uint64_t figures = 0, verticesOfFigure = 0, instances = 0;
-  /// Of the instances. Nothing: the GPU chose, and nobody tells.
+  /// Numbers of instances. Empty if the GPU decided and the numbers are not known.
   std::optional<std::uint64_t> skinned, notDue;
   std::uint64_t outOfView = 0;
   std::optional<std::uint64_t> vertices;  ///< skinned

@@ -11,19 +11,19 @@ using namespace dermis;
 namespace crowd {
 namespace {
 
-/// What chance is for.
+/// Purposes of `chance`.
 enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
 
-// Metres of someone of 1.75 m; an animal that is longer than high counts by its length.
+// In meters, for a figure of 1.75 m. An animal that is longer than high is measured by its length.
 constexpr double standingSpacing = 0.95;
 constexpr double aisleInside = 1.6, aisleWidth = 3.0;
 constexpr double ringSpacing = 1.3, walkingSpacing = 1.75;
 constexpr std::uint32_t ringsOneWay = 3;
 
-/// How far from the feet a figure, and the shadow that it throws, reach.
+/// Distance from the feet that a figure and its shadow may reach.
 constexpr double reach = 2.3;
 
-/// An update may come late by as much as the feet go in so many pixels.
+/// An update may be late as long as the feet move less than this number of pixels.
 constexpr double unseenPixels = 2;
 
 }  // namespace
@@ -52,7 +52,7 @@ Stroll::Stroll(const Character& character, const Gait& gait, const StrollOptions
   flight_ = Flight(plan);
 }
 
-/// Where nobody can walk, all stand, and the other way round.
+/// If no clip walks, all figures stand; if no clip stands, all walk.
 void Stroll::cast(std::uint32_t figures) {
   std::uint32_t standing = walkingClips_.empty() ? figures : (figures + 8) / 12;
   if (standingClips_.empty()) standing = 0;
@@ -60,7 +60,7 @@ void Stroll::cast(std::uint32_t figures) {
   castWalking(standing, figures - standing);
 }
 
-/// A sunflower's spiral: any number of figures, as dense everywhere (Vogel 1979).
+/// Sunflower spiral: any number of figures, equally dense everywhere (Vogel 1979).
 void Stroll::castStanding(std::uint32_t first, std::uint32_t count) {
   const double goldenAngle = std::numbers::pi * (3 - std::sqrt(5.0));
   for (std::uint32_t figure = first; figure < first + count; ++figure) {
@@ -77,7 +77,7 @@ void Stroll::castStanding(std::uint32_t first, std::uint32_t count) {
   }
 }
 
-/// All of a ring are equally tall, so equally fast, and nobody runs into the next.
+/// All figures of a ring have the same height, so the same speed, and do not collide.
 void Stroll::castWalking(std::uint32_t first, std::uint32_t count) {
   double radius = aisleInside + aisleWidth;
   if (!roles_.empty()) radius += roles_.back().radius / unit_;
@@ -113,7 +113,8 @@ JointMatrix Stroll::place(std::uint32_t figure, std::uint64_t frame) const {
   const Role& role = roles_[figure];
   const ClipGait& gait = gait_->clips[role.clip];
   const double angle = role.angle + role.step * static_cast<double>(clock(frame));
-  // From the direction in which it goes by itself to the one in which it is to go.
+  // Rotates from the direction in which the clip walks to the direction in which the figure should
+  // walk.
   const double own = gait.walks() ? std::atan2(gait.stepX, gait.stepZ) : 0;
   const double heading = angle + role.yaw;
   const double turn = std::atan2(std::cos(heading), std::sin(heading)) - own;
@@ -145,7 +146,7 @@ FigureFrame Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
   now.isInView = flight_.sees(seen, middle, reach * unit_);
   const double distance =
       std::hypot(middle[0] - seen.place[0], middle[1] - seen.place[1], middle[2] - seen.place[2]);
-  // In the time of a frame a hand or foot goes about so far.
+  // Approximate distance that a hand or foot moves in a frame.
   const double moved = 1.3 * unit_ / framesPerSecond_;
   const double late = unseenPixels * flight_.pixelSize(seen, distance) / moved;
   now.updateInterval = late < 1 ? 1 : late < 3 ? 2 : late < 7 ? 4 : 8;

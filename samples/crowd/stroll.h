@@ -1,5 +1,5 @@
-// The crowd of the film: some stand in the middle and wave, the others walk around them in rings,
-// as fast as their feet go.
+// The crowd of the film. Some figures stand in the middle and wave. The others walk around them in
+// rings, at the speed of their feet.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct StrollOptions {
 
 class Stroll final : public Figures {
  public:
-  /// `character` and what it moves like must outlive it.
+  /// `character` and `gait` must outlive it.
   Stroll(const Character& character, const Gait& gait, const StrollOptions& options);
 
   FigureFrame at(std::uint32_t figure, std::uint64_t frame) const override;
@@ -36,8 +36,8 @@ class Stroll final : public Figures {
   struct Role {
     std::uint32_t clip = 0, phase = 0;
     double radius = 0, angle = 0;  ///< about the middle, at the beginning
-    double step = 0;               ///< angle that it goes on by, each frame
-    double yaw = 0;                ///< how it looks, from outwards
+    double step = 0;               ///< angle that it moves on in each frame
+    double yaw = 0;                ///< direction in which it looks; 0 is outwards
     double scale = 1;
   };
 

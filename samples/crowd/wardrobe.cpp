@@ -58,7 +58,7 @@ const std::vector<Colors>& allColors() {
   return all;
 }
 
-/// The colour of most of it: eyes and soles do not count.
+/// The color of the largest part of it, without eyes and soles.
 Color ownColor(const gltf::Primitive& primitive) {
   const std::size_t count = primitive.colors.size() / 4;
   if (count == 0) return {1, 1, 1};
@@ -96,7 +96,7 @@ std::array<float, 3> Wardrobe::tint(std::uint32_t figure, std::uint32_t part) co
   if (tints.empty()) return {1, 1, 1};
   const double choice = chance(figure, 100 + part) * static_cast<double>(tints.size());
   const Color& color = tints[static_cast<std::size_t>(choice)];
-  // No two dyes are the same.
+  // Each figure has a slightly different shade.
   const double light = 1 + 0.15 * deviation(figure, 200 + part);
   return {static_cast<float>(color[0] * light), static_cast<float>(color[1] * light),
           static_cast<float>(color[2] * light)};

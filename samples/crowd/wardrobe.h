@@ -1,4 +1,4 @@
-// What figures wear: each is dressed in colours of its own.
+// Clothes: each figure has its own colors.
 #pragma once
 
 #include <array>
@@ -9,12 +9,12 @@
 
 namespace crowd {
 
-/// By the names of materials: body, hair, shirt, trousers, shoes. Others stay as they are.
+/// Recognizes materials by name: body, hair, shirt, trousers, shoes. Others are not changed.
 class Wardrobe {
  public:
   explicit Wardrobe(const Character& character);
 
-  /// What the base colour of a figure's part is multiplied by: linear red, green, blue.
+  /// Factor for the base color of a figure's part: linear red, green, blue.
   std::array<float, 3> tint(std::uint32_t figure, std::uint32_t part) const;
 
  private:

@@ -1,10 +1,10 @@
-// An engine that keeps the books itself: it has the buffers, the instances and their places, turns
-// them into a plan, and records it. A hundred instances of one mesh go into its vertex buffer, and
+// An engine that manages buffers and instances itself. It turns a batch of instances into a plan
+// and records the plan. A hundred instances of one mesh are skinned into its vertex buffer, and
 // every vertex of the last frame is compared with the reference.
 //
 //   dermis_embed
 //
-// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
 
 #include <vulkan/vulkan.h>
 
@@ -27,7 +27,7 @@ using namespace dermis;
 
 constexpr std::uint32_t vertexCount = 200, jointCount = 2, instanceCount = 100, frameCount = 4;
 
-/// The value, or the end of the program.
+/// Returns the value, or ends the program if there is none.
 template <typename T>
 T must(Result<T> result) {
   if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
@@ -37,7 +37,7 @@ void must(VkResult result) {
   if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
 }
 
-/// A Vulkan structure of which nothing but the type is set.
+/// Returns a Vulkan structure with sType set and all other members zero.
 template <typename T>
 T structure(VkStructureType type) {
   T made{};
@@ -45,7 +45,7 @@ T structure(VkStructureType type) {
   return made;
 }
 
-// -- What an engine has anyway.
+// -- What every engine already has.
 
 struct Engine {
   VkInstance instance;
@@ -86,7 +86,7 @@ Engine makeEngine() {
   return engine;
 }
 
-/// A buffer that the CPU sees.
+/// A buffer in memory that the CPU can access.
 struct Buffer {
   VkBuffer handle = VK_NULL_HANDLE;
   VkDeviceSize size = 0;
@@ -135,14 +135,14 @@ void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency
                        &memory, 0, nullptr, 0, nullptr);
 }
 
-// -- The mesh: a strip of two joints. The pose of each instance is another.
+// -- The mesh: a strip of two joints. Each instance has its own pose.
 
 struct Strip {
   float positions[vertexCount][3], normals[vertexCount][3], weights[vertexCount][2];
   std::uint8_t joints[vertexCount][2];
 };
 
-/// The joint's global transform × its inverse bind matrix, of all instances.
+/// Joint global transform × inverse bind matrix, for all joints of all instances.
 std::vector<JointMatrix> posesOf(std::uint32_t frame) {
   std::vector<JointMatrix> matrices;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
@@ -265,7 +265,7 @@ int main() {
     submit(engine);
   }
 
-  // -- The proof: every vertex against the reference in double precision.
+  // -- The check: every vertex is compared with the reference in double precision.
   double worst = 0;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
     const std::byte* skinnedInstance =

@@ -1,9 +1,9 @@
-// Ten thousand figures whose poses never see the CPU: a compute pass of this program writes them,
-// and Dermis reads them where they stand.
+// Ten thousand figures whose poses stay on the GPU: a compute pass of this program writes them, and
+// Dermis reads them in place.
 //
 //   dermis_gpu_poses
 //
-// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
 
 #include <vulkan/vulkan.h>
 
@@ -25,7 +25,7 @@ using namespace dermis;
 
 constexpr std::uint32_t vertexCount = 40, jointCount = 2, figureCount = 10'000, frameCount = 3;
 
-/// The value, or the end of the program.
+/// Returns the value, or ends the program if there is none.
 template <typename T>
 T must(Result<T> result) {
   if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
@@ -35,7 +35,7 @@ void must(VkResult result) {
   if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
 }
 
-/// A Vulkan structure of which nothing but the type is set.
+/// Returns a Vulkan structure with sType set and all other members zero.
 template <typename T>
 T structure(VkStructureType type) {
   T made{};
@@ -43,7 +43,7 @@ T structure(VkStructureType type) {
   return made;
 }
 
-// -- What an engine has anyway.
+// -- What every engine already has.
 
 struct Engine {
   VkInstance instance;
@@ -123,7 +123,7 @@ void submit(const Engine& engine) {
   must(vkQueueWaitIdle(engine.queue));
 }
 
-/// The engine's animation: a compute pass that writes all poses, one behind the other.
+/// The engine's animation: a compute pass that writes all poses, one after the other.
 struct Animation {
   VkPipelineLayout layout = VK_NULL_HANDLE;
   VkPipeline pipeline = VK_NULL_HANDLE;
@@ -290,7 +290,7 @@ int main() {
     submit(engine);
   }
 
-  // -- The proof: what the GPU wrote is copied, and every vertex compared with the reference.
+  // -- The check: the output of the GPU is copied, and every vertex is compared with the reference.
   constexpr VkMemoryPropertyFlags mapped =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   const std::uint64_t outputSize = scene.statistics().outputs.capacity;

@@ -1,7 +1,8 @@
 #version 450
 
-// The poses of all figures, one behind the other, two joints each. A joint is three rows of a 3x4 matrix: joint global transform
-// times inverse bind matrix. Joint 0 rests; joint 1 turns about the figure, by another angle for each.
+// Writes the poses of all figures, one after the other, with two joints each. A joint is three rows of a 3x4 matrix: joint global
+// transform times inverse bind matrix. Joint 0 does not move; joint 1 turns about the figure's axis, by a different angle for each
+// figure.
 
 layout(local_size_x = 64) in;
 

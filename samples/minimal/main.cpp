@@ -1,9 +1,9 @@
-// The smallest engine: a device without a window, one character that bends, and the proof that
-// every vertex of the last frame is where it must be.
+// The smallest engine: a device without a window and one character that bends. At the end it checks
+// every vertex of the last frame.
 //
 //   dermis_minimal
 //
-// Exit status: 0 done, 4 no Vulkan device, 1 anything else.
+// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
 
 #include <vulkan/vulkan.h>
 
@@ -23,7 +23,7 @@ using namespace dermis;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 3;
 
-/// The value, or the end of the program.
+/// Returns the value, or ends the program if there is none.
 template <typename T>
 T must(Result<T> result) {
   if (!result) std::exit((std::printf("%s\n", result.error().message.c_str()), 1));
@@ -33,7 +33,7 @@ void must(VkResult result) {
   if (result != VK_SUCCESS) std::exit((std::printf("VkResult %d\n", result), 4));
 }
 
-/// A Vulkan structure of which nothing but the type is set.
+/// Returns a Vulkan structure with sType set and all other members zero.
 template <typename T>
 T structure(VkStructureType type) {
   T made{};
@@ -41,7 +41,7 @@ T structure(VkStructureType type) {
   return made;
 }
 
-// -- What an engine has anyway.
+// -- What every engine already has.
 
 struct Engine {
   VkInstance instance;
@@ -184,7 +184,7 @@ int main() {
     must(scene.record(engine.commandBuffer));
     barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
     // [/frame]
-    // An engine draws here. This one copies the vertices, to look at them.
+    // An engine draws here. This program copies the vertices to compare them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
     vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), engine.readBack, 1, &copy);
     barrier(engine.commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
@@ -197,7 +197,7 @@ int main() {
     must(vkQueueWaitIdle(engine.queue));
   }
 
-  // -- The proof: every vertex against the reference in double precision.
+  // -- The check: every vertex is compared with the reference in double precision.
   // [compare]
   SkinnedView skinned;
   skinned.positions = {engine.vertices, vertexCount, 24, VertexFormat::float32x3};

@@ -32,7 +32,7 @@ std::vector<std::vector<std::uint32_t>> quadNeighbours(const QuadMesh& mesh) {
   return neighbours;
 }
 
-// The triangle of a corner of a quad and the two after it: 1 where all sides are alike, 0 where it
+// The triangle of a corner of a quad and the two after it: 1 if all sides are equal, 0 if it
 // has no area.
 double evenness(const QuadMesh& mesh, const Quad& quad, std::size_t corner) {
   const Vec3& a = mesh.positions[quad[corner % 4]];

@@ -38,10 +38,10 @@ std::optional<Place> nextPlace(std::string_view name, std::size_t from) {
   return std::nullopt;
 }
 
-/// The device or volume, and the number of the file there.
+/// The device or volume, and the number of the file on it.
 using FileIdentity = std::pair<std::uint64_t, std::uint64_t>;
 
-/// Nothing if there is no file.
+/// Empty if there is no file.
 std::optional<FileIdentity> identityOf(const std::filesystem::path& path) {
 #ifdef _WIN32
   const HANDLE file =
@@ -61,8 +61,8 @@ std::optional<FileIdentity> identityOf(const std::filesystem::path& path) {
 #endif
 }
 
-/// The file of that name, or its name where there is none yet; nothing for devices and FIFOs, which
-/// take what several write.
+/// Identifies the file of that name; the name itself if there is no file yet. Empty for devices and
+/// FIFOs, which several outputs may share.
 std::optional<std::string> writtenFile(const std::filesystem::path& path) {
   if (const std::optional<FileIdentity> file = identityOf(path)) {
     std::error_code error;
@@ -113,7 +113,7 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
     const std::optional<FileIdentity> identity = identityOf(pathOf(name));
     if (identity && read.contains(*identity)) {
       return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} {} would overwrite a file that is read", option, name)};
+                   fmt::format("{} {} would overwrite an input file", option, name)};
     }
     if (isFrame && written.empty()) return {};
     const std::optional<std::string> file = writtenFile(pathOf(name));
@@ -121,12 +121,12 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
     const auto other = written.find(*file);
     if (other != written.end()) {
       return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} {} is the file that {} writes", option, name, other->second)};
+                   fmt::format("{} {} is also the output of {}", option, name, other->second)};
     }
     if (!isFrame) written.emplace(*file, option);
     return {};
   };
-  // Single files first: frames, of which there may be millions, are only looked up.
+  // Single files first: frames, of which there may be millions, are then only looked up.
   for (const auto& [option, output, frames] : outputs) {
     if (output.empty() || frameName(output, 0)) continue;
     if (Result<void> good = check(option, output, false); !good) return good;

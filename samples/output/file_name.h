@@ -1,4 +1,4 @@
-// Names of output files: their endings, the numbers of frames, and whether they are inputs.
+// Names of output files: their endings, frame numbers, and whether they are inputs.
 #pragma once
 
 #include <cstdint>
@@ -12,30 +12,32 @@
 
 namespace dermis::samples {
 
-/// Of a name in UTF-8, as programs take them from the command line. What `std::filesystem::path`
-/// makes of a `std::string` depends on the standard library on Windows.
+/// The path of a name in UTF-8, the encoding of command-line arguments here. On Windows the
+/// encoding that `std::filesystem::path` expects in a `std::string` depends on the standard
+/// library.
 std::filesystem::path pathOf(std::string_view name);
 
-/// Whether something stands before that ending, which is given in lower case, in any case.
+/// Whether the name ends with `ending` in upper or lower case, and has something before it.
+/// `ending` is in lower case.
 bool hasEnding(std::string_view name, std::string_view ending);
 
-/// The name of a frame: the first %0Nd in the pattern, N from 1 to 9, replaced by its number.
-/// Nothing if there is none.
+/// The name of a frame: the first %0Nd in the pattern, with N from 1 to 9, is replaced by the
+/// number of the frame. Empty if the pattern has none.
 std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame);
 
-/// Whether a name has a place for a number that is not %0Nd, or more than one.
+/// Whether a name has more than one place for a number, or one that is not %0Nd.
 bool hasWrongPattern(std::string_view name);
 
-/// What an option asks to write.
+/// An output that an option requests.
 struct RequestedOutput {
   std::string_view option;   ///< "--json"
   std::string name;          ///< empty: nothing
   std::uint32_t frames = 1;  ///< if the name has a place for a number
 };
 
-/// Fails with `invalidArgument` if an output, or one of its frames, would overwrite a file that is
-/// read, or another output: whatever they are called, links are the same file. Devices and FIFOs
-/// may be named twice.
+/// Fails with `invalidArgument` if an output, or one of its frames, would overwrite an input file
+/// or another output. Files are compared by identity, so a link counts as the file that it leads
+/// to. Devices and FIFOs may be named twice.
 Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
                               std::span<const std::filesystem::path> inputs);
 

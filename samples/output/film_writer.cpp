@@ -22,8 +22,8 @@ namespace {
 
 using render::Picture;
 
-/// ffmpeg, fed with raw pictures on its standard input. A socket and not a pipe: when ffmpeg ends
-/// early, writing to it is then an error and no signal.
+/// Sends raw pictures to the standard input of ffmpeg. It uses a socket, not a pipe: if ffmpeg ends
+/// early, writing is then an error and not a signal.
 class FilmWriter final : public PictureWriter {
  public:
   FilmWriter(std::string name, std::unique_ptr<OutputFile> output, int input, pid_t child)
@@ -59,11 +59,11 @@ class FilmWriter final : public PictureWriter {
     return {ErrorCode::ioError, fmt::format("{} cannot be written: ffmpeg failed", name_)};
   }
 
-  /// Waits for ffmpeg; whether it has done its work.
+  /// Waits for ffmpeg, and returns whether it succeeded.
   bool end() {
     close(input_);
     siginfo_t information{};
-    // It is reaped only when no signal can mean it any more.
+    // The process is reaped only when no signal handler can kill it any more.
     while (waitid(P_PID, static_cast<id_t>(child_), &information, WEXITED | WNOWAIT) != 0 &&
            errno == EINTR) {
     }
@@ -81,7 +81,7 @@ class FilmWriter final : public PictureWriter {
   pid_t child_ = 0;
 };
 
-/// The program of that name in the PATH, or nothing.
+/// The program of that name in the PATH; empty if there is none.
 std::optional<std::string> findProgram(const std::string& name) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "");
@@ -100,7 +100,7 @@ std::vector<std::string> encoderArguments(PictureKind kind) {
     case PictureKind::apng:
       return {"-plays", "0", "-f", "apng"};
     default:
-      // What every player shows: 4:2:0, which wants even sides.
+      // Every player supports 4:2:0, which needs even sides.
       return {"-vf",       "pad=ceil(iw/2)*2:ceil(ih/2)*2",
               "-pix_fmt",  "yuv420p",
               "-crf",      "18",
@@ -120,12 +120,13 @@ std::vector<std::string> ffmpegArguments(const std::string& output, PictureKind 
                                      "-r",       fmt::format("{}", framesPerSecond),
                                      "-i",       "pipe:0"};
   for (std::string& argument : encoderArguments(kind)) arguments.push_back(std::move(argument));
-  // A name is neither an option nor an address.
+  // So that ffmpeg takes the name for neither an option nor an address.
   arguments.push_back("file:" + output);
   return arguments;
 }
 
-/// Starts ffmpeg; its process, or 0. Signals that this program ignores are none of its business.
+/// Starts ffmpeg. Returns its process, or 0. ffmpeg does not inherit the signals that this program
+/// ignores.
 pid_t spawnFfmpeg(const std::string& program, std::vector<std::string> arguments, int input) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -154,8 +155,8 @@ pid_t spawnFfmpeg(const std::string& program, std::vector<std::string> arguments
 Result<void> checkFilmProgram(const std::string& output) {
   if (findProgram("ffmpeg")) return {};
   return Error{ErrorCode::missingFeature,
-               fmt::format("{} takes the program ffmpeg, which is not in the PATH; numbered "
-                           "pictures need none: name them like frame%04d.png",
+               fmt::format("{} needs the program ffmpeg, which is not in the PATH; numbered "
+                           "pictures do not need it: name them like frame%04d.png",
                            output)};
 }
 
@@ -168,7 +169,7 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
   if (!file) return file.error();
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-    return Error{ErrorCode::ioError, "no socket can be made for ffmpeg"};
+    return Error{ErrorCode::ioError, "cannot create a socket for ffmpeg"};
   const pid_t child = spawnFfmpeg(
       program, ffmpegArguments((*file)->temporaryName(), kind, width, height, framesPerSecond),
       ends[1]);

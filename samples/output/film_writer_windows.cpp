@@ -6,8 +6,9 @@ namespace dermis::samples {
 
 Result<void> checkFilmProgram(const std::string& output) {
   return Error{ErrorCode::missingFeature,
-               fmt::format("{}: films are not written on Windows; numbered pictures are: name them "
-                           "like frame%04d.png",
+               fmt::format("{}: films cannot be written on Windows; write numbered pictures "
+                           "instead, with a name like "
+                           "frame%04d.png",
                            output)};
 }
 

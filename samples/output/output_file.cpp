@@ -27,7 +27,7 @@ bool isSame(const struct stat& a, const struct stat& b) {
   return a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
-/// Follows symbolic links to a name that is none, whether or not a file has it.
+/// Follows symbolic links to a name that is not a link. There need not be a file of that name.
 Result<std::filesystem::path> followLinks(const std::filesystem::path& name) {
   constexpr int mostLinks = 40;  // as many as Linux follows
   std::filesystem::path path = name;
@@ -41,7 +41,7 @@ Result<std::filesystem::path> followLinks(const std::filesystem::path& name) {
   return cannotWrite(name, ELOOP);
 }
 
-/// Standard output or error if that is the file, or -1.
+/// The descriptor of standard output or error if it is that file, otherwise -1.
 int streamOf(const struct stat& file) {
   for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
     struct stat other {};
@@ -70,7 +70,7 @@ Result<OutputTarget> findTarget(const std::filesystem::path& name) {
   if (!path) return path.error();
   target.path = std::move(*path);
   if (!exists) return target;
-  // Links in /proc lead to open files, which need not have a name.
+  // Links in /proc lead to open files, which may have no name.
   struct stat followed {};
   if (stat(target.path.c_str(), &followed) != 0 || !isSame(file, followed)) {
     target.isThrough = true;
@@ -92,11 +92,11 @@ int writeAll(int file, std::span<const std::byte> bytes) {
   return 0;
 }
 
-/// An open device, FIFO or stream. -1 where it cannot be opened, and then `errno` says why.
+/// Opens a device, FIFO or stream. Returns -1 if that fails; `errno` is then the reason.
 int openThrough(const OutputTarget& target) {
   if (target.stream < 0)
     return open(target.path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
-  std::fflush(stdout);  // What was printed before comes before.
+  std::fflush(stdout);  // What was printed before must come first.
   return fcntl(target.stream, F_DUPFD_CLOEXEC, 3);
 }
 
@@ -109,7 +109,7 @@ Result<void> writeThrough(const OutputTarget& target, std::span<const std::byte>
   return {};
 }
 
-/// Copies a file to where output is written through.
+/// Copies a file to a target that is written through.
 Result<void> copyThrough(const OutputTarget& target, int from) {
   const int to = openThrough(target);
   if (to < 0) return cannotWrite(target.name, errno);
@@ -127,19 +127,20 @@ Result<void> copyThrough(const OutputTarget& target, int from) {
   return {};
 }
 
-/// A name that no other file has. It is short, since the target's may be as long as names can be.
+/// A name that no other file has. It is short, since the name of the target may already have the
+/// maximum length.
 std::string temporaryNameIn(const std::filesystem::path& folder) {
   std::random_device random;
   const std::uint64_t number = std::uint64_t{random()} << 32 | random();
   return (folder / fmt::format(".dermis-{:016x}.part", number)).string();
 }
 
-/// The permissions and, where that is allowed, the owner of the file that is replaced.
+/// Copies the permissions and, if allowed, the owner of the file that is replaced.
 void imitate(const OutputTarget& target, int file) {
   struct stat old {};
   if (!target.permissions || stat(target.path.c_str(), &old) != 0) return;
   const bool isOwned = fchown(file, old.st_uid, old.st_gid) == 0;
-  // Another group must not get what this one had.
+  // If the group differs, it must not get the permissions of the old group.
   const mode_t kept = isOwned ? permissionBits : permissionBits & ~mode_t{070};
   (void)fchmod(file, *target.permissions & kept);
 }
@@ -179,7 +180,7 @@ Result<void> OutputFile::write(std::span<const std::byte> bytes) {
 
 Result<void> OutputFile::commit() {
   if (target_.isThrough) return copyThrough(target_, file_);
-  // Some file systems cannot synchronize, and say EINVAL.
+  // Some file systems cannot synchronize and return EINVAL.
   if (fsync(file_) != 0 && errno != EINVAL) return cannotWrite(target_.name, errno);
   if (close(std::exchange(file_, -1)) != 0) return cannotWrite(target_.name, errno);
   if (rename(temporary_.c_str(), target_.path.c_str()) != 0)

@@ -1,10 +1,10 @@
-// The one way in which programs write files: whole or not at all.
+// Writes files atomically: whole or not at all. All programs write files this way.
 //
-// A file is written under a name of its own beside its target, synchronized, and then renamed.
-// Until then, whatever goes wrong, what stood at the target is untouched. Symbolic links are
-// followed: the link stays, and the file that it names is replaced. A new file gets the permissions
-// that the umask leaves, a replaced one keeps those that it had. What is not a regular file
-// (devices, FIFOs) and standard output are written through. On Windows a replaced file gets the
+// A file is written under a temporary name next to its target, synchronized, and then renamed. If
+// anything fails before that, the old file is unchanged. Symbolic links are followed: the link
+// stays, and the file that it names is replaced. A new file gets the permissions that the umask
+// leaves; a replaced file keeps its permissions. Standard output and files that are not regular
+// (devices, FIFOs) are written directly ("written through"). On Windows a replaced file gets the
 // permissions of a new one, and a link is replaced.
 #pragma once
 
@@ -24,21 +24,21 @@ namespace dermis::samples {
 Result<void> writeFile(const std::filesystem::path& path, std::span<const std::byte> bytes);
 Result<void> writeFile(const std::filesystem::path& path, const std::string& text);
 
-/// Where output goes.
+/// The place that output is written to.
 struct OutputTarget {
   std::filesystem::path name;           ///< as the user gave it
   std::filesystem::path path;           ///< with symbolic links followed
   std::optional<unsigned> permissions;  ///< of the file that is replaced
-  bool isThrough = false;               ///< no regular file: it is written through
-  int stream = -1;                      ///< the program's standard output or error, if it is that
+  bool isThrough = false;               ///< not a regular file: it is written through
+  int stream = -1;  ///< descriptor of standard output or error, if the target is one of them
 };
 
-/// A file that another program writes, which is told its temporary name. Without `commit` it is
-/// removed.
+/// A file that another program writes, under a temporary name. It is removed unless `commit` is
+/// called.
 class OutputFile {
  public:
-  /// Makes an empty file: beside the target or, if that is written through, in the folder for
-  /// temporary files. Fails with `ioError`.
+  /// Creates an empty file: next to the target or, if the target is written through, in the folder
+  /// for temporary files. Fails with `ioError`.
   static Result<std::unique_ptr<OutputFile>> create(const std::filesystem::path& path);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -47,7 +47,7 @@ class OutputFile {
   const std::string& temporaryName() const { return temporary_; }
   /// Fails with `ioError`.
   Result<void> write(std::span<const std::byte> bytes);
-  /// Puts what was written in its place. Fails with `ioError`.
+  /// Moves the file to its target. Fails with `ioError`.
   Result<void> commit();
 
  private:
@@ -61,7 +61,7 @@ class OutputFile {
   std::string temporary_;
   UnfinishedFile unfinished_;  ///< A signal removes it.
   int file_ = -1;
-  bool isThere_ = false;  ///< The temporary file is, and is ours.
+  bool isThere_ = false;  ///< Whether this object created the temporary file.
 };
 
 }  // namespace dermis::samples

@@ -25,7 +25,7 @@ Error cannotWrite(const std::filesystem::path& path, int reason) {
   return cannotWrite(path, std::generic_category().message(reason));
 }
 
-/// By the error that the last function of Windows left.
+/// Uses the error of the last Windows function.
 Error cannotWrite(const std::filesystem::path& path) {
   wchar_t* text = nullptr;
   const DWORD code = GetLastError();
@@ -58,8 +58,8 @@ Result<OutputTarget> findTarget(const std::filesystem::path& name) {
   return target;
 }
 
-/// An open file, or -1, and then `GetLastError` says why. Others may remove it while it is open:
-/// `UnfinishedFile` does.
+/// Opens a file. Returns -1 if that fails; `GetLastError` then returns the reason. It may be
+/// removed while it is open: `UnfinishedFile` does so.
 int openFile(const std::filesystem::path& path, DWORD creation) {
   const HANDLE handle = CreateFileW(path.c_str(), GENERIC_READ | GENERIC_WRITE,
                                     FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,

@@ -1,4 +1,4 @@
-// Pictures on their way into files: one, numbered ones, or a film that ffmpeg makes of them.
+// Writes pictures to files: one picture, numbered pictures, or a film that ffmpeg encodes.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace dermis::samples {
 
 enum class PictureKind { png, mp4, gif, apng };
 
-/// What a file's ending means, or nothing.
+/// The kind that the ending of a file means; empty if it is unknown.
 std::optional<PictureKind> pictureKind(std::string_view fileName);
 
 class PictureWriter {
@@ -22,18 +22,18 @@ class PictureWriter {
   virtual ~PictureWriter() = default;
   /// Fails with `ioError`.
   virtual Result<void> write(const render::Picture& picture) = 0;
-  /// After the last picture: the file is not whole before. Fails with `ioError`.
+  /// Call it after the last picture; the file is incomplete before. Fails with `ioError`.
   virtual Result<void> finish() = 0;
 };
 
-/// PNG files: OUT, or OUT with the number of each in the place for it.
+/// PNG files: OUT, or OUT with the number of each picture in its place.
 std::unique_ptr<PictureWriter> writePngs(const std::string& output);
 
-/// Fails with `missingFeature` if there is no ffmpeg in the PATH, which films need, and on Windows.
+/// Fails with `missingFeature` if ffmpeg, which films need, is not in the PATH, and on Windows.
 Result<void> checkFilmProgram(const std::string& output);
 
-/// A film of pictures of one size. It replaces what stands at OUT when it is finished, and not
-/// before. Fails like `checkFilmProgram`, and with `ioError`.
+/// A film of pictures of one size. It replaces OUT only when it is finished. Fails as
+/// `checkFilmProgram` does, and with `ioError`.
 Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, PictureKind kind,
                                                  std::uint32_t width, std::uint32_t height,
                                                  double framesPerSecond);

@@ -34,7 +34,7 @@ Progress::~Progress() {
 void Progress::step() {
   ++done_;
   if (!visible_) return;
-  // Not fmt::print, which throws when the terminal is gone.
+  // Not fmt::print, which throws if the terminal is gone.
   std::fputs(fmt::format("\r{}: {} of {}", what_, done_, total_).c_str(), stderr);
 }
 

@@ -19,13 +19,13 @@ struct Slot {
   std::array<char, PATH_MAX> path{};
 };
 
-// Signal handlers reach nothing but globals.
+// Signal handlers can only use globals.
 std::array<Slot, 8> slots;
 std::atomic<pid_t> childToKill = 0;
 static_assert(std::atomic<SlotState>::is_always_lock_free &&
               std::atomic<pid_t>::is_always_lock_free);
 
-/// Calls only what POSIX lists as safe in a signal handler.
+/// Calls only functions that POSIX lists as safe in a signal handler.
 void removeAndEnd(int signalNumber) {
   if (const pid_t child = childToKill; child != 0) {
     kill(child, SIGKILL);
@@ -34,7 +34,7 @@ void removeAndEnd(int signalNumber) {
   for (const Slot& slot : slots) {
     if (slot.state == SlotState::named) unlink(slot.path.data());
   }
-  // It is blocked until the handler returns, and then ends the program.
+  // The signal is blocked until the handler returns; then it ends the program.
   std::signal(signalNumber, SIG_DFL);
   raise(signalNumber);
 }

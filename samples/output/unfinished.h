@@ -1,4 +1,4 @@
-// What must not outlive the program when a signal ends it: unfinished files, and the program that
+// Cleans up when a signal ends the program: removes unfinished files, and ends the program that
 // writes one.
 #pragma once
 
@@ -10,13 +10,13 @@
 
 namespace dermis::samples {
 
-/// On Windows: Ctrl+C, Ctrl+Break and the closing of the console do so. Elsewhere:
 /// SIGINT, SIGTERM and SIGHUP, unless they are ignored already, remove what is registered below and
-/// then end the program as they would without this. SIGPIPE and SIGXFSZ are ignored: writing fails
-/// instead, like on a full disk. To be called once, when the program begins.
+/// then end the program as usual. On Windows, Ctrl+C, Ctrl+Break and closing the console do so.
+/// SIGPIPE and SIGXFSZ are ignored: writing then fails as on a full disk. Call it once, when the
+/// program begins.
 void handleSignals();
 
-/// A file that a signal removes, as long as this lives. Eight at a time: more are not removed.
+/// A signal removes this file as long as the object lives. At most eight files are removed.
 class UnfinishedFile {
  public:
   explicit UnfinishedFile(const std::string& path);
@@ -29,8 +29,8 @@ class UnfinishedFile {
 };
 
 #ifndef _WIN32
-/// The child process that a signal kills before it removes files, or 0 for none. The caller must
-/// not reap it before it is set to 0 again.
+/// Sets the child process that a signal kills before it removes files; 0 for none. The caller must
+/// set it to 0 again before it reaps the process.
 void setUnfinishedChild(pid_t child);
 #endif
 

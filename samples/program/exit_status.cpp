@@ -15,7 +15,7 @@ namespace {
 const char* name = "dermis";
 std::string subcommand;
 
-/// What cannot be written to standard error is lost; the exit status still tells.
+/// If standard error cannot be written, the message is lost, but the exit status is right.
 void print(std::string_view kind, std::string_view message) {
   std::fflush(stdout);
   try {
@@ -51,7 +51,7 @@ void reportNote(std::string_view message) {
 
 ExitStatus reportWrongUsage(std::string_view message) {
   return reportError(ExitStatus::wrongUsage,
-                     fmt::format("{} ({}{}{} --help tells more)", message, name,
+                     fmt::format("{} (see {}{}{} --help)", message, name,
                                  subcommand.empty() ? "" : " ", subcommand));
 }
 

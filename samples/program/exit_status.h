@@ -1,4 +1,4 @@
-// How programs end, and what they say on standard error.
+// Exit statuses, and messages on standard error.
 #pragma once
 
 #include <string>
@@ -17,10 +17,10 @@ enum class ExitStatus : int {
   stopped = 5,  ///< output not writable, no window, device lost, out of memory
 };
 
-/// What stands before each message, followed by ": "; "dermis" until `runProgram` says otherwise.
-/// `name` must outlive the program.
+/// The name before each message; "dermis" until `runProgram` sets it. `name` must outlive the
+/// program.
 void setProgramName(const char* name);
-/// The subcommand whose --help the hint of `reportWrongUsage` means; empty: the program's own.
+/// The subcommand whose --help `reportWrongUsage` mentions; empty for the program itself.
 void setSubcommandName(std::string name);
 
 /// One line on standard error: "NAME: error: …".
@@ -28,9 +28,9 @@ ExitStatus reportError(ExitStatus status, std::string_view message);
 void reportWarning(std::string_view message);
 void reportNote(std::string_view message);
 
-/// With a hint at the subcommand's --help. The message names the option.
+/// Mentions the subcommand's --help. The message names the option.
 ExitStatus reportWrongUsage(std::string_view message);
-/// An error of a model file, and one of a device, with the status that each means.
+/// Report an error of a model file or of a device, with its exit status.
 ExitStatus reportModelError(const Error& error);
 ExitStatus reportDeviceError(const Error& error);
 ExitStatus deviceErrorStatus(const Error& error);

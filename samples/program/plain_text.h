@@ -1,4 +1,5 @@
-// Names come from files, and a file may put line ends and terminal controls into them.
+// Makes names from files safe to print: they may contain line breaks and terminal control
+// characters.
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 
 namespace dermis::samples {
 
-/// The text as one line, whatever a terminal obeys in it escaped (dermis/text.h).
+/// The text on one line, with terminal control characters escaped (dermis/text.h).
 std::string plainLine(std::string_view text);
 
 }  // namespace dermis::samples

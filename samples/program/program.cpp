@@ -44,7 +44,7 @@ const CLI::App* findSubcommand(const CLI::App& app, std::string_view name) {
   return nullptr;
 }
 
-/// What CLI11 would take for something else than was meant; empty if nothing is wrong.
+/// Finds arguments that CLI11 would misunderstand; empty if there are none.
 std::string complaintAbout(std::span<char* const> arguments, const CLI::App& command) {
   std::string_view before;
   for (const std::string_view argument : arguments) {
@@ -76,7 +76,8 @@ std::string toUtf8(const wchar_t* text) {
   return utf8;
 }
 
-/// The arguments of `main` are in the code page of the machine, which lacks most characters.
+/// On Windows, the arguments of `main` are in the code page of the machine, which lacks most
+/// characters.
 ExitStatus runWithArguments(int, char**, ExitStatus (*run)(int, char**)) {
   SetConsoleOutputCP(CP_UTF8);
   int count = 0;
@@ -90,8 +91,9 @@ ExitStatus runWithArguments(int, char**, ExitStatus (*run)(int, char**)) {
   return run(count, pointers.data());
 }
 #else
-/// Without this the next file that is opened would become standard output or error. Reading what
-/// is only written to, and the reverse, fails as it does for a stream that is closed.
+/// Opens the standard streams that are closed. Otherwise the next file that is opened would become
+/// standard output or error. They are opened for the wrong direction, so that using them fails as
+/// for a closed stream.
 void fillClosedStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(stream, F_GETFD) == -1)
@@ -120,7 +122,7 @@ std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv) {
     app.exit(success);  // --help, --version
     return ExitStatus::done;
   } catch (const CLI::ParseError& error) {
-    // An option that is not known may be the reason why another seems to be missing.
+    // An unknown option may be the reason why another one seems to be missing.
     const std::vector<std::string> extras = app.remaining(true);
     const auto unknown = std::ranges::find_if(extras, isOption);
     if (unknown == extras.end()) return reportWrongUsage(error.what());

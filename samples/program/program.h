@@ -11,16 +11,16 @@ class App;
 
 namespace dermis::samples {
 
-/// Of a program that ends with any of them; the last word of its --help.
+/// The end of the --help of a program that uses all of them.
 inline constexpr const char* exitStatusHelp =
-    "Exit status: 0 done, 1 verification failed, 2 wrong usage, 3 bad input, 4 no usable device,\n"
-    "5 anything else that stopped it.";
+    "Exit status: 0 success, 1 verification failed, 2 wrong usage, 3 bad input,\n"
+    "4 no usable device, 5 any other error.";
 
-/// Nothing where the program is to go on; otherwise help was printed, or what is wrong.
+/// Empty if the program should continue. Otherwise help or an error was printed.
 std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv);
 
-/// What `main` returns. What `run` throws, and standard output that cannot be written, is reported.
-/// `run` gets the arguments in UTF-8, on Windows too.
+/// Returns the value for `main` to return. Reports exceptions of `run`, and a standard output that
+/// cannot be written. `run` gets the arguments in UTF-8, on Windows, too.
 int runProgram(const char* name, int argc, char** argv, ExitStatus (*run)(int argc, char** argv));
 
 }  // namespace dermis::samples

@@ -22,7 +22,7 @@ constexpr std::array<const char*, 3> fontFiles{
     "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
 };
 
-/// Nothing where it cannot be read.
+/// Nothing if it cannot be read.
 std::vector<unsigned char> readBytes(const std::string& name) {
   std::ifstream stream(name, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -83,7 +83,8 @@ Result<std::vector<std::byte>> encodePng(const Picture& picture) {
   };
   if (stbi_write_png_to_func(append, &bytes, static_cast<int>(picture.width),
                              static_cast<int>(picture.height), channels, opaque.data(), 0) == 0)
-    return Error{ErrorCode::limitExceeded, "there is no memory to write the picture as PNG"};
+    return Error{ErrorCode::limitExceeded,
+                 "there is not enough memory to write the picture as PNG"};
   return bytes;
 }
 

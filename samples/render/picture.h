@@ -20,13 +20,13 @@ struct Picture {
 Result<std::vector<std::byte>> encodePng(const Picture& picture);
 
 /// The file of the typeface that labels are set in: DejaVu Sans (Debian's fonts-dejavu-core), or
-/// what DERMIS_FONT in the environment names. Fails with `ioError` where there is none.
+/// what DERMIS_FONT in the environment names. Fails with `ioError` if there is none.
 Result<std::string> findFontFile();
 
 /// A typeface, for labels.
 class Font {
  public:
-  /// Of `findFontFile`. Fails with `ioError` where there is none: a picture then has no labels.
+  /// Of `findFontFile`. Fails with `ioError` if there is none: a picture then has no labels.
   static Result<Font> load();
 
   /// Pixels that a line of text takes.

@@ -259,7 +259,7 @@ Result<void> Renderer::record(VkCommandBuffer commandBuffer, RenderFrame& frame,
   if (views.size() > frame.views_.size()) {
     return Error{ErrorCode::invalidArgument,
                  "the frame was made for " + std::to_string(frame.views_.size()) +
-                     " views, and is given " + std::to_string(views.size())};
+                     " views, but gets " + std::to_string(views.size())};
   }
   for (std::size_t index = 0; index < views.size(); ++index) {
     const View& view = views[index];

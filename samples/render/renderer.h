@@ -80,7 +80,7 @@ class Renderer {
   /// Records shadow maps and picture, outside a render pass. What is in the views need not live
   /// longer than the call, but for buffers and geometry. Builds pipelines when they are first
   /// wanted. Fails with `invalidArgument` for more views than the frame was made for, or a format
-  /// that cannot be drawn from. `afterPass` is called where each shadow map and the picture is
+  /// that cannot be drawn from. `afterPass` is called when each shadow map and the picture is
   /// recorded, outside a render pass, `passCount` times.
   Result<void> record(VkCommandBuffer commandBuffer, RenderFrame& frame,
                       std::span<const View> views, const std::function<void()>& afterPass = {});

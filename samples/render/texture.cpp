@@ -116,15 +116,15 @@ Result<void> upload(Device& device, const TexturePixels& pixels, const Image& im
 
 Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, gltf::MemoryBudget* budget) {
   const auto* bytes = reinterpret_cast<const stbi_uc*>(encoded.data());
-  const Error broken{ErrorCode::invalidData, "it is neither a PNG nor a JPEG, or broken"};
+  const Error broken{ErrorCode::invalidData, "it is not a valid PNG or JPEG"};
   if (encoded.empty() || !std::in_range<int>(encoded.size())) return broken;
   const int size = static_cast<int>(encoded.size());
   int width = 0, height = 0, channels = 0;
   if (stbi_info_from_memory(bytes, size, &width, &height, &channels) == 0) return broken;
   if (width < 1 || height < 1 || width > largestSide || height > largestSide) {
     return Error{ErrorCode::limitExceeded, "it has " + std::to_string(width) + " x " +
-                                               std::to_string(height) + " pixels, and at most " +
-                                               std::to_string(largestSide) + " a side are read"};
+                                               std::to_string(height) + " pixels; the maximum is " +
+                                               std::to_string(largestSide) + " per side"};
   }
   const auto pixels =
       std::uint64_t{4} * static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height);

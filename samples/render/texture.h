@@ -24,8 +24,8 @@ struct TextureOptions {
   Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
 };
 
-/// Decodes a PNG or JPEG. Fails with `invalidData` where it is broken or something else, and with
-/// `limitExceeded` where it is larger than 8192 pixels a side, or than the budget, if there is one:
+/// Decodes a PNG or JPEG. Fails with `invalidData` if it is broken or something else, and with
+/// `limitExceeded` if it is larger than 8192 pixels a side, or than the budget, if there is one:
 /// before memory is taken for it.
 Result<TexturePixels> decodeImage(std::span<const std::byte> encoded,
                                   gltf::MemoryBudget* budget = nullptr);

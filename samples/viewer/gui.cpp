@@ -34,7 +34,7 @@ Result<samples::render::Owned<VkDescriptorPool>> makePool(const samples::Device&
 #if IMGUI_VERSION_NUM >= 19000
 Result<void> uploadFonts(samples::Device&) {
   if (ImGui_ImplVulkan_CreateFontsTexture()) return {};
-  return Error{ErrorCode::vulkanError, "the texture of the typeface could not be made"};
+  return Error{ErrorCode::vulkanError, "the font texture could not be created"};
 }
 #else
 Result<void> uploadFonts(samples::Device& device) {

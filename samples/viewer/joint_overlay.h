@@ -7,7 +7,7 @@
 
 namespace dermis::viewer {
 
-/// Where a point of the scene is seen; nothing where it is behind the eye.
+/// Where a point of the scene is seen; nothing if it is behind the eye.
 std::optional<std::array<float, 2>> project(const samples::render::Camera& camera, const Area& area,
                                             const glm::vec3& point);
 

@@ -31,7 +31,7 @@ class CompiledFolder : public KernelFolder {
     KernelUpdate update;
     update.isOther = !done->replaced.empty();
     update.text = update.isOther ? "reloaded " + plural(done->replaced.size(), "kernel")
-                                 : std::string("no kernel is another one");
+                                 : std::string("no kernel changed");
     return std::optional(std::move(update));
   }
 

@@ -23,7 +23,7 @@ class KernelFolder {
   /// For the context; valid as long as this object lives.
   virtual vulkan::KernelSource source() const = 0;
   /// Looks for changed files, once all pictures before are complete. Nothing: there are none. Fails
-  /// once where a kernel cannot be compiled; the old ones stay.
+  /// once if a kernel cannot be compiled; the old ones stay.
   virtual Result<std::optional<KernelUpdate>> reload(const vulkan::Context& context) = 0;
   /// How many modules there are, and where from.
   virtual std::string summary() const = 0;

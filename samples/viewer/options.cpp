@@ -27,7 +27,7 @@ std::optional<samples::ExitStatus> readMethod(const char* option, const std::str
   method = methodFromName(name);
   if (method) return std::nullopt;
   return samples::reportWrongUsage(
-      fmt::format("{}: there is no method '{}'; there are {}", option, name, methodNames()));
+      fmt::format("{}: there is no method '{}'; the methods are {}", option, name, methodNames()));
 }
 
 std::string sampleFigure() {
@@ -38,35 +38,34 @@ std::string sampleFigure() {
 }  // namespace
 
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
-  CLI::App app("Shows skinned models, by every method of Dermis. F1 in its window shows the keys.",
+  CLI::App app("Shows skinned models with every method of Dermis. F1 in the window shows the keys.",
                "dermis_viewer");
   app.footer(
-      "Exit status: 0 done, 2 wrong usage, 3 bad input, 4 no usable device, 5 anything else that\n"
-      "stopped it.");
+      "Exit status: 0 success, 2 wrong usage, 3 bad input, 4 no usable device, 5 any other error.");
   std::string method, comparison;
   bool isEmpty = false;
   CLI::Option* model =
       app.add_option("MODEL", options.model, "A .gltf or .glb file [the sample figure]");
-  CLI::Option* empty = app.add_flag("--empty", isEmpty, "Begin without a model")->excludes(model);
+  CLI::Option* empty = app.add_flag("--empty", isEmpty, "Start without a model")->excludes(model);
   app.add_option("--method", method, methodNames() + " [dual_quaternion]");
   app.add_option("--compare", comparison, "Show another method beside it");
   app.add_option("--animation", options.animation,
                  "A clip's number or name, or none for the rest pose [the first]")
       ->excludes(empty);
   app.add_option("--time", options.time, "Seconds into the clip [0]")->excludes(empty);
-  app.add_flag("--paused", options.isPaused, "Begin with the clip stopped");
+  app.add_flag("--paused", options.isPaused, "Start with the clip paused");
   app.add_option("--width", options.width, "Width of the window [1280]")
       ->check(CLI::Range(64u, largestSide));
   app.add_option("--height", options.height, "Height of the window [800]")
       ->check(CLI::Range(64u, largestSide));
   app.add_option("--device", options.device,
-                 "auto, a number of 'dermis devices', or part of a name");
+                 "auto, a number from 'dermis devices', or part of a name");
 #ifdef DERMIS_RUNTIME_COMPILER
   CLI::Option* shaders = app.add_option(
       "--shaders", options.shaders,
       "Compile the kernels from this folder of GLSL, and again whenever a file changes");
   app.add_option("--shader-cache", options.shaderCache,
-                 "The folder to keep compiled kernels in, for the next time")
+                 "Folder that keeps compiled kernels for the next run")
       ->needs(shaders);
 #endif
   app.add_option("--frames", options.frames, "End after this number of frames");

@@ -40,7 +40,7 @@ void drawEmpty(const Facts& facts, const Area& picture) {
   list.AddText({x - size.x / 2, y - size.y / 2}, color(textColor), text.c_str());
 }
 
-/// Where there is no panel for it.
+/// If there is no panel for it.
 void drawFreeLegend(const Facts& facts, const Area& picture, const State& state) {
   const float width = 250, pad = 12;
   const float height = legendHeight(facts, state);

@@ -9,7 +9,7 @@ namespace {
 
 Error failed(const char* function, VkResult result) {
   if (result == VK_ERROR_DEVICE_LOST) {
-    return {ErrorCode::vulkanError, "the device was lost: it stopped, or was taken away",
+    return {ErrorCode::vulkanError, "the device was lost: it stopped or was removed",
             static_cast<std::int32_t>(result)};
   }
   return {

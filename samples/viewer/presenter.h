@@ -27,7 +27,7 @@ struct WindowFrame {
 
 class Presenter {
  public:
-  /// Fails with `missingFeature` where there is no display or no device for it.
+  /// Fails with `missingFeature` if there is no display or no device for it.
   static Result<std::unique_ptr<Presenter>> create(const Options& options);
   ~Presenter();
 

@@ -56,8 +56,7 @@ bool Shot::operator==(const Shot& other) const {
 
 Result<std::unique_ptr<SceneView>> SceneView::create(samples::OpenDevice& device,
                                                      cli::Scene scene) {
-  if (scene.parts.empty())
-    return Error{ErrorCode::invalidData, "it has no skinned mesh in its scene"};
+  if (scene.parts.empty()) return Error{ErrorCode::invalidData, "its scene has no skinned mesh"};
   std::unique_ptr<SceneView> view(new SceneView(device, std::move(scene)));
   if (Result<void> done = view->prepare(); !done) return done.error();
   return view;
@@ -187,7 +186,7 @@ Result<bool> SceneView::pose(const Shot& shot) {
     if (!cli::allows(scene_, shot.methods[figure])) {
       return Error{ErrorCode::invalidArgument,
                    std::string(methodName(shot.methods[figure])) +
-                       " needs centres of rotation, which this model has none of"};
+                       " needs centers of rotation, but this model has none"};
     }
     if (Result<void> set = drawn_->setMethod(figure, shot.methods[figure]); !set)
       return set.error();

@@ -39,7 +39,7 @@ struct Quality {
   samples::render::ShadowSizes shadows;
 };
 
-/// What the last picture cost; 0 where it is not known.
+/// What the last picture cost; 0 if it is not known.
 struct SceneTimes {
   double skinningSeconds = 0;  ///< of the GPU, the last time that there was something to skin
   double drawingSeconds = 0;   ///< of the GPU
@@ -50,7 +50,7 @@ struct SceneTimes {
 /// const.
 class SceneView {
  public:
-  /// `device` must outlive it. Fails with `invalidData` where nothing of the scene is skinned.
+  /// `device` must outlive it. Fails with `invalidData` if nothing of the scene is skinned.
   static Result<std::unique_ptr<SceneView>> create(samples::OpenDevice& device, cli::Scene scene);
 
   const cli::Scene& scene() const { return scene_; }

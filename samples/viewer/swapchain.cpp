@@ -72,7 +72,7 @@ Result<void> Swapchain::chooseFormat() {
     }
   }
   return Error{ErrorCode::missingFeature,
-               "the window has no format with a byte each of red, green and blue"};
+               "the window has no format with 8 bits each for red, green and blue"};
 }
 
 VkFormat Swapchain::srgbFormat() const {

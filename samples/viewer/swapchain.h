@@ -18,7 +18,7 @@ class Swapchain {
     VkSemaphore drawn = VK_NULL_HANDLE;     ///< for the submission to signal
   };
 
-  /// `device` and `surface` must outlive it. Fails with `missingFeature` where images of the
+  /// `device` and `surface` must outlive it. Fails with `missingFeature` if images of the
   /// surface have no bytes of red, green and blue, or cannot be copied to. Has no images yet.
   static Result<Swapchain> create(samples::Device& device, VkSurfaceKHR surface);
 
@@ -31,7 +31,7 @@ class Swapchain {
   /// New images, for a surface of that size where it does not say itself. The device must be idle.
   /// Without any where the surface has no size now.
   Result<void> resize(VkExtent2D pixels);
-  /// The next image; nothing where there is none now, or new ones must be made first: `isStale`.
+  /// The next image; nothing if there is none now, or new ones must be made first: `isStale`.
   Result<std::optional<Image>> acquire();
   Result<void> present(const Image& image);
   bool isStale() const { return isStale_ || swapchain_.get() == VK_NULL_HANDLE; }

@@ -216,7 +216,7 @@ void Viewer::reloadKernels() {
   const Result<std::optional<KernelUpdate>> update = kernels->reload(presenter_->device().context);
   if (!update) {
     kernelError_ = update.error().message;
-    kernelsUpdate_ = "the old ones are used: " + kernelError_;
+    kernelsUpdate_ = "the old kernels stay in use: " + kernelError_;
     return fail(samples::ExitStatus::badInput, kernelError_);
   }
   if (!*update) return;
@@ -294,7 +294,7 @@ void Viewer::chooseMethods() {
     }
     if (hasSoughtCenters_) {
       fail(samples::ExitStatus::badInput,
-           fmt::format("{} needs centres of rotation, which take too long to find for {}",
+           fmt::format("{} needs centers of rotation, which take too long to compute for {}",
                        methodName(state_.methods[index]), fileName(path_)));
       state_.methods[index] = methods_[index];
       continue;
@@ -405,7 +405,7 @@ Facts Viewer::facts() const {
   if (const LoadRequest* current = loader_.current(); current != nullptr) {
     facts.isLoading = true;
     facts.loading = view_ != nullptr && current->path == path_
-                        ? "finding centres of rotation …"
+                        ? "computing centers of rotation …"
                         : fmt::format("reading {} …", fileName(current->path));
   }
   facts.errors = errors_ ? &*errors_ : nullptr;

@@ -20,7 +20,7 @@ class Viewer {
 
   /// Until the user ends it, or until it has shown the frames that were asked for; those end with
   /// the first error, which nobody is there to read. Returns what the program ends with: not `done`
-  /// if it could not do what the command line asks. Fails with `vulkanError` where the device does.
+  /// if it could not do what the command line asks. Fails with `vulkanError` if the device does.
   Result<samples::ExitStatus> run();
 
  private:

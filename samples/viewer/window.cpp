@@ -19,14 +19,14 @@ Error failed(const std::string& what) {
 Result<Window> Window::create(std::uint32_t width, std::uint32_t height) {
   // Ctrl+C ends the program at once, as it does any other.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
-  if (SDL_Init(SDL_INIT_VIDEO) != 0) return failed("there is no display for a window");
+  if (SDL_Init(SDL_INIT_VIDEO) != 0) return failed("there is no display to open a window on");
   Window window;
   window.window_ =
       SDL_CreateWindow("Dermis", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
                        static_cast<int>(width), static_cast<int>(height),
                        SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
   if (window.window_ == nullptr) {
-    const Error error = failed("a window with Vulkan cannot be opened");
+    const Error error = failed("cannot open a window for Vulkan");
     SDL_Quit();
     return error;
   }
@@ -49,10 +49,10 @@ Window& Window::operator=(Window&& other) noexcept {
 Result<std::vector<std::string>> Window::surfaceExtensions() const {
   unsigned int count = 0;
   if (SDL_Vulkan_GetInstanceExtensions(window_, &count, nullptr) == SDL_FALSE)
-    return failed("the window has no Vulkan");
+    return failed("the window does not support Vulkan");
   std::vector<const char*> names(count);
   if (SDL_Vulkan_GetInstanceExtensions(window_, &count, names.data()) == SDL_FALSE)
-    return failed("the window has no Vulkan");
+    return failed("the window does not support Vulkan");
   return std::vector<std::string>(names.begin(), names.end());
 }
 

@@ -41,7 +41,7 @@ class Window {
 /// What the device shows its pictures on. The device and the window must outlive it.
 class Surface {
  public:
-  /// Fails with `missingFeature` where the device cannot show anything in the window.
+  /// Fails with `missingFeature` if the device cannot show anything in the window.
   static Result<Surface> create(const Window& window, const samples::Device& device);
   Surface() = default;
   ~Surface();

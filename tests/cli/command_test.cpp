@@ -91,7 +91,7 @@ void expectComplaint(const std::vector<std::string>& arguments, const std::strin
   EXPECT_EQ(result.status, 2);
   const bool isCommand = !arguments.empty() && arguments[0][0] != '-' && arguments[0] != "fly";
   const std::string help = isCommand ? "dermis " + arguments[0] : "dermis";
-  EXPECT_EQ(result.errors, "dermis: error: " + sentence + " (" + help + " --help tells more)\n");
+  EXPECT_EQ(result.errors, "dermis: error: " + sentence + " (see " + help + " --help)\n");
 }
 
 TEST(CommandTest, WrongUsageNamesTheOptionAndTheSubcommandsHelp) {
@@ -106,9 +106,9 @@ TEST(CommandTest, WrongUsageNamesTheOptionAndTheSubcommandsHelp) {
   expectComplaint({"skin", bar, "-o", out, "--fps", "3"}, "--fps requires --frames");
   expectComplaint({"skin", bar, "-o", out, "--time", "nan"}, "--time must be a number of seconds");
   expectComplaint({"skin", bar, "-o", outFile("a%04d.ply")},
-                  "-o OUT has a place for a number; --frames says how many there are");
+                  "-o OUT has a place for a number, so --frames is required");
   expectComplaint({"skin", bar, "-o", out, "--device", "cpu", "--animation", "zzz"},
-                  "--animation: there is no animation 'zzz' among the 1 of the file");
+                  "--animation: there is no animation 'zzz'; the file has 1");
   expectComplaint({"render", bar, "-o", "a.png", "--elevation", "91"},
                   "--elevation must be from -90 to 90 degrees");
   expectComplaint({"compare", bar, "--repetitions", "0"}, "--repetitions must be from 1 to 10000");

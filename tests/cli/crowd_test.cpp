@@ -170,8 +170,8 @@ TEST(CrowdReportTest, ItsModelIsNotOverwritten) {
     const CommandResult result = runCommand({dermisCrowdProgram, "--model", model, option, model});
     EXPECT_EQ(result.status, 2);
     EXPECT_EQ(result.errors, "dermis_crowd: error: " + std::string(option) + " " + model +
-                                 " would overwrite a file that is read (dermis_crowd --help tells "
-                                 "more)\n");
+                                 " would overwrite an input file (see dermis_crowd "
+                                 "--help)\n");
   }
 }
 

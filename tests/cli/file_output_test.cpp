@@ -224,7 +224,7 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
       {"--junit", "verify", model, "--junit", folder + "/hard.glb"},
   };
   for (const std::vector<std::string>& command : commands) {
-    expectRefusedOutput(command, " would overwrite a file that is read");
+    expectRefusedOutput(command, " would overwrite an input file");
     EXPECT_TRUE(textOf(model) == bytes);
   }
   const CommandResult few =
@@ -243,7 +243,7 @@ TEST(FileOutputTest, TwoOutputsAreNotOneFile) {
       {"--json", "compare", bar, "-o", folder + "/new.png", "--json", folder + "/new.png"},
   };
   for (const std::vector<std::string>& command : commands) {
-    expectRefusedOutput(command, " is the file that -");
+    expectRefusedOutput(command, " is also the output of -");
     EXPECT_EQ(textOf(there), "kept");
     EXPECT_FALSE(std::filesystem::exists(folder + "/new"));
   }
@@ -278,7 +278,7 @@ TEST(FileOutputTest, FilesBesideTheModelAreNotOverwritten) {
   const CommandResult result = dermis({"skin", model, "-o", link, "--device", "cpu"});
   EXPECT_EQ(result.status, 2);
   expectOneErrorLine(result);
-  EXPECT_NE(result.errors.find("would overwrite a file that is read"), std::string::npos)
+  EXPECT_NE(result.errors.find("would overwrite an input file"), std::string::npos)
       << result.errors;
   const CommandResult report =
       dermis({"compare", model, "--device", "cpu", "--json", folder + "/./triangle.bin"});

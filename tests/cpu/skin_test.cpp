@@ -569,7 +569,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   expectBadInstance([](cpu::Instance& i) { i.pose = i.pose.first(3); }, ": its pose has 3 joints");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = {&unknown, 1}; }, "");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = falling; },
-                    ": its morph targets do not rise");
+                    ": its morph targets are not in ascending order");
   expectBadInstance([](cpu::Instance& i) { i.settles = true; },
                     " settles or restarts its motion, but has no previous positions");
   expectBadInstance([](cpu::Instance& i) { i.restartsMotion = true; },

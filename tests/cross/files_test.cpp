@@ -1,4 +1,4 @@
-// What programs write, on every system: Windows has an implementation of its own.
+// Tests how programs write files, on every system: Windows has its own implementation.
 
 #include <gtest/gtest.h>
 

@@ -165,12 +165,12 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   expectRefused(system.addPose(1), "the CPU writes hold 20, of which 20 are in use");
   must(system.addPose(20, {.writer = PoseWriter::gpu}));
   expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}),
-                "the GPU writes hold 20, of which 20 are in use, and may hold 20");
+                "the GPU writes hold 20 joints, of which 20 are in use; their maximum is 20");
   InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
   instance.bounds = true;
   must(system.addInstance(instance));
   expectRefused(system.addInstance(instance),
-                "1 instances have them already, which is the maximum");
+                "1 instances have them already, and that is the maximum");
   instance.bounds = false;
   must(system.addInstance(instance));
   expectRefused(system.addInstance(instance),
@@ -192,7 +192,8 @@ TEST_F(SystemGrowthTest, TheOutputGrowsToItsMaximumAndNoFurther) {
   const Result<InstanceHandle> tenth = engine->addInstance(instance);
   ASSERT_FALSE(tenth.ok());
   EXPECT_EQ(tenth.error().code, ErrorCode::limitExceeded);
-  EXPECT_NE(tenth.error().message.find("of 32400 bytes of output, 0 are free"), std::string::npos)
+  EXPECT_NE(tenth.error().message.find("of 32400 bytes of output only 0 are free"),
+            std::string::npos)
       << tenth.error().message;
   EXPECT_EQ(engine->statistics().outputs.capacity, 32400u);
   engine.submit();
@@ -345,9 +346,9 @@ TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
   };
-  expectRefused(engine->writePose(ofGpu), "is written by the GPU: markWritten");
-  expectRefused(engine->markWritten({&ofCpu, 1}), "is written by the CPU: writePose");
-  expectRefused(engine->poseRange(ofCpu), "is written by the CPU: writePose");
+  expectRefused(engine->writePose(ofGpu), "is written by the GPU; use markWritten");
+  expectRefused(engine->markWritten({&ofCpu, 1}), "is written by the CPU; use writePose");
+  expectRefused(engine->poseRange(ofCpu), "is written by the CPU; use writePose");
   must(engine->markWritten({&ofGpu, 1}));
   must(engine->markAllWritten());
   must(engine->removePose(ofGpu));

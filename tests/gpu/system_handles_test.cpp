@@ -150,7 +150,7 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
          d.layout.positions = VertexFormat::snorm16x4;
          d.box = {{-1, -1, -1}, {1, 1, infinity}};
        }},
-      {"centres of rotation",
+      {"centers of rotation",
        [&](InstanceDescription& d) {
          OwnedMesh mesh = randomMesh(1, 20, 8, 4);
          mesh.centersOfRotation.clear();

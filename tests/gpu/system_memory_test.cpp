@@ -161,7 +161,7 @@ TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   own.buffers.destroy = [](void*, const CreatedBuffer&) { ++destroyed; };
   const Result<SkinningSystem> system = SkinningSystem::create(own);
   ASSERT_FALSE(system.ok());
-  EXPECT_NE(system.error().message.find("gave no buffer for 'dermis "), std::string::npos)
+  EXPECT_NE(system.error().message.find("returned no buffer for 'dermis "), std::string::npos)
       << system.error().message;
   EXPECT_EQ(destroyed, 0);
 }

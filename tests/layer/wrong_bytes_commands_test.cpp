@@ -47,7 +47,8 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
       "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
   EXPECT_EQ(result.status, 1) << result.errors;
   const std::string what = "1 vertices are outside their bound, the first is 0;";
-  const std::string bits = "the result is not to the bit that of 64 invocations, 4 instances each";
+  const std::string bits =
+      "the result does not have the same bits as that of 64 invocations, 4 instances each";
 
   EXPECT_EQ(countOf(result.output, "FAILED  "), 1u) << result.output;
   EXPECT_EQ(countOf(result.output, "FAILED  " + bar + "  linear: "), 1u) << result.output;
@@ -93,7 +94,7 @@ TEST(WrongBytesCommandsTest, TheCrowdsCheckTellsWhichVertexIsWrong) {
       "--frames-in-flight", "1"};
   const CommandResult result = runWithWrongBytes(command, plants);
   EXPECT_EQ(result.status, 1) << result.output << result.errors;
-  EXPECT_EQ(countOf(result.errors, "instances are not as they must be; the first: frame 1, "), 1u)
+  EXPECT_EQ(countOf(result.errors, "instances are wrong; the first: frame 1, "), 1u)
       << result.errors;
   EXPECT_EQ(countOf(result.errors, ", vertex "), 1u) << result.errors;
   EXPECT_EQ(countOf(result.output, "are inside their bounds"), 0u) << result.output;

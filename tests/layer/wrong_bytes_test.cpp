@@ -208,7 +208,7 @@ TEST_F(WrongBytesTest, AWrongByteOfAnAttributeIsFoundAtItsVertex) {
 
 TEST_F(WrongBytesTest, AWrongPreviousPositionIsFound) {
   const auto wrong = invert(2, Stream::previousPositions, 5, 3, 0x80);
-  expectOnly(verify(before, wrong), 2, "on a first frame, previous positions are not the current");
+  expectOnly(verify(before, wrong), 2, "in a first frame, previous positions are not the current");
   expectOnly(verify(now, wrong), 2, "previous positions are not those of the frame before");
   expectOnly(verify(now, wrong), 2,
              "1 previous positions are outside their bound, the first is vertex 5");
@@ -229,7 +229,7 @@ TEST_F(WrongBytesTest, ATouchedNeighbourIsFound) {
           verify(frame, invert(0, Stream::previousPositions, 3, behind(byte), 1));
       // Positions, normals and tangents, and previous positions: 52 bytes, and the gap.
       const std::string place = "byte " + std::to_string(3 * 56 + 52 + byte) + " of the positions'";
-      expectOnly(verified, 0, "1 bytes between attributes were changed, the first is " + place);
+      expectOnly(verified, 0, "1 bytes between attributes were changed; the first is " + place);
     }
   }
 }
@@ -277,10 +277,10 @@ TEST_F(WrongBytesTest, WhatIsNotTwiceTheSameIsFound) {
   // Thorough: all frames again, over another poison, and each instance by itself.
   const auto last = invert(1, Stream::normals, 39, 0, 1);
   expectOnly(verify(again + now - 1, last, true), 1,
-             "a byte of an attribute was not written, or not twice the same");
+             "a byte of an attribute was not written, or two runs wrote different values");
   const auto ofTheFirst = invert(0, Stream::normals, 39, 0, 1);
   expectOnly(verify(alone + now - 1, ofTheFirst, true), 0,
-             "alone, it is not skinned to the same bits");
+             "skinned alone, it does not have the same bits");
 }
 
 }  // namespace

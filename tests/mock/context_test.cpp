@@ -93,7 +93,7 @@ TEST(ContextTest, MissingHandlesAndOldVersionsAreRefused) {
           "Vulkan 1.1");
   mock.limits.maxPerStageDescriptorStorageBuffers = 3;
   refuses([](Description&) {}, ErrorCode::missingFeature,
-          "3 storage buffers per stage, Dermis needs 4");
+          "3 storage buffers per stage, but Dermis needs 4");
 }
 
 TEST(ContextTest, AFailedCreationLeavesNothingBehind) {

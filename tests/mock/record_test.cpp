@@ -339,7 +339,7 @@ TEST_F(RecordTest, WindowsThatDifferNeedPushDescriptors) {
     }
   }
   ASSERT_NO_FATAL_FAILURE(create(false));
-  expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "other limits");
+  expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "limits of another device");
   EXPECT_FALSE(context->limits().separateRanges);
 }
 
@@ -397,7 +397,7 @@ TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
       "positions, bounds, for 4 influences";
   const std::string end = " has not been prepared";
   const std::string sentences[] = {
-      "the palette kernel for dual quaternions of joints that scale" + end,
+      "the palette kernel for dual quaternions with joints that scale" + end,
       "the clear kernel" + end, "the variant of linear" + skin + " and joints that scale" + end,
       "the variant of dual_quaternion" + skin + " and joints that scale" + end};
   ASSERT_EQ(batch.plan.variants().size(), 4u);
@@ -620,7 +620,7 @@ TEST_F(RecordTest, APlanForOtherLimitsIsRefused) {
   other[2].storage16Bit = true;
   for (const DeviceLimits& limits : other) {
     const MockBatch batch = MockBatch::withAllMethods(limits);
-    expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "other limits");
+    expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "limits of another device");
   }
 }
 

@@ -279,7 +279,7 @@ TEST(ReferenceMethods, ThoseWithACenterOfRotationRefuseAMeshWithout) {
     if (result) continue;
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
     EXPECT_EQ(result.error().message, "mesh 'Fox': " + std::string(methodName(method)) +
-                                          " needs centres of rotation, it has none");
+                                          " needs centers of rotation, but it has none");
   }
 }
 

@@ -193,13 +193,13 @@ TEST_F(MorphTest, RefusesTargetsThatAreNotThereTwiceOrWithoutANumber) {
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(result.error().message.find(part), std::string::npos) << result.error().message;
   };
-  refused({{4, 1.0f}}, "morph target 4 is outside the mesh's 4");
+  refused({{4, 1.0f}}, "morph target 4 does not exist; the mesh has 4");
   refused({{0, 1.0f}, {0xffffffffu, 1.0f}}, "morph target 4294967295");
-  refused({{2, 1.0f}, {1, 1.0f}, {2, 0.5f}}, "morph target 2 has a weight twice");
+  refused({{2, 1.0f}, {1, 1.0f}, {2, 0.5f}}, "morph target 2 has two weights");
   refused({{1, std::numeric_limits<float>::quiet_NaN()}}, "not finite");
   refused({{1, -std::numeric_limits<float>::infinity()}}, "not finite");
   targets.clear();
-  refused({{0, 1.0f}}, "outside the mesh's 0");
+  refused({{0, 1.0f}}, "does not exist; the mesh has 0");
 }
 
 TEST_F(MorphTest, WhatTheMeshLacksIsNotDisplaced) {

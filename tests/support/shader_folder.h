@@ -33,7 +33,7 @@ class ShaderFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Replaces what stands once in a file. Returns the number of its line.
+  /// Replaces text that occurs exactly once in a file. Returns its line number.
   int edit(const std::string& file, const std::string& before, const std::string& after) const {
     const std::filesystem::path path = path_ / file;
     std::string text;

@@ -435,7 +435,7 @@ TEST(Pack, RefusesWhatValidateRefuses) {
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::invalidMesh);
     // An empty mesh is not to be mended.
-    const char* hint = mesh.positions.empty() ? "" : "; repair() can mend it";
+    const char* hint = mesh.positions.empty() ? "" : "; repair() can fix it";
     EXPECT_EQ(result.error().message, sentence + hint);
   };
   OwnedMesh mesh = slottedMesh(1, 65, 2, 10);

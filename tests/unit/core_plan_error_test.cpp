@@ -96,7 +96,7 @@ TEST_F(PlanErrors, BrokenPromises) {
   limits.promises = {2, false, false};
   expectGood();
   limits.promises.maxInfluences = 1;
-  expectInvalid({"job 0", "2 influences", "maxInfluences is 1"});
+  expectInvalid({"job 0", "2 influences", "maxInfluences must be 1"});
   limits.promises = {0, true, false};
   expectInvalid({"job 0", "morph targets", "noMorphTargets"});
   limits.promises = {0, false, true};
@@ -193,7 +193,7 @@ TEST_F(PlanErrors, MethodsWithACenterOfRotationForAMeshWithoutAny) {
       continue;
     }
     const std::string sentence = "job 1: " + std::string(methodName(method)) +
-                                 " needs centres of rotation, its mesh has none";
+                                 " needs centers of rotation, but its mesh has none";
     expectInvalid({sentence.c_str()});
   }
 }

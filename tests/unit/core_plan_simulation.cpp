@@ -295,7 +295,7 @@ class Simulation {
     // The kernel reads the box of snorm16 positions from the first extension only.
     const VertexFormat positions = dispatch.variant.positions;
     if (positions == VertexFormat::snorm16x3 || positions == VertexFormat::snorm16x4) {
-      constexpr std::uint32_t box = offsetof(abi::ExtensionRecord, centreX) / 4;
+      constexpr std::uint32_t box = offsetof(abi::ExtensionRecord, centerX) / 4;
       constexpr std::uint32_t extension = offsetof(abi::InstanceRecord, extension) / 4;
       for (std::uint32_t instance = 1; instance < count; ++instance) {
         for (std::uint32_t index = box; index < box + 6; ++index) {
@@ -439,7 +439,7 @@ class Simulation {
     if (job.positions.format != VertexFormat::snorm16x3 &&
         job.positions.format != VertexFormat::snorm16x4)
       return;
-    const std::array<float, 3> centre{extension.centreX, extension.centreY, extension.centreZ};
+    const std::array<float, 3> centre{extension.centerX, extension.centerY, extension.centerZ};
     const std::array<float, 3> inverse{extension.inverseX, extension.inverseY, extension.inverseZ};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = static_cast<double>(job.box.min[axis]);

@@ -200,8 +200,9 @@ TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
   create();
   ASSERT_TRUE(scene->addPose(250).ok());
   expectRefused(scene->addPose(400), ErrorCode::limitExceeded,
-                "a pose takes 400 joints in one pose buffer, which holds at most 682; those that "
-                "the CPU writes hold 256, of which 254 are in use, and may hold 600");
+                "a pose takes 400 joints in one pose buffer, which holds at most 682; all pose "
+                "buffers that the CPU writes hold 256 joints, of which 254 are in use; their "
+                "maximum is 600");
   std::vector<PoseHandle> poses(1000);
   expectRefused(scene->addPoses(poses, 20, {.writer = PoseWriter::gpu}), ErrorCode::limitExceeded,
                 "1000 poses take 20000 joints in one pose buffer, which holds at most 1365");

@@ -82,7 +82,7 @@ TEST_F(ValidateMorphs, VerticesMustRise) {
     vertices[1] = second;
     EXPECT_EQ(onlyFinding(MeshProblem::morphVertices, 1, 0),
               "mesh 'Fox': morph target 1 displaces vertex " + std::to_string(second) +
-                  ", which lies outside the mesh or does not come after the one before");
+                  ", which is outside the mesh or not in ascending order");
   }
   vertices = {9, 5, 2};
   targets[1].vertices = vertices;
@@ -150,7 +150,7 @@ TEST_F(ValidateMorphs, ComponentsAndStrides) {
   displacements.stride = 11;
   EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
             "mesh 'Fox': the stride of the tangent displacements of morph target 0 is 11 bytes, "
-            "an element has 12");
+            "but an element has 12");
 }
 
 TEST_F(ValidateMorphs, BadViewsAreNotRead) {

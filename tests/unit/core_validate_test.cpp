@@ -117,7 +117,7 @@ TEST_F(ValidateTest, CountsThatDisagree) {
                {&view.tangents, "tangents"},
                {&view.dualQuaternionWeights, "dual-quaternion weights"},
                {&view.bulgeStrengths, "bulge strengths"},
-               {&view.centersOfRotation, "centres of rotation"},
+               {&view.centersOfRotation, "centers of rotation"},
                {&set.joints, "joints"},
                {&set.weights, "weights"}};
   for (const auto& [attribute, name] : cases) {
@@ -144,7 +144,7 @@ TEST_F(ValidateTest, StridesThatAreTooSmall) {
                {&view.tangents, "tangents", 16},
                {&view.dualQuaternionWeights, "dual-quaternion weights", 4},
                {&view.bulgeStrengths, "bulge strengths", 4},
-               {&view.centersOfRotation, "centres of rotation", 12},
+               {&view.centersOfRotation, "centers of rotation", 12},
                {&set.joints, "joints", 16},
                {&set.weights, "weights", 16}};
   for (const auto& [attribute, name, size] : cases) {
@@ -153,7 +153,7 @@ TEST_F(ValidateTest, StridesThatAreTooSmall) {
       attribute->stride = stride;
       EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
                 "mesh 'Fox': the stride of the " + std::string(name) + " is " +
-                    std::to_string(stride) + " bytes, an element has " + std::to_string(size));
+                    std::to_string(stride) + " bytes, but an element has " + std::to_string(size));
     }
     attribute->stride = size;
   }
@@ -183,7 +183,7 @@ TEST_F(ValidateTest, TypesThatAnAttributeMayHave) {
        "dual-quaternion weights",
        {Type::float32, Type::unorm8, Type::unorm16}},
       {&view.bulgeStrengths, "bulge strengths", {Type::float32, Type::unorm8, Type::unorm16}},
-      {&view.centersOfRotation, "centres of rotation", {Type::float32}},
+      {&view.centersOfRotation, "centers of rotation", {Type::float32}},
       {&set.joints, "joints", {Type::uint8, Type::uint16, Type::uint32}},
       {&set.weights, "weights", {Type::float32, Type::unorm8, Type::unorm16}}};
   for (const auto& [attribute, name, allowed] : cases) {
@@ -235,7 +235,7 @@ TEST_F(ValidateTest, SharesHaveOneComponentCentersThree) {
     std::uint32_t allowed;
   } cases[] = {{&view.dualQuaternionWeights, "dual-quaternion weights", 1},
                {&view.bulgeStrengths, "bulge strengths", 1},
-               {&view.centersOfRotation, "centres of rotation", 3}};
+               {&view.centersOfRotation, "centers of rotation", 3}};
   for (const auto& [attribute, name, allowed] : cases) {
     const AttributeView good = *attribute;
     for (const std::uint32_t components : {0u, 1u, 2u, 3u, 4u, 0xffffffffu}) {
@@ -256,20 +256,20 @@ TEST_F(ValidateTest, StridesAreHeldAgainstTheTypesSize) {
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.positions.stride = 5;
   EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
-            "mesh 'Fox': the stride of the positions is 5 bytes, an element has 6");
+            "mesh 'Fox': the stride of the positions is 5 bytes, but an element has 6");
   view.positions = mesh.view().positions;
   view.tangents.type = ComponentType::snorm8;
   view.tangents.stride = 4;
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   view.tangents.stride = 3;
   EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
-            "mesh 'Fox': the stride of the tangents is 3 bytes, an element has 4");
+            "mesh 'Fox': the stride of the tangents is 3 bytes, but an element has 4");
 }
 
 TEST_F(ValidateTest, JointsAndWeightsOfDifferentNumber) {
   set.joints.components = 3;
   EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
-            "mesh 'Fox': an influence set has 3 joints but 4 weights a vertex");
+            "mesh 'Fox': an influence set has 3 joints but 4 weights per vertex");
   set.joints.components = 0;
   onlyFinding(MeshProblem::wrongFormat, 2, 0);
 }
@@ -292,7 +292,7 @@ TEST_F(ValidateTest, NonFiniteAttributes) {
   } cases[] = {{MeshProblem::nonFinitePosition, &mesh.positions, 3, "position"},
                {MeshProblem::nonFiniteNormal, &mesh.normals, 3, "normal"},
                {MeshProblem::nonFiniteTangent, &tangents, 4, "tangent"},
-               {MeshProblem::nonFiniteCenter, &mesh.centersOfRotation, 3, "centre of rotation"}};
+               {MeshProblem::nonFiniteCenter, &mesh.centersOfRotation, 3, "center of rotation"}};
   for (const auto& [problem, values, components, name] : cases) {
     const std::vector<float> good = *values;
     for (std::size_t component = 0; component < components; ++component) {
@@ -583,7 +583,7 @@ TEST_F(ValidateTest, VerticesWithoutWeight) {
     for (std::size_t slot = 0; slot < 4; ++slot) mesh.weights[vertex * 4 + slot] = 0;
   }
   EXPECT_EQ(onlyFinding(MeshProblem::vertexWithoutWeight, 2, 3),
-            "mesh 'Fox', vertex 3: no joint has weight; it stays in bind pose");
+            "mesh 'Fox', vertex 3: no joint has a weight; the vertex stays in bind pose");
 }
 
 TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {

@@ -177,7 +177,7 @@ TEST(GltfAccessor, ReadsSparseDataThatBreaksRules) {
   };
   const auto positions = [](const gltf::Model& model) { return firstPrimitive(model).positions; };
   EXPECT_EQ(positions(expectNoted(withIndices({2, 0}),
-                                  "accessor 0: sparse index 1 is 0 after 2: they must rise")),
+                                  "accessor 0: sparse index 1 is 0 after 2: they must ascend")),
             (Floats{-1, -2, -3, 1, 0, 0, 7, 8, 9}));
   EXPECT_EQ(positions(expectNoted(withIndices({1, 1}), "accessor 0: sparse index 1 is 1 after 1")),
             (Floats{0, 0, 0, -1, -2, -3, 0, 2, 0}));
@@ -272,13 +272,13 @@ TEST(GltfAccessor, RefusesBadDescriptions) {
   expectAfter("componentType", nullptr, "accessor 0: it has no componentType");
   expectAfter("type", "VEC5", "accessor 0: type is 'VEC5'");
   expectAfter("type", nullptr, "accessor 0: it has no type");
-  expectAfter("count", 0, "JOINTS_0: accessor 1 has 3 elements where POSITION has 0");
-  expectAfter("count", -3, "accessor 0: count is not a whole number");
+  expectAfter("count", 0, "JOINTS_0: accessor 1 has 3 elements, but POSITION has 0");
+  expectAfter("count", -3, "accessor 0: count is not an integer");
   expectAfter("count", nullptr, "accessor 0: it has no count");
   expectAfter("bufferView", 12, "accessor 0: bufferView is 12, and the file has 3 bufferViews");
-  expectAfter("bufferView", -1, "accessor 0: bufferView is not a whole number");
+  expectAfter("bufferView", -1, "accessor 0: bufferView is not an integer");
   expectAfter("normalized", 1, "accessor 0: normalized is neither true nor false");
-  expectAfter("byteOffset", "4", "accessor 0: byteOffset is not a whole number");
+  expectAfter("byteOffset", "4", "accessor 0: byteOffset is not an integer");
 
   file = skinnedTriangle();
   file.json["bufferViews"][0]["buffer"] = 1;
@@ -324,7 +324,7 @@ TEST(GltfAccessor, NotesFaultsOfWhatNothingSkinnedUses) {
   file.attributes()["TEXCOORD_0"] = unused;
   const gltf::Model model = expectNoted(file, "accessor 3: sparse: it has no indices");
   EXPECT_TRUE(firstPrimitive(model).texcoords.empty());
-  EXPECT_TRUE(hasNote(model, "TEXCOORD_0: accessor 3 is SCALAR of unsigned byte where VEC2"))
+  EXPECT_TRUE(hasNote(model, "TEXCOORD_0: accessor 3 is SCALAR of unsigned byte, not VEC2"))
       << testing::PrintToString(model.notes);
   // As soon as it is skinned, it is an error.
   file.json["nodes"].back()["skin"] = 0;

@@ -132,7 +132,7 @@ TEST(GltfAnimation, NormalizesRotationKeys) {
   Floats values = turnAboutZ({0, 90});
   for (float& value : values) value *= 3;
   const gltf::Model model = loaded(animated({0, 1}, values, "rotation", "LINEAR"));
-  EXPECT_EQ(model.notes.at(0), "2 rotation keys in 1 channel not of unit length, normalised");
+  EXPECT_EQ(model.notes.at(0), "2 rotation keys in 1 channel not of unit length, normalized");
   EXPECT_NEAR(angleAt(model, 0.5), 45, 1e-5);
   EXPECT_FLOAT_EQ(model.clips[0].channels[0].values[3], 1.0f);
 }
@@ -261,7 +261,7 @@ TEST(GltfAnimation, LeavesOutChannelsThatItDoesNotKnow) {
   gltf::Model model = loaded(file);
   EXPECT_EQ(model.clips.at(0).channels.size(), 1u);
   EXPECT_EQ(xAt(model, 1), 1);
-  EXPECT_EQ(model.notes.at(0), "1 animation channel with a target that is not known, left out");
+  EXPECT_EQ(model.notes.at(0), "1 animation channel with an unknown target, left out");
 }
 
 // The accessor of the times has no bytes: a placeholder, of which nothing can be made.
@@ -303,34 +303,35 @@ TEST(GltfAnimation, RefusesBadTimes) {
 
   FileBuilder file = withTimes({0, 1});
   sampler(file)["input"] = file.add<std::uint16_t>({0, 1}, "SCALAR", unsignedShortType);
-  expectInvalid(file, "input: accessor 5 is SCALAR of unsigned short where SCALAR of float");
+  expectInvalid(file, "input: accessor 5 is SCALAR of unsigned short, not SCALAR of float");
   sampler(file)["input"] = sampler(file)["output"];
-  expectInvalid(file, "input: accessor 4 is VEC3 of float where SCALAR");
+  expectInvalid(file, "input: accessor 4 is VEC3 of float, not SCALAR");
 }
 
 TEST(GltfAnimation, RefusesBadValues) {
-  expectInvalid(animated({0, 1}, Floats(9), "translation", "LINEAR"),
-                "animation 0 channel 0 output: accessor 4 has 3 elements where 2 belong to 2 keys");
+  expectInvalid(
+      animated({0, 1}, Floats(9), "translation", "LINEAR"),
+      "animation 0 channel 0 output: accessor 4 has 3 elements, but there must be 2 for 2 keys");
   expectInvalid(animated({0, 1}, Floats(6), "translation", "CUBICSPLINE"),
-                "accessor 4 has 2 elements where 6 belong to 2 keys");
+                "accessor 4 has 2 elements, but there must be 6 for 2 keys");
   const float nan = std::numeric_limits<float>::quiet_NaN();
   expectInvalid(animated({0, 1}, {0, 0, 0, 0, nan, 0}, "translation", "LINEAR"),
                 "output: element 1 of accessor 4 is not finite");
   FileBuilder file = animated({0, 1}, Floats(6), "translation", "LINEAR");
   channel(file)["target"]["path"] = "rotation";
-  expectInvalid(file, "output: accessor 4 is VEC3 of float where VEC4");
+  expectInvalid(file, "output: accessor 4 is VEC3 of float, not VEC4");
   sampler(file)["output"] = file.add(std::vector<std::int8_t>(8), "VEC4", byteType);
-  expectInvalid(file, "output: accessor 5 is VEC4 of byte where VEC4 of float or normalized byte");
+  expectInvalid(file, "output: accessor 5 is VEC4 of byte, not VEC4 of float or normalized byte");
   channel(file)["target"]["path"] = "scale";
   sampler(file)["output"] = file.add(std::vector<std::uint32_t>(6), "VEC3", unsignedIntType);
-  expectInvalid(file, "output: accessor 6 is VEC3 of unsigned int where VEC3 of float");
+  expectInvalid(file, "output: accessor 6 is VEC3 of unsigned int, not VEC3 of float");
 }
 
 TEST(GltfAnimation, ReadsKeysThatBreakRules) {
   // Equal times are a jump to the later key.
   gltf::Model model = expectNoted(
       animated({0, 1, 1, 2}, {0, 0, 0, 1, 0, 0, 5, 0, 0, 7, 0, 0}, "translation", "LINEAR"),
-      "key 2 of accessor 3 is at 1 seconds after 1: times must rise");
+      "key 2 of accessor 3 is at 1 seconds after 1: times must ascend");
   EXPECT_EQ(xAt(model, 0.5), 0.5);
   EXPECT_EQ(xAt(model, 1), 5);
   EXPECT_EQ(xAt(model, 1.5), 6);
@@ -348,10 +349,10 @@ TEST(GltfAnimation, ReadsKeysThatBreakRules) {
   EXPECT_EQ(xAt(model, 5), 7);
   FileBuilder file = animated({0, 1}, Floats(6), "translation", "LINEAR");
   sampler(file)["output"] = file.add<std::int8_t>({0, 0, 0, 127, 0, 0}, "VEC3", byteType, true);
-  EXPECT_EQ(xAt(expectNoted(file, "output: accessor 5 is VEC3 of normalized byte where VEC3"), 1),
+  EXPECT_EQ(xAt(expectNoted(file, "output: accessor 5 is VEC3 of normalized byte, not VEC3"), 1),
             1);
   sampler(file)["output"] = file.add<std::int16_t>({0, 0, 0, 300, 0, 0}, "VEC3", shortType);
-  EXPECT_EQ(xAt(expectNoted(file, "output: accessor 6 is VEC3 of short where VEC3"), 1), 300);
+  EXPECT_EQ(xAt(expectNoted(file, "output: accessor 6 is VEC3 of short, not VEC3"), 1), 300);
   // Nothing can be made of no keys at all.
   file.json["accessors"][sampler(file)["input"].get<std::size_t>()]["count"] = 0;
   sampler(file)["output"] = file.addAccessor(
@@ -371,12 +372,12 @@ TEST(GltfAnimation, UsesAStrideWhereNoneMayStand) {
 TEST(GltfAnimation, LeavesOutChannelsWithoutEffect) {
   FileBuilder file = animated({0, 1}, {0, 0, 0, 1, 0, 0}, "translation", "LINEAR");
   file.json["animations"][0]["channels"].push_back(Json(channel(file)));
-  EXPECT_EQ(expectNoted(file, "animation 0 channel 1: it moves what another channel moves")
+  EXPECT_EQ(expectNoted(file, "animation 0 channel 1: another channel already animates")
                 .clips[0]
                 .channels.size(),
             1u);
   channel(file)["target"] = {{"node", 1}, {"path", "weights"}};
-  EXPECT_EQ(expectNoted(file, "animation 0 channel 0: node 1 has no mesh whose weights")
+  EXPECT_EQ(expectNoted(file, "animation 0 channel 0: node 1 has no mesh, so there are no weights")
                 .clips[0]
                 .channels.size(),
             1u);
@@ -389,7 +390,7 @@ TEST(GltfAnimation, RefusesBadTargets) {
   file.json["animations"][0]["channels"].push_back(Json(channel(file)));
   file.json["animations"][0]["samplers"].push_back(Json(sampler(file)));
   file.json["animations"][0]["channels"][1]["sampler"] = 1;
-  expectInvalid(file, "animation 0 channel 1: it moves what another channel moves");
+  expectInvalid(file, "animation 0 channel 1: another channel already animates");
   file = animated({0, 1}, Floats(6), "translation", "LINEAR");
   channel(file)["target"]["node"] = 3;
   expectInvalid(file, "animation 0 channel 0 target: node is 3, and the file has 3 nodes");

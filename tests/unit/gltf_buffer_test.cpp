@@ -91,10 +91,10 @@ TEST_F(GltfBuffer, OpensNothingOutsideTheFolder) {
                 "outside the file's folder");
   }
   expectError(withUri(absolute).load(folder_ / "inside"), ErrorCode::ioError,
-              isWindows ? "is not a file beside this one" : "outside the file's folder");
+              isWindows ? "is not a relative file name" : "outside the file's folder");
   for (const char* uri : {"file:///etc/passwd", "http://example.com/a.bin", "C:/a.bin"}) {
     expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
-                "is not a file beside this one");
+                "is not a relative file name");
   }
 }
 
@@ -119,7 +119,7 @@ TEST_F(GltfBuffer, FollowsLinksInsideTheFolderAlone) {
     EXPECT_EQ(loaded(withUri(uri).load(folder_ / "inside")).skinnedPrimitives.size(), 1u) << uri;
   for (const char* uri : {"bad.bin", "up/outside.bin", "twice.bin", "self/environ"}) {
     expectError(withUri(uri).load(folder_ / "inside"), ErrorCode::ioError,
-                "leads outside the file's folder by a symbolic link");
+                "leads outside the file's folder through a symbolic link");
   }
   // An absolute link into the folder stays inside too.
   std::filesystem::create_symlink(std::filesystem::canonical(folder_) / "inside" / "plain.bin",
@@ -152,7 +152,7 @@ TEST_F(GltfBuffer, SaysWhatStandsWhereAFileShould) {
 #ifndef _WIN32
   const std::filesystem::path pipe = folder_ / "pipe.bin";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  refused("pipe.bin", "pipe.bin' is a pipe, a socket or a device, and not a file");
+  refused("pipe.bin", "pipe.bin' is a pipe, a socket or a device, not a file");
   std::filesystem::create_symlink("loop.bin", folder_ / "loop.bin");
   refused("loop.bin", "loop.bin' cannot be opened: Too many levels of symbolic links");
   if (geteuid() == 0) return;  // who may read everything
@@ -183,10 +183,10 @@ TEST_F(GltfBuffer, RefusesAFileThatIsTooShort) {
   file.json["buffers"][0]["byteLength"] = file.binary.size() + 3;
   write("short.bin", file.binary);
   const gltf::Model model = loaded(file.load(folder_));
-  EXPECT_TRUE(hasNote(model, "buffer 0: byteLength says 99 bytes, 96 are there"))
+  EXPECT_TRUE(hasNote(model, "buffer 0: byteLength is 99, but there are only 96 bytes"))
       << testing::PrintToString(model.notes);
   expectError(file.load(folder_, {.strict = true}), ErrorCode::invalidData,
-              "buffer 0: byteLength says 99 bytes, 96 are there");
+              "buffer 0: byteLength is 99, but there are only 96 bytes");
   // One that is longer is read as far as the byteLength goes.
   bytes.resize(bytes.size() + 1000);
   write("long.bin", bytes);
@@ -231,7 +231,7 @@ TEST_F(GltfBuffer, RefusesBrokenDataUris) {
   expectInvalid(withUri("data:application/octet-stream;base64"), "has no comma");
   expectInvalid(withUri("data:;base64,AAAA*AAA"), "character 4 of its data URI is not base64");
   expectInvalid(withUri("data:;base64,AAAA==AA"), "is not base64");
-  expectInvalid(withUri("data:;base64,AAAAA"), "is cut off");
+  expectInvalid(withUri("data:;base64,AAAAA"), "is truncated");
   expectInvalid(withUri("data:;base64,AAAA"), "are outside bufferView 0 of 3 bytes");
   expectInvalid(withUri("data:,%zz"), "a '%' without two digits");
 }
@@ -254,7 +254,7 @@ TEST_F(GltfBuffer, NotesABinaryChunkThatIsTooShort) {
   ASSERT_NE(found, bytes.end());
   std::transform(longer.begin(), longer.end(), found,
                  [](char character) { return static_cast<std::byte>(character); });
-  EXPECT_EQ(expectNoted(bytes, "buffer 0: byteLength says 99 bytes, 96 are there")
+  EXPECT_EQ(expectNoted(bytes, "buffer 0: byteLength is 99, but there are only 96 bytes")
                 .skinnedPrimitives.size(),
             1u);
 }
@@ -271,8 +271,7 @@ TEST_F(GltfBuffer, ReadsPastABufferThatNothingSkinnedUses) {
   const gltf::Model model = loaded(file.load(folder_));
   EXPECT_TRUE(firstPrimitive(model).texcoords.empty());
   EXPECT_TRUE(hasNote(model, "buffer 1: there is no file")) << testing::PrintToString(model.notes);
-  EXPECT_TRUE(
-      hasNote(model, "accessor 3: it is broken, or its bytes are not there; it is left out"));
+  EXPECT_TRUE(hasNote(model, "accessor 3: it is invalid, or its data is missing; it is left out"));
   expectError(file.load(folder_, {.strict = true}), ErrorCode::ioError, "buffer 1: there is no");
   file.attributes()["POSITION"] = 3;
   expectError(file.load(folder_), ErrorCode::ioError, "buffer 1: there is no file");
@@ -281,7 +280,7 @@ TEST_F(GltfBuffer, ReadsPastABufferThatNothingSkinnedUses) {
 TEST_F(GltfBuffer, RefusesBadDescriptions) {
   FileBuilder file = withUri("x.bin");
   file.json["buffers"][0]["uri"] = 4;
-  expectInvalid(file, "buffer 0: uri is not a text");
+  expectInvalid(file, "buffer 0: uri is not a string");
   file.json["buffers"][0].erase("byteLength");
   expectInvalid(file, "buffer 0: it has no byteLength");
   file.json["buffers"][0] = {{"byteLength", 0}, {"uri", "data:,"}};

@@ -67,7 +67,7 @@ TEST(GltfContainer, RefusesBadGlbNumbers) {
 
   auto bytes = good;
   bytes.resize(11);
-  expectInvalidBytes(bytes, "the GLB header is cut off");
+  expectInvalidBytes(bytes, "the GLB header is truncated");
 
   bytes = good;
   setWord(bytes, 4, 1);
@@ -127,16 +127,16 @@ TEST(GltfContainer, RefusesZeroBytesInTheText) {
   const std::string text = skinnedTriangle().text();
   expectNoted(bytesOf(text + std::string(5, '\0')), "padded with zero bytes");
   expectInvalidBytes(bytesOf(text + std::string("\0x", 2)),
-                     "the JSON text is broken at byte " + std::to_string(text.size()));
+                     "the JSON text is invalid at byte " + std::to_string(text.size()));
 }
 
 TEST(GltfContainer, RefusesBrokenJson) {
-  expectInvalidBytes(bytesOf("{\"asset\":"), "the JSON text is broken at byte");
+  expectInvalidBytes(bytesOf("{\"asset\":"), "the JSON text is invalid at byte");
   expectInvalidBytes(bytesOf("[1, 2]"), "the JSON text is not an object");
   expectInvalidBytes(bytesOf("{}"), "no object 'asset'");
   expectInvalidBytes(bytesOf("{\"asset\": {}}"), "no version");
   expectInvalidBytes(bytesOf("{\"asset\": {\"version\": \"2.0\"}, \"scene\": 1e999}"), "too large");
-  expectInvalidBytes(bytesOf("{\"asset\": {\"version\": \"\xff\"}}"), "broken at byte");
+  expectInvalidBytes(bytesOf("{\"asset\": {\"version\": \"\xff\"}}"), "invalid at byte");
 }
 
 // A parser that recurses would end with its stack: the nesting is measured first.
@@ -206,9 +206,9 @@ TEST(GltfContainer, TakesWholeNumbersWithAFractionOfZero) {
   file.json["accessors"][0]["count"] = 3.0;
   EXPECT_EQ(loaded(file).skinnedPrimitives.size(), 1u);
   file.json["scene"] = 0.5;
-  expectInvalid(file, "the file: scene is not a whole number");
+  expectInvalid(file, "the file: scene is not an integer");
   file.json["scene"] = -1;
-  expectInvalid(file, "the file: scene is not a whole number");
+  expectInvalid(file, "the file: scene is not an integer");
 }
 
 // 2^32 would be 0 in an int: the file would be read as another one.
@@ -217,7 +217,7 @@ TEST(GltfContainer, RefusesNumbersThatWouldWrap) {
   file.json["scene"] = std::uint64_t{1} << 32;
   expectInvalid(file, "the file: scene is 4294967296");
   file.json["scene"] = ~std::uint64_t{0};
-  expectInvalid(file, "the file: scene is not a whole number");
+  expectInvalid(file, "the file: scene is not an integer");
 }
 
 TEST(GltfContainer, RefusesSectionsOfTheWrongKind) {
@@ -236,7 +236,7 @@ TEST(GltfContainer, RefusesCountlessEmptyThings) {
   std::string text = R"({"asset": {"version": "2.0"}, "materials": [{})";
   for (int i = 0; i < 300'000; ++i) text += ",{}";
   expectError(loadFromMemory(bytesOf(text + "]}"), {}), ErrorCode::limitExceeded,
-              "300001 materials: more memory is wanted than a file of this size justifies");
+              "300001 materials: it needs more memory than a file of this size justifies");
 }
 
 }  // namespace

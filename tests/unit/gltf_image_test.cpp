@@ -69,7 +69,7 @@ TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
   EXPECT_EQ(imageText(found), "picture");
   const std::string absolute = (folder / "secret.png").string();
   std::filesystem::remove(folder / "inside" / "link.png");
-  std::error_code notMade;  // where there are no links, it is a file that is absent
+  std::error_code notMade;  // without symbolic links, the file is just missing
   std::filesystem::create_symlink("../secret.png", folder / "inside" / "link.png", notMade);
   for (const std::string& uri : std::vector<std::string>{
            "../secret.png", absolute, "link.png", "absent.png", "https://example.org/a.png", "%"}) {

@@ -249,7 +249,7 @@ TEST(GltfPrimitive, MakesNoTrianglesOfPointsAndLines) {
 TEST(GltfPrimitive, LeavesOutIndicesThatMakeNoTriangle) {
   const gltf::Model model = loaded(fiveVertices(4));
   EXPECT_EQ(firstPrimitive(model).triangles, (Indices{0, 1, 2}));
-  EXPECT_TRUE(hasNote(model, "the last 2 indices make no triangle and are left out"));
+  EXPECT_TRUE(hasNote(model, "the last 2 indices do not form a triangle and are left out"));
 }
 
 TEST(GltfPrimitive, ReadsIndicesOfEveryType) {
@@ -274,7 +274,7 @@ TEST(GltfPrimitive, RefusesBadIndices) {
   file.primitive()["indices"] = file.add<std::uint8_t>({0, 255, 1}, "SCALAR", unsignedByteType);
   expectInvalid(file, "is 255, and there are 3 vertices");
   file.primitive()["indices"] = file.addFloats({0, 1, 2}, "SCALAR");
-  expectInvalid(file, "indices: accessor 5 is SCALAR of float where SCALAR of unsigned byte");
+  expectInvalid(file, "indices: accessor 5 is SCALAR of float, not SCALAR of unsigned byte");
   file.primitive()["indices"] = 0;
   expectInvalid(file, "indices: accessor 0 is VEC3 of float");
   file.primitive()["indices"] = 77;
@@ -354,7 +354,7 @@ TEST(GltfPrimitive, NotesBadMaterials) {
   file.json["materials"] = {{{"pbrMetallicRoughness", 3}}};
   expectNoted(file, "material 0: pbrMetallicRoughness is not an object");
   file.json["materials"] = {{{"pbrMetallicRoughness", {{"metallicFactor", "x"}}}}};
-  EXPECT_EQ(expectNoted(file, "material 0: metallicFactor holds something other than numbers")
+  EXPECT_EQ(expectNoted(file, "material 0: metallicFactor contains something other than numbers")
                 .materials[0]
                 .metallic,
             1.0f);
@@ -383,7 +383,7 @@ TEST(GltfPrimitive, ReadsMorphTargets) {
 TEST(GltfPrimitive, RefusesBadMorphTargets) {
   FileBuilder file = skinnedTriangle();
   file.primitive()["targets"] = {{{"POSITION", file.addFloats(Floats(6), "VEC3")}}};
-  expectInvalid(file, "morph target 0 POSITION: accessor 3 has 2 elements where");
+  expectInvalid(file, "morph target 0 POSITION: accessor 3 has 2 elements, but");
   file.primitive()["targets"] = {{{"POSITION", 2}}};
   expectInvalid(file, "morph target 0 POSITION: accessor 2 is VEC4");
   file.primitive()["targets"] = {{{"POSITION", 99}}};
@@ -408,7 +408,8 @@ TEST(GltfPrimitive, ReadsWeightsOfAnotherNumberThanTargets) {
             (Floats{4, 0}));
   file.json["meshes"][0]["weights"] = {4, 5};
   file.json["nodes"][0]["weights"] = {1};
-  expectInvalid(file, "node 0: it has 1 weights for 2 morph targets, and its mesh has others");
+  expectInvalid(file,
+                "node 0: it has 1 weights for 2 morph targets, but its mesh has more weights");
 }
 
 // A primitive without targets stays as it is while others move.
@@ -419,7 +420,7 @@ TEST(GltfPrimitive, ReadsPrimitivesOfDifferentNumbersOfTargets) {
   file.json["meshes"][0]["primitives"].insert(file.json["meshes"][0]["primitives"].begin(),
                                               without);
   const gltf::Model model =
-      expectNoted(file, "mesh 0 primitive 1: it has 2 morph targets, primitive 0 has 0");
+      expectNoted(file, "mesh 0 primitive 1: it has 2 morph targets, but primitive 0 has 0");
   EXPECT_EQ(model.meshes[0].morphTargetCount, 2u);
   EXPECT_EQ(model.meshes[0].primitives[0].morphTargets.size(), 0u);
   EXPECT_EQ(model.meshes[0].primitives[1].morphTargets.size(), 2u);
@@ -440,7 +441,7 @@ TEST(GltfPrimitive, ReadsQuantizedMeshes) {
   file.attributes()["NORMAL"] = normals;
   file.attributes()["TANGENT"] = file.add<std::int8_t>(
       {127, 0, 0, 127, 127, 0, 0, 127, 127, 0, 0, -127}, "VEC4", byteType, true);
-  expectNoted(file, "NORMAL: accessor 4 is VEC3 of normalized byte where VEC3 of float must be");
+  expectNoted(file, "NORMAL: accessor 4 is VEC3 of normalized byte, not VEC3 of float");
   EXPECT_EQ(firstPrimitive(loaded(file)).positions, (Floats{1, -2, 3, 4, 5, 6, 7, 8, 9}));
   file.json["extensionsUsed"] = {"KHR_mesh_quantization"};
   file.json["extensionsRequired"] = {"KHR_mesh_quantization"};
@@ -457,18 +458,18 @@ TEST(GltfPrimitive, RefusesFormatsThatAnAttributeMayNotHave) {
     file.attributes()[attribute] = file.add(values, type, componentType, normalized);
     expectInvalid(file, std::string("mesh 0 primitive 0 ") + attribute + ": accessor 3 is " + text);
   };
-  expectFormat("POSITION", Floats(12), "VEC4", floatType, false, "VEC4 of float where VEC3");
+  expectFormat("POSITION", Floats(12), "VEC4", floatType, false, "VEC4 of float, not VEC3");
   expectFormat("POSITION", std::vector<std::uint32_t>(9), "VEC3", unsignedIntType, false,
-               "VEC3 of unsigned int where VEC3 of float");
-  expectFormat("NORMAL", Floats(6), "VEC2", floatType, false, "VEC2 of float where VEC3");
-  expectFormat("TANGENT", Floats(9), "VEC3", floatType, false, "VEC3 of float where VEC4");
+               "VEC3 of unsigned int, not VEC3 of float");
+  expectFormat("NORMAL", Floats(6), "VEC2", floatType, false, "VEC2 of float, not VEC3");
+  expectFormat("TANGENT", Floats(9), "VEC3", floatType, false, "VEC3 of float, not VEC4");
   expectFormat("JOINTS_0", std::vector<std::uint16_t>(9), "VEC3", unsignedShortType, false,
-               "VEC3 of unsigned short where VEC4");
+               "VEC3 of unsigned short, not VEC4");
   expectFormat("WEIGHTS_0", std::vector<std::uint32_t>(12), "VEC4", unsignedIntType, false,
-               "VEC4 of unsigned int where VEC4 of float or normalized unsigned byte");
+               "VEC4 of unsigned int, not VEC4 of float or normalized unsigned byte");
   expectFormat("WEIGHTS_0", std::vector<std::int16_t>(12), "VEC4", shortType, false,
-               "VEC4 of short where");
-  expectFormat("WEIGHTS_0", Floats(9), "VEC3", floatType, false, "VEC3 of float where VEC4");
+               "VEC4 of short, not");
+  expectFormat("WEIGHTS_0", Floats(9), "VEC3", floatType, false, "VEC3 of float, not VEC4");
 }
 
 // A joint is an integer whatever stores it.
@@ -479,16 +480,16 @@ TEST(GltfPrimitive, ReadsJointsOfFormatsThatTheyMayNotHave) {
     return onlySet(firstPrimitive(expectNoted(file, "JOINTS_0: accessor 3 is VEC4 of " + text)));
   };
   const Bytes bytes{0, 1, 0, 0, 1, 0, 0, 0, 200, 1, 0, 0};
-  gltf::Influences set = read(bytes, unsignedByteType, true, "normalized unsigned byte where");
+  gltf::Influences set = read(bytes, unsignedByteType, true, "normalized unsigned byte, not");
   EXPECT_EQ(set.jointType, ComponentType::uint8);
   EXPECT_EQ(componentsOf<std::uint8_t>(set.joints), bytes);
   const Shorts shorts{0, 1, 0, 0, 1, 0, 0, 0, 65535, 1, 0, 0};
-  set = read(Floats(shorts.begin(), shorts.end()), floatType, false, "float where");
+  set = read(Floats(shorts.begin(), shorts.end()), floatType, false, "float, not");
   EXPECT_EQ(set.jointType, ComponentType::uint16);
   EXPECT_EQ(componentsOf<std::uint16_t>(set.joints), shorts);
-  set = read(Indices(shorts.begin(), shorts.end()), unsignedIntType, false, "unsigned int where");
+  set = read(Indices(shorts.begin(), shorts.end()), unsignedIntType, false, "unsigned int, not");
   EXPECT_EQ(componentsOf<std::uint16_t>(set.joints), shorts);
-  set = read(std::vector<std::int16_t>(12, 300), shortType, false, "short where");
+  set = read(std::vector<std::int16_t>(12, 300), shortType, false, "short, not");
   EXPECT_EQ(componentsOf<std::uint16_t>(set.joints), Shorts(12, 300));
 
   const auto expectNoJoint = [](auto values, int type, const std::string& text) {
@@ -496,7 +497,7 @@ TEST(GltfPrimitive, ReadsJointsOfFormatsThatTheyMayNotHave) {
     file.attributes()["JOINTS_0"] = file.add(values, "VEC4", type);
     expectInvalid(file, "mesh 0 primitive 0 JOINTS_0: component 0 of vertex 0 is " + text);
   };
-  expectNoJoint(Floats(12, 0.5f), floatType, "0.5, which is no joint");
+  expectNoJoint(Floats(12, 0.5f), floatType, "0.5, which is not a joint");
   expectNoJoint(Floats(12, -1), floatType, "-1, which");
   expectNoJoint(Floats(12, std::numeric_limits<float>::quiet_NaN()), floatType, "nan, which");
   expectNoJoint(Indices(12, 65536), unsignedIntType, "65536, which");
@@ -514,7 +515,7 @@ TEST(GltfPrimitive, ReadsWeightsOfFormatsThatTheyMayNotHave) {
   EXPECT_EQ(componentsOf<std::uint8_t>(set.weights), bytes);
   file.attributes()["WEIGHTS_0"] =
       file.add(std::vector<std::int16_t>(12, 32767), "VEC4", shortType, true);
-  set = onlySet(firstPrimitive(expectNoted(file, "accessor 4 is VEC4 of normalized short where")));
+  set = onlySet(firstPrimitive(expectNoted(file, "accessor 4 is VEC4 of normalized short, not")));
   EXPECT_EQ(set.weightType, ComponentType::float32);
   EXPECT_EQ(componentsOf<float>(set.weights), Floats(12, 1.0f));
 }
@@ -528,13 +529,13 @@ TEST(GltfPrimitive, LeavesOutAttributesThatConcernNoVertex) {
     return firstPrimitive(expectNoted(file, text));
   };
   EXPECT_TRUE(leaveOut("TEXCOORD_0", Floats(9), "VEC3", floatType,
-                       "mesh 0 primitive 0 TEXCOORD_0: accessor 3 is VEC3 of float where VEC2")
+                       "mesh 0 primitive 0 TEXCOORD_0: accessor 3 is VEC3 of float, not VEC2")
                   .texcoords.empty());
   EXPECT_TRUE(leaveOut("TEXCOORD_0", Floats(4), "VEC2", floatType,
-                       "TEXCOORD_0: accessor 3 has 2 elements where POSITION has 3")
+                       "TEXCOORD_0: accessor 3 has 2 elements, but POSITION has 3")
                   .texcoords.empty());
   EXPECT_TRUE(leaveOut("COLOR_0", Floats(6), "VEC2", floatType,
-                       "COLOR_0: accessor 3 is VEC2 of float where VEC4")
+                       "COLOR_0: accessor 3 is VEC2 of float, not VEC4")
                   .colors.empty());
   leaveOut("_LEVEL", Floats{1, 2}, "SCALAR", floatType, "'_LEVEL': accessor 3 has 2 elements");
   FileBuilder file = skinnedTriangle();
@@ -571,10 +572,10 @@ TEST(GltfPrimitive, RefusesJointsWithoutWeightsAndTheReverse) {
 TEST(GltfPrimitive, RefusesCountsThatDisagree) {
   FileBuilder file = skinnedTriangle();
   file.accessor("WEIGHTS_0")["count"] = 2;
-  expectInvalid(file, "WEIGHTS_0: accessor 2 has 2 elements where POSITION has 3");
+  expectInvalid(file, "WEIGHTS_0: accessor 2 has 2 elements, but POSITION has 3");
   file = skinnedTriangle();
   file.attributes()["NORMAL"] = file.addFloats(Floats(6), "VEC3");
-  expectInvalid(file, "NORMAL: accessor 3 has 2 elements where POSITION has 3");
+  expectInvalid(file, "NORMAL: accessor 3 has 2 elements, but POSITION has 3");
 }
 
 TEST(GltfPrimitive, RefusesBadDescriptions) {
@@ -591,10 +592,10 @@ TEST(GltfPrimitive, RefusesBadDescriptions) {
   expectInvalid(file, "mesh 0: it has no primitives");
   file = skinnedTriangle();
   file.primitive()["mode"] = 7;
-  expectInvalid(file, "mesh 0 primitive 0: mode is none of 0 to 6");
+  expectInvalid(file, "mesh 0 primitive 0: mode is not from 0 to 6");
   file = skinnedTriangle();
   file.json["meshes"][0]["name"] = 4;
-  EXPECT_EQ(expectNoted(file, "mesh 0: its name is not a text").meshes[0].name, "");
+  EXPECT_EQ(expectNoted(file, "mesh 0: its name is not a string").meshes[0].name, "");
 }
 
 // Whether a joint exists is a matter of each vertex, which `validate` looks at.

@@ -178,7 +178,7 @@ void addBuffers(std::vector<Violation>& table) {
       table.end(),
       {
           {"buffer_shorter_than_it_says", noted, Three::loads,
-           "buffer 0: byteLength says 343 bytes, 340 are there",
+           "buffer 0: byteLength is 343, but there are only 340 bytes",
            [withBuffer](File& f) { withBuffer(f, f.binary.size() + 3); }},
           {"buffer_too_short", refused, Three::refuses, "are outside bufferView 9 of 4 bytes",
            [withBuffer](File& f) {
@@ -256,12 +256,12 @@ void addBuffers(std::vector<Violation>& table) {
              accessor(f, times)["max"] = {0.25};
            }},
           {"sparse_indices_that_fall", noted, Three::loads,
-           "accessor 4: sparse index 1 is 1 after 2: they must rise",
+           "accessor 4: sparse index 1 is 1 after 2: they must ascend",
            [](File& f) {
              makeSparse(f, {2, 1}, {7, 8, 9, 4, 5, 6});
            }},
           {"sparse_index_twice", noted, Three::loads,
-           "accessor 4: sparse index 1 is 1 after 1: they must rise",
+           "accessor 4: sparse index 1 is 1 after 1: they must ascend",
            [](File& f) {
              makeSparse(f, {1, 1}, {0, 0, 0, 4, 5, 6});
            }},
@@ -285,8 +285,7 @@ void addMeshes(std::vector<Violation>& table) {
       table.end(),
       {
           {"joints_of_float", noted, Three::loads,
-           "JOINTS_0: accessor 1 is VEC4 of float where VEC4 of unsigned byte or unsigned short "
-           "must be",
+           "JOINTS_0: accessor 1 is VEC4 of float, not VEC4 of unsigned byte or unsigned short",
            [](File& f) {
              store(f, joints, Floats{0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, floatType);
            }},
@@ -305,7 +304,7 @@ void addMeshes(std::vector<Violation>& table) {
            "JOINTS_0: accessor 1 is VEC4 of normalized unsigned byte",
            [](File& f) { accessor(f, joints)["normalized"] = true; }},
           {"joints_with_a_fraction", refused, Three::refuses,
-           "JOINTS_0: component 1 of vertex 2 is 0.5, which is no joint",
+           "JOINTS_0: component 1 of vertex 2 is 0.5, which is not a joint",
            [](File& f) {
              store(f, joints, Floats{0, 0, 0, 0, 1, 0, 0, 0, 0, 0.5f, 0, 0}, floatType);
            }},
@@ -322,7 +321,7 @@ void addMeshes(std::vector<Violation>& table) {
                    shortType, true);
            }},
           {"positions_quantized_without_saying_so", noted, Three::loads,
-           "POSITION: accessor 0 is VEC3 of short where VEC3 of float must be",
+           "POSITION: accessor 0 is VEC3 of short, not VEC3 of float",
            [](File& f) {
              store(f, positions, std::vector<std::int16_t>{0, 0, 0, 1, 0, 0, 0, 2, 0}, shortType);
            }},
@@ -330,7 +329,7 @@ void addMeshes(std::vector<Violation>& table) {
            "indices: accessor 3 is SCALAR of normalized unsigned short",
            [](File& f) { accessor(f, indices)["normalized"] = true; }},
           {"indices_left_over", noted, Three::loads,
-           "mesh 0 primitive 0: the last 1 indices make no triangle and are left out",
+           "mesh 0 primitive 0: the last 1 indices do not form a triangle and are left out",
            [](File& f) {
              store(f, indices, Shorts{0, 1, 2, 0}, unsignedShortType);
              accessor(f, indices)["count"] = 4;
@@ -343,11 +342,11 @@ void addMeshes(std::vector<Violation>& table) {
            },
            false},
           {"texcoords_of_three", noted, Three::loads,
-           "TEXCOORD_0: accessor 0 is VEC3 of float where VEC2 of float or normalized unsigned "
-           "byte or normalized unsigned short must be",
+           "TEXCOORD_0: accessor 0 is VEC3 of float, not VEC2 of float or normalized unsigned "
+           "byte or normalized unsigned short",
            [](File& f) { f.attributes()["TEXCOORD_0"] = positions; }},
           {"texcoords_of_another_count", noted, Three::loads,
-           "TEXCOORD_0: accessor 10 has 2 elements where POSITION has 3",
+           "TEXCOORD_0: accessor 10 has 2 elements, but POSITION has 3",
            [](File& f) {
              f.attributes()["TEXCOORD_0"] = f.addFloats({0, 0, 1, 1}, "VEC2");
            }},
@@ -358,13 +357,13 @@ void addMeshes(std::vector<Violation>& table) {
            "mesh 0 primitive 0 attributes: '_LEVEL' is 99, and the file has 10 accessors",
            [](File& f) { f.attributes()["_LEVEL"] = 99; }},
           {"normals_of_another_count", refused, Three::loads,
-           "NORMAL: accessor 10 has 2 elements where POSITION has 3 | which vertex has none is not "
+           "NORMAL: accessor 10 has 2 elements, but POSITION has 3 | which vertex has none is not "
            "said",
            [](File& f) {
              f.attributes()["NORMAL"] = f.addFloats({0, 0, 1, 0, 0, 1}, "VEC3");
            }},
           {"tangents_of_three", refused, Three::loads,
-           "TANGENT: accessor 0 is VEC3 of float where VEC4 | the handedness is missing",
+           "TANGENT: accessor 0 is VEC3 of float, not VEC4 | the handedness is missing",
            [](File& f) { f.attributes()["TANGENT"] = positions; }},
           {"joints_without_weights", refused, Three::misreads,
            "mesh 0 primitive 0: JOINTS_0 has no WEIGHTS_0",
@@ -380,7 +379,7 @@ void addMeshes(std::vector<Violation>& table) {
            "three.js has four influences only",
            [](File& f) { f.attributes()["WEIGHTS_1"] = weights; }},
           {"targets_differ", noted, Three::loads,
-           "mesh 0 primitive 1: it has 0 morph targets, primitive 0 has 1",
+           "mesh 0 primitive 1: it has 0 morph targets, but primitive 0 has 1",
            [](File& f) {
              Json second = f.primitive();
              second.erase("targets");
@@ -404,8 +403,8 @@ void addMeshes(std::vector<Violation>& table) {
            },
            false},
           {"too_few_weights_of_a_node", refused, Three::loads,
-           "node 0: it has 1 weights for 2 morph targets, and its mesh has others | three.js keeps "
-           "the mesh's for the rest, the specification has the node override them",
+           "node 0: it has 1 weights for 2 morph targets, but its mesh has more weights | three.js "
+           "keeps the mesh's for the rest, the specification has the node override them",
            [](File& f) {
              f.json["animations"][0]["channels"].erase(2);
              f.primitive()["targets"].push_back({{"POSITION", displacements}});
@@ -417,7 +416,7 @@ void addMeshes(std::vector<Violation>& table) {
            "mesh 0 primitive 0: material is 3, and the file has 0 materials",
            [](File& f) { f.primitive()["material"] = 3; }},
           {"material_value_of_no_kind", noted, Three::loads,
-           "material 0: alphaMode is 'SOME', which the specification does not know",
+           "material 0: alphaMode is 'SOME', which the specification does not define",
            [](File& f) {
              f.json["materials"] = {{{"alphaMode", "SOME"}}};
              f.primitive()["material"] = 0;
@@ -509,7 +508,7 @@ void addNodes(std::vector<Violation>& table) {
              f.json["skins"].push_back({{"joints", Json::array()}});
            }},
           {"matrix_and_translation", noted, Three::loads,
-           "node 0: it has both matrix and translation; the matrix is taken",
+           "node 0: it has both matrix and translation; the matrix is used",
            [](File& f) {
              node(f, 0)["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
              node(f, 0)["translation"] = {4, 5, 6};
@@ -522,7 +521,7 @@ void addNodes(std::vector<Violation>& table) {
              f.json["scenes"][0]["nodes"] = {0, 3};
            }},
           {"matrix_of_an_animated_node", noted, Three::loads,
-           "animation 0 channel 1: node 2 has a matrix, which has been taken apart for the "
+           "animation 0 channel 1: node 2 has a matrix, which has been decomposed for the "
            "animation",
            [](File& f) {
              node(f, 2).erase("translation");
@@ -538,7 +537,7 @@ void addNodes(std::vector<Violation>& table) {
            }},
           {"null_for_nothing", noted, Three::refuses, "node 1: 'mesh' is null",
            [](File& f) { node(f, 1)["mesh"] = nullptr; }},
-          {"name_is_a_number", noted, Three::refuses, "mesh 0: its name is not a text",
+          {"name_is_a_number", noted, Three::refuses, "mesh 0: its name is not a string",
            [](File& f) { mesh(f)["name"] = 5; }},
           {"properties_unknown", Verdict::used, Three::loads, "",
            [](File& f) {
@@ -558,7 +557,7 @@ void addNodes(std::vector<Violation>& table) {
            [](File& f) { f.json["extensionsUsed"] = Json::object(); }},
           {"version_is_a_number", noted, Three::loads, "asset: version is not written as '2.0'",
            [](File& f) { f.json["asset"]["version"] = 2; }},
-          {"version_is_missing", refused, Three::refuses, "asset: no version is given",
+          {"version_is_missing", refused, Three::refuses, "asset: it has no version",
            [](File& f) { f.json["asset"] = Json::object(); }},
       });
 }
@@ -580,13 +579,13 @@ void addAnimations(std::vector<Violation>& table) {
            },
            false},
           {"times_equal", noted, Three::loads,
-           "input: key 1 of accessor 10 is at 0 seconds after 0: times must rise",
+           "input: key 1 of accessor 10 is at 0 seconds after 0: times must ascend",
            [retime](File& f) {
              retime(f, {0, 0, 1});
            },
            false},
           {"times_that_fall", refused, Three::loads,
-           "input: key 2 of accessor 10 is at 0.25 seconds after 1: times must rise | three.js "
+           "input: key 2 of accessor 10 is at 0.25 seconds after 1: times must ascend | three.js "
            "searches them as they stand, others sort them",
            [retime](File& f) {
              retime(f, {0, 1, 0.25f});
@@ -610,35 +609,35 @@ void addAnimations(std::vector<Violation>& table) {
            "said",
            [](File& f) { sampler(f, 0)["interpolation"] = "SMOOTH"; }},
           {"keys_of_another_count", refused, Three::misreads,
-           "output: accessor 10 has 3 elements where 2 belong to 2 keys",
+           "output: accessor 10 has 3 elements, but there must be 2 for 2 keys",
            [](File& f) {
              sampler(f, 0)["output"] = f.addFloats({0, 0, 0, 1, 0, 0, 2, 0, 0}, "VEC3");
            }},
           {"translations_of_short", noted, Three::loads,
-           "output: accessor 7 is VEC3 of short where VEC3 of float must be",
+           "output: accessor 7 is VEC3 of short, not VEC3 of float",
            [](File& f) {
              store(f, translations, std::vector<std::int16_t>{0, 0, 0, 1, 0, 0}, shortType);
            }},
           {"rotations_not_normalized", refused, Three::misreads,
-           "output: accessor 8 is VEC4 of byte where VEC4 of float or normalized byte",
+           "output: accessor 8 is VEC4 of byte, not VEC4 of float or normalized byte",
            [](File& f) {
              store(f, rotations, std::vector<std::int8_t>{0, 0, 0, 127, 0, 0, 90, 90}, byteType);
            }},
           {"channel_twice", noted, Three::loads,
-           "animation 0 channel 3: it moves what another channel moves, the translation of node 1, "
-           "in the same way",
+           "animation 0 channel 3: another channel already animates the translation of node 1 "
+           "with the same sampler",
            [](File& f) {
              Json& channels = f.json["animations"][0]["channels"];
              channels.push_back(Json(channels[0]));
            }},
           {"channel_contradicts_another", refused, Three::misreads,
-           "animation 0 channel 3: it moves what another channel moves, the translation of node 1",
+           "animation 0 channel 3: another channel already animates the translation of node 1",
            [](File& f) {
              addChannel(f, times, f.addFloats({5, 5, 5, 6, 6, 6}, "VEC3"),
                         {{"node", 1}, {"path", "translation"}});
            }},
           {"weights_of_no_mesh_move", noted, Three::loads,
-           "animation 0 channel 3: node 1 has no mesh whose weights could move",
+           "animation 0 channel 3: node 1 has no mesh, so there are no weights to animate",
            [](File& f) {
              addChannel(f, times, morphKeys, {{"node", 1}, {"path", "weights"}});
            }},

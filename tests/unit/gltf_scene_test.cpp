@@ -62,7 +62,7 @@ TEST(GltfNode, NormalizesRotations) {
       {{{"rotation", {0, 0, 2, 2}}}, {{"rotation", {0, 0, 0, 0}}}, {{"rotation", {0, 0, 0, 1}}}}));
   EXPECT_NEAR(model.nodes[0].rotation[2], std::sqrt(0.5), 1e-15);
   EXPECT_EQ(model.nodes[1].rotation, (std::array<double, 4>{0, 0, 0, 1}));
-  EXPECT_EQ(model.notes.at(0), "2 node rotations not of unit length, normalised");
+  EXPECT_EQ(model.notes.at(0), "2 node rotations not of unit length, normalized");
 }
 
 // A chain as deep as a hostile file likes: no recursion may follow it.
@@ -94,9 +94,9 @@ TEST(GltfNode, RefusesBadProperties) {
   expectInvalid(withNodes({{{"translation", {1, 2}}}}),
                 "node 0: translation is not an array of 3 numbers");
   expectInvalid(withNodes({{{"rotation", {1, 2, 3, "x"}}}}),
-                "node 0: rotation holds something other than numbers");
+                "node 0: rotation contains something other than numbers");
   expectInvalid(withNodes({{{"scale", {1, 1, 1e300}}}}),
-                "node 0: scale holds a number that float32 cannot hold");
+                "node 0: scale contains a number that is out of range for float32");
   expectInvalid(withNodes({{{"matrix", {1, 0, 0, 0}}}}),
                 "node 0: matrix is not an array of 16 numbers");
 }
@@ -155,7 +155,7 @@ TEST(GltfScene, TakesTheDefaultScene) {
   file.json.erase("scenes");
   model = loaded(file);
   EXPECT_EQ(model.skinnedPrimitives.size(), 1u) << "without scenes it is all root nodes";
-  EXPECT_EQ(model.notes.at(0), "the file has no scene: all its nodes are taken");
+  EXPECT_EQ(model.notes.at(0), "the file has no scene: all its nodes are used");
 }
 
 TEST(GltfScene, FindsSkinnedNodesBelowTheRoots) {
@@ -281,8 +281,7 @@ TEST(GltfSkin, RefusesBadSkins) {
   skin["inverseBindMatrices"] = 8;
   expectInvalid(file, "skin 0: inverseBindMatrices is 8, and the file has 3 accessors");
   skin["inverseBindMatrices"] = 0;
-  expectInvalid(file,
-                "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float where MAT4 of float");
+  expectInvalid(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float, not MAT4 of float");
   file.json["nodes"][0]["skin"] = 1;
   expectInvalid(file, "node 0: skin is 1, and the file has 1 skins");
   file.json["skins"] = Json::array();
@@ -303,7 +302,7 @@ TEST(GltfSkin, LeavesOutABrokenSkinThatNoNodeUses) {
   EXPECT_TRUE(gltf::pose(model, 0, none, 0).empty());
   EXPECT_EQ(model.skinnedPrimitives.at(0).skin, 1u);
   file.json["skins"][0] = {{"joints", {1, 2}}, {"inverseBindMatrices", 0}};
-  model = expectNoted(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float where MAT4");
+  model = expectNoted(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float, not MAT4");
   EXPECT_TRUE(model.skins[0].joints.empty());
   EXPECT_EQ(gltf::pose(model, 1, none, 0).size(), 2u);
 }
@@ -323,9 +322,9 @@ TEST(GltfSkin, RefusesBadMatrices) {
   expectInvalid(withMatrices(matrixByColumns(1, 0, 0, 0)),
                 "skin 0 inverseBindMatrices: accessor 3 has 1 matrices for 2 joints");
   expectInvalid(withMatrices(two(20, std::numeric_limits<float>::quiet_NaN())),
-                "skin 0: inverse bind matrix 1 holds a number that is not finite");
+                "skin 0: inverse bind matrix 1 contains a number that is not finite");
   expectInvalid(withMatrices(two(0, std::numeric_limits<float>::infinity())),
-                "skin 0: inverse bind matrix 0 holds a number that is not finite");
+                "skin 0: inverse bind matrix 0 contains a number that is not finite");
   expectInvalid(withMatrices(two(19, 0.5f)),
                 "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1");
   loaded(withMatrices(two(19, 1e-7f)));

@@ -92,7 +92,7 @@ TEST(RuntimeCompilerTest, ModulesAreKeptOnDiskAndDamageIsMended) {
     const std::vector<std::string> told = compiler.takeCacheProblems();
     ASSERT_EQ(told.size(), problems);
     for (const std::string& problem : told) {
-      EXPECT_NE(problem.find("wrong checksum and was thrown away"), std::string::npos) << problem;
+      EXPECT_NE(problem.find("wrong checksum and was deleted"), std::string::npos) << problem;
     }
     EXPECT_TRUE(compiler.takeCacheProblems().empty());
   };

@@ -1,5 +1,5 @@
-// Computes a box around a skinned mesh from its pose, without skinning it. Engines need it for
-// culling, and for positions in snorm16, which are relative to a box. `jointBounds` collects what
+// Computes a box around a skinned mesh from its pose, without skinning it. Engines need such a box
+// for culling, and for snorm16 positions, which are relative to a box. `jointBounds` collects what
 // is needed about the vertices, once, at import. `skinnedBounds` then takes a few microseconds for
 // a pose. docs/bounds.md has the proof.
 #pragma once
@@ -42,7 +42,7 @@ struct JointBounds {
   /// A joint that moves vertices.
   struct Joint {
     std::uint32_t joint;  ///< index into the pose
-    Extent alone;         ///< of the vertices that only this joint moves, in bind space
+    Extent alone;         ///< in bind space, of the vertices that only this joint moves
   };
 
   /// Two joints that have vertices in common, and these vertices.
@@ -53,7 +53,7 @@ struct JointBounds {
     /// Minimum and maximum over the vertices of a = w₁ / (w₂ (k − 1)): k is the number of
     /// influences of the vertex, w₁ and w₂ are the weights of the first and second joint.
     float firstOverSecond[2];
-    float secondOverFirst[2];  ///< the same of b = w₂ / (w₁ (k − 1))
+    float secondOverFirst[2];  ///< the same for b = w₂ / (w₁ (k − 1))
     float minSum;              ///< minimum of a + b
   };
 
@@ -99,8 +99,8 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// this pose, including rounding errors. It is in the space of the pose. In ordinary poses it is a
 /// few percent larger than necessary; docs/bounds.md has the formulas, the proof and numbers.
 ///
-/// The methods are `linear`, `dualQuaternion` and `blended`. For all other methods nothing is
-/// proven, and the box is infinite.
+/// There is a proof for `linear`, `dualQuaternion` and `blended`. For all other methods the box is
+/// infinite.
 ///
 /// The box is infinite (from -inf to inf), too, if a joint that moves vertices is not finite or is
 /// outside the pose, or if the mesh reaches beyond 1e38. A side may be infinite if numbers leave

@@ -36,11 +36,11 @@ namespace dermis {
 /// Sums are computed in double precision. The result differs from the exact center only by the
 /// rounding of weights and centers to float32.
 ///
-/// `solve` takes about 4 ns for each term: for each vertex, triangle and pair of joints that the
-/// two share (x86-64, one core). Triangles of equal weights count as one. That is O(vertices ×
-/// triangles) for each pair of joints: 0.5 s for a body of 10,000 vertices, 20,000 triangles and 26
-/// joints. The worst case, with the same four joints in all vertices, takes 5 s for 10,000 vertices
-/// and a hundred times as long for ten times as many.
+/// There is one term for each vertex, triangle, and pair of joints that the two share; triangles
+/// with equal weights count as one. `solve` takes about 4 ns per term (x86-64, one core), so its
+/// time is O(vertices × triangles) for each pair of joints. A body of 10,000 vertices, 20,000
+/// triangles and 26 joints takes 0.5 s. The worst case is a mesh with the same four joints in all
+/// vertices: 10,000 vertices take 5 s, and ten times as many take a hundred times as long.
 ///
 /// The solver owns its data: the memory of mesh and triangles may be released after `make`.
 /// Movable, not copyable. A moved-from solver may only be destroyed or assigned to.
@@ -48,7 +48,7 @@ class DERMIS_CORE_API CenterOfRotationSolver {
  public:
   /// Sorts the triangles by the pairs of joints that move them. O(triangles × joints²), where
   /// joints is the number of joints of one triangle. Takes 20 bytes for each pair of each triangle,
-  /// and as much again while it runs. A triangle has 6 to 15 pairs if vertices have four
+  /// and temporarily the same amount again. A triangle has 6 to 15 pairs if vertices have four
   /// influences.
   ///
   /// `triangles` has three vertex indices for each triangle. Pass the whole surface, as one mesh,

@@ -1,8 +1,8 @@
-// Macros for what the shared libraries of Dermis export. There is one macro for each library. If
-// DERMIS_SHARED is defined, a declaration with the macro is exported while that library is
-// compiled, and imported elsewhere; everything else is hidden. The CMake targets and dermis.pc of a
-// shared build define DERMIS_SHARED. In a static build the macros are empty, so a plugin that links
-// Dermis exports nothing of it.
+// Export macros of the shared libraries, one for each library. If DERMIS_SHARED is defined, a
+// declaration with the macro is exported while that library is compiled, and imported elsewhere;
+// everything else is hidden. The CMake targets and dermis.pc of a shared build define
+// DERMIS_SHARED. In a static build the macros are empty, so a plugin that links Dermis exports
+// nothing of it.
 #pragma once
 
 #if !defined(DERMIS_SHARED)

@@ -1,8 +1,8 @@
 // Loads glTF 2.0 files as meshes, skins and clips, and samples poses.
 //
-// If a file breaks a rule of the specification, a sentence names the accessor, node or skin at
-// fault. If the meaning is clear nevertheless (for example a byteStride that is not allowed), the
-// file is used and the sentence is a note. Otherwise it is an error. A damaged or hostile file can
+// If a file breaks a rule of the specification, a message names the accessor, node or skin at
+// fault. If the meaning is still clear (for example a byteStride that is not allowed), the file is
+// used and the message is a note. Otherwise the message is an error. A damaged or hostile file can
 // cause an error, but never a crash, a hang, or more memory than its size justifies
 // (memory_budget.h).
 //
@@ -42,8 +42,8 @@ struct Node {
   /// Column-major, as in the file. If there is one, it replaces the three members above. A node
   /// that a clip animates has none: its matrix has been decomposed into these members, with a note.
   std::optional<std::array<double, 16>> matrix;
-  /// The weights with which the node overrides those of its mesh, one for each morph target; empty
-  /// if it does not. Missing weights are 0.
+  /// Morph weights that override those of the mesh, one for each morph target; empty if the node
+  /// has none. Missing weights are 0.
   std::vector<float> morphWeights;
 };
 
@@ -156,7 +156,7 @@ class DERMIS_GLTF_API PrimitiveView {
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;  ///< empty if the mesh is not decoded (see `load`)
-  /// Morph targets of the primitive that has the most, decoded or not. A primitive with fewer has
+  /// The largest number of morph targets of a primitive, decoded or not. A primitive with fewer has
   /// the first of them.
   std::uint32_t morphTargetCount = 0;
   std::vector<float> morphWeights;  ///< one for each morph target; missing weights are 0

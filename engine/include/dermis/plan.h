@@ -1,5 +1,5 @@
 // Turns a batch of instances into commands, on the CPU, without Vulkan. An engine passes the plan
-// to `vulkan::Context::record`, or issues the commands with its own RHI. For that it also needs
+// to `vulkan::Context::record`, or issues the commands with its own RHI. To do so it also needs
 // vulkan/kernels.h (of dermis::vulkan) and shaders/abi.h.
 #pragma once
 
@@ -56,8 +56,8 @@ struct DeviceLimits {
   bool separateRanges = true;
   /// Whether kernels may store 2 bytes at a time
   /// (VkPhysicalDevice16BitStorageFeatures::storageBuffer16BitAccess). `OutputAttribute` says what
-  /// this permits. Must be false if Dermis was built without `DERMIS_SUBWORD_STORES`, as
-  /// `vulkan::Context::limits` then returns.
+  /// this permits. Must be false if Dermis was built without `DERMIS_SUBWORD_STORES`;
+  /// `vulkan::Context::limits` then returns false.
   bool storage16Bit = false;
   /// The same for 1 byte (VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
   bool storage8Bit = false;
@@ -73,11 +73,13 @@ struct DeviceLimits {
   /// store an attribute, or all of a vertex, at once, which is faster on lavapipe. Used with
   /// `texelBuffers` and `shaderInt64` only.
   bool scalarBlockLayout = false;
-  /// Whether kernels store interleaved vertices by way of workgroup memory, so that neighbouring
-  /// invocations store 16 bytes each, one behind the other. Used where positions, normals and
-  /// tangents stand one right behind the other without gaps, have 8, 12, 16, 24 or 32 bytes
-  /// together, and there are no previous positions or results; by `linear` and `dualQuaternion`;
-  /// and only without `texelBuffers`. Needs no feature of the device.
+  /// Whether kernels collect interleaved vertices in workgroup memory, so that consecutive
+  /// invocations store consecutive blocks of 16 bytes. Needs no device feature. Used only if
+  /// - `texelBuffers` is false;
+  /// - the method is `linear` or `dualQuaternion`;
+  /// - there are no previous positions or results;
+  /// - positions, normals and tangents are adjacent, without gaps, and take 8, 12, 16, 24 or 32
+  ///   bytes together.
   bool stagedStores = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
@@ -241,23 +243,24 @@ struct Variant {
   bool morphs = false;
   /// Whether joints may scale or shear (`PoseDescription::mayScale`).
   bool scales = false;
-  /// Tables, meshes and palettes are read through uniform texel buffers, not storage buffers.
+  /// Whether tables, meshes and palettes are read through uniform texel buffers, not storage
+  /// buffers.
   bool texels = false;
-  /// Each position is stored together with the normal that follows it, 8 bytes at a time. Only with
-  /// `texels` and `DeviceLimits::shaderInt64`, and if `recordBytes` is 0. With motion or results
-  /// only if `wideStores` is set, too.
+  /// Whether each position is stored together with the normal that follows it, 8 bytes at a time.
+  /// Only with `texels` and `DeviceLimits::shaderInt64`, and if `recordBytes` is 0. With motion or
+  /// results only if `wideStores` is set, too.
   bool pairs = false;
   /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
   /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged`, or with `texels` and
   /// `DeviceLimits::scalarBlockLayout`.
   std::uint8_t recordBytes = 0;
-  /// Vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
+  /// Whether vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
   bool staged = false;
-  /// The kernel is of the module that can store more than 4 bytes at a time.
+  /// Whether the kernel is in the module that can store more than 4 bytes at a time.
   bool wideStores = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
-  /// Every vertex has exactly `influences` influences.
+  /// Whether every vertex has exactly `influences` influences.
   bool fullInfluences = false;
   std::uint8_t instancesPerInvocation = 1;
   std::uint16_t workgroupSize = 64;

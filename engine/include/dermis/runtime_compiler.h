@@ -1,6 +1,5 @@
-// The kernels of dermis::vulkan compiled at run time from their GLSL, and compiled again when a
-// file changes: for those who work on kernels. Built with DERMIS_RUNTIME_COMPILER=ON; links
-// glslang.
+// Compiles the kernels of dermis::vulkan from GLSL at run time, and again when a file changes. For
+// developers of kernels. Built with DERMIS_RUNTIME_COMPILER=ON; links glslang.
 //
 //   RuntimeCompiler compiler = must(RuntimeCompiler::create({DERMIS_SHADER_DIR, cacheFolder}));
 //   description.kernelSource = compiler.source();
@@ -34,31 +33,33 @@ struct RuntimeCompilerOptions {
 
 /// What a reload did.
 struct KernelReload {
-  /// Modules that read a file that changed: compiled again, or taken from the cache.
+  /// Number of modules with a changed source file. They were compiled again, or taken from the
+  /// cache.
   std::uint32_t compiled = 0;
-  /// Those whose SPIR-V is another one now. It is in use from the next `record` on.
+  /// Names of the modules whose SPIR-V changed. The next `record` uses the new SPIR-V.
   std::vector<std::string> replaced;
-  std::uint32_t pipelines = 0;  ///< that were created for them
+  std::uint32_t pipelines = 0;  ///< number of pipelines that were created for these modules
 };
 
-/// Since the compiler was created.
+/// Counts since the compiler was created.
 struct RuntimeCompilerStatistics {
-  std::uint32_t compiled = 0;   ///< modules, by glslang
+  std::uint32_t compiled = 0;   ///< modules that glslang compiled
   std::uint32_t fromCache = 0;  ///< modules that were taken from the cache folder
 };
 
-/// Gives a Context its kernels. Unchanged GLSL gives the modules that are in the library, word for
-/// word. A module is compiled when `Context::prepare` first needs it.
+/// Supplies the kernels of a Context. Unchanged GLSL compiles to the same words as the modules in
+/// the library. A module is compiled when `Context::prepare` first needs it.
 ///
-/// `abi.h` is compiled into the library, too: it must not change. Nor must bindings, push constants
-/// and specialization constants.
+/// Do not change `abi.h`, since it is compiled into the library, too. Do not change bindings, push
+/// constants or specialization constants either.
 ///
-/// One object serves one Context, and must outlive it. It may be moved, but not during a call of
-/// another thread. `prepare` may run on other threads during any call here.
+/// One object serves one Context, and must outlive it. It may be moved, but not while another
+/// thread calls a function of it. `prepare` may run on other threads during any call.
 class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
  public:
-  /// Compiles nothing. Fails with `ioError` if the folder has no `abi.h`, and with
-  /// `invalidArgument` if that is not the one of this library: the folder is of another version.
+  /// Compiles nothing yet. Fails with `ioError` if the folder has no `abi.h`, and with
+  /// `invalidArgument` if its `abi.h` differs from the one in this library: the folder is from
+  /// another version.
   static Result<RuntimeCompiler> create(RuntimeCompilerOptions options);
 
   ~RuntimeCompiler();
@@ -69,28 +70,29 @@ class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
   /// `shaderError` and the message of `reload`.
   vulkan::KernelSource source() const;
 
-  /// Looks for changed files, compiles the modules that read them, creates their pipelines, and
-  /// swaps them by `Context::replaceKernels`, whose rules for `frame`, `completedFrame` and threads
-  /// hold. One thread calls it, in every frame or now and then: replaced pipelines are destroyed by
-  /// a later call. If nothing changed, it asks for the time and size of each file, and no more. It
-  /// does nothing while `prepare` compiles on another thread.
+  /// Looks for changed files, compiles the modules that use them, creates their pipelines, and
+  /// swaps them with `Context::replaceKernels`. The rules of that function for `frame`,
+  /// `completedFrame` and threads apply. One thread calls `reload`, in every frame or from time to
+  /// time; a later call destroys the replaced pipelines. If nothing changed, it only reads the time
+  /// and size of each file. It does not look for changes while `prepare` compiles on another
+  /// thread.
   ///
-  /// All changed modules are swapped, or none. It fails with `shaderError` if one does not compile:
-  /// the message is glslang's first error, "FILE:LINE: text (module NAME)". All old kernels stay
-  /// until a later call finds a change that mends it; calls until then return an empty
-  /// `KernelReload`. Fails with `ioError` if a file cannot be read, `invalidArgument` if `abi.h`
-  /// changed, and as `replaceKernels`.
+  /// Either all changed modules are swapped or none. Fails with `shaderError` if one does not
+  /// compile; the message is the first error of glslang, "FILE:LINE: text (module NAME)". All old
+  /// kernels then stay in use until a later call finds another change and compiles it. Until then
+  /// calls return an empty `KernelReload`. Fails with `ioError` if a file cannot be read, with
+  /// `invalidArgument` if `abi.h` changed, and as `replaceKernels` does.
   ///
-  /// A `SkinningSystem` skins nothing again for it: instances at rest keep what the old kernels
-  /// wrote, until their pose is written.
+  /// A `SkinningSystem` does not skin again because of a reload: instances at rest keep what the
+  /// old kernels wrote until their pose is written.
   Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
                               std::uint64_t completedFrame);
 
   /// How many modules were compiled, and how many came from the cache.
   RuntimeCompilerStatistics statistics() const;
 
-  /// What was wrong with the cache folder since the last call, a sentence each: an entry that was
-  /// damaged and made again, or one that cannot be read or written.
+  /// Problems of the cache folder since the last call, one sentence each. For example, an entry was
+  /// damaged and made again, or cannot be read or written.
   std::vector<std::string> takeCacheProblems();
 
  private:

@@ -1,6 +1,6 @@
-// Makes names from files fit for messages. A name in a file may have millions of characters, and
-// may contain line breaks, control characters for terminals, or marks that reverse the writing
-// direction.
+// Makes names from files safe to print in messages. A name in a file may have millions of
+// characters, and may contain line breaks, control characters for terminals, or marks that reverse
+// the writing direction.
 #pragma once
 
 #include <cstddef>

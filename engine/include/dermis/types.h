@@ -1,5 +1,5 @@
-// Plain data of the interface. It consists of float arrays, so that no GLM_FORCE_* setting of an
-// engine changes its layout. glm.h converts from and to GLM.
+// Plain data of the interface: float arrays, so that no GLM_FORCE_* setting of an engine changes
+// the layout. glm.h converts from and to GLM.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 #define DERMIS_VERSION_MAJOR 0
 /// Changes if the interface grows. While the major version is 0: changes if it breaks.
 #define DERMIS_VERSION_MINOR 1
-/// Changes if the interface stays the same.
+/// Changes if only the implementation changes.
 #define DERMIS_VERSION_PATCH 0
 
 namespace dermis {

@@ -79,15 +79,14 @@ Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t ver
   }
   const bool isPlanar = layout.arrangement == Arrangement::planar;
   if (isPlanar && layout.stride != 0) {
-    return invalid(
-        "the layout is planar: attributes stand without gaps, a stride is for interleaved ones");
+    return invalid("the layout is planar and has a stride; only interleaved layouts may have one");
   }
   Result<VertexPlaces> places =
       isPlanar ? separate(layout, vertexCount, offset) : interleave(layout, vertexCount, offset);
   if (!places) return places;
   places->motion = layout.motion;
   if (offset % places->alignment != 0) {
-    return invalid("vertices of the layout begin at a multiple of " +
+    return invalid("vertices of this layout must begin at a multiple of " +
                    std::to_string(places->alignment) + " bytes, not at " + std::to_string(offset));
   }
   return places;

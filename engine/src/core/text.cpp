@@ -41,7 +41,7 @@ bool isObeyed(std::uint32_t code) {
          code == 0x200f || (code >= 0x2028 && code <= 0x202e) || (code >= 0x2066 && code <= 0x2069);
 }
 
-/// What is shown instead of a character, or nothing where it is shown itself.
+/// What is shown instead of a character, or nothing if it is shown itself.
 std::string escapeOf(const Character& character) {
   if (character.isValid && !isObeyed(character.code)) return {};
   if (character.code == '\n') return "\\n";

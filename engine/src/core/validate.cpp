@@ -103,9 +103,8 @@ bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32
                const char* elements, Findings& findings) {
   const std::string name = rule.name;
   if (!rule.allows(view.type) || view.components < rule.fewest || view.components > rule.most) {
-    findings.addView(
-        MeshProblem::wrongFormat,
-        name + " have a component type or number of components that they may not have");
+    findings.addView(MeshProblem::wrongFormat,
+                     name + " have a component type or number of components that is not allowed");
     return false;
   }
   if (view.count != count) {
@@ -118,7 +117,7 @@ bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32
   if (view.stride < size) {
     findings.addView(MeshProblem::strideTooSmall,
                      "the stride of the " + name + " is " + std::to_string(view.stride) +
-                         " bytes, an element has " + std::to_string(size));
+                         " bytes, but an element has " + std::to_string(size));
     return false;
   }
   return true;
@@ -132,7 +131,7 @@ bool checkMorphTarget(const MorphTargetView& target, std::size_t index, std::uin
         (i > 0 && target.vertices[i] <= target.vertices[i - 1])) {
       findings.addView(MeshProblem::morphVertices,
                        name + " displaces vertex " + std::to_string(target.vertices[i]) +
-                           ", which lies outside the mesh or does not come after the one before");
+                           ", which is outside the mesh or not in ascending order");
       return false;
     }
   }
@@ -171,7 +170,7 @@ bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
       findings.addView(MeshProblem::wrongFormat,
                        "an influence set has " + std::to_string(set.joints.components) +
                            " joints but " + std::to_string(set.weights.components) +
-                           " weights a vertex");
+                           " weights per vertex");
       good = false;
     }
   }
@@ -195,7 +194,7 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
   good &= check(mesh.tangents, {"tangents", 4, 4, isDirectionType});
   good &= check(mesh.dualQuaternionWeights, {"dual-quaternion weights", 1, 1, isWeightType});
   good &= check(mesh.bulgeStrengths, {"bulge strengths", 1, 1, isWeightType});
-  good &= check(mesh.centersOfRotation, {"centres of rotation", 3, 3, isFloat32});
+  good &= check(mesh.centersOfRotation, {"centers of rotation", 3, 3, isFloat32});
   for (std::size_t index = 0; index < mesh.morphTargets.size(); ++index) {
     good &= checkMorphTarget(mesh.morphTargets[index], index, mesh.vertexCount, findings);
   }
@@ -319,8 +318,9 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
     }
   }
   if (usedWeights == 0) {
-    findings.addVertex(MeshProblem::vertexWithoutWeight, vertex,
-                       [] { return std::string("no joint has weight; it stays in bind pose"); });
+    findings.addVertex(MeshProblem::vertexWithoutWeight, vertex, [] {
+      return std::string("no joint has a weight; the vertex stays in bind pose");
+    });
     return;
   }
   if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
@@ -348,13 +348,13 @@ const char* meshProblemName(MeshProblem problem) {
     case MeshProblem::noInfluenceSets:
       return "no joints and weights";
     case MeshProblem::countMismatch:
-      return "counts disagree";
+      return "counts differ";
     case MeshProblem::strideTooSmall:
       return "stride too small";
     case MeshProblem::wrongFormat:
       return "wrong format";
     case MeshProblem::morphVertices:
-      return "morph target's vertices";
+      return "wrong vertices of a morph target";
     case MeshProblem::nonFinitePosition:
       return "position not finite";
     case MeshProblem::nonFiniteNormal:
@@ -364,7 +364,7 @@ const char* meshProblemName(MeshProblem problem) {
     case MeshProblem::nonFiniteMorph:
       return "displacement not finite";
     case MeshProblem::nonFiniteCenter:
-      return "centre of rotation not finite";
+      return "center of rotation not finite";
     case MeshProblem::shareOutOfRange:
       return "dual-quaternion weight or bulge strength out of range";
     case MeshProblem::nonFiniteWeight:
@@ -393,7 +393,7 @@ Result<void> MeshReport::accepted() const {
       findings, [](const MeshFinding& finding) { return refusedByPack(finding.problem); });
   if (refused == findings.end()) return {};
   return Error{ErrorCode::invalidMesh,
-               refused->message + (repairable() ? "; repair() can mend it" : "")};
+               refused->message + (repairable() ? "; repair() can fix it" : "")};
 }
 
 bool MeshReport::repairable() const {
@@ -422,7 +422,7 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
     }
     checkDirection(mesh.normals, 3, MeshProblem::nonFiniteNormal, "normal", vertex, findings);
     checkDirection(mesh.tangents, 4, MeshProblem::nonFiniteTangent, "tangent", vertex, findings);
-    checkDirection(mesh.centersOfRotation, 3, MeshProblem::nonFiniteCenter, "centre of rotation",
+    checkDirection(mesh.centersOfRotation, 3, MeshProblem::nonFiniteCenter, "center of rotation",
                    vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
   }

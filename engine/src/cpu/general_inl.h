@@ -175,7 +175,7 @@ struct Slots {
   std::uint32_t influences;
 };
 
-/// Calls `sum` with the number of influences: as a constant, or 0 where it is too large to be one.
+/// Calls `sum` with the number of influences: as a constant, or 0 if it is too large to be one.
 template <class Sum>
 HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
   switch (influences) {
@@ -550,7 +550,7 @@ HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, 
 template <class D>
 HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& position) {
   const auto along = [&](Vec<D> v, std::size_t axis) HWY_ATTR {
-    return hn::Mul(hn::Sub(v, hn::Set(d, instance.boxCentre[axis])),
+    return hn::Mul(hn::Sub(v, hn::Set(d, instance.boxCenter[axis])),
                    hn::Set(d, instance.boxInverse[axis]));
   };
   return {along(position.x, 0), along(position.y, 1), along(position.z, 2)};

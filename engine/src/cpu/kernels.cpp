@@ -449,7 +449,8 @@ Result<void> setTarget(std::string_view name) {
   }
   std::string message(1, '\'');
   message.append(name).append(
-      "' is no instruction set of this processor that Dermis was compiled for; those are ");
+      "' is not an instruction set that this processor supports and Dermis was compiled for; "
+      "available: ");
   return Error{ErrorCode::invalidArgument, message + all};
 }
 

@@ -268,9 +268,10 @@ Result<Mesh> Mesh::create(const PackedMesh& packed) {
   auto data = std::make_unique<MeshData>();
   data->info = packed.info();
   if (data->info.maxInfluences > mostInfluences) {
-    return Error{ErrorCode::limitExceeded,
-                 "a vertex has " + std::to_string(data->info.maxInfluences) +
-                     " influences, the CPU path takes at most " + std::to_string(mostInfluences)};
+    return Error{ErrorCode::limitExceeded, "a vertex has " +
+                                               std::to_string(data->info.maxInfluences) +
+                                               " influences, but the CPU path supports at most " +
+                                               std::to_string(mostInfluences)};
   }
   const Reader reader(packed);
   const abi::MeshHeader& header = reader.header;

@@ -61,7 +61,7 @@ struct Run {
 struct MeshData {
   MeshInfo info;
   std::vector<Lanes> positions;     ///< 3 a block
-  std::vector<Lanes> normals;       ///< 3 a block, of unit length; empty where there are none
+  std::vector<Lanes> normals;       ///< 3 a block, of unit length; empty if there are none
   std::vector<Lanes> givenNormals;  ///< as the mesh has them
   std::vector<Lanes> tangents;      ///< 4 a block: unit length, and 1 or -1
   std::vector<Lanes> givenTangents;

@@ -10,7 +10,7 @@
 namespace dermis::cpu {
 
 /// Adds to a block what the active targets displace. `lanes` are its positions, normals and
-/// tangents, three components each; null where they are not wanted.
+/// tangents, three components each; null if they are not wanted.
 void morphBlock(const MeshData& mesh, std::uint32_t block, std::span<const MorphWeight> morphs,
                 Lanes* positions, Lanes* normals, Lanes* tangents);
 

@@ -46,7 +46,7 @@ Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,
                        const Subject& subject, const char* name) {
   if (pose.size() >= info.requiredJoints) return {};
   return wrong(subject.name() + ": its " + name + " has " + std::to_string(pose.size()) +
-               " joints, its mesh requires " + std::to_string(info.requiredJoints));
+               " joints, but its mesh requires " + std::to_string(info.requiredJoints));
 }
 
 Result<void> checkInstance(const Job& job, const Instance& instance, const Subject& subject) {
@@ -66,10 +66,10 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
   if (Result<void> good = checkMorphs(instance.morphs, info.morphTargetCount, subject); !good)
     return good;
   if (!std::ranges::is_sorted(instance.morphs, {}, &MorphWeight::target))
-    return wrong(subject.name() + ": its morph targets do not rise");
+    return wrong(subject.name() + ": its morph targets are not in ascending order");
   if (isSnormPosition(job.places.positions.format) && !isBox(instance.box)) {
     return wrong(subject.name() +
-                 ": the box of its snorm16 positions must be finite, each side longer than 0");
+                 ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }
   if (job.places.motion == Motion::none && (instance.settles || instance.restartsMotion)) {
     return wrong(subject.name() + " settles or restarts its motion, but has no previous positions");
@@ -78,7 +78,7 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
   if (Result<void> good = checkPose(instance.previousPose, info, subject, "previous pose"); !good)
     return good;
   if (!std::ranges::is_sorted(instance.previousMorphs, {}, &MorphWeight::target))
-    return wrong(subject.name() + ": its previous morph targets do not rise");
+    return wrong(subject.name() + ": its previous morph targets are not in ascending order");
   return checkMorphs(instance.previousMorphs, info.morphTargetCount, subject);
 }
 
@@ -117,7 +117,7 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
                  at(instance.output.previousPositions, places.previousPositions)};
   if (isSnormPosition(places.positions.format)) {
     const BoxScale scale = boxScale(instance.box);
-    std::ranges::copy(scale.centre, own.boxCentre);
+    std::ranges::copy(scale.center, own.boxCenter);
     std::ranges::copy(scale.inverse, own.boxInverse);
   }
   return own;
@@ -136,7 +136,7 @@ void skinMesh(const Job& job, const MeshData& mesh) {
 Result<void> checkMethod(Method method, const char* subject) {
   if (!isForComparison(method)) return {};
   return wrong(subject + std::string(methodName(method)) +
-               " is for comparison, the CPU path has the everyday methods only");
+               " is a method for comparison, which the CPU path does not support");
 }
 
 void skinTask(const Task& task) {
@@ -164,8 +164,9 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
                  std::to_string(vertexCount));
   }
   if (positions.size() != vertices.size() * 3) {
-    return wrong(std::to_string(vertices.size()) + " vertices have three floats each, not " +
-                 std::to_string(positions.size()) + " in all");
+    return wrong(std::to_string(vertices.size()) +
+                 " vertices need three floats each, but there are " +
+                 std::to_string(positions.size()) + " floats");
   }
   if (vertices.empty()) return {};
   Instance own;

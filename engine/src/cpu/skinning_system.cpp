@@ -364,9 +364,9 @@ TaskInstance SkinningSystem::State::taskInstance(const abi::InstanceRecord& reco
   instance.morphs = {reinterpret_cast<const MorphWeight*>(tables.data() + extension.morphs),
                      extension.morphCount};
   result = extension.result;
-  const float centre[3] = {extension.centreX, extension.centreY, extension.centreZ};
+  const float center[3] = {extension.centerX, extension.centerY, extension.centerZ};
   const float inverse[3] = {extension.inverseX, extension.inverseY, extension.inverseZ};
-  std::ranges::copy(centre, instance.boxCentre);
+  std::ranges::copy(center, instance.boxCenter);
   std::ranges::copy(inverse, instance.boxInverse);
   return instance;
 }

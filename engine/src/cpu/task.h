@@ -36,7 +36,7 @@ struct TaskInstance {
   std::span<const JointMatrix> previousPose;
   std::span<const MorphWeight> previousMorphs;
   InstanceResult* result = nullptr;
-  float boxCentre[3] = {}, boxInverse[3] = {};  ///< of snorm16 positions; 1 / half its size
+  float boxCenter[3] = {}, boxInverse[3] = {};  ///< of snorm16 positions; 1 / half its size
 
   std::byte* output(Stream stream) const { return outputs[static_cast<std::size_t>(stream)]; }
 };

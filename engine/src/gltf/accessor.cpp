@@ -300,7 +300,7 @@ void Source::leaveOut(std::size_t mesh, std::size_t primitive, const std::string
 
 void Source::refuseFaulty(int index) const {
   if (isFaulty_[static_cast<std::size_t>(index)])
-    failInvalid("accessor ", index, ": it is broken, or its bytes are not there");
+    failInvalid("accessor ", index, ": it is invalid, or its data is missing");
 }
 
 void Source::require(int index, int type, std::span<const Format> formats, const std::string& where,
@@ -319,7 +319,7 @@ void Source::require(int index, int type, std::span<const Format> formats, const
   }
   const std::string sentence =
       join(where, ": accessor ", index, " is ", typeName(accessor.type), " of ", formatName(format),
-           " where ", typeName(type), " of ", allowed, " must be");
+           ", not ", typeName(type), " of ", allowed);
   if (accessor.type != type || !isIn(tolerated)) failInvalid(sentence);
   notes_.broken(NoteKind::format, sentence);
 }
@@ -382,7 +382,7 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
     if (i > 0 && elements[i] <= elements[i - 1]) {
       // Each is written in its turn: of two for one element, the last counts.
       notes_.broken(NoteKind::sparse, "accessor ", index, ": sparse index ", i, " is ", elements[i],
-                    " after ", elements[i - 1], ": they must rise");
+                    " after ", elements[i - 1], ": they must ascend");
     }
   }
   return elements;

@@ -66,7 +66,7 @@ class Source {
   /// All components of all elements as they are stored, tightly packed.
   std::vector<std::byte> stored(int accessor);
 
-  /// The bytes of a bufferView, whatever they are. Throws `Failure` with `invalidData` where there
+  /// The bytes of a bufferView, whatever they are. Throws `Failure` with `invalidData` if there
   /// is no such view, or it has no bytes.
   std::span<const std::byte> viewBytes(std::uint64_t view, const std::string& where) const;
 
@@ -103,7 +103,7 @@ class Source {
   std::vector<bool> isFaulty_;  ///< Accessors that may not be read; nothing skinned uses them.
 };
 
-/// The name of a component type and normalisation: "normalized unsigned byte".
+/// The name of a component type and normalization: "normalized unsigned byte".
 std::string formatName(Format format);
 
 }  // namespace dermis::gltf

@@ -45,7 +45,7 @@ struct Tally {
   std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
 };
 
-// 0 where a channel has no effect: there are no weights to move.
+// 0 if a channel has no effect: there are no weights to move.
 std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
   switch (channel.path) {
     case ChannelPath::translation:
@@ -59,7 +59,7 @@ std::uint32_t componentsOf(const Source& source, const Channel& channel, const s
   const int mesh = source.content().nodes[channel.node].mesh;
   if (mesh < 0) {
     source.notes().broken(NoteKind::channel, where, ": node ", channel.node,
-                          " has no mesh whose weights could move");
+                          " has no mesh, so there are no weights to animate");
     return 0;
   }
   const auto count = morphTargetCount(source.content().meshes[static_cast<std::size_t>(mesh)]);
@@ -80,10 +80,10 @@ void checkTimes(const std::vector<float>& times, int accessor, const std::string
     const std::string key =
         join(where, ": key ", i, " of accessor ", accessor, " is at ", times[i]);
     if (!std::isfinite(times[i])) failInvalid(key, ", which is not finite");
-    if (times[i] < before) failInvalid(key, " seconds after ", before, ": times must rise");
+    if (times[i] < before) failInvalid(key, " seconds after ", before, ": times must ascend");
     if (times[i] < 0) notes.broken(NoteKind::keys, key, " seconds, which is negative");
     if (i > 0 && times[i] == before)
-      notes.broken(NoteKind::keys, key, " seconds after ", before, ": times must rise");
+      notes.broken(NoteKind::keys, key, " seconds after ", before, ": times must ascend");
   }
 }
 
@@ -116,8 +116,8 @@ std::vector<float> readValues(Source& source, int accessor, const Channel& chann
   const std::uint64_t perElement = channel.path == ChannelPath::weights ? channel.components : 1;
   const std::uint64_t wanted = channel.times.size() * perKey * perElement;
   if (source.count(accessor) != wanted) {
-    failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor), " elements where ",
-                wanted, " belong to ", channel.times.size(), " keys");
+    failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor),
+                " elements, but there must be ", wanted, " for ", channel.times.size(), " keys");
   }
   std::vector<float> values = source.floats(accessor);
   const auto bad =
@@ -158,7 +158,7 @@ std::size_t normalizeRotations(Channel& channel, double tolerance) {
   return count;
 }
 
-// The channel, or nothing where it is left out.
+// The channel, or nothing if it is left out.
 std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
                                    const tinygltf::AnimationChannel& from, const std::string& where,
                                    Tally& tally) {
@@ -251,7 +251,7 @@ void decomposeTarget(Model& model, const Channel& channel, const std::string& wh
   if (!node.matrix || channel.path == ChannelPath::weights) return;
   decompose(node);
   notes.broken(NoteKind::animatedMatrix, where, ": node ", channel.node,
-               " has a matrix, which has been taken apart for the animation");
+               " has a matrix, which has been decomposed for the animation");
 }
 
 Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t index, Model& model,
@@ -269,10 +269,10 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
     const auto [first, isNew] = samplers.emplace(target, sampler);
     if (!isNew) {
       const std::string sentence =
-          join(where, ": it moves what another channel moves, the ",
-               animation.channels[i].target_path, " of node ", channel->node);
+          join(where, ": another channel already animates the ", animation.channels[i].target_path,
+               " of node ", channel->node);
       if (first->second != sampler) failInvalid(sentence);
-      source.notes().broken(NoteKind::channel, sentence, ", in the same way");
+      source.notes().broken(NoteKind::channel, sentence, " with the same sampler");
       continue;
     }
     decomposeTarget(model, *channel, where, source.notes());
@@ -295,11 +295,11 @@ void readAnimations(Source& source, Model& model) {
   if (tally.normalizedKeys > 0) {
     model.notes.push_back(join(counted(tally.normalizedKeys, "rotation key"), " in ",
                                counted(tally.channelsWithNormalizedKeys, "channel"),
-                               " not of unit length, normalised"));
+                               " not of unit length, normalized"));
   }
   if (tally.unknownPaths > 0) {
     model.notes.push_back(join(counted(tally.unknownPaths, "animation channel"),
-                               " with a target that is not known, left out"));
+                               " with an unknown target, left out"));
   }
 }
 

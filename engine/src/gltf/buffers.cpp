@@ -26,7 +26,7 @@ std::uint8_t base64Digit(char character) {
 std::vector<std::byte> decodeBase64(std::string_view text, const std::string& where) {
   const std::size_t length = text.size();
   while (!text.empty() && text.back() == '=' && length - text.size() < 2) text.remove_suffix(1);
-  if (text.size() % 4 == 1) failInvalid(where, ": the base64 text of its data URI is cut off");
+  if (text.size() % 4 == 1) failInvalid(where, ": the base64 text of its data URI is truncated");
 
   std::vector<std::byte> bytes;
   bytes.reserve(text.size() * 3 / 4);
@@ -48,8 +48,8 @@ std::vector<std::byte> decodeBase64(std::string_view text, const std::string& wh
 std::uint64_t lengthOf(const BufferDescription& description, std::uint64_t there,
                        const std::string& where, Notes& notes) {
   if (there >= description.byteLength) return description.byteLength;
-  notes.broken(NoteKind::bufferLength, where, ": byteLength says ", description.byteLength,
-               " bytes, ", there, " are there");
+  notes.broken(NoteKind::bufferLength, where, ": byteLength is ", description.byteLength,
+               ", but there are only ", there, " bytes");
   return there;
 }
 

@@ -23,7 +23,7 @@ struct Buffer {
   Bytes storage;  ///< shared by the buffers of one side file; null in the binary chunk
 };
 
-/// Fetches them all. Throws `Failure`: `ioError` where a file cannot be read or lies outside the
+/// Fetches them all. Throws `Failure`: `ioError` if a file cannot be read or lies outside the
 /// folder, `limitExceeded`. One that nothing skinned uses may fail, and one may be shorter than it
 /// says, with a note.
 std::vector<Buffer> loadBuffers(const Document& document,

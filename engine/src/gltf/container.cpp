@@ -34,16 +34,16 @@ bool isGlb(std::span<const std::byte> bytes) {
 // Returns how many of the file's bytes, of which there are `size`, belong to the container.
 std::uint32_t checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
   if (bytes.size() < headerSize) {
-    failInvalid("the GLB header is cut off: ", bytes.size(), " bytes where it has ", headerSize);
+    failInvalid("the GLB header is truncated: ", bytes.size(), " bytes instead of ", headerSize);
   }
   const std::uint32_t version = readWord(bytes, 4);
   if (version != 2) {
     fail(ErrorCode::unsupportedFeature,
-         join("the GLB header says version ", version, ", and only version 2 is known"));
+         join("the GLB header says version ", version, "; only version 2 is supported"));
   }
   const std::uint32_t length = readWord(bytes, 8);
   if (length > size || length < headerSize)
-    failInvalid("the GLB header says ", length, " bytes, the file has ", size);
+    failInvalid("the GLB header says ", length, " bytes, but the file has ", size);
   return length;
 }
 
@@ -79,7 +79,7 @@ void checkStart(std::span<const std::byte> start, std::uint64_t size) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first == std::string_view::npos || text[first] == '{') return;
-  failInvalid("the JSON text is broken at byte ", text.data() + first - asText(start).data() + 1);
+  failInvalid("the JSON text is invalid at byte ", text.data() + first - asText(start).data() + 1);
 }
 
 Container openContainer(std::span<const std::byte> bytes, Notes& notes) {
@@ -88,7 +88,7 @@ Container openContainer(std::span<const std::byte> bytes, Notes& notes) {
 
   const std::uint32_t size = checkHeader(bytes, bytes.size());
   if (size < bytes.size()) {
-    notes.broken(NoteKind::container, "the GLB header says ", size, " bytes, the file has ",
+    notes.broken(NoteKind::container, "the GLB header says ", size, " bytes, but the file has ",
                  bytes.size());
     bytes = bytes.first(size);
   }
@@ -96,14 +96,14 @@ Container openContainer(std::span<const std::byte> bytes, Notes& notes) {
   std::size_t offset = headerSize;
   for (std::size_t chunk = 0; offset < bytes.size(); ++chunk) {
     if (bytes.size() - offset < chunkHeaderSize) {
-      failInvalid("the header of GLB chunk ", chunk, " at byte ", offset, " is cut off");
+      failInvalid("the header of GLB chunk ", chunk, " at byte ", offset, " is truncated");
     }
     const std::uint32_t length = readWord(bytes, offset);
     const std::uint32_t type = readWord(bytes, offset + 4);
     offset += chunkHeaderSize;
     if (length > bytes.size() - offset) {
       failInvalid("GLB chunk ", chunk, " at byte ", offset - chunkHeaderSize, " says ", length,
-                  " bytes, ", bytes.size() - offset, " are left in the file");
+                  " bytes, but only ", bytes.size() - offset, " are left in the file");
     }
     if (length % 4 != 0) {
       notes.broken(NoteKind::container, "the length of GLB chunk ", chunk, ", ", length,

@@ -20,12 +20,12 @@ struct Container {
 /// So many bytes of a file show whether it can be one.
 inline constexpr std::size_t containerStart = 12;
 
-/// Throws `Failure` where a file of `size` bytes that begins with these cannot be read whatever
+/// Throws `Failure` if a file of `size` bytes that begins with these cannot be read whatever
 /// follows: the header of a GLB file disagrees with its size, or a text is no JSON object.
 void checkStart(std::span<const std::byte> start, std::uint64_t size);
 
 /// Takes the file apart: GLB where it begins with the magic, otherwise all of it is JSON. Throws
-/// `Failure` where a GLB header or chunk needs more bytes than there are.
+/// `Failure` if a GLB header or chunk needs more bytes than there are.
 Container openContainer(std::span<const std::byte> bytes, Notes& notes);
 
 }  // namespace dermis::gltf

@@ -57,7 +57,7 @@ json parseJson(std::string_view text) {
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    failInvalid("the JSON text is broken at byte ", error.byte);
+    failInvalid("the JSON text is invalid at byte ", error.byte);
   } catch (const json::out_of_range&) {
     failInvalid("the JSON text has a number that is too large");
   }
@@ -75,7 +75,7 @@ std::string_view trimText(std::string_view text, Notes& notes) {
     text = text.substr(0, text.find_last_not_of('\0') + 1);
   }
   const std::size_t zero = text.find('\0');
-  if (zero != std::string_view::npos) failInvalid("the JSON text is broken at byte ", zero);
+  if (zero != std::string_view::npos) failInvalid("the JSON text is invalid at byte ", zero);
   return text;
 }
 
@@ -83,7 +83,7 @@ std::string_view trimText(std::string_view text, Notes& notes) {
 std::string versionOf(const json& version, Notes& notes) {
   const bool isText = version.is_string();
   if (isText && version != "2") return version.get<std::string>();
-  if (!isText && !version.is_number()) failInvalid("asset: version is not a text");
+  if (!isText && !version.is_number()) failInvalid("asset: version is not a string");
   const double number = isText ? 2 : version.get<double>();
   notes.broken(NoteKind::version, "asset: version is not written as '2.0'");
   return number == 2 ? "2.0" : textOf(number);
@@ -95,7 +95,7 @@ void checkVersion(json& root, Notes& notes) {
     failInvalid("the JSON text has no object 'asset': this is not a glTF 2.0 file");
   }
   const auto version = asset->find("version");
-  if (version == asset->end()) failInvalid("asset: no version is given");
+  if (version == asset->end()) failInvalid("asset: it has no version");
   const std::string text = versionOf(*version, notes);
   // tinygltf wants a text.
   *version = text;
@@ -130,7 +130,7 @@ std::vector<std::string> extensionNames(const json& root, const char* property, 
     notes.broken(NoteKind::emptyArray, inQuotes(property), " is an empty array");
   if (!list->is_array()) failInvalid(property, " is not an array");
   for (const json& name : *list) {
-    if (!name.is_string()) failInvalid(property, " holds something that is not a name");
+    if (!name.is_string()) failInvalid(property, " contains something that is not a string");
     names.push_back(name.get<std::string>());
   }
   return names;
@@ -139,7 +139,7 @@ std::vector<std::string> extensionNames(const json& root, const char* property, 
 bool usesQuantization(const json& root, Notes& notes) {
   constexpr std::string_view quantization = "KHR_mesh_quantization";
   std::vector<std::string> used;
-  notes.tolerate(NoteKind::extensions, "; it is not looked at",
+  notes.tolerate(NoteKind::extensions, "; it is ignored",
                  [&] { used = extensionNames(root, "extensionsUsed", notes); });
   const auto required = extensionNames(root, "extensionsRequired", notes);
   const std::unordered_set<std::string> usedNames(used.begin(), used.end());

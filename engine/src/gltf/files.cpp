@@ -34,7 +34,7 @@ bool hasScheme(std::string_view uri) {
 // The path of a side file below the folder as its URI spells it, or a failure.
 std::filesystem::path relativePath(std::string_view uri, const std::string& where) {
   if (hasScheme(uri)) {
-    fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a file beside this one"));
+    fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a relative file name"));
   }
   const std::string text = decodePercent(uri, where);
   // There a colon names a drive, or another stream of a file.
@@ -107,7 +107,7 @@ std::vector<std::byte> readBytes(std::ifstream& stream, std::uint64_t count,
 void checkSize(std::uint64_t size, const std::string& where) {
   if (size <= largestFile) return;
   fail(ErrorCode::limitExceeded,
-       join(where, ": ", size, " bytes, and at most ", largestFile, " of a file are read"));
+       join(where, ": the file has ", size, " bytes; the maximum is ", largestFile));
 }
 
 }  // namespace
@@ -126,7 +126,7 @@ FileToRead findFile(const std::filesystem::path& path, const std::string& where)
   if (error) refuse(name, " cannot be opened: ", error.message());
   if (status.type() == std::filesystem::file_type::directory) refuse(name, " is a folder");
   if (status.type() != std::filesystem::file_type::regular)
-    refuse(name, " is a pipe, a socket or a device, and not a file");
+    refuse(name, " is a pipe, a socket or a device, not a file");
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) refuse(name, " cannot be opened: ", error.message());
   return {path, size};
@@ -163,7 +163,7 @@ FileToRead SideFiles::find(std::string_view uri, const std::string& where) const
   if (!isInside(real, folder)) {
     fail(ErrorCode::ioError,
          join(where, ": ", name,
-              " leads outside the file's folder by a symbolic link and is not opened"));
+              " leads outside the file's folder through a symbolic link and is not opened"));
   }
   return {real, named.size};
 }

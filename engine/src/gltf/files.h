@@ -30,11 +30,11 @@ struct FileToRead {
 std::string utf8(const std::filesystem::path& path);
 
 /// Throws `Failure` with `ioError`: there is no such file, it is a folder, it may not be looked at.
-/// `where` says what names it, with a colon behind it, or nothing.
+/// `where` is the prefix of messages, with a colon, or empty.
 FileToRead findFile(const std::filesystem::path& path, const std::string& where = {});
 
 /// The file that a model is in, whole. Throws `Failure`: with `ioError`, and with `invalidData` or
-/// `limitExceeded` where its size or its first bytes show that it cannot be one, before the rest is
+/// `limitExceeded` if its size or its first bytes show that it cannot be one, before the rest is
 /// read.
 std::vector<std::byte> readModelFile(const FileToRead& file);
 
@@ -62,7 +62,7 @@ class SideFiles {
   std::map<std::filesystem::path, Bytes> read_;
 };
 
-/// `%20` to a space and so on. Throws `Failure` where a '%' is not followed by two hexadecimal
+/// `%20` to a space and so on. Throws `Failure` if a '%' is not followed by two hexadecimal
 /// digits.
 std::string decodePercent(std::string_view text, const std::string& where);
 

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A member of an object, or null where there is no such member or no object.
+/// A member of an object, or null if there is no such member or no object.
 const json& member(const json& value, const char* name) {
   static const json nothing;
   if (!value.is_object()) return nothing;

@@ -21,7 +21,7 @@ void checkMatrix(const std::array<double, 16>& matrix, std::size_t index, Notes&
   notes.broken(NoteKind::matrix, "node ", index, ": the fourth row of its matrix is not 0 0 0 1");
 }
 
-// Returns whether the rotation had to be normalised.
+// Returns whether the rotation had to be normalized.
 bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node, Notes& notes) {
   if (!source.matrix.empty()) {
     std::copy(source.matrix.begin(), source.matrix.end(), node.matrix.emplace().begin());
@@ -99,7 +99,7 @@ void readNodes(const Source& source, Model& model) {
   orderNodes(content, model);
   if (normalized > 0) {
     model.notes.push_back(
-        join(counted(normalized, "node rotation"), " not of unit length, normalised"));
+        join(counted(normalized, "node rotation"), " not of unit length, normalized"));
   }
 }
 

@@ -58,7 +58,7 @@ class Notes {
   bool strict() const { return strict_; }
 
   /// Counts a broken rule under the sentence made of the parts, which names the place. Throws
-  /// `Failure` with that sentence where strict.
+  /// `Failure` with that sentence if strict.
   template <typename... Parts>
   void broken(NoteKind kind, const Parts&... parts) {
     if (strict_) failInvalid(parts...);

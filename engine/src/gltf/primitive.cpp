@@ -92,7 +92,7 @@ class PrimitiveCheck {
 
   void run() {
     if (!primitive_.targets.empty() && hasNoAttribute()) {
-      failInvalid(where_, ": it has morph targets, but no attribute that they could change");
+      failInvalid(where_, ": it has morph targets, but no attribute that they could displace");
     }
     // It is left out.
     if (!primitive_.attributes.contains("POSITION")) return;
@@ -191,7 +191,7 @@ class PrimitiveCheck {
     const std::uint32_t vertices = source_.count(primitive_.attributes.at("POSITION"));
     if (source_.count(accessor) == vertices) return;
     failInvalid(place, ": accessor ", accessor, " has ", source_.count(accessor),
-                " elements where POSITION has ", vertices);
+                " elements, but POSITION has ", vertices);
   }
 
   // A file may use the formats of KHR_mesh_quantization without saying so.
@@ -226,7 +226,7 @@ void readJoints(Source& source, int accessor, const std::string& where, Influenc
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] >= 0 && values[i] <= 65535 && values[i] == std::floor(values[i]))) {
       failInvalid(where, ": component ", i % 4, " of vertex ", i / 4, " is ", values[i],
-                  ", which is no joint");
+                  ", which is not a joint");
     }
     const auto joint = static_cast<std::uint16_t>(values[i]);
     std::memcpy(&set.joints[i * sizeof joint], &joint, sizeof joint);
@@ -341,7 +341,7 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
     case TINYGLTF_MODE_TRIANGLES:
       if (indices.size() % 3 != 0) {
         source.notes().broken(NoteKind::restOfTriangles, where, ": the last ", indices.size() % 3,
-                              " indices make no triangle and are left out");
+                              " indices do not form a triangle and are left out");
         indices.resize(indices.size() - indices.size() % 3);
       }
       return indices;

@@ -192,7 +192,7 @@ class ReferenceCheck {
   void name(json& item, const std::string& where) const {
     const auto found = item.find("name");
     if (found == item.end() || found->is_string()) return;
-    notes_.broken(NoteKind::name, where, ": its name is not a text");
+    notes_.broken(NoteKind::name, where, ": its name is not a string");
     item.erase(found);
   }
 
@@ -224,7 +224,7 @@ class ReferenceCheck {
       }
     }
     if (!value.is_number_unsigned() || value.get<std::uint64_t>() > largestInteger) {
-      failInvalid(what, " is not a whole number from 0 upwards");
+      failInvalid(what, " is not an integer of at least 0");
     }
     return value.get<std::uint64_t>();
   }
@@ -339,10 +339,10 @@ class ReferenceCheck {
   // Finite in float32, which is what is made of it in the end.
   static void finiteNumber(const json& value, const char* property, const std::string& where) {
     if (!value.is_number())
-      failInvalid(where, ": ", property, " holds something other than numbers");
+      failInvalid(where, ": ", property, " contains something other than numbers");
     const double magnitude = std::abs(value.get<double>());
     if (!(magnitude <= static_cast<double>(std::numeric_limits<float>::max()))) {
-      failInvalid(where, ": ", property, " holds a number that float32 cannot hold");
+      failInvalid(where, ": ", property, " contains a number that is out of range for float32");
     }
   }
 
@@ -357,14 +357,14 @@ class ReferenceCheck {
                     const std::string& what) {
     if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
     failInvalid(what, " is ", inQuotes(value.is_string() ? value.get<std::string>() : value.dump()),
-                ", which the specification does not know");
+                ", which the specification does not define");
   }
 
   void checkBuffer(json& buffer, const std::string& where) const {
     if (requireInteger(buffer, "byteLength", where) == 0)
       notes_.broken(NoteKind::bufferLength, where, ": byteLength is 0");
     const auto uri = buffer.find("uri");
-    if (uri != buffer.end() && !uri->is_string()) failInvalid(where, ": uri is not a text");
+    if (uri != buffer.end() && !uri->is_string()) failInvalid(where, ": uri is not a string");
   }
 
   void checkView(json& view, const std::string& where, std::size_t index) {
@@ -405,7 +405,8 @@ class ReferenceCheck {
     const std::uint64_t count = requireInteger(accessor, "count", where);
     if (count == 0) notes_.broken(NoteKind::accessor, where, ": count is 0");
     if (count > std::numeric_limits<std::uint32_t>::max()) {
-      fail(ErrorCode::limitExceeded, join(where, ": a count of ", count, " is beyond 32 bits"));
+      fail(ErrorCode::limitExceeded,
+           join(where, ": a count of ", count, " does not fit in 32 bits"));
     }
     if (accessor.contains("sparse")) checkSparse(accessor, count, where, used);
     if (used && accessor.contains("bufferView"))
@@ -446,7 +447,7 @@ class ReferenceCheck {
     json lean = json::object();
     const auto keep = [&](const json& from, json& to, const char* property, auto check) {
       if (!from.contains(property)) return;
-      if (notes_.tolerate(NoteKind::material, "; the default is taken", check))
+      if (notes_.tolerate(NoteKind::material, "; the default is used", check))
         to[property] = from[property];
     };
     keep(material, lean, "name", [] {});
@@ -484,7 +485,7 @@ class ReferenceCheck {
       if (used) use(primitive, "indices");
       idleReference(primitive, "material", "materials", place);
       if (integer(primitive, "mode", place, 4) > 6) {
-        failInvalid(place, ": mode is none of 0 to 6");
+        failInvalid(place, ": mode is not from 0 to 6");
       }
       if (primitive.contains("targets")) {
         json& targets = requireArray(primitive, "targets", place);
@@ -495,7 +496,7 @@ class ReferenceCheck {
       }
       if (targetCount(primitive) != targetCount(primitives[0])) {
         notes_.broken(NoteKind::targetCount, place, ": it has ", targetCount(primitive),
-                      " morph targets, primitive 0 has ", targetCount(primitives[0]));
+                      " morph targets, but primitive 0 has ", targetCount(primitives[0]));
       }
     }
     checkWeights(mesh, targetsOf(mesh), where);
@@ -557,7 +558,7 @@ class ReferenceCheck {
     for (const char* property : {"translation", "rotation", "scale"}) {
       if (!node.contains("matrix") || !node.contains(property)) continue;
       notes_.broken(NoteKind::matrix, where, ": it has both matrix and ", property,
-                    "; the matrix is taken");
+                    "; the matrix is used");
       node.erase(property);
     }
     if (!node.contains("skin")) return;
@@ -574,7 +575,7 @@ class ReferenceCheck {
     // Whether the rest is 0 or the mesh's own, programs do not agree about.
     if (node["weights"].size() < facts.weights) {
       failInvalid(where, ": it has ", node["weights"].size(), " weights for ", facts.targets,
-                  " morph targets, and its mesh has others");
+                  " morph targets, but its mesh has more weights");
     }
   }
 
@@ -642,7 +643,7 @@ class ReferenceCheck {
     json& target = requireObject(channel, "target", where);
     reference(target, "node", "nodes", where + " target");
     if (!require(target, "path", where + " target").is_string()) {
-      failInvalid(where, " target: path is not a text");
+      failInvalid(where, " target: path is not a string");
     }
     // The channels of an extension may have no node. tinygltf would drop them and shift the rest.
     if (!target.contains("node")) {

@@ -25,7 +25,7 @@ std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::si
     (model.nodes[indexOf(node)].parent == none ? roots : others).push_back(indexOf(node));
   std::vector<bool> reachable = nodesBelow(model, roots);
   for (const std::uint32_t node : others) {
-    const std::string sentence = join("scene ", scene, ": node ", node, " is not a root, but a ",
+    const std::string sentence = join("scene ", scene, ": node ", node, " is not a root but a ",
                                       "child of node ", model.nodes[node].parent);
     if (!reachable[node]) failInvalid(sentence);
     source.notes().broken(NoteKind::sceneNode, sentence);
@@ -33,13 +33,13 @@ std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::si
   return reachable;
 }
 
-// What the default scene holds: `scene`, or scene 0 where the file does not say (as three.js does),
+// What the default scene holds: `scene`, or scene 0 if the file does not say (as three.js does),
 // or all nodes where it has no scenes.
 std::vector<bool> findReachable(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   if (!content.scenes.empty())
     return nodesOfScene(source, model, static_cast<std::size_t>(std::max(content.defaultScene, 0)));
-  if (!model.nodes.empty()) model.notes.push_back("the file has no scene: all its nodes are taken");
+  if (!model.nodes.empty()) model.notes.push_back("the file has no scene: all its nodes are used");
   return std::vector<bool>(model.nodes.size(), true);
 }
 

@@ -19,7 +19,7 @@ JointMatrix toJointMatrix(const float* columns, const std::string& where) {
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
       const float value = columns[column * 4 + row];
-      if (!std::isfinite(value)) failInvalid(where, " holds a number that is not finite");
+      if (!std::isfinite(value)) failInvalid(where, " contains a number that is not finite");
       if (row < 3) {
         matrix.m[row][column] = value;
       } else if (std::abs(value - (column == 3 ? 1.0f : 0.0f)) > tolerance) {
@@ -63,8 +63,8 @@ std::vector<std::uint32_t> findRoots(const Model& model) {
 
 Skin readSkin(Source& source, const tinygltf::Skin& from, const std::string& where) {
   if (from.joints.size() > maxPoseJoints) {
-    fail(ErrorCode::limitExceeded, join(where, ": it has ", from.joints.size(),
-                                        " joints, and a palette holds ", maxPoseJoints));
+    fail(ErrorCode::limitExceeded,
+         join(where, ": it has ", from.joints.size(), " joints; the maximum is ", maxPoseJoints));
   }
   Skin skin;
   std::transform(from.joints.begin(), from.joints.end(), std::back_inserter(skin.joints), indexOf);

@@ -45,8 +45,9 @@ Result<void> checkAbi(const fs::path& shaderFolder) {
   if (!file) return Error{ErrorCode::ioError, "cannot read '" + path.string() + "'"};
   if (text == abiText) return {};
   return Error{ErrorCode::invalidArgument,
-               "the library was compiled with another abi.h than '" + path.string() +
-                   "': the kernels there are of another version, or it must be compiled again"};
+               "'" + path.string() +
+                   "' differs from the abi.h that the library was compiled with: "
+                   "use the kernels of this version, or compile the library again"};
 }
 
 std::vector<std::pair<std::string, std::string>> definesOf(const kernels::Recipe& recipe) {

@@ -65,9 +65,9 @@ std::string encodeEntry(const CacheKey& key, std::span<const std::uint32_t> word
   return header + module;
 }
 
-// What is wrong with an entry; null where nothing is.
+// What is wrong with an entry; null if nothing is.
 const char* findDamage(std::string_view bytes, const CacheKey& key) {
-  if (bytes.size() < headerSize || !bytes.starts_with(magic)) return "is no cache entry";
+  if (bytes.size() < headerSize || !bytes.starts_with(magic)) return "is not a cache entry";
   if (wordAt(bytes, 4) != formatVersion) return "is of another version";
   if (doubleWordAt(bytes, 8) != key[0] || doubleWordAt(bytes, 16) != key[1]) {
     return "belongs to another shader";
@@ -99,7 +99,7 @@ CacheLookup Cache::load(const CacheKey& key) const {
   const char* damage = findDamage(*bytes, key);
   if (damage == nullptr) return {decodeModule(*bytes), {}};
   std::filesystem::remove(path, failure);
-  return {{}, "cache entry '" + path.string() + "' " + damage + " and was thrown away"};
+  return {{}, "cache entry '" + path.string() + "' " + damage + " and was deleted"};
 }
 
 Result<void> Cache::store(const CacheKey& key, std::span<const std::uint32_t> words) const {
@@ -107,7 +107,7 @@ Result<void> Cache::store(const CacheKey& key, std::span<const std::uint32_t> wo
   std::filesystem::create_directories(folder_, failure);
   if (failure) {
     return Error{ErrorCode::ioError,
-                 "cannot make the cache folder '" + folder_.string() + "': " + failure.message()};
+                 "cannot create the cache folder '" + folder_.string() + "': " + failure.message()};
   }
   return writeFileAtomically(pathOf(key), encodeEntry(key, words));
 }

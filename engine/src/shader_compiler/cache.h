@@ -15,8 +15,8 @@ namespace dermis {
 using CacheKey = std::array<std::uint64_t, 2>;
 
 struct CacheLookup {
-  std::vector<std::uint32_t> words;  ///< The module; empty where there is none to use.
-  std::string problem;               ///< What was wrong with the entry; empty where nothing was.
+  std::vector<std::uint32_t> words;  ///< The module; empty if there is none to use.
+  std::string problem;               ///< What was wrong with the entry; empty if nothing was.
 };
 
 class Cache {

@@ -94,7 +94,7 @@ class CacheUse {
 
   CacheLookup load() const { return cache_.load(key_); }
 
-  /// What kept the module from being stored; empty where nothing did. A module with an include that
+  /// What kept the module from being stored; empty if nothing did. A module with an include that
   /// is not in the key is not stored: its change would go unnoticed.
   std::string store(const FrontEndOutput& translated,
                     const std::vector<std::uint32_t>& words) const {
@@ -131,7 +131,8 @@ Result<std::vector<std::uint32_t>> ShaderCompiler::compileFile(
   try {
     const std::optional<ShaderStage> stage = stageOfEnding(path);
     if (!stage) {
-      return invalidArgument("shader '" + path.string() + "' ends in none of .comp, .vert, .frag");
+      return invalidArgument("shader '" + path.string() +
+                             "' does not end in .comp, .vert or .frag");
     }
     std::optional<std::string> text = readFile(path);
     if (!text) return Error{ErrorCode::ioError, "cannot read shader '" + path.string() + "'"};

@@ -14,7 +14,7 @@ namespace dermis {
 namespace {
 
 // glslang counts its users itself, but not under a lock in every version. The lock and the count
-// are constant-initialised and hold nothing, so that there is nothing to destroy when the program
+// are constant-initialized and hold nothing, so that there is nothing to destroy when the program
 // ends.
 class GlslangUse {
  public:
@@ -88,7 +88,7 @@ std::vector<std::uint32_t> generate(const glslang::TIntermediate& intermediate, 
                                     spv::SpvBuildLogger& logger) {
   glslang::SpvOptions options;
   options.generateDebugInfo = debugInfo;
-  options.disableOptimizer = true;  // Ours keeps specialisation constants and bindings.
+  options.disableOptimizer = true;  // Ours keeps specialization constants and bindings.
   std::vector<unsigned int> words;
   glslang::GlslangToSpv(intermediate, words, &logger, &options);
   return {words.begin(), words.end()};

@@ -1,4 +1,4 @@
-// GLSL to SPIR-V, as glslang writes it: neither optimised nor validated.
+// GLSL to SPIR-V, as glslang writes it: neither optimized nor validated.
 #pragma once
 
 #include <cstdint>

@@ -49,7 +49,7 @@ Includer::IncludeResult* Includer::include(const char* headerName, const char* i
   return &results_.back();
 }
 
-// Why a file that was found may not be included; empty where it may.
+// Why a file that was found may not be included; empty if it may.
 std::string Includer::objectionTo(const IncludeFile& file) const {
   if (isOpen(file.path)) return "a file includes itself: " + describeCycle(file.path);
   if (open_.size() >= maximumDepth) return "includes are nested too deeply";

@@ -198,7 +198,7 @@ class Scanner {
 }  // namespace
 
 Result<std::vector<ContractableInstruction>> findContractable(Words words) {
-  const Error damaged{ErrorCode::invalidData, "the words are no SPIR-V module"};
+  const Error damaged{ErrorCode::invalidData, "the words are not a SPIR-V module"};
   if (words.size() < moduleHeaderLength || words[0] != spv::MagicNumber) return damaged;
   Scanner scanner;
   for (words = words.subspan(moduleHeaderLength); !words.empty();) {

@@ -42,7 +42,7 @@ Result<void> validate(std::span<const std::uint32_t> words, bool scalarBlockLayo
 }
 
 // -- Which functions are inlined. Drivers inline all of them. If that is done before a module is
-// optimised, it becomes three times as large; if nothing is, drivers take longer for each pipeline.
+// optimized, it becomes three times as large; if nothing is, drivers take longer for each pipeline.
 
 /// Maximum instructions of a function with several callers that is inlined. Measured on lavapipe
 /// with 40: pipelines are built in 0.83 of the time that no inlining takes, as with any larger
@@ -184,10 +184,10 @@ Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint
   if (options.optimize) InliningChoice{input};
   std::vector<std::uint32_t> optimized;
   if (!optimizer.Run(input.data(), input.size(), &optimized, runOptions)) {
-    return message.asError(name, "the SPIR-V cannot be optimised");
+    return message.asError(name, "the SPIR-V cannot be optimized");
   }
   forgetInliningChoice(optimized);
-  if (const auto valid = validate(optimized, scalar, name, "the optimiser made invalid SPIR-V");
+  if (const auto valid = validate(optimized, scalar, name, "the optimizer made invalid SPIR-V");
       !valid) {
     return valid.error();
   }

@@ -1,4 +1,4 @@
-// SPIRV-Tools' optimiser and validator for Vulkan 1.1.
+// SPIRV-Tools' optimizer and validator for Vulkan 1.1.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct OptimizerOptions {
   bool scalarBlockLayout = false;  ///< Blocks may have that layout.
 };
 
-/// Checks the module, runs the passes, and checks what came out. Unused bindings and specialisation
+/// Checks the module, runs the passes, and checks what came out. Unused bindings and specialization
 /// constants stay, and NoContraction is respected. Fails with `shaderError`; `name` is the
 /// source's, for the message.
 Result<std::vector<std::uint32_t>> optimizeAndValidate(std::span<const std::uint32_t> words,

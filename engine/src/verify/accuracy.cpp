@@ -70,9 +70,9 @@ double positionFormatBound(VertexFormat format, const reference::Double3& positi
     } else if (precision.rounding == Rounding::snorm) {
       const auto low = static_cast<double>(box.min[axis]);
       const auto high = static_cast<double>(box.max[axis]);
-      const double centre = (low + high) / 2, half = (high - low) / 2;
+      const double center = (low + high) / 2, half = (high - low) / 2;
       error[axis] =
-          half * (0.5 / precision.largest) + floatRounding * (4 * std::abs(centre) + 8 * half);
+          half * (0.5 / precision.largest) + floatRounding * (4 * std::abs(center) + 8 * half);
     }
   }
   return std::hypot(error[0], error[1], error[2]);

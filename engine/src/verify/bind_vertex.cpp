@@ -178,12 +178,12 @@ Result<std::vector<ActiveMorph>> activeMorphs(const MeshView& mesh,
     if (morph.weight == 0) continue;
     if (morph.target >= weightOf.size()) {
       return morphError(mesh, morph.target,
-                        " is outside the mesh's " + std::to_string(weightOf.size()));
+                        " does not exist; the mesh has " + std::to_string(weightOf.size()));
     }
     if (!std::isfinite(morph.weight)) {
       return morphError(mesh, morph.target, " has a weight that is not finite");
     }
-    if (weightOf[morph.target] != 0) return morphError(mesh, morph.target, " has a weight twice");
+    if (weightOf[morph.target] != 0) return morphError(mesh, morph.target, " has two weights");
     weightOf[morph.target] = static_cast<double>(morph.weight);
   }
   std::vector<ActiveMorph> active;

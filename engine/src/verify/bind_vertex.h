@@ -28,7 +28,7 @@ struct Influence {
   std::uint32_t joint;
   double stored;      ///< the weight as stored, times 65535, duplicates added up: what the pivot is
                       ///< chosen by
-  double weight = 0;  ///< normalised
+  double weight = 0;  ///< normalized
 };
 
 /// All sets together, one entry a joint, in the order of joints; the weights sum to 1. Empty: no

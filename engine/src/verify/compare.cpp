@@ -232,7 +232,7 @@ std::string complaint(const char* name, const SkinnedAttribute& attribute,
   }
   if (attribute.stride < formatSize(attribute.format)) {
     return std::string("the stride of the skinned ") + name + " is " +
-           std::to_string(attribute.stride) + " bytes, an element has " +
+           std::to_string(attribute.stride) + " bytes, but an element has " +
            std::to_string(formatSize(attribute.format));
   }
   return {};
@@ -273,7 +273,7 @@ Result<Comparison> compareWithReference(const SkinnedMesh& expected, const Skinn
     wrong = complaint("tangents", actual.tangents, isTangentFormat, count);
   }
   if (wrong.empty() && isSnormPosition(actual.positions.format) && !isUpright(actual.box)) {
-    wrong = "the box of the skinned positions is not finite or upside down";
+    wrong = "the box of the skinned positions is not finite, or its minimum is above its maximum";
   }
   if (wrong.empty() && expected.bounds.size() != count) {
     wrong = "the reference has " + std::to_string(expected.bounds.size()) + " bounds for " +

@@ -21,7 +21,7 @@ double amplification(Method method, const Conditioning& conditioning) {
 struct Direction {
   double alignment;
   double bindRounding;     ///< in units of u
-  double length;           ///< of what is normalised in the end
+  double length;           ///< of what is normalized in the end
   double shortcutsInside;  ///< how many times M's own error counts: M is used so often
 };
 

@@ -18,7 +18,7 @@ struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
                         ///< value of joint j
   double stretch = 1;   ///< max σ_j; 1 for a vertex without weight
-  double distance = 0;  ///< |p|, from the origin of the bind pose; where there is a centre of
+  double distance = 0;  ///< |p|, from the origin of the bind pose; if there is a center of
                         ///< rotation c, |p| + 2 |c|
   double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels take for rigid as they are
   /// What the bind pose in float32 may be off by, in units of u: of the mesh's for p, of |n| and
@@ -33,18 +33,18 @@ struct Conditioning {
   /// where joints cancel in a blend, what is left was rounded at the size of the joints.
   double normalAlignment = 1;
   double tangentAlignment = 1;  ///< |M t| / (max σ_j |t|), likewise
-  /// A length that counts besides the scale: twice max σ_j times the centre of rotation's distance
+  /// A length that counts besides the scale: twice max σ_j times the center of rotation's distance
   /// from the origin (`centerOfRotation`, `bulgeControlled`), how far differences of rotations that
-  /// all but agree throw the centre (`sphericalBlend`: |r| + max |t_a − t_b| / σ, σ the least
+  /// all but agree throw the center (`sphericalBlend`: |r| + max |t_a − t_b| / σ, σ the least
   /// singular value that is made use of), and what is left of the errors of earlier steps
   /// (`dualQuaternionIterative`: scale · (`turning` − 1)).
   double leverage = 0;
-  /// |b|, the length of the blended quaternion before it is normalised: at least the greatest
+  /// |b|, the length of the blended quaternion before it is normalized: at least the greatest
   /// weight, and so at least 1/4 for up to four influences. 1 for `linear` and `logMatrix`.
   double blendLength = 1;
   double turning = 1;  ///< `dualQuaternionIterative`: 1 / (1 − ρ), ρ the factor by which steps
                        ///< shrink
-  double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalised
+  double normalLength = 1;   ///< `blended`: of the sum of both unit normals, which is normalized
   double tangentLength = 1;  ///< likewise
   bool normalRotatedOnly =
       true;  ///< blended rotations of rigid joints: directions pass through no 3×3

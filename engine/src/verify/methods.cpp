@@ -141,7 +141,7 @@ Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning) {
 
 namespace {
 
-/// In directions in which the rotations differ by less, the centre stays where it is: 0.
+/// In directions in which the rotations differ by less, the center stays where it is: 0.
 constexpr double leastSingularValue = 1e-3;
 /// What packing drops.
 constexpr double leastWeight = 0x1p-49;
@@ -184,7 +184,7 @@ dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
     least = std::min(least, singularValue);
     center += parts.right[i] * (glm::dot(parts.right[i], right) / parts.values[i]);
   }
-  // Rotations are known to a rounding; where they all but agree, that moves the centre far.
+  // Rotations are known to a rounding; where they all but agree, that moves the center far.
   conditioning.leverage = glm::length(center) + (std::isfinite(least) ? apart / least : 0);
   return center;
 }
@@ -277,7 +277,7 @@ BindVertex skinBlended(const VertexToSkin& vertex, Conditioning& conditioning) {
           unitOrZero(tangent), turned.handedness};
 }
 
-/// A centre that is far away counts as the vertex' own position does.
+/// A center that is far away counts as the vertex' own position does.
 void conditionCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
   const double distance = 2 * glm::length(vertex.inputs.center);
   conditioning.leverage = conditioning.stretch * distance;
@@ -294,7 +294,7 @@ BindVertex skinCenterOfRotation(const VertexToSkin& vertex, Conditioning& condit
   return moveRigidly(vertex, blend.scaleShear, blend.rigid.real, translation, conditioning);
 }
 
-/// What linear blending and dual quaternions make of the centre differs; that much of it is added.
+/// What linear blending and dual quaternions make of the center differs; that much of it is added.
 BindVertex skinBulgeControlled(const VertexToSkin& vertex, Conditioning& conditioning) {
   const dvec3& center = vertex.inputs.center;
   const RigidBlend blend = blendRigid(vertex, conditioning);

@@ -76,7 +76,7 @@ Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> 
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
     return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": " +
                                                  std::string(methodName(method)) +
-                                                 " needs centres of rotation, it has none"};
+                                                 " needs centers of rotation, but it has none"};
   }
   const Result<std::vector<ActiveMorph>> active = activeMorphs(mesh, morphs);
   if (!active) return active.error();

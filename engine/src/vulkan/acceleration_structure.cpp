@@ -16,10 +16,11 @@ Result<void> checkLayout(const OutputAttribute& positions, VkFormat format,
                          VkDeviceAddress outputAddress) {
   const std::string name(formatName(positions.format));
   if (format == VK_FORMAT_UNDEFINED)
-    return invalid("not every device can build from positions in " + name);
+    return invalid("an acceleration structure cannot be built on every device from positions in " +
+                   name);
   if (positions.stride < formatSize(positions.format)) {
     return invalid("the stride of " + std::to_string(positions.stride) +
-                   " bytes is less than a position in " + name + " takes");
+                   " bytes is less than the size of a position in " + name);
   }
   const std::uint32_t alignment = formatAlignment(positions.format);
   if (positions.stride % alignment != 0) {
@@ -78,7 +79,7 @@ Result<VkTransformMatrixKHR> boxTransform(const Box& box) {
     // In double precision neither the sum nor the difference of two floats overflows.
     const auto halfSize = static_cast<float>((high - low) / 2);
     if (!std::isfinite(low) || !std::isfinite(high) || !(halfSize > 0))
-      return invalid("the box of snorm16 positions must be finite, each side longer than 0");
+      return invalid("the box of snorm16 positions must be finite, with sides longer than 0");
     transform.matrix[axis][axis] = halfSize;
     transform.matrix[axis][3] = static_cast<float>((low + high) / 2);
   }

@@ -24,7 +24,7 @@ Result<void> checkDescription(const DeviceDescription& description) {
   if (description.getInstanceProcAddr == nullptr) return missingHandle("getInstanceProcAddr");
   if (description.apiVersion < VK_API_VERSION_1_1) {
     return Error{ErrorCode::missingFeature,
-                 "Dermis needs Vulkan 1.1, the engine enabled " +
+                 "Dermis needs Vulkan 1.1, but the engine enabled " +
                      std::to_string(VK_API_VERSION_MAJOR(description.apiVersion)) + "." +
                      std::to_string(VK_API_VERSION_MINOR(description.apiVersion))};
   }
@@ -172,12 +172,12 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
   if (description.texelBuffers.value_or(defaults.texelBuffers))
     chooseTexelBuffers(properties.limits, state.limits);
-  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::BINDING_COUNT_LEAST) {
+  if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::MIN_BINDING_COUNT) {
     return Error{ErrorCode::missingFeature,
                  std::string("device '") + properties.deviceName + "' allows " +
                      std::to_string(properties.limits.maxPerStageDescriptorStorageBuffers) +
-                     " storage buffers per stage, Dermis needs " +
-                     std::to_string(abi::BINDING_COUNT_LEAST)};
+                     " storage buffers per stage, but Dermis needs " +
+                     std::to_string(abi::MIN_BINDING_COUNT)};
   }
 
   if (Result<void> good = state.createLayouts(); !good) return good.error();
@@ -219,8 +219,8 @@ Result<std::uint32_t> Context::replaceKernels(std::span<const KernelModule> modu
                                               std::uint64_t completedFrame) const {
   if (!modules.empty() && state_->kernelSource.get == nullptr) {
     return Error{ErrorCode::invalidArgument,
-                 "replaceKernels needs DeviceDescription::kernelSource: later pipelines would have "
-                 "other kernels"};
+                 "replaceKernels needs DeviceDescription::kernelSource: without it, pipelines that "
+                 "are created later would use the kernels of the library"};
   }
   for (const KernelModule& module : modules) {
     if (module.spirv.empty()) {
@@ -229,9 +229,9 @@ Result<std::uint32_t> Context::replaceKernels(std::span<const KernelModule> modu
     }
   }
   if (completedFrame >= frame) {
-    return Error{ErrorCode::invalidArgument, "frame " + std::to_string(frame) +
-                                                 " is to be recorded, but frame " +
-                                                 std::to_string(completedFrame) + " is complete"};
+    return Error{ErrorCode::invalidArgument,
+                 "frame " + std::to_string(frame) + " is the next frame, but frame " +
+                     std::to_string(completedFrame) + " is already complete"};
   }
   return state_->pipelines->replace(modules, state_->pipelineLayout, frame, completedFrame);
 }

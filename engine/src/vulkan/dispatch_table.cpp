@@ -86,9 +86,9 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
     loader.deviceFunction("vkCmdEndDebugUtilsLabelEXT", table.cmdEndDebugUtilsLabel);
   }
   if (!loader.firstMissing().empty()) {
-    return Error{
-        ErrorCode::missingEntryPoint,
-        "the driver has no entry point '" + loader.firstMissing() + "' for what was enabled"};
+    return Error{ErrorCode::missingEntryPoint, "the driver has no entry point '" +
+                                                   loader.firstMissing() +
+                                                   "' of a version or extension that was enabled"};
   }
   return table;
 }
@@ -104,13 +104,13 @@ const char* resultText(VkResult result) {
     case VK_ERROR_DEVICE_LOST:
       return "the device was lost (VK_ERROR_DEVICE_LOST)";
     case VK_ERROR_INITIALIZATION_FAILED:
-      return "initialisation failed (VK_ERROR_INITIALIZATION_FAILED)";
+      return "initialization failed (VK_ERROR_INITIALIZATION_FAILED)";
     case VK_ERROR_OUT_OF_POOL_MEMORY:
       return "the descriptor pool is exhausted (VK_ERROR_OUT_OF_POOL_MEMORY)";
     case VK_ERROR_FRAGMENTATION:
       return "fragmentation (VK_ERROR_FRAGMENTATION)";
     case VK_ERROR_INVALID_SHADER_NV:
-      return "the driver refuses the shader (VK_ERROR_INVALID_SHADER_NV)";
+      return "the driver rejects the shader (VK_ERROR_INVALID_SHADER_NV)";
     default:
       return nullptr;
   }

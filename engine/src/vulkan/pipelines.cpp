@@ -16,12 +16,12 @@ Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
   for (const std::uint8_t unit : variant.units) {
     if (unit >= 4 || (limits.storage16Bit && (unit == 2 || limits.storage8Bit))) continue;
     return Error{ErrorCode::missingFeature,
-                 "a variant that stores less than a word at a time needs storageBuffer16BitAccess "
+                 "a variant that stores less than 4 bytes at a time needs storageBuffer16BitAccess "
                  "and, for single bytes, storageBuffer8BitAccess"};
   }
   if (variant.wideStores && !(limits.scalarBlockLayout && limits.shaderInt64)) {
     return Error{ErrorCode::missingFeature,
-                 "a variant that stores more than a word at a time needs scalarBlockLayout and "
+                 "a variant that stores more than 4 bytes at a time needs scalarBlockLayout and "
                  "shaderInt64"};
   }
   return {};
@@ -64,7 +64,7 @@ Result<VkPipeline> Pipelines::createFromSource(const Variant& variant,
     if (!spirv) return spirv.error();
     if (spirv->empty()) {
       return Error{ErrorCode::missingFeature,
-                   "KernelSource::get gave no kernel '" + kernelName(variant, limits_) + "'"};
+                   "KernelSource::get returned no kernel '" + kernelName(variant, limits_) + "'"};
     }
     return create(variant, layout, *spirv);
   }
@@ -72,7 +72,7 @@ Result<VkPipeline> Pipelines::createFromSource(const Variant& variant,
   if (spirv.empty()) {
     return Error{ErrorCode::missingFeature, "this build of Dermis has no kernel for " +
                                                 std::string(methodName(variant.method)) +
-                                                " in that layout"};
+                                                " in this layout"};
   }
   return create(variant, layout, spirv);
 }

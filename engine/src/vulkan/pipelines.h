@@ -30,7 +30,7 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Nothing where it has been built. Fails with `missingFeature` where the device, or this build
+  /// Nothing if it has been built. Fails with `missingFeature` if the device, or this build
   /// of Dermis, has no module for the variant.
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
 

@@ -18,7 +18,7 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
   const std::uint64_t given = range.buffer == VK_NULL_HANDLE ? 0 : range.size;
   if (given >= needed) return {};
   return Error{ErrorCode::invalidArgument, std::string("the plan needs ") + std::to_string(needed) +
-                                               " bytes of " + name + ", the bindings have " +
+                                               " bytes of " + name + ", but the bindings have " +
                                                std::to_string(given)};
 }
 
@@ -28,7 +28,7 @@ std::string describe(const Variant& variant) {
            (variant.method == Method::linear      ? "matrices"
             : variant.method == Method::logMatrix ? "logarithms"
                                                   : "dual quaternions") +
-           (variant.scales ? " of joints that scale" : "");
+           (variant.scales ? " with joints that scale" : "");
   }
   if (variant.kernel == Kernel::clear) return "the clear kernel";
   if (variant.kernel == Kernel::visibility)
@@ -44,8 +44,8 @@ std::string describe(const Variant& variant) {
   if (variant.bounds) text += ", bounds";
   if (variant.recordBytes != 0)
     text += ", " + std::to_string(variant.recordBytes) +
-            (variant.staged ? " bytes by way of workgroup memory" : " bytes a store");
-  if (variant.pairs) text += ", 8 bytes a store";
+            (variant.staged ? " bytes per vertex through workgroup memory" : " bytes per store");
+  if (variant.pairs) text += ", 8 bytes per store";
   text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
           (variant.influences == 0 ? std::string("any number of")
                                    : std::to_string(variant.influences)) +
@@ -91,8 +91,9 @@ Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
   const BufferRange& normals = buffers.outputs.normals;
   if (!stores || (positions.buffer == normals.buffer && positions.offset == normals.offset))
     return {};
-  return Error{ErrorCode::invalidArgument,
-               "the plan was made for outputs in one buffer, the bindings have normals in another"};
+  return Error{
+      ErrorCode::invalidArgument,
+      "the plan was made for outputs in one buffer, but the bindings have normals in another"};
 }
 
 Result<void> BindingsState::checkVariants(const Plan& plan) const {
@@ -108,7 +109,7 @@ Result<void> BindingsState::check(const Plan& plan) const {
   if (!plan.commands().empty() && plan.limits() != context->limits) {
     return Error{
         ErrorCode::invalidArgument,
-        "the plan was made for other limits than this device's; makePlan takes Context::limits()"};
+        "the plan was made for the limits of another device; pass Context::limits() to makePlan"};
   }
   if (Result<void> good = checkOneBuffer(plan); !good) return good;
   return checkVariants(plan);
@@ -296,7 +297,7 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
   }
   if (plan.buffer(BufferRole::readBack).size != 0) {
     return Error{ErrorCode::invalidArgument,
-                 "the plan is of a scene: its commands use buffers that bindings do not have"};
+                 "the plan is for a scene: its commands use buffers that bindings do not have"};
   }
   const BindingsState& bound = *bindings.state_;
   if (Result<void> good = bound.check(plan); !good) return good;

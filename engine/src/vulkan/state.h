@@ -27,7 +27,7 @@ struct ContextState {
   ~ContextState();
 
   std::uint32_t bindingCount() const {
-    return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::BINDING_COUNT_LEAST
+    return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::MIN_BINDING_COUNT
                                                                    : abi::BINDING_COUNT;
   }
   /// They follow the storage buffers: a device with fewer of those reads no texels.

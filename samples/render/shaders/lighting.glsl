@@ -22,7 +22,7 @@ vec2 discTap(int index, int count) {
 }
 
 // Away from the surface by a texel's width, the more the light grazes it: so that a surface does not
-// shade itself where the map is too coarse for its slope.
+// shade itself if the map is too coarse for its slope.
 vec3 offsetFromSurface(vec3 position, vec3 normal, float cosine, float texel) {
   float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
   return position + normal * texel * (0.6 + 1.4 * sine);

@@ -16,8 +16,9 @@ struct MeshData;
 /// the same time. A moved-from mesh may only be assigned to or destroyed.
 ///
 /// It owns its memory. Per vertex this is about 80 bytes with normals, 32 more with tangents, and 8
-/// for each influence; for the influences, each group of eight vertices counts as if all had as
-/// many as the one with the most. With morph targets it keeps a copy of the packed mesh, too.
+/// for each influence. Vertices are stored in groups of eight; each takes the space of as many
+/// influences as the vertex of the group that has the most. With morph targets it keeps a copy of
+/// the packed mesh, too.
 class DERMIS_CPU_API Mesh {
  public:
   /// Converts a packed mesh, which may be released afterwards. O(vertices × influences). Fails with

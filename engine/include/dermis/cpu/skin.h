@@ -1,5 +1,5 @@
 // Skins on the CPU, with SIMD instructions. All methods except those for comparison are available.
-// It needs no Vulkan, and starts no threads: the thread that calls `skin` does the work.
+// Needs no Vulkan and starts no threads: the thread that calls `skin` does the work.
 //
 //     const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
 //     cpu::Job job;
@@ -37,11 +37,11 @@ struct OutputMemory {
 
   /// No memory.
   constexpr OutputMemory() = default;
-  /// One address for all attributes, for what `placeVertices` returns.
+  /// One address for all attributes, for the offsets that `placeVertices` returns.
   constexpr OutputMemory(void* all)
       : positions(all), normals(all), tangents(all), previousPositions(all) {}
-  /// An array for each attribute; null for attributes that the job does not write. Offsets then
-  /// usually are 0, and not those of `placeVertices`.
+  /// An array for each attribute; null for attributes that the job does not write. The offsets in
+  /// `Job::places` are then usually 0, not those that `placeVertices` returns.
   constexpr OutputMemory(void* positionArray, void* normalArray, void* tangentArray,
                          void* previousArray)
       : positions(positionArray),
@@ -82,8 +82,8 @@ struct Job {
 /// Skins the vertices of a job. Any number of threads may call it at the same time, if they write
 /// different bytes.
 ///
-/// Every vertex has the same bits whatever the range, the other instances, the thread and the
-/// processor are. This holds for finite poses, in threads that round to nearest and do not flush
+/// The bits of a vertex do not depend on the range, the other instances, the thread or the
+/// processor. This holds for finite poses, in threads that round to nearest and do not flush
 /// subnormal numbers to zero.
 ///
 /// Each thread keeps its working memory for the next job, so it stops allocating after its largest

@@ -1,6 +1,6 @@
 // Skins a whole scene on the CPU: the same handles, update intervals, visibility, motion and bounds
-// as vulkan::SkinningSystem, without Vulkan. It contains a Scene (scene.h), and owns meshes, poses
-// and output. It turns each frame into jobs, which the engine runs on its threads.
+// as vulkan::SkinningSystem, without Vulkan. A system contains a Scene (scene.h), and owns meshes,
+// poses and output. It turns each frame into jobs, which the engine runs on its threads.
 //
 // One frame:
 //

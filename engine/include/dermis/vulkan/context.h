@@ -50,7 +50,7 @@ struct DeviceDescription {
   /// `Context::limits` is at most what such a buffer can hold. Results are the same to the bit. If
   /// not set: true for CPU devices (measured on lavapipe), false for others (a guess).
   std::optional<bool> texelBuffers;
-  /// Whether kernels may store interleaved vertices by way of workgroup memory
+  /// Whether kernels may store interleaved vertices through workgroup memory
   /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete
   /// GPUs (a guess), false for others.
   std::optional<bool> stagedStores;
@@ -107,20 +107,20 @@ class DERMIS_VULKAN_API Context {
   /// attributes are not placed by a `VertexLayout`: `everyVariant` lists their variants.
   Result<void> prepare(std::span<const Variant> variants) const;
 
-  /// Swaps kernels between two frames: creates every existing pipeline of these modules again,
-  /// all or none, and returns their number. `record` uses them from then on. It does not wait for
-  /// the GPU. `kernelSource` must give the new modules from then on: pipelines that `prepare`
-  /// creates on another thread during the call are created again.
+  /// Swaps kernels between two frames: creates every existing pipeline of these modules again, and
+  /// returns their number. Either all are replaced or none. `record` uses the new pipelines from
+  /// then on. Does not wait for the GPU. `kernelSource` must return the new modules from then on;
+  /// pipelines that `prepare` creates on another thread during the call are created again.
   ///
-  /// `frame` and `completedFrame` are as for `SkinningSystem::beginFrame`, whether or not there is
-  /// a system: the frame that is recorded next, and the last one that the GPU has finished.
-  /// Replaced pipelines are destroyed by a later call, with or without modules, when `frame` is
-  /// complete. Command buffers that were recorded before must not be submitted again after `frame`.
-  /// Other threads may record during the call: what they record must belong to `frame` or an
-  /// earlier one, and each of its dispatches uses the old or the new kernel.
+  /// `frame` is the frame that is recorded next, `completedFrame` the last frame that the GPU has
+  /// completed: as for `SkinningSystem::beginFrame`, even if there is no system. Once `frame` is
+  /// complete, the next call, with or without modules, destroys the replaced pipelines. Command
+  /// buffers that were recorded before must not be submitted again after `frame`. Other threads may
+  /// record during the call, for `frame` or an earlier frame; each of their dispatches uses either
+  /// the old or the new kernel.
   ///
-  /// Fails with `invalidArgument` (no `kernelSource`; an empty module; `completedFrame` is not
-  /// before `frame`) or `vulkanError`, and changes nothing then.
+  /// Fails with `vulkanError`, and with `invalidArgument` if there is no `kernelSource`, a module
+  /// is empty, or `completedFrame` is not before `frame`. If it fails, nothing changes.
   Result<std::uint32_t> replaceKernels(std::span<const KernelModule> modules, std::uint64_t frame,
                                        std::uint64_t completedFrame) const;
 

@@ -1,6 +1,6 @@
-// The Vulkan types that Dermis' headers name, declared as in vulkan_core.h, which this header does
-// not include. So an engine may include volk, or Vulkan's header with or without prototypes, before
-// or after Dermis' headers. Only vertex_input.h and acceleration_structure.h include vulkan_core.h.
+// Declares the Vulkan types that Dermis' headers use, as vulkan_core.h does, but does not include
+// it. So an engine may include volk, or Vulkan's header with or without prototypes, before or after
+// Dermis' headers. Only vertex_input.h and acceleration_structure.h include vulkan_core.h.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ using VkInstance = struct VkInstance_T*;
 using VkPhysicalDevice = struct VkPhysicalDevice_T*;
 using VkDevice = struct VkDevice_T*;
 using VkCommandBuffer = struct VkCommandBuffer_T*;
-// The condition of vulkan_core.h.
+// The same condition as in vulkan_core.h.
 #if defined(__LP64__) || defined(_WIN64) || (defined(__x86_64__) && !defined(__ILP32__)) || \
     defined(_M_X64) || defined(__ia64) || defined(_M_IA64) || defined(__aarch64__) ||       \
     defined(__powerpc64__)

@@ -54,17 +54,18 @@ struct SpecializationConstants {
 /// The specialization constants for a variant.
 DERMIS_VULKAN_API SpecializationConstants specializationConstants(const Variant& variant);
 
-/// Modules for a Context in place of those in the library: from `RuntimeCompiler::source`
-/// (runtime_compiler.h), or from the engine's own build of the kernels.
+/// Supplies modules to a Context that replace those in the library: `RuntimeCompiler::source`
+/// (runtime_compiler.h), or the engine's own build of the kernels.
 struct KernelSource {
-  void* user = nullptr;
-  /// The SPIR-V of a module, by `kernelName`. `Context::prepare` calls it for each pipeline that it
-  /// creates, on its own thread: perhaps on several at once. It may fail; so does `prepare` then.
-  /// It throws nothing. Null: the library's modules.
+  void* user = nullptr;  ///< passed to `get`
+  /// Returns the SPIR-V of the module with this `kernelName`. `Context::prepare` calls it for each
+  /// pipeline that it creates, in the thread that calls `prepare`; several threads may call it at
+  /// once. If it fails, `prepare` fails with the same error. It must not throw. If null, the
+  /// modules in the library are used.
   Result<std::vector<std::uint32_t>> (*get)(void* user, std::string_view name) = nullptr;
 };
 
-/// A module by its `kernelName`. The memory is the caller's.
+/// A module and its `kernelName`. The caller owns the memory.
 struct KernelModule {
   std::string_view name;
   std::span<const std::uint32_t> spirv;

@@ -44,7 +44,7 @@ struct MappedRange {
 struct SkinningSystemDescription {
   /// Required, not owned. The Context must outlive the system. It may be moved.
   Context* context = nullptr;
-  // -- These have the meaning that they have in `SceneDescription`.
+  // -- As in `SceneDescription`.
   std::uint32_t framesInFlight = 2;
   Capacity meshCapacity = SceneDescription().meshCapacity;  ///< bytes
   Capacity jointCapacity = SceneDescription().jointCapacity;

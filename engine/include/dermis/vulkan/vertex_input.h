@@ -18,7 +18,7 @@ namespace dermis::vulkan {
 
 /// The format with which vertex input reads an attribute. Every Vulkan device supports it for
 /// vertex buffers. VK_FORMAT_UNDEFINED for `none`, and for float16x3, snorm16x3 and snorm8x3, which
-/// Vulkan does not require devices to read. Use x4 formats instead, or read the attribute from a
+/// Vulkan does not require devices to support. Use x4 formats instead, or read the attribute from a
 /// storage buffer.
 ///
 /// The shader must decode snorm16x4 positions and octahedral directions (dermis_decode.glsl).

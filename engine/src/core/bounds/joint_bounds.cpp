@@ -69,7 +69,7 @@ Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
   return {code, "mesh " + inQuotes(mesh.name) + what};
 }
 
-/// Where each vertex may be, relative to its bind position; empty where nothing displaces it.
+/// Where each vertex may be, relative to its bind position; empty if nothing displaces it.
 class Displacements {
  public:
   Result<void> gather(const MeshView& mesh, std::span<const MorphRange> ranges) {
@@ -107,7 +107,7 @@ class Displacements {
       if (vertex >= mesh.vertexCount || !std::isfinite(whole.x + whole.y + whole.z)) {
         return invalid(mesh, ErrorCode::invalidMesh,
                        name + ", element " + std::to_string(element) +
-                           ": its vertex is outside the mesh, or it is not finite");
+                           ": its vertex is outside the mesh, or the displacement is not finite");
       }
       const math::Vec3 low = static_cast<double>(range.min) * whole;
       const math::Vec3 high = static_cast<double>(range.max) * whole;

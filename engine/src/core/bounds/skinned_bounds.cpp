@@ -237,7 +237,7 @@ class PoseBounds {
   }
 
  private:
-  /// False where a joint that moves vertices is not finite, or is not there, and where the mesh is
+  /// False if a joint that moves vertices is not finite, or is not in the pose, and if the mesh is
   /// so large that float32 cannot hold the sums of an extent: from here on no number is NaN.
   bool pose(std::span<const JointMatrix> palette) {
     joints_.reserve(bounds_.joints.size());
@@ -264,7 +264,7 @@ class PoseBounds {
   }
 
   /// Finds the joints whose vertices may have influences in opposite hemispheres: by trios or,
-  /// where a vertex has too many influences for those, by angles, which see some where there are
+  /// where a vertex has too many influences for those, by angles, which see some if there are
   /// none.
   void findSplitJoints() {
     for (const auto& [a, b, c] : bounds_.trios) {

@@ -62,10 +62,10 @@ Result<void> checkJoints(const JointBounds& bounds) {
   std::uint32_t required = 0;
   for (const JointBounds::Joint& joint : bounds.joints) {
     if (joint.joint < required || joint.joint >= maxPoseJoints || hasNan(joint.alone.reach))
-      return damaged("its joints are not in order, or not numbers");
+      return damaged("its joints are not in ascending order, or contain NaN");
     required = joint.joint + 1;
   }
-  if (required != bounds.requiredJoints) return damaged("the joints that it requires are others");
+  if (required != bounds.requiredJoints) return damaged("the number of required joints is wrong");
   return {};
 }
 
@@ -78,7 +78,8 @@ Result<void> checkPairs(const JointBounds& bounds) {
     if (pair.first >= pair.second || pair.second >= bounds.joints.size() || key < next ||
         pair.influences < 2 || hasNan(pair.extent.reach) || hasNan(ratios) ||
         std::ranges::any_of(ratios, [](float ratio) { return ratio < 0; }))
-      return damaged("its pairs of joints are not in order, or not numbers");
+      return damaged(
+          "its pairs of joints are not in ascending order, or contain values that are not valid");
     next = key + 1;
   }
   return {};
@@ -89,7 +90,7 @@ Result<void> checkTrios(const JointBounds& bounds) {
   for (const std::array<std::uint32_t, 3>& trio : bounds.trios) {
     if (trio[0] >= trio[1] || trio[1] >= trio[2] || trio[2] >= bounds.joints.size() ||
         (before != nullptr && !(*before < trio)))
-      return damaged("its trios of joints are not in order");
+      return damaged("its trios of joints are not in ascending order");
     before = &trio;
   }
   return {};
@@ -123,16 +124,17 @@ std::vector<std::byte> JointBounds::bytes() const {
 Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
   Header header{};
   if (bytes.size() >= sizeof(header)) std::memcpy(&header, bytes.data(), sizeof(header));
-  if (header.magic != magic) return damaged("the bytes do not begin with their header");
+  if (header.magic != magic)
+    return damaged("the bytes do not begin with the header of joint bounds");
   if (header.version != version) {
     return Error{ErrorCode::unsupportedVersion,
                  "joint bounds: version " + std::to_string(header.version) +
-                     ", this library reads version " + std::to_string(version)};
+                     ", but this library reads version " + std::to_string(version)};
   }
   if (std::uint64_t{header.wordCount} * 4 != bytes.size() ||
       wordsOf(header.joints, header.pairs, header.trios) != header.wordCount) {
     return damaged("they have " + std::to_string(bytes.size()) +
-                   " bytes, which is not what their header says");
+                   " bytes, but their header says otherwise");
   }
   std::vector<std::uint32_t> words(header.wordCount);
   std::memcpy(words.data(), bytes.data(), bytes.size());
@@ -146,7 +148,7 @@ Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
   bounds.unweighted = header.unweighted;
   bounds.requiredJoints = header.requiredJoints;
   if (hasNan(bounds.unweighted.min) || hasNan(bounds.unweighted.max))
-    return damaged("the box of vertices without weight is not of numbers");
+    return damaged("the box of vertices without weight contains NaN");
   if (Result<void> good = checkJoints(bounds); !good) return good.error();
   if (Result<void> good = checkPairs(bounds); !good) return good.error();
   if (Result<void> good = checkTrios(bounds); !good) return good.error();

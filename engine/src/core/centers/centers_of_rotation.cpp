@@ -1,4 +1,4 @@
-// Centres of rotation: what they depend on is read from the mesh's views, then each vertex is
+// Centers of rotation: what they depend on is read from the mesh's views, then each vertex is
 // solved by itself.
 
 #include "dermis/centers_of_rotation.h"
@@ -204,7 +204,7 @@ Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
                    ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
-  // Centres that the mesh has already, good or bad, have no say.
+  // Centers that the mesh has already, good or bad, have no say.
   MeshView bare = mesh;
   bare.centersOfRotation = {};
   if (Result<void> accepted = validate(bare, jointCount).accepted(); !accepted) return accepted;
@@ -267,15 +267,15 @@ Result<void> CenterOfRotationSolver::solve(std::uint32_t firstVertex,
                                            std::span<float> centers) const {
   const std::size_t count = centers.size() / 3;
   if (centers.size() % 3 != 0) {
-    return Error{ErrorCode::invalidArgument, "centres have 3 floats each; " +
+    return Error{ErrorCode::invalidArgument, "centers have 3 floats each; " +
                                                  std::to_string(centers.size()) +
-                                                 " floats are not a multiple of that"};
+                                                 " floats are not a multiple of 3"};
   }
   if (firstVertex > vertexCount() || count > vertexCount() - firstVertex) {
     return Error{ErrorCode::invalidArgument,
                  "vertices " + std::to_string(firstVertex) + " to " +
                      std::to_string(std::uint64_t{firstVertex} + count) +
-                     " (excluded) are not all in the mesh, which has " +
+                     " (exclusive) are not all in the mesh, which has " +
                      std::to_string(vertexCount())};
   }
   for (std::size_t i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ struct Influence {
   double weight = 0;
 };
 
-/// Σ weight · (centroid, 1): their quotient is a centre.
+/// Σ weight · (centroid, 1): their quotient is a center.
 struct Moment {
   double x = 0, y = 0, z = 0, sum = 0;
 
@@ -40,7 +40,7 @@ class PairIndex {
  public:
   explicit PairIndex(std::span<const Group> groups);
 
-  /// Adds what two influences of a vertex contribute to its centre: all groups' moments, times
+  /// Adds what two influences of a vertex contribute to its center: all groups' moments, times
   /// their similarity by this pair, j and k in one order only. The factor of 2 cancels.
   void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
 
@@ -54,7 +54,7 @@ class PairIndex {
     std::size_t first = 0, last = 0;
   };
 
-  /// Null where no group has both joints.
+  /// Null if no group has both joints.
   const Range* rangeOf(const Influence& first, const Influence& second) const;
 
   std::unordered_map<std::uint32_t, Range> ranges_;

@@ -33,11 +33,11 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::Me
     if (next / 2 < first / 2 + isOdd || count > header.maxInfluences ||
         count < header.minInfluences) {
       return damagedBlob("the influences of vertex " + std::to_string(vertex) +
-                         " do not follow those before");
+                         " do not follow those of the vertex before it");
     }
   }
   const std::uint64_t count = begin(vertices);
-  if (count % 2 != 0) return damagedBlob("its influences do not end with a whole unit");
+  if (count % 2 != 0) return damagedBlob("the number of its influences is odd");
   if (offset % 4 != 0 || !isSection(offset, count * abi::INFLUENCE_WORDS, words.size())) {
     return damagedBlob("its influences lie outside the blob");
   }
@@ -105,10 +105,11 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
   if (header.version != abi::MESH_VERSION) {
     return Error{ErrorCode::unsupportedVersion,
                  "packed mesh: version " + std::to_string(header.version) +
-                     ", this library reads version " + std::to_string(abi::MESH_VERSION)};
+                     ", but this library reads version " + std::to_string(abi::MESH_VERSION)};
   }
   if (header.wordCount != words.size()) {
-    return damagedBlob("it has " + std::to_string(words.size() * 4) + " bytes, its header says " +
+    return damagedBlob("it has " + std::to_string(words.size() * 4) +
+                       " bytes, but its header says " +
                        std::to_string(std::uint64_t{header.wordCount} * 4));
   }
   if (checksumOfBlob(words) != header.checksum) return damagedBlob("the checksum does not match");

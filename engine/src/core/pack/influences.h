@@ -14,7 +14,7 @@ struct PackedInfluence {
 };
 
 /// The influences of a vertex: those of one joint added up, none of weight 0; the pivot first, the
-/// rest by falling weight. The weights sum to exactly 1; empty where the vertex has none.
+/// rest by falling weight. The weights sum to exactly 1; empty if the vertex has none.
 void packInfluences(const MeshView& mesh, std::uint32_t vertex,
                     std::vector<PackedInfluence>& influences);
 

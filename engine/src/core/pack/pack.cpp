@@ -154,7 +154,7 @@ std::uint32_t appendPositions(const MeshView& mesh, std::vector<std::uint32_t>& 
   return offset;
 }
 
-/// Three or four components to a record; 0 where the mesh has none.
+/// Three or four components to a record; 0 if the mesh has none.
 std::uint32_t appendVectors(const AttributeView& view, std::uint32_t components,
                             std::vector<std::uint32_t>& words) {
   if (!view) return 0;
@@ -168,7 +168,7 @@ std::uint32_t appendVectors(const AttributeView& view, std::uint32_t components,
   return offset;
 }
 
-/// One a vertex; 0 where the mesh has none.
+/// One a vertex; 0 if the mesh has none.
 std::uint32_t appendFloats(const AttributeView& view, std::vector<std::uint32_t>& words) {
   if (!view) return 0;
   const std::uint32_t offset = offsetOf(words);
@@ -243,7 +243,7 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
 
   if (wordsNeeded(mesh) > mostWords) {
     return Error{ErrorCode::limitExceeded,
-                 "mesh " + inQuotes(mesh.name) + ": packed, it might be larger than 16 GiB"};
+                 "mesh " + inQuotes(mesh.name) + ": the packed mesh might be larger than 16 GiB"};
   }
 
   PackedMesh packed;

@@ -33,9 +33,9 @@ using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
   const BoxScale scale = boxScale(box);
-  extension.centreX = scale.centre[0];
-  extension.centreY = scale.centre[1];
-  extension.centreZ = scale.centre[2];
+  extension.centerX = scale.center[0];
+  extension.centerY = scale.center[1];
+  extension.centerZ = scale.center[2];
   extension.inverseX = scale.inverse[0];
   extension.inverseY = scale.inverse[1];
   extension.inverseZ = scale.inverse[2];
@@ -78,10 +78,11 @@ Result<void> Groups::place(const Job& job, const OutputStreams& streams, const P
     }
   }
   if (placing.isCulled && vertexRuns_.size() > 1) {
-    return Error{ErrorCode::limitExceeded,
-                 placing.subject.name() +
-                     " is culled on the GPU and needs more than one output range: the GPU would "
-                     "choose each part for itself"};
+    return Error{
+        ErrorCode::limitExceeded,
+        placing.subject.name() +
+            " is culled on the GPU, so its output must lie in one storage buffer range, but it "
+            "does not"};
   }
   chooseVariant(job, streams, placing.mayScale, limits, tuning);
   GroupKey key;
@@ -229,7 +230,7 @@ Result<void> PlanBuilder::finish(const FrameWork* frame) {
   }
   if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
     return Error{ErrorCode::limitExceeded,
-                 "the tables of the batch are larger than a storage buffer range; split it"};
+                 "the tables of the batch are larger than a storage buffer range; split the batch"};
   }
   plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
   plan_->candidateCount = static_cast<std::uint32_t>(candidates_.size());
@@ -265,7 +266,7 @@ Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t work
                             maxWorkgroups)) {
     return Error{ErrorCode::limitExceeded,
                  "the batch needs " + std::to_string(workgroups) +
-                     " workgroups in one dispatch, more than the device can count; split it"};
+                     " workgroups in one dispatch, more than the device allows; split the batch"};
   }
   DispatchCommand& dispatch = dispatches_.emplace_back().command;
   dispatch.variant = variant;
@@ -516,7 +517,7 @@ bool areEvenlySpaced(std::span<const std::uint32_t> records) {
 
 /// Whether the instances have the same box for positions in snorm16.
 bool haveOneBox(std::span<const std::uint32_t> tables, std::span<const std::uint32_t> records) {
-  constexpr std::size_t box = offsetof(abi::ExtensionRecord, centreX) / 4, boxWords = 6;
+  constexpr std::size_t box = offsetof(abi::ExtensionRecord, centerX) / 4, boxWords = 6;
   const auto boxOf = [&](std::size_t record) {
     const auto instance = abi::load<abi::InstanceRecord>(records, record);
     return tables.subspan(instance.extension + box, boxWords);
@@ -606,10 +607,11 @@ Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
   if (most > limits_.maxWorkgroupCountX) {
     return Error{ErrorCode::limitExceeded,
                  "instances that are culled on the GPU have " + std::to_string(most) +
-                     " meshes and layouts, more than the device can count workgroups"};
+                     " combinations of mesh and layout, but the device allows at most " +
+                     std::to_string(limits_.maxWorkgroupCountX) + " workgroups"};
   }
   culled_.frame = frame;
-  culled_.mostWorkgroups = limits_.maxWorkgroupCountX;
+  culled_.maxWorkgroups = limits_.maxWorkgroupCountX;
   for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
     DispatchCommand& dispatch = visibility_[pass];
     dispatch.variant = visibilityVariant(tuning_);

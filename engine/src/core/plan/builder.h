@@ -75,7 +75,7 @@ struct Placing {
 class Groups {
  public:
   /// Appends a run for each output range that the vertices of a job lie in, and takes part in their
-  /// groups. Fails with `limitExceeded` where a kernel cannot see all windows of a run, or the GPU
+  /// groups. Fails with `limitExceeded` if a kernel cannot see all windows of a run, or the GPU
   /// would choose more than one; nothing is appended then.
   Result<void> place(const Job& job, const OutputStreams& streams, const Placing& placing,
                      const DeviceLimits& limits, const Tuning& tuning,
@@ -102,7 +102,7 @@ class Groups {
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> heads_;  ///< a hash table: a power of two of lists of entries
-  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbours mostly belong together
+  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbors mostly belong together
   LayoutNeeds lastLayout_;            ///< of the job that was placed last …
   FormNeeds lastForm_;
   Variant lastVariant_;        ///< … its variant …
@@ -158,7 +158,7 @@ struct PlanSizes {
   OutputSizes outputs;
   bool isScene = false;  ///< there are the buffers of a scene
   std::uint32_t slots =
-      0;  ///< of a scene: words of visibility, records of history; 0 where the GPU chooses nothing
+      0;  ///< of a scene: words of visibility, records of history; 0 if the GPU chooses nothing
 
   /// Of one buffer, given those of the tables.
   BufferRequirement requirement(BufferRole role, std::uint64_t tables,
@@ -228,7 +228,7 @@ class PlanBuilder {
 
   void clearResult(std::uint32_t result) { cleared_.push_back(result); }
 
-  /// `run` and `extras` must stay until `finish`; `extras` is null where they are not needed.
+  /// `run` and `extras` must stay until `finish`; `extras` is null if they are not needed.
   void add(const PlacedRun& run, std::uint32_t palette, std::uint32_t flags,
            const InstanceExtras* extras) {
     count(run.group);
@@ -240,7 +240,7 @@ class PlanBuilder {
     candidates_.push_back({static_cast<std::uint32_t>(entries_.size() - 1), candidate});
   }
 
-  /// The commands of a batch; with `frame`, those of a scene. Fails with `limitExceeded` where the
+  /// The commands of a batch; with `frame`, those of a scene. Fails with `limitExceeded` if the
   /// tables, or a dispatch, become too large.
   Result<void> finish(const FrameWork* frame = nullptr);
 

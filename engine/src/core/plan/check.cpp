@@ -46,18 +46,17 @@ Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index, con
                                                 " storage buffers per stage"};
   }
   if (unit == 2 && !limits.storage16Bit) {
-    return Error{
-        ErrorCode::missingFeature,
-        placeOf(streams, index, subject) +
-            " must be multiples of 4, or storageBuffer16BitAccess enabled, and Dermis built "
-            "with DERMIS_SUBWORD_STORES"};
+    return Error{ErrorCode::missingFeature,
+                 placeOf(streams, index, subject) +
+                     " must be multiples of 4, unless storageBuffer16BitAccess is enabled and "
+                     "Dermis was built with DERMIS_SUBWORD_STORES"};
   }
   if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
     return Error{
         ErrorCode::missingFeature,
         placeOf(streams, index, subject) +
-            " must be multiples of 4, or storageBuffer8BitAccess and "
-            "storageBuffer16BitAccess enabled, and Dermis built with DERMIS_SUBWORD_STORES"};
+            " must be multiples of 4, unless storageBuffer8BitAccess and "
+            "storageBuffer16BitAccess are enabled and Dermis was built with DERMIS_SUBWORD_STORES"};
   }
   return {};
 }
@@ -132,7 +131,7 @@ BoxScale boxScale(const Box& box) {
   BoxScale scale;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double least = double{box.min[axis]}, greatest = double{box.max[axis]};
-    scale.centre[axis] = static_cast<float>((least + greatest) / 2);
+    scale.center[axis] = static_cast<float>((least + greatest) / 2);
     scale.inverse[axis] = static_cast<float>(2 / (greatest - least));
   }
   return scale;
@@ -151,7 +150,7 @@ namespace {
 
 Error tooManyInfluences(const MeshInfo& mesh, const Promises& promises, const Subject& subject) {
   return invalid(subject.name() + ": a vertex has " + std::to_string(mesh.maxInfluences) +
-                 " influences, Promises::maxInfluences is " +
+                 " influences, but Promises::maxInfluences is " +
                  std::to_string(promises.maxInfluences));
 }
 
@@ -185,7 +184,7 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
   }
   if (batch.poses[pose].jointCount < job.mesh.requiredJoints) {
     return invalid(subject.name() + ": its mesh needs a pose of " +
-                   std::to_string(job.mesh.requiredJoints) + " joints, pose " +
+                   std::to_string(job.mesh.requiredJoints) + " joints, but pose " +
                    std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
   }
   return {};
@@ -221,7 +220,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
       job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
     return invalid(subject.name() + ": a packed mesh of " + std::to_string(job.mesh.byteSize) +
-                   " bytes cannot stand at byte " + std::to_string(job.meshOffset) +
+                   " bytes cannot begin at byte " + std::to_string(job.meshOffset) +
                    " of a mesh buffer of " + std::to_string(batch.meshesSize));
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
@@ -231,19 +230,19 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   if (isForComparison(job.method) && !limits.comparisonMethods) {
     return Error{ErrorCode::missingFeature,
                  subject.name() +
-                     ": this Dermis was built without the methods for comparison "
+                     ": this Dermis was built without the comparison methods "
                      "(DERMIS_COMPARISON_METHODS), " +
-                     std::string(methodName(job.method)) + " among them"};
+                     "such as " + std::string(methodName(job.method))};
   }
   if (needsCentersOfRotation(job.method) && !job.mesh.hasCentersOfRotation) {
     return invalid(subject.name() + ": " + std::string(methodName(job.method)) +
-                   " needs centres of rotation, its mesh has none");
+                   " needs centers of rotation, but its mesh has none");
   }
   if (Result<void> good = checkFormats(job, subject); !good) return good;
   if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
-    return invalid(subject.name() + " wants normals, its mesh has none");
+    return invalid(subject.name() + " has normals in its output, but its mesh has none");
   if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
-    return invalid(subject.name() + " wants tangents, its mesh has none");
+    return invalid(subject.name() + " has tangents in its output, but its mesh has none");
   if (Result<void> good = checkMotion(batch, job, subject); !good) return good;
   if (!job.morphs.empty()) {
     if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
@@ -251,13 +250,13 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   }
   if (isSnormPosition(job.positions.format) && !isBox(job.box)) {
     return invalid(subject.name() +
-                   ": the box of its snorm16 positions must be finite, each side longer than 0");
+                   ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }
   if (hasResult(job) && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
     return Error{ErrorCode::limitExceeded,
-                 subject.name() + " wants bounds, or positions in snorm16: on a device with " +
+                 subject.name() + " has bounds or snorm16 positions, which a device with " +
                      std::to_string(limits.maxStorageBuffersPerStage) +
-                     " storage buffers per stage this is not possible"};
+                     " storage buffers per stage does not support"};
   }
   if (Result<void> good = checkTogether(batch, job, streams, subject); !good) return good;
   return checkStreams(batch, job, streams, subject, limits);
@@ -274,10 +273,10 @@ Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
     if (common.value_or(run.windows[stream]) != run.windows[stream]) {
       return Error{ErrorCode::limitExceeded,
                    subject.name() + ": its " + streamName(stream) +
-                       " lie too far from the attribute before for a device " +
+                       " are too far from the preceding attribute for a device " +
                        (hasFewBuffers ? "with " + std::to_string(limits.maxStorageBuffersPerStage) +
                                             " storage buffers per stage"
-                                      : "that cannot bind another range of the output for each "
+                                      : "that cannot bind a separate range of the output for each "
                                         "attribute (DeviceLimits::separateRanges)")};
     }
     common = run.windows[stream];
@@ -291,12 +290,12 @@ Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::siz
   const auto name = [index] { return "pose " + std::to_string(index); };
   if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
     return invalid(name() + " has " + std::to_string(pose.jointCount) +
-                   " joints, it may have 1 to " + std::to_string(maxPoseJoints));
+                   " joints, but it may have 1 to " + std::to_string(maxPoseJoints));
   }
   if (pose.matrixOffset % matrixAlignment != 0 || pose.matrixOffset > batch.posesSize ||
       std::uint64_t{pose.jointCount} * sizeof(JointMatrix) > batch.posesSize - pose.matrixOffset) {
     return invalid(name() + ": " + std::to_string(pose.jointCount) +
-                   " matrices cannot stand at byte " + std::to_string(pose.matrixOffset) +
+                   " matrices cannot begin at byte " + std::to_string(pose.matrixOffset) +
                    " of a poses buffer of " + std::to_string(batch.posesSize));
   }
   return checkPromisedPose(pose.mayScale, promises, {"pose", index});
@@ -305,7 +304,7 @@ Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::siz
 Result<void> checkPromises(const Promises& promises) {
   const std::uint8_t influences = promises.maxInfluences;
   if (influences == 0 || influences == 1 || influences == 2 || influences == 4) return {};
-  return invalid("Promises::maxInfluences is 1, 2, 4, or 0 for no promise, not " +
+  return invalid("Promises::maxInfluences must be 1, 2, 4, or 0 for no promise, not " +
                  std::to_string(influences));
 }
 
@@ -315,7 +314,7 @@ Result<void> checkLimits(const DeviceLimits& limits) {
       limits.maxStorageBufferRange < 1024 ||
       !std::has_single_bit(limits.minStorageBufferOffsetAlignment) ||
       limits.minStorageBufferOffsetAlignment > limits.maxStorageBufferRange / 4) {
-    return invalid("the limits are not those of a Vulkan device");
+    return invalid("the limits are lower than those of any Vulkan device");
   }
   return checkPromises(limits.promises);
 }
@@ -323,11 +322,11 @@ Result<void> checkLimits(const DeviceLimits& limits) {
 Result<void> checkTuning(const Tuning& tuning) {
   if (!std::has_single_bit(tuning.workgroupSize) || tuning.workgroupSize < 8 ||
       tuning.workgroupSize > 128) {
-    return invalid("tuning: a workgroup has a power of two of invocations from 8 to 128, not " +
+    return invalid("Tuning::workgroupSize must be a power of two from 8 to 128, not " +
                    std::to_string(tuning.workgroupSize));
   }
   if (tuning.instancesPerInvocation < 1 || tuning.instancesPerInvocation > 32) {
-    return invalid("tuning: an invocation skins 1 to 32 instances, not " +
+    return invalid("Tuning::instancesPerInvocation must be from 1 to 32, not " +
                    std::to_string(tuning.instancesPerInvocation));
   }
   if (!std::has_single_bit(tuning.verticesPerInvocation) || tuning.verticesPerInvocation > 16) {

@@ -45,9 +45,9 @@ inline Result<void> checkJob(const Batch& batch, const Job& job, const Subject& 
 }
 /// Whether positions in snorm16 can be relative to it.
 DERMIS_CORE_API bool isBox(const Box& box);
-/// What positions in snorm16 are made of: less the centre, times 1 / half the size.
+/// What positions in snorm16 are made of: less the center, times 1 / half the size.
 struct BoxScale {
-  float centre[3], inverse[3];
+  float center[3], inverse[3];
 };
 DERMIS_CORE_API BoxScale boxScale(const Box& box);
 DERMIS_CORE_API Result<void> checkMorphs(std::span<const MorphWeight> morphs,

@@ -77,9 +77,9 @@ Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limit
   const std::uint64_t most = std::max({palettesSize_, batch.posesSize, batch.meshesSize});
   if (most <= limits.maxStorageBufferRange) return {};
   return Error{ErrorCode::limitExceeded, "meshes, poses or palettes of " + std::to_string(most) +
-                                             " bytes are more than a storage buffer range of " +
+                                             " bytes are larger than a storage buffer range of " +
                                              std::to_string(limits.maxStorageBufferRange) +
-                                             " bytes; a batch of fewer of them would fit"};
+                                             " bytes; split the batch"};
 }
 
 /// Checks all jobs and marks the palettes that they read. Returns the first error in a job; in
@@ -173,7 +173,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
                              PlanData& plan) {
   if (Result<void> good = checkLimits(limits); !good) return good;
   if (Result<void> good = checkTuning(tuning); !good) return good;
-  if (batch.jobs.size() > notUsed / 2) return invalid("a batch of more than 2^31 jobs");
+  if (batch.jobs.size() > notUsed / 2) return invalid("the batch has more than 2^31 jobs");
   Result<void> placed;
   if (Result<void> good = placeJobs(batch, limits, tuning, placed); !good) return good;
   if (Result<void> good = checkPoses(batch, limits); !good) return good;

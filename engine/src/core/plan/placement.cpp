@@ -372,7 +372,7 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
 
 namespace {
 
-/// What two neighbouring windows share.
+/// What two neighboring windows share.
 std::uint64_t windowOverlap(std::uint64_t range) {
   return range / 16;
 }

@@ -10,7 +10,7 @@
 
 namespace dermis {
 
-/// One attribute of a job's output; `size` 0 where it is not wanted.
+/// One attribute of a job's output; `size` 0 if it is not wanted.
 struct OutputStream {
   std::uint64_t offset = 0;
   std::uint32_t stride = 0;
@@ -75,7 +75,7 @@ Variant visibilityVariant(const Tuning& tuning);
 /// The skin kernel for a job, but for its form. It depends on nothing else in the batch.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
-/// All that `layoutVariant` looks at, on one device with one tuning: neighbours mostly have the
+/// All that `layoutVariant` looks at, on one device with one tuning: neighbors mostly have the
 /// same.
 struct LayoutNeeds {
   LayoutNeeds() = default;

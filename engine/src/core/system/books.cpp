@@ -205,8 +205,8 @@ Result<void> SceneBooks::checkWrite(PoseHandle handle, PoseWriter writer) const 
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->writer == writer) return {};
   return invalid("pose " + std::to_string(handle.index) +
-                 (writer == PoseWriter::cpu ? " is written by the GPU: markWritten"
-                                            : " is written by the CPU: writePose"));
+                 (writer == PoseWriter::cpu ? " is written by the GPU; use markWritten"
+                                            : " is written by the CPU; use writePose"));
 }
 
 void SceneBooks::markWritten(ScenePose& pose, PoseHandle handle) {

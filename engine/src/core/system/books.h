@@ -42,7 +42,7 @@ struct ScenePose {
   /// The pose as it was last converted to one of the forms that methods read.
   struct Form {
     std::uint32_t unit = notUsed;  ///< the first of its palette
-    std::uint64_t version = 0;     ///< of the pose; 0 where it is to be converted again
+    std::uint64_t version = 0;     ///< of the pose; 0 if it is to be converted again
     std::uint64_t plannedIn = 0;   ///< the plan that converts it
   };
 

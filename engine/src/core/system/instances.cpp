@@ -46,7 +46,7 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   const ScenePose* pose = poses_.find(instance.poseHandle);
   if (pose == nullptr) return unknownHandle("pose", instance.poseHandle);
   if (updateInterval == 0)
-    return invalid("the instance's update interval is 1 or more frames, not 0");
+    return invalid("the instance's update interval must be at least 1 frame, not 0");
   if (instance.layout.motion == Motion::reskinned)
     return invalid(
         "the instance's layout has Motion::reskinned; a scene supports Motion::kept only");
@@ -72,9 +72,9 @@ Result<void> SceneBooks::takeResult(SceneInstance& instance) {
   if (!result) return result.error();
   if (!*result) {
     return Error{ErrorCode::limitExceeded,
-                 "the instance wants bounds, or positions in snorm16: " +
+                 "the instance has bounds or snorm16 positions, but " +
                      std::to_string(resultStore_.ranges.capacity()) +
-                     " instances have them already, which is the maximum"};
+                     " instances have them already, and that is the maximum"};
   }
   instance.extras.result = static_cast<std::uint32_t>((*result)->offset);
   return {};
@@ -98,9 +98,9 @@ Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
     return {};
   }
   return noRoom("pose " + std::to_string(instance.poseHandle.index) + " takes " +
-                    std::to_string(size) + " times 16 bytes in the form that " +
+                    std::to_string(size) + " units of 16 bytes in the form that " +
                     std::string(methodName(instance.method)) + " reads",
-                unitStore_, "such units of palettes");
+                unitStore_, "units of palettes");
 }
 
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
@@ -326,7 +326,7 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
 Result<void> SceneBooks::setBox(InstanceHandle handle, const Box& box) {
   if (!isBox(box)) {
     return invalid("instance " + std::to_string(handle.index) +
-                   ": the box of its snorm16 positions must be finite, each side longer than 0");
+                   ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }
   instances_.at(handle.index).extras.box = box;
   states_[handle.index].isUrgent = true;
@@ -401,7 +401,7 @@ Result<void> SceneBooks::change(const InstanceChange& change) {
   if (state == nullptr) return unknownHandle("instance", change.instance);
   if (change.updateInterval == 0u) {
     return invalid("instance " + std::to_string(change.instance.index) +
-                   ": an update interval is 1 or more frames, not 0");
+                   ": the update interval must be at least 1 frame, not 0");
   }
   if (Result<void> done = changeSkinning(change); !done) return done;
   changeState(*state, change);

@@ -28,7 +28,7 @@ class DERMIS_CORE_API RangeAllocator {
   explicit RangeAllocator(std::uint64_t capacity = 0, std::uint64_t base = 0);
 
   /// The smallest gap that holds `size` at a multiple of `alignment`, which need not be a power of
-  /// two; nothing where there is none. `size` is not 0.
+  /// two; nothing if there is none. `size` is not 0.
   std::optional<Range> allocate(std::uint64_t size, std::uint64_t alignment);
   /// The same in the gap of the lowest offset, where the range ends at or before `end`.
   std::optional<Range> allocateBelow(std::uint64_t size, std::uint64_t alignment,

@@ -44,7 +44,7 @@ Result<void> checkDescription(const SceneDescription& description) {
     return Error{
         ErrorCode::limitExceeded,
         std::string("the scene's ") + field.name + " of " + std::to_string(capacity.initial) +
-            " makes a buffer larger than this device's storage buffer range of " +
+            " needs a buffer larger than this device's storage buffer range of " +
             std::to_string(range) + " bytes; the maximum is " + std::to_string(field.most)};
   }
   if (description.outputOffset % outputRangeAlignment(description.limits) != 0 ||

@@ -70,7 +70,7 @@ Result<void> SceneBooks::grow(Store& store, std::uint64_t least) {
   return {};
 }
 
-/// Nothing where the maximum is too small. Fails if growing does.
+/// Nothing if the maximum is too small. Fails if growing does.
 Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
                                               std::uint64_t alignment) {
   if (const std::optional<Range> range = store.ranges.allocate(size, alignment)) return range;
@@ -88,11 +88,11 @@ Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
 Error SceneBooks::noRoom(const std::string& what, const Store& store, const char* unit) {
   const RangeAllocator& ranges = store.ranges;
   return {ErrorCode::limitExceeded,
-          what + ", of " + std::to_string(ranges.capacity()) + " " + unit + ", " +
+          what + ", but of " + std::to_string(ranges.capacity()) + " " + unit +
               (ranges.capacity() < store.capacity.maximum
-                   ? "at most " + std::to_string(store.capacity.maximum) + ", "
+                   ? " (maximum " + std::to_string(store.capacity.maximum) + ")"
                    : std::string()) +
-              std::to_string(ranges.capacity() - ranges.used()) + " are free, " +
+              " only " + std::to_string(ranges.capacity() - ranges.used()) + " are free, at most " +
               std::to_string(ranges.largestFree()) + " in one piece"};
 }
 
@@ -107,7 +107,7 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
 }
 
 /// Matrices one behind the other, in all slots, and their buffer: one more where none has room.
-/// Nothing where there may be no other.
+/// Nothing if there may be no other.
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);
@@ -157,9 +157,9 @@ Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, PoseWriter wr
   return {ErrorCode::limitExceeded,
           (poses == 1 ? std::string("a pose takes ") : std::to_string(poses) + " poses take ") +
               std::to_string(count) + " joints in one pose buffer, which holds at most " +
-              std::to_string(largestPoseBuffer(writer)) + "; those that the " +
-              (isCpu ? "CPU" : "GPU") + " writes hold " + std::to_string(held) + ", of which " +
-              std::to_string(used) + " are in use, and may hold " +
+              std::to_string(largestPoseBuffer(writer)) + "; all pose buffers that the " +
+              (isCpu ? "CPU" : "GPU") + " writes hold " + std::to_string(held) +
+              " joints, of which " + std::to_string(used) + " are in use; their maximum is " +
               std::to_string(capacity.maximum)};
 }
 

@@ -45,7 +45,7 @@ std::string embeddingHeader(const std::string& cppNamespace,
                         "extern const std::span<const std::uint32_t> " + module.name + "_spirv;\n");
   }
   text +=
-      "\n// The module of that name; empty where there is none.\n"
+      "\n// The module of that name; empty if there is none.\n"
       "std::span<const std::uint32_t> find(std::string_view name);\n";
   return text + "\n}  // namespace " + cppNamespace + "\n";
 }

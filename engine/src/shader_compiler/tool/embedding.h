@@ -18,7 +18,7 @@ struct EmbeddedModule {
 std::string embeddingHeader(const std::string& cppNamespace,
                             const std::vector<EmbeddedModule>& modules);
 
-/// Defines them, constant-initialised: usable before main, and from many threads.
+/// Defines them, constant-initialized: usable before main, and from many threads.
 std::string embeddingSource(const std::string& cppNamespace, const std::string& headerName,
                             const std::vector<EmbeddedModule>& modules);
 

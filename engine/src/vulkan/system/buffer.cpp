@@ -25,7 +25,7 @@ Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Descriptio
   const bool isMapped = created->mapped != nullptr || description.use == BufferUse::device;
   if (created->buffer == VK_NULL_HANDLE || !isMapped) {
     return Error{ErrorCode::invalidArgument,
-                 std::string("BufferCallbacks::create gave ") +
+                 std::string("BufferCallbacks::create returned ") +
                      (isMapped ? "no buffer" : "memory that is not mapped") + " for '" +
                      description.name + "'"};
   }

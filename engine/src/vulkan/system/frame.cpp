@@ -40,7 +40,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   if (plan.buffer(BufferRole::visibility).size != 0) {
     if (frame.visibility == VK_NULL_HANDLE) {
       return Error{ErrorCode::invalidArgument,
-                   "FrameDescription::visibility is null, and there are instances that are culled "
+                   "FrameDescription::visibility is null, but there are instances that are culled "
                    "on the GPU"};
     }
   }

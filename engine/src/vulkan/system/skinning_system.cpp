@@ -229,7 +229,7 @@ Result<BufferRange> SkinningSystem::poseRange(PoseHandle pose) const {
   const PoseMemory& memory = state_->poseBuffers[place->poseBuffer];
   if (memory.mapped != nullptr) {
     return Error{ErrorCode::invalidArgument,
-                 "pose " + std::to_string(pose.index) + " is written by the CPU: writePose"};
+                 "pose " + std::to_string(pose.index) + " is written by the CPU; use writePose"};
   }
   return BufferRange{memory.range.buffer, memory.range.offset + place->offset,
                      place->jointCount * sizeof(JointMatrix)};

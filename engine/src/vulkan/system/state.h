@@ -17,7 +17,7 @@ namespace dermis::vulkan {
 
 /// What one frame in flight has for itself.
 struct FrameSlot {
-  std::uint64_t frame = 0;  ///< that last used it; 0 where none did
+  std::uint64_t frame = 0;  ///< that last used it; 0 if none did
   SystemBuffer upload;
   SystemBuffer readBack;
   bool hasTimestamps = false;

@@ -22,7 +22,7 @@ class Timestamps {
 
   void begin(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
   void end(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
-  /// Of a frame that is complete; nothing where the queue has no timestamps.
+  /// Of a frame that is complete; nothing if the queue has no timestamps.
   std::optional<double> seconds(std::uint32_t frame) const;
 
  private:
