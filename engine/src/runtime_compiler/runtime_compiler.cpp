@@ -45,9 +45,8 @@ Result<void> checkAbi(const fs::path& shaderFolder) {
   if (!file) return Error{ErrorCode::ioError, "cannot read '" + path.string() + "'"};
   if (text == abiText) return {};
   return Error{ErrorCode::invalidArgument,
-               "'" + path.string() +
-                   "' differs from the abi.h that the library was compiled with: "
-                   "use the kernels of this version, or compile the library again"};
+               "the library was compiled with an abi.h that differs from '" + path.string() +
+                   "': use the kernels of this version, or compile the library again"};
 }
 
 std::vector<std::pair<std::string, std::string>> definesOf(const kernels::Recipe& recipe) {
