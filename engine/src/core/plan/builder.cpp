@@ -10,7 +10,8 @@
 namespace dermis {
 namespace {
 
-/// Kernels number workgroups in 32 bits, with those that fill the last row: up to twice as many.
+/// Kernels count workgroups in 32 bits, including those that fill the last row: up to twice as
+/// many.
 constexpr std::uint64_t maxWorkgroups = std::uint64_t{1} << 31;
 
 std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
@@ -291,7 +292,7 @@ Result<void> PlanBuilder::addPaletteDispatches() {
   return {};
 }
 
-/// A workgroup a palette.
+/// One workgroup per palette.
 Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
                                              std::span<const abi::PaletteRecord> records,
                                              BufferRole joints, std::uint32_t buffer) {
@@ -307,7 +308,7 @@ Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
   return {};
 }
 
-/// An invocation a result.
+/// One invocation per result.
 Result<void> PlanBuilder::addClearDispatch() {
   if (cleared_.empty()) return {};
   std::vector<std::uint32_t>& tables = plan_->tables;
@@ -323,7 +324,8 @@ std::uint64_t PlanBuilder::vertexGroupsOf(const Group& group) const {
   return divideUp(group.key.vertexEnd - group.key.firstVertex, tuning_.workgroupSize);
 }
 
-/// Of one dispatch, given its groups: fewer than the tuning says if it has too few workgroups.
+/// Instances per invocation of a dispatch with these groups: fewer than the tuning says if there
+/// would be too few workgroups.
 std::uint32_t PlanBuilder::instancesPerInvocation(std::span<const std::uint32_t> groups) const {
   std::uint32_t instances = tuning_.instancesPerInvocation;
   for (; instances > 1 && tuning_.minWorkgroups > 0; instances = (instances + 1) / 2) {
@@ -344,7 +346,7 @@ Result<void> PlanBuilder::addDispatches() {
   };
   order_.resize(planGroups_.size());
   for (std::uint32_t index = 0; index < order_.size(); ++index) order_[index] = index;
-  // As a stable sort, which would allocate.
+  // Stable. std::stable_sort would allocate.
   std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return std::tuple_cat(dispatchOrder(a), std::tie(a)) <
            std::tuple_cat(dispatchOrder(b), std::tie(b));
@@ -405,7 +407,7 @@ Result<void> PlanBuilder::addDispatches() {
   return {};
 }
 
-/// The word of the first; nothing aligned needs to be.
+/// Returns the word of the first. Needs no alignment.
 std::uint32_t PlanBuilder::appendMorphs(std::span<const MorphWeight> morphs) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
@@ -466,7 +468,7 @@ void PlanBuilder::writeInstances() {
 
 namespace {
 
-/// Whether each word of the records rises by the same from one to the next.
+/// Whether each word increases by the same amount from record to record.
 bool areEvenlySpaced(const std::uint32_t* records, std::uint32_t count) {
   constexpr std::size_t words = abi::INSTANCE_WORDS;
   if (count < 2) return false;
@@ -539,7 +541,7 @@ void PlanBuilder::appendCulledDispatches() {
     abi::SkinPush push = pushOf(dispatches_[first + index]);
     store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
           abi::CulledDispatchRecord{push.groups, push.groupCount, push.instancesPerInvocation, 0});
-    // Only the GPU will know how many there are. Those too many find no instance in the last group.
+    // Only the GPU knows the number of workgroups. Excess ones find no instance in the last group.
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);
     dispatch.groupCountX = dispatch.groupCountY = dispatch.workgroupCount = 0;
@@ -548,7 +550,7 @@ void PlanBuilder::appendCulledDispatches() {
   visibility_[1].workgroupCount = static_cast<std::uint32_t>(count);
 }
 
-/// A workgroup for each group, then one for each indirect dispatch.
+/// First pass: a workgroup for each group. Second pass: one for each indirect dispatch.
 Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
   visibility_[0].workgroupCount = culledGroups_;
   const std::uint32_t most = std::max(culledGroups_, visibility_[1].workgroupCount);
@@ -594,7 +596,7 @@ void PlanBuilder::listFrame(const FrameWork& frame) {
   if (dispatches_.empty() && frame.moves.empty()) return;
   std::vector<Command>& commands = plan_->commands;
   const bool culls = !candidates_.empty();
-  // Frames before this one have finished with what is overwritten, and what they wrote is seen.
+  // Earlier frames have finished reading what this frame overwrites, and their writes are visible.
   commands.emplace_back(
       BarrierCommand{computeBoth | Access::copyRead | Access::copyWrite | Access::indirectRead,
                      computeBoth | Access::copyRead | Access::copyWrite});
