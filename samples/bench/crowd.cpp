@@ -67,7 +67,7 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
   mesh.positions = view(&first.position, ComponentType::float32, 3);
   mesh.normals = view(&first.normal, ComponentType::float32, 3);
-  // What a method that reads centres costs does not depend on where they are.
+  // What a method that reads centers costs does not depend on where they are.
   mesh.centersOfRotation = mesh.positions;
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);

@@ -43,7 +43,7 @@ struct Crowd {
 /// primitive, or one without normals or four influences a vertex.
 Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
 
-/// A long figure of 60 joints, four influences everywhere: the joints of a vertex are neighbours.
+/// A long figure of 60 joints, four influences everywhere: the joints of a vertex are neighbors.
 Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount);
 
 }  // namespace dermis::samples

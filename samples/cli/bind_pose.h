@@ -15,7 +15,7 @@ struct SkinnedPart {
   std::vector<float> tangents;   ///< 4 a vertex, or empty
 };
 
-/// A part without influences: morphed, but where it is. Directions are not of unit length.
+/// A part without influences: morphed, but not skinned. Normals and tangents are not normalized.
 SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs);
 
 }  // namespace dermis::cli

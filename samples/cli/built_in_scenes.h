@@ -1,5 +1,5 @@
-// The case that shows what methods do, for which there need be no file: a bar that is twisted, and
-// an arm that is bent.
+// Built-in scenes that show what the methods do, without a file: a bar that is twisted, and an arm
+// that is bent.
 #pragma once
 
 #include "comparison_picture.h"
@@ -7,7 +7,7 @@
 
 namespace dermis::cli {
 
-/// The sample models `bar` and `arm`, each in the middle of its clip, where it is twisted and bent
+/// The sample models `bar` and `arm`, each in the middle of its clip, where it is twisted or bent
 /// most.
 struct BuiltInScenes {
   Scene bar, arm;
@@ -15,10 +15,10 @@ struct BuiltInScenes {
 
 Result<BuiltInScenes> loadBuiltInScenes(const MeshPreparation& preparation);
 
-/// Where the arm's clip bends it most, in seconds.
+/// The time in seconds at which the clip bends the arm most.
 double builtInArmTime(const Scene& arm);
 
-/// The candy wrapper, and the elbow. They refer to the scenes.
+/// The strips of both scenes: candy wrapper and elbow. They refer to the scenes.
 std::vector<ComparisonStrip> builtInStrips(const BuiltInScenes& scenes);
 
 }  // namespace dermis::cli

@@ -10,18 +10,18 @@
 
 namespace dermis::cli {
 
-/// A vertex of an instance. Bytes, and operations on one float32.
+/// Bytes and float32 operations for one vertex of an instance.
 struct ByteModel {
   std::string name;
   double written = 0;   ///< to memory
-  double stored = 0;    ///< of the sectors of 32 bytes that all stores touch, each by itself
+  double stored = 0;    ///< sectors of 32 bytes that the stores touch, counted for each store
   double meshRead = 0;  ///< shared by the instances of an invocation
   double paletteRead = 0;
-  double operations = 0;       ///< each multiplication and each addition by itself
-  double fusedOperations = 0;  ///< an addition of a product counted with it
+  double operations = 0;       ///< multiplications and additions counted separately
+  double fusedOperations = 0;  ///< a fused multiply-add counts once
 };
 
-/// What a GPU can do in a second, in units of 10^12.
+/// Throughput of a GPU per second, in units of 10^12.
 struct GpuSpeed {
   std::string name;
   double memory = 0;      ///< bytes
@@ -30,21 +30,21 @@ struct GpuSpeed {
   double operations = 0;  ///< of float32
 };
 
-/// 0.5, 3.35 and 4.8 TB/s.
+/// GPUs whose memory moves 0.5, 3.35 and 4.8 TB/s.
 std::vector<GpuSpeed> gpuSpeeds();
 
-/// How many vertices a second a GPU could skin, and what keeps it from more.
+/// How many vertices per second a GPU could skin, and what limits it.
 struct ByteBound {
   double verticesPerSecond = 0;
   std::string by;  ///< "memory", "stores", "mesh", "palette" or "arithmetic"
 };
 ByteBound boundOf(const ByteModel& model, const GpuSpeed& gpu);
 
-/// Dual quaternions and linear blending, four influences, 4 instances an invocation, in layouts of
-/// every day and by each way to store. Fails if SPIRV-Tools cannot read a kernel.
+/// Models of dual quaternions and linear blending with four influences and 4 instances per
+/// invocation, for common layouts and each way to store. Empty if SPIRV-Tools cannot read a kernel.
 std::optional<std::vector<ByteModel>> byteModels();
 
-/// As a table. Returns whether there is one.
+/// Prints a table. Returns false if there is none.
 bool printByteModels();
 
 }  // namespace dermis::cli

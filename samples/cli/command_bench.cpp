@@ -23,7 +23,7 @@ namespace dermis::cli {
 namespace {
 
 constexpr std::uint32_t mostRounds = 10'000, mostInstances = 100'000;
-/// The figure of which a crowd is made where there is no model.
+/// The figure of the crowd, if there is no model.
 constexpr std::uint32_t figureVertices = 10'000;
 
 struct BenchOptions {
@@ -102,7 +102,7 @@ ExitStatus bench(const BenchOptions& options) {
   }
   samples::OpenDevice* const device = open ? &*open : nullptr;
   if (device != nullptr) {
-    // First of all: nothing is compiled yet.
+    // Measured first, before anything is compiled.
     const Result<samples::StartUp> startUp = samples::measureStartUp(*device, *crowd);
     if (!startUp) return reportDeviceError(startUp.error());
     title.startUp = *startUp;

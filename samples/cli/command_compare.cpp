@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint32_t mostRepetitions = 10'000;
 constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
-/// Narrower ones have no room for the names of methods.
+/// Narrower columns have no room for the names of the methods.
 constexpr std::uint32_t leastColumnWidth = 110;
 
 struct CompareOptions {
@@ -101,7 +101,7 @@ MeshPreparation preparationFor(const CompareOptions& options) {
   return preparation;
 }
 
-/// The model, with something to skin.
+/// Loads the model. Fails if it has nothing to skin.
 ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) {
   Result<Scene> scene = loadScene(samples::pathOf(options.model), preparationFor(options));
   if (!scene) return reportModelError(scene.error());
@@ -138,7 +138,7 @@ ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject
   return ExitStatus::done;
 }
 
-/// Of the picture, in their order.
+/// The methods for the columns of the picture, in order.
 Result<std::vector<Method>> chooseColumns(const CompareOptions& options, const Scene& scene) {
   std::vector<Method> columns;
   for (const std::string& name : options.methods) {

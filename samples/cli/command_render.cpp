@@ -98,7 +98,7 @@ ExitStatus checkUsage(const RenderOptions& options) {
   return ExitStatus::done;
 }
 
-/// Everything between a scene and its pictures.
+/// Renders the pictures of a scene.
 class Film {
  public:
   Film(const RenderOptions& options, const Scene& scene, std::uint32_t clip,
@@ -132,7 +132,7 @@ class Film {
   render::View view_;
 };
 
-/// In a still the pose that was asked for; crowds and films go on and on.
+/// A still shows the requested time; in crowds and films the clip repeats.
 double Film::timeOf(const Role& role, double time) const {
   return options_.frames || roles_.size() > 1 ? timeInClip(*scene_.model, role, time) : time;
 }
@@ -157,8 +157,8 @@ Result<void> Film::prepare() {
   return {};
 }
 
-/// Each map draws everything once more: large crowds get fewer, and finer ones, as their figures
-/// are small.
+/// Each shadow map draws everything again. Large crowds get fewer and finer maps, since their
+/// figures are small.
 render::ShadowSizes Film::shadowSizes() const {
   double triangles = 0;
   for (const ScenePart& part : scene_.parts)
@@ -175,7 +175,7 @@ render::ShadowSizes Film::shadowSizes() const {
   return sizes;
 }
 
-/// Poses the first figure and widens the box by it.
+/// Poses the first figure and extends the box to contain it.
 Result<void> Film::look(const Role& role, double time, std::optional<Box>& around) {
   if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
   if (Result<void> posed = drawn_->setPose(0, scenePose(scene_, role.clip, time)); !posed)
@@ -189,7 +189,7 @@ Result<void> Film::look(const Role& role, double time, std::optional<Box>& aroun
   return {};
 }
 
-/// The box around a clip.
+/// The box around the figure over a whole clip.
 Result<std::optional<Box>> Film::lookThrough(const Role& role, std::uint32_t poses) {
   std::optional<Box> around;
   const double duration =
@@ -201,8 +201,8 @@ Result<std::optional<Box>> Film::lookThrough(const Role& role, std::uint32_t pos
   return around;
 }
 
-/// A crowd is seen from higher up and from nearer, so that the last of its rows are seen and the
-/// first are large.
+/// For a crowd the camera is higher and nearer, so that the last rows are visible and the first are
+/// large.
 render::CameraOptions Film::cameraOptions() const {
   const bool isCrowd = options_.instances > 1;
   render::CameraOptions camera;
@@ -216,8 +216,9 @@ render::CameraOptions Film::cameraOptions() const {
   return camera;
 }
 
-/// The lowest place of the clip, so that no foot goes through it; but under the very foot of a
-/// still that only just hovers. A hair lower, for soles that are as flat as the ground.
+/// The ground is at the lowest point of the clip, so that no foot goes through it; in a still that
+/// hovers only slightly, directly under the foot. It is slightly lower, for soles that are as flat
+/// as the ground.
 float groundUnder(const Box& pose, const Box& extent) {
   const float height = extent.max[1] - extent.min[1];
   const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
@@ -301,7 +302,7 @@ Result<void> Film::skinAndDraw() {
   view_.draws = {};
   if (done) frame_->target().recordReadBack(*device_.device, commandBuffer);
   functions.EndCommandBuffer(commandBuffer);
-  // Of a film the pictures are counted.
+  // For a film, progress counts pictures.
   Progress progress("rendering", options_.frames ? 1 : passes);
   if (done) done = counter->submitAndWait(commandBuffer, [&] { progress.step(); });
   device_.device->freeCommandBuffer(commandBuffer);
@@ -365,7 +366,7 @@ samples::RequestedOutput requestedOutput(const RenderOptions& options) {
   return {"-o", options.output, options.frames.value_or(1)};
 }
 
-/// What would be a pity to notice after all pictures are drawn.
+/// Checks that should not fail only after all pictures are drawn.
 ExitStatus checkOutput(const RenderOptions& options) {
   const samples::RequestedOutput output = requestedOutput(options);
   if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
@@ -395,7 +396,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
 
-  // First: what cannot be written is noticed before anything is prepared.
+  // Opened first, so that an output that cannot be written fails before anything is prepared.
   Result<std::unique_ptr<PictureWriter>> writer = openWriter(options);
   if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
   samples::DeviceOptions deviceOptions;

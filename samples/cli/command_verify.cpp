@@ -42,10 +42,10 @@ bool isSkinned(const Scene& scene) {
                              [](const ScenePart& part) { return part.mesh != nullptr; });
 }
 
-/// What became of one model, whatever it is; the others have verdicts of their own.
+/// Verifies models. An error in one model does not affect the others.
 class Verifier {
  public:
-  /// `reports` are refused for a model that they would damage.
+  /// `reports` must not overwrite a file of a model.
   Verifier(samples::TargetPool& pool, const VerifyOptions& options,
            std::span<const samples::RequestedOutput> reports)
       : pool_(pool), reports_(reports), coverage_(options.coverage()) {
@@ -70,7 +70,7 @@ class Verifier {
   const std::vector<ModelVerification>& models() const { return models_; }
   /// Which report would overwrite a file of a model; empty if none would.
   const std::string& overwrites() const { return overwrites_; }
-  /// The worst that happened.
+  /// The worst status of all models.
   ExitStatus status() const { return status_; }
 
  private:
@@ -103,7 +103,7 @@ class Verifier {
     if (models_.back().failures() != 0) worsen(ExitStatus::verificationFailed);
   }
 
-  /// A mesh or a pose that cannot be verified, unless the device is to blame.
+  /// Bad input if a mesh or pose cannot be verified, unless the device is at fault.
   static ExitStatus statusOf(const Error& error) {
     return error.code == ErrorCode::invalidMesh || error.code == ErrorCode::invalidArgument ||
                    error.code == ErrorCode::limitExceeded
@@ -127,7 +127,7 @@ class Verifier {
   ExitStatus status_ = ExitStatus::done;
 };
 
-/// Each that was asked for, whatever becomes of the other.
+/// Writes each requested report, even if another one fails.
 ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
                         const std::vector<ModelVerification>& models) {
   ExitStatus status = ExitStatus::done;
@@ -139,7 +139,7 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
   return status;
 }
 
-/// What a report of the CPU path does not speak of.
+/// The methods that a report of the CPU path does not cover.
 std::string notCovered(const samples::BatchTarget& target) {
   std::string methods;
   for (const Method method : allMethods) {
@@ -157,7 +157,7 @@ ExitStatus verifyOn(samples::TargetPool pool, const VerifyOptions& options,
     verifier.verify(model);
     if (!verifier.overwrites().empty()) return reportWrongUsage(verifier.overwrites());
   }
-  // Files first: standard output may be closed.
+  // Write files first: standard output may be closed.
   const samples::BatchTarget& target = pool.first();
   const ExitStatus written = writeReports(options, target.name(), verifier.models());
   fmt::print("device  {}\n", target.name());
@@ -168,7 +168,7 @@ ExitStatus verifyOn(samples::TargetPool pool, const VerifyOptions& options,
   return written == ExitStatus::done ? verifier.status() : written;
 }
 
-/// A device, and what skins on it.
+/// A device and the target that skins on it.
 struct DeviceWithTarget {
   explicit DeviceWithTarget(samples::OpenDevice opened)
       : open(std::move(opened)), target(*open.device, open.context) {}

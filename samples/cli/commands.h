@@ -1,5 +1,4 @@
-// The subcommands. Each adds itself to the command line; what it returns is the exit status of the
-// program.
+// The subcommands. Each adds itself to the command line. It returns the exit status of the program.
 #pragma once
 
 #include <CLI/CLI.hpp>

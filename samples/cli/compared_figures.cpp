@@ -138,11 +138,11 @@ Result<void> ComparedFigures::findBox() {
       box_.max[axis] = std::max(box_.max[axis], std::min((*box)->max[axis], high + beyond));
     }
   }
-  box_.min[1] = floor_;  // What is below is not seen.
+  box_.min[1] = floor_;  // Nothing below the floor is visible.
   return {};
 }
 
-/// Of each vertex; 0 if one is not finite.
+/// The distance of each vertex; 0 if a position is not finite.
 std::vector<double> ComparedFigures::distances(std::size_t method, std::size_t part) const {
   const std::vector<float>&a = positions_[method][part], &b = positions_.back()[part];
   std::vector<double> found(a.size() / 3);

@@ -1,5 +1,5 @@
-// A scene in one pose, once for each of several methods: to be drawn side by side, with the
-// distances from dual quaternions as a heat map.
+// A scene in one pose, skinned by several methods, to draw them side by side, with the distances
+// from dual quaternions as a heat map.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace dermis::cli {
 
-/// Of the vertices that are finite by both methods, in units of the model.
+/// Distances of the vertices that are finite with both methods, in units of the model.
 struct FigureDifference {
   double largest = 0;
   double rootMeanSquare = 0;
@@ -20,19 +20,18 @@ struct FigureDifference {
 
 class ComparedFigures {
  public:
-  /// Skins on the device, and waits for it. All must outlive it; the scene allows all methods.
-  /// Fails if the device does, and with `invalidData` if no vertex is finite.
+  /// Skins on the device, and waits for it. All arguments must outlive this object. The scene must
+  /// allow all methods. Fails if the device does, and with `invalidData` if no vertex is finite.
   static Result<ComparedFigures> create(samples::OpenDevice& device,
                                         samples::render::Renderer& renderer, const Scene& scene,
                                         const ScenePose& pose, std::span<const Method> methods);
 
-  /// Around all figures, but for vertices that a method throws far away from where dual quaternions
-  /// have theirs, or below the floor.
+  /// The box around all figures, without vertices that a method moves far away from their position
+  /// with dual quaternions, or below the floor.
   const Box& box() const { return box_; }
-  /// The height on which they stand: so low that no foot goes through it, but not so low as what a
-  /// method has torn off.
+  /// The height of the floor: below all feet, but not below vertices that a method has torn off.
   float floor() const { return floor_; }
-  /// The diagonal of the figure's box by dual quaternions; above 0.
+  /// The diagonal of the box of the figure with dual quaternions; above 0.
   double size() const { return size_; }
   /// A part's vertices as the device wrote them, 3 floats each; empty if no joint moves it.
   std::span<const float> positions(std::size_t method, std::size_t part) const {
@@ -40,13 +39,13 @@ class ComparedFigures {
   }
   const FigureDifference& difference(std::size_t method) const { return differences_[method]; }
 
-  /// The distance that has the last colour of a heat map: none until this is called.
+  /// Makes the heat maps. `hottest` is the distance with the last color.
   Result<void> makeHeatMaps(double hottest);
 
   Result<void> addDraws(std::size_t method, std::vector<samples::render::Draw>& draws) const;
   Result<void> addHeatMap(std::size_t method, std::vector<samples::render::Draw>& draws) const;
 
-  /// What of the materials could not be had.
+  /// Problems of materials that could not be loaded.
   const std::vector<std::string>& notes() const { return drawn_.notes(); }
 
  private:
@@ -62,7 +61,7 @@ class ComparedFigures {
 
   samples::OpenDevice* device_;
   const Scene* scene_;
-  DrawnScene drawn_;  ///< The last figure is that by dual quaternions.
+  DrawnScene drawn_;  ///< The last figure is skinned with dual quaternions.
   std::vector<Positions> positions_;
   std::vector<FigureDifference> differences_;
   std::vector<std::vector<samples::MappedBuffer>> heat_;  ///< by method, by part

@@ -20,16 +20,16 @@
 namespace dermis::cli {
 namespace {
 
-/// Enough that a run takes milliseconds, or all of a GPU.
+/// Enough that a run takes milliseconds, or keeps a whole GPU busy.
 constexpr std::uint64_t verticesOnCpu = 1'500'000;
 constexpr std::uint64_t verticesOnGpu = 8'000'000;
 /// A small mesh with many joints: joint matrices and palettes of all methods.
 constexpr std::uint64_t mostPaletteBytes = std::uint64_t{1} << 26;
 constexpr std::uint64_t mostInstances = 20'000;
-/// Of all instances, whoever asks for them.
+/// Of all instances, even if the number of instances was given.
 constexpr std::uint64_t mostVertices = 100'000'000;
 
-/// Whether a kernel would take a joint for one that scales or shears (docs/accuracy.md).
+/// Whether a kernel treats a joint as rigid (docs/accuracy.md).
 bool isRigid(const JointMatrix& joint) {
   const auto at = [&joint](int row, int column) {
     return static_cast<double>(joint.m[row][column]);
@@ -158,7 +158,7 @@ class MethodComparer {
     return {};
   }
 
-  /// The parts in a row.
+  /// The vertices of all parts, one part after the other.
   Result<std::vector<reference::Double3>> skinModel(Method method) const {
     std::vector<reference::Double3> positions;
     for (std::size_t index = 0; index < scene_.parts.size(); ++index) {
@@ -247,7 +247,7 @@ class MethodComparer {
   /// `run` returns what a method takes; less than 0 if it is not timed.
   template <typename Run>
   Result<void> repeat(const Run& run) {
-    // In turn, so that what else the machine does hits all alike.
+    // Methods take turns, so that other load on the machine affects all of them equally.
     std::vector<std::vector<double>> seconds(comparison_.methods.size());
     for (std::uint32_t repetition = 0; repetition < options_.repetitions; ++repetition) {
       for (std::size_t method = 0; method < seconds.size(); ++method) {
@@ -314,7 +314,7 @@ class MethodComparer {
     });
   }
 
-  /// The kernels of a device with all that Dermis makes use of.
+  /// Plans for a device with all features that Dermis uses.
   Result<void> planOnly() {
     DeviceLimits limits;
     limits.maxStorageBuffersPerStage = storageBuffersWanted;
@@ -331,7 +331,7 @@ class MethodComparer {
     return {};
   }
 
-  /// By the driver where it counts those of every kernel.
+  /// Counts from the driver, if it counts the instructions of every kernel.
   void countInstructions(const std::vector<Variant>& variants, const DeviceLimits& limits,
                          const samples::PipelineStatistics* statistics) {
     std::vector<std::optional<std::uint64_t>> counts;

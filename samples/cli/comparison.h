@@ -1,4 +1,4 @@
-// The methods beside each other: what they cost, and what they do.
+// Compares the methods: what they cost, and what they do.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ namespace dermis::cli {
 
 struct ComparedMethod {
   Method method = Method::linear;
-  std::optional<double> seconds;  ///< the median; nothing if it was not timed
-  std::optional<double> time;     ///< of linear's
+  std::optional<double> seconds;  ///< the median; empty if it was not timed
+  std::optional<double> time;     ///< relative to linear
   std::optional<std::uint64_t> instructions;
   std::uint32_t bytesPerJoint = 0;  ///< of the palette, as the skin kernel reads it
   TubeComparison tube;
@@ -48,17 +48,17 @@ struct ComparisonOptions {
   MethodShares shares;
 };
 
-/// What times the methods.
+/// The device or CPU that the methods are timed on.
 struct ComparisonTimer {
   samples::OpenDevice* device = nullptr;
-  /// Without a device: dermis::cpu, on one thread. It has the everyday methods only.
+  /// Without a device: dermis::cpu, on one thread, without the comparison methods.
   bool isCpu = false;
 };
 
-/// Steps that `compareMethods` tells of.
+/// How many times `compareMethods` calls `step`.
 std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTimer& timer);
 
-/// Compares all methods on a scene that has a part with a mesh, each prepared with centres of
+/// Compares all methods on a scene that has a part with a mesh, each prepared with centers of
 /// rotation, in one pose. Without a timer nothing is timed. `step` is called after each step.
 /// Fails if the device does, with `invalidArgument` if so many instances have too many
 /// vertices.

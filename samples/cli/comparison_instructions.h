@@ -1,4 +1,4 @@
-// How long a kernel is, for devices whose driver does not say.
+// Counts the instructions of a kernel, for devices whose driver does not report them.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,13 @@
 
 namespace dermis::cli {
 
-/// A kernel with its constants specialised, everything inlined, and without what they leave dead;
-/// nothing if SPIRV-Tools fail.
+/// A kernel with its constants specialized, all functions inlined, and dead code removed. Empty if
+/// SPIRV-Tools fail.
 std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
 
-/// The SPIR-V instructions of a kernel that calculate or touch memory, once its constants are
-/// specialised and what they leave dead is gone. One for a vector, and a loop's counted once.
-/// Nothing if SPIRV-Tools fail, or the command was built without them.
+/// The number of SPIR-V instructions of a kernel that calculate or access memory, after
+/// specialization and removal of dead code. A vector instruction counts once, and so do the
+/// instructions of a loop. Empty if SPIRV-Tools fail, or if the command was built without them.
 std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
                                                    const DeviceLimits& limits);
 

@@ -39,7 +39,7 @@ float linearOf(std::uint8_t encoded) {
   return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
 }
 
-/// In front of one colour, neither white nor black: figures may be either.
+/// In front of one color, neither white nor black: figures may be either.
 render::LightingStyle styleOfPictures() {
   render::LightingStyle style;
   style.horizonColor = style.zenithColor = {linearOf(sheetPanel[0]), linearOf(sheetPanel[1]),
@@ -48,7 +48,7 @@ render::LightingStyle styleOfPictures() {
   return style;
 }
 
-/// Light from everywhere, so that a colour is what the scale says, and just enough from one side to
+/// Light from everywhere, so that a color is what the scale says, and just enough from one side to
 /// see a shape.
 render::LightingStyle styleOfHeatMaps() {
   render::LightingStyle style = styleOfPictures();
@@ -162,7 +162,7 @@ class ComparisonDrawer {
                   const Sheet::Style& style) {
     for (std::size_t line = 0; line < lines; ++line) {
       for (std::size_t column = 0; column < texts.size(); ++column) {
-        if (line < texts[column].size()) sheet_.centred(column, texts[column][line], style);
+        if (line < texts[column].size()) sheet_.centered(column, texts[column][line], style);
       }
       sheet_.advance(std::round(style.height * lineGap));
     }

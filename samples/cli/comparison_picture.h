@@ -1,5 +1,5 @@
-// The methods side by side, as in Figure 1 of Kavan et al. 2007: a strip of pictures for each
-// scene, names and numbers under each, and a heat map of the distance from dual quaternions.
+// Draws the methods side by side, as in Figure 1 of Kavan et al. 2007: a strip of pictures for each
+// scene, with names and numbers below, and a heat map of the distance from dual quaternions.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +22,14 @@ struct ComparisonColumn {
   std::vector<std::string> cost;  ///< lines below its name, in the strips that show it
 };
 
-/// A scene that is the same in all columns, but for the method.
+/// A row of pictures of one scene; the columns differ only in the method.
 struct ComparisonStrip {
   const Scene* scene = nullptr;  ///< allows all methods, and `dualQuaternion`
   ScenePose pose;
   std::string title, remark;
   samples::render::CameraOptions camera;
-  /// Of a scene of one part: what is left of its least section is written below it.
+  /// For a scene of one part: the smallest cross-section relative to bind pose is written below the
+  /// picture.
   std::optional<SectionRange> sections;
   bool showsCost = false;
   bool hasHeatMap = false;  ///< one more strip, below it
@@ -41,12 +42,12 @@ struct ComparisonSheet {
   std::string footer;
 };
 
-/// Pictures that `drawComparison` tells of.
+/// How many times `drawComparison` calls `step`.
 std::size_t comparisonPictures(const ComparisonSheet& sheet);
 
-/// Draws on a device that was opened for graphics. `font` may be null: there are no words then.
-/// `step` is called after each picture. What of the materials could not be had is added to `notes`.
-/// Fails if the device does, and with `invalidData` if there is nothing to draw.
+/// Draws on a device that was opened for graphics. `font` may be null: there is no text then.
+/// `step` is called after each picture. Problems of materials are added to `notes`. Fails if the
+/// device does, and with `invalidData` if there is nothing to draw.
 Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
                                                 const ComparisonSheet& sheet,
                                                 const samples::render::Font* font,

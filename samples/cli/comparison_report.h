@@ -1,4 +1,4 @@
-// What `compare` found, for people and for programs.
+// Reports the results of `compare`, as text and as JSON.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace dermis::cli {
 
-/// What was compared where.
+/// What was compared, and on which device.
 struct ComparisonTitle {
   std::string device;  ///< its name, or "reference"
   std::string driver;  ///< empty for the reference
@@ -16,7 +16,7 @@ struct ComparisonTitle {
   std::string pose;  ///< "rest pose", "clip 0 'walk' at 0.341 s"
 };
 
-/// A table on standard output, after lines that say how to read it.
+/// Prints a table, after lines that explain it.
 void printComparison(const ComparisonTitle& title, const MethodComparison& comparison);
 
 /// Fails with `ioError`.

@@ -1,4 +1,4 @@
-// What `compare` compares: a model in a pose, or the built-in arm.
+// The subject of `compare`: a model in a pose, or the built-in arm.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ struct ComparisonSubject {
   const Scene& scene() const { return model ? *model : builtIn->arm; }
 };
 
-/// The columns that a picture has where nobody chose any: those that the scene allows.
+/// The default columns of a picture: those that the scene allows.
 std::vector<Method> usualColumns(const Scene& scene);
 
 /// A picture of a subject with built-in scenes: these, then the model with what skinning it takes,

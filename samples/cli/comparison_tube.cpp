@@ -108,11 +108,11 @@ glm::dvec3 ringMiddle(const Points& points, std::uint32_t ring) {
 
 /// Of the ring's projection onto the plane in which that is largest.
 double ringArea(const Points& points, std::uint32_t ring) {
-  const glm::dvec3 centre = ringMiddle(points, ring);
+  const glm::dvec3 center = ringMiddle(points, ring);
   glm::dvec3 area(0);
   for (std::uint32_t side = 0; side < sides; ++side) {
     area +=
-        glm::cross(pointOf(points, ring, side) - centre, pointOf(points, ring, side + 1) - centre) /
+        glm::cross(pointOf(points, ring, side) - center, pointOf(points, ring, side + 1) - center) /
         2.0;
   }
   return glm::length(area);

@@ -1,5 +1,5 @@
-// What a method does to a straight tube of two joints that is twisted, and bent: numbers that can
-// be told from theory.
+// Measures what a method does to a straight tube of two joints that is twisted or bent. The numbers
+// can be checked against theory.
 #pragma once
 
 #include "dermis/method.h"
@@ -11,10 +11,10 @@ namespace dermis::cli {
 inline constexpr double tubeTwistDegrees = 120;
 inline constexpr double tubeBendDegrees = 90;
 
-/// Of a skinned tube against the same tube in bind pose.
+/// The skinned tube relative to the same tube in bind pose.
 struct TubeShape {
-  /// The least distance of a vertex from the tube's axis in bind pose, in radii: what a twist
-  /// leaves. No use where the tube is bent.
+  /// The smallest distance of a vertex from the axis of the tube in bind pose, in radii. Meaningful
+  /// only for a twist.
   double leastRadius = 1;
   /// The least area of a ring of vertices, across the tube.
   double leastSection = 1;
@@ -31,7 +31,7 @@ struct TubeComparison {
 
 /// By the reference. The tube is the sample bar's, more finely divided: length 1, radius 0.1,
 /// weights that change linearly over the 0.4 about its middle, which is where the second joint is;
-/// bind space begins at its other end. Centres of rotation are the rings' middles.
+/// bind space begins at its other end. Centers of rotation are the rings' middles.
 Result<TubeComparison> compareTube(Method method, const MethodShares& shares);
 
 }  // namespace dermis::cli

@@ -28,7 +28,7 @@ class Plane {
   Plane(std::span<const float> rest, std::span<const float> skinned, double x)
       : rest_(rest), skinned_(skinned), x_(x) {}
 
-  /// A section runs from edges that go down through the plane to edges that go up: so neighbouring
+  /// A section runs from edges that go down through the plane to edges that go up: so neighboring
   /// triangles agree which way.
   void cut(std::span<const std::uint32_t, 3> triangle, Areas& areas) const {
     std::array<glm::dvec3, 2> rest{}, skinned{};

@@ -1,4 +1,4 @@
-// What skinning leaves of the girth of a limb.
+// Measures how much of the cross-section of a limb is left after skinning.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace dermis::cli {
 
-/// Where sections are made, across the x axis of bind space.
+/// The range of the sections, across the x axis of bind space.
 struct SectionRange {
   double from = 0, to = 0;
 };

@@ -8,8 +8,8 @@
 namespace dermis::cli {
 namespace {
 
-/// A number from 0 to 1 that only depends on the figure and on what it is for (Wellons 2018,
-/// "Prospecting for hash functions").
+/// A number from 0 to 1 that depends only on the figure and the purpose (Wellons 2018, "Prospecting
+/// for hash functions").
 double chance(std::uint32_t figure, std::uint32_t purpose) {
   std::uint32_t bits = figure * 0x9e3779b9u + purpose * 0x85ebca6bu + 1;
   bits = (bits ^ (bits >> 16)) * 0x7feb352du;

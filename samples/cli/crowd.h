@@ -1,4 +1,4 @@
-// Who stands where in a picture, and does what.
+// Places the figures of a crowd in a picture, and chooses their clips.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace dermis::cli {
 
-/// What one figure of a crowd plays.
+/// The clip and phase of one figure.
 struct Role {
   std::uint32_t clip = gltf::none;
   double phase = 0;  ///< seconds that it is ahead
@@ -20,7 +20,7 @@ struct Role {
 std::vector<Role> castCrowd(const gltf::Model& model, std::uint32_t clip, bool isVaried,
                             std::uint32_t figures);
 
-/// Seconds into the clip, which is played again and again.
+/// Seconds into the clip, which repeats.
 double timeInClip(const gltf::Model& model, const Role& role, double time);
 
 /// Where figures stand that keep within `extent`: in rows, a little out of line and turned a
@@ -28,7 +28,7 @@ double timeInClip(const gltf::Model& model, const Role& role, double time);
 /// where it is.
 std::vector<JointMatrix> placeCrowd(const Box& extent, std::uint32_t figures);
 
-/// The box around a box that is turned and moved.
+/// The box around a transformed box.
 Box moved(const Box& box, const JointMatrix& transform);
 
 }  // namespace dermis::cli

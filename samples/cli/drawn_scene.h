@@ -1,5 +1,4 @@
-// A scene, once or many times over, skinned by a SkinningSystem and ready to be drawn from its
-// output.
+// A scene, once or many times, skinned by a SkinningSystem and drawn from its output.
 #pragma once
 
 #include <cstdint>
@@ -28,16 +27,16 @@ class DrawnScene {
 
   std::uint32_t figureCount() const { return static_cast<std::uint32_t>(figures_.size()); }
 
-  /// Begins the next frame; all recorded before must be complete.
+  /// Begins the next frame. All recorded frames must be complete.
   Result<void> beginFrame();
   Result<void> setPose(std::uint32_t figure, const ScenePose& pose);
-  /// Skins a figure by another method from now on, which the scene must allow; it has to be posed
-  /// again. Begins a frame of its own; all recorded before must be complete.
+  /// Skins a figure with another method from now on, which the scene must allow. The figure must be
+  /// posed again. Begins a frame; all recorded frames must be complete.
   Result<void> setMethod(std::uint32_t figure, Method method);
-  /// Skins, and makes what was skinned ready to be drawn, and to be copied.
+  /// Records the skinning, and the barriers for drawing and copying the output.
   Result<void> recordSkinning(VkCommandBuffer commandBuffer);
 
-  /// What draws a figure as it was last posed, its bind space moved by `transform`.
+  /// Adds the draws of a figure in its last pose, transformed by `transform`.
   Result<void> addDraws(std::uint32_t figure, const JointMatrix& transform,
                         std::vector<samples::render::Draw>& draws) const;
   /// Around a figure as it was skinned in the last complete frame; nothing if no vertex of it is
@@ -46,7 +45,7 @@ class DrawnScene {
 
   vulkan::SystemStatistics statistics() const { return system_->statistics(); }
 
-  /// What of the materials could not be had.
+  /// Problems of materials that could not be loaded.
   const std::vector<std::string>& notes() const { return appearances_->notes(); }
 
  private:
@@ -64,7 +63,7 @@ class DrawnScene {
     std::vector<PoseHandle> poses;  ///< by skin; a null handle where no part uses it
     std::vector<FigurePart> parts;
   };
-  /// What all figures share.
+  /// The data of a part that all figures share.
   struct SharedPart {
     const samples::render::Geometry* geometry = nullptr;
     samples::render::Surface surface;

@@ -1,4 +1,4 @@
-// The dermis command: skins glTF models, and proves on a device that every vertex is right.
+// The dermis command: skins glTF models, and verifies every vertex on a device.
 
 #include <fmt/format.h>
 

@@ -15,11 +15,11 @@
 namespace dermis::cli {
 namespace {
 
-/// More influences than this, the weakest, have no say in where a centre is: one vertex of very
-/// many must not make all others as wide.
+/// Maximum influences per vertex; the weakest beyond it are ignored for centers. Otherwise one
+/// vertex with very many would give all vertices as many slots.
 constexpr std::uint32_t mostSlots = 32;
 
-/// The solver's 20, and as many again while it is made.
+/// The 20 bytes of the solver, and temporarily as many again.
 constexpr std::uint64_t bytesPerPair = 40;
 
 struct JointWeight {
@@ -58,7 +58,7 @@ class JoinedMesh {
 
   std::span<const std::uint32_t> triangles() const { return triangles_; }
 
-  /// How many pairs of joints the triangles have, each counted by itself: what the solver stores.
+  /// Number of pairs of joints of all triangles, which is what the solver stores.
   std::uint64_t pairCount() const {
     std::uint64_t pairs = 0;
     std::vector<std::uint32_t> joints;

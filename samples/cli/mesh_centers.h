@@ -1,4 +1,4 @@
-// Centres of rotation for what a glTF file holds.
+// Centers of rotation for the meshes of a glTF file.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace dermis::cli {
 
-/// Finds the centers of rotation of meshes of one file, each once.
+/// Computes the centers of rotation of the meshes of one file, each once.
 class MeshCenters {
  public:
   /// `mostTerms`: of the sums of all meshes together, some 4 ns each. The budget, which must
@@ -19,9 +19,10 @@ class MeshCenters {
   MeshCenters(std::uint64_t mostTerms, gltf::MemoryBudget& budget)
       : termsLeft_(mostTerms), budget_(budget) {}
 
-  /// Those of a primitive, 3 floats a vertex. All primitives of a mesh count, so that they agree
-  /// where they meet. `jointCount` is at most `namedJoints` of the mesh. Shows progress. Fails with
-  /// `limitExceeded` if they are too much work: dense meshes cost the square of their size.
+  /// The centers of a primitive, 3 floats per vertex. They depend on all primitives of the mesh, so
+  /// that primitives agree where they meet. `jointCount` is at most `namedJoints` of the mesh.
+  /// Shows progress. Fails with `limitExceeded` if they are too much work: dense meshes cost the
+  /// square of their size.
   Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                                 std::uint32_t jointCount);
 

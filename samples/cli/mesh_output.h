@@ -1,4 +1,4 @@
-// Skinned primitives on their way into a file: what all formats have in common.
+// Writes skinned primitives to a file: the part that all formats share.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace dermis::cli {
 /// One skinned primitive.
 struct OutputPart {
   std::string name;  ///< never empty
-  /// What skinning leaves as it is: triangles, texture coordinates, colours, material.
+  /// Data that skinning does not change: triangles, texture coordinates, colors, material.
   const gltf::Primitive* primitive = nullptr;
   std::vector<float> positions;  ///< 3 a vertex, in the scene's space
   std::vector<float> normals;    ///< 3 a vertex
@@ -34,8 +34,8 @@ enum class OutputFormat { ply, obj, glb };
 /// The format that a file's ending means, in any case, or nothing.
 std::optional<OutputFormat> outputFormat(std::string_view fileName);
 
-/// What a part is called: its node's name, or its mesh's, or the node's number; and which of the
-/// mesh's primitives it is if there are several.
+/// The name of a part: that of its node, or of its mesh, or the number of the node; and the number
+/// of the primitive if the mesh has several.
 std::string partName(const gltf::Model& model, const gltf::SkinnedPrimitive& source);
 
 /// Vertices with a position or normal that is NaN or infinite.

@@ -1,4 +1,4 @@
-// What the subcommands that blend by a method of choice ask for.
+// Options of subcommands that have --method.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -19,10 +19,10 @@ struct MethodShares {
 /// --dual-quaternion-weight and --bulge-strength.
 void addShares(CLI::App& command, MethodShares& shares);
 
-/// Reports wrong usage where one is not from 0 to 1.
+/// Reports wrong usage if a share is not from 0 to 1.
 samples::ExitStatus checkShares(const MethodShares& shares);
 
-/// "linear, dual_quaternion, … or bulge_controlled"; the last word to choice.
+/// "linear, dual_quaternion, … or bulge_controlled", with `lastWord` in place of "or".
 std::string methodNames(const std::string& lastWord);
 
 }  // namespace dermis::cli

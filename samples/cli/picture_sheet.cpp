@@ -85,7 +85,7 @@ void Sheet::left(std::string_view text, const Style& style, float from, float ro
   font_->draw(picture_, fitted(text, style, room > 0 ? room : innerWidth() - from), label);
 }
 
-void Sheet::centred(std::size_t column, std::string_view text, Style style) {
+void Sheet::centered(std::size_t column, std::string_view text, Style style) {
   const auto room = static_cast<float>(columnWidth_);
   if (const float wide = width(text, style); wide > room) style.height *= room / wide;
   const float from = static_cast<float>(columnLeft(column) - margin_) +

@@ -1,4 +1,4 @@
-// A sheet of paper that grows downwards: columns of pictures, and words above and below them.
+// A sheet that grows downwards: columns of pictures, with text above and below them.
 #pragma once
 
 #include <array>
@@ -28,26 +28,26 @@ class Sheet {
     SheetColor color = sheetInk;
   };
 
-  /// Without a typeface there are no words, but the room for them. It must outlive the sheet.
+  /// Without a font there is no text, but its space is kept. The font must outlive the sheet.
   Sheet(std::uint32_t width, std::size_t columns, const samples::render::Font* font);
 
   std::uint32_t columnWidth() const { return columnWidth_; }
-  /// What lengths are multiplied by where columns are narrower or wider than usual.
+  /// Factor for lengths if columns are narrower or wider than usual.
   float scale() const { return scale_; }
 
-  /// Goes on so many pixels farther down.
+  /// Moves down by this number of pixels.
   void advance(float pixels);
   /// A thin line across.
   void rule();
-  /// At the left of a line; cut short where there is no room.
+  /// Writes at the left of a line; the text is cut if there is no room.
   void left(std::string_view text, const Style& style, float from = 0, float room = 0);
-  /// What a text takes; 0 without a typeface.
+  /// The width of a text; 0 without a font.
   float width(std::string_view text, const Style& style) const;
-  /// In the middle of a column, smaller where it has no room.
-  void centred(std::size_t column, std::string_view text, Style style);
+  /// Writes in the middle of a column, smaller if there is no room.
+  void centered(std::size_t column, std::string_view text, Style style);
   /// A picture of the width of a column or less, in its middle.
   void paste(std::size_t column, const samples::render::Picture& picture);
-  /// A box of colours from left to right, in a line of text; `from` as in `left`.
+  /// A box of colors from left to right, in a line of text; `from` as in `left`.
   void gradient(const std::vector<SheetColor>& colors, float from, float length, float height);
   /// Of what is inside the margins.
   float innerWidth() const { return static_cast<float>(innerWidth_); }
@@ -65,7 +65,7 @@ class Sheet {
   float scale_, y_ = 0;
 };
 
-/// A name in as few lines as fit, broken behind underscores.
+/// A name in as few lines as possible, broken after underscores.
 std::vector<std::string> brokenName(const Sheet& sheet, std::string_view name,
                                     const Sheet::Style& style);
 

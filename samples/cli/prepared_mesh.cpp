@@ -8,7 +8,7 @@
 namespace dermis::cli {
 namespace {
 
-/// Of a packed mesh, and of a repaired one: positions, normals, tangents, centres.
+/// Of a packed mesh, and of a repaired one: positions, normals, tangents, centers.
 constexpr std::uint64_t bytesPerVertex = 2 * 4 * 16;
 /// Weight and joint, packed, repaired, and while one is made of the other.
 constexpr std::uint64_t bytesPerInfluence = 3 * 8;

@@ -1,4 +1,4 @@
-// A glTF primitive made ready for skinning with palettes of so many joints.
+// Prepares a glTF primitive for skinning: validates, repairs and packs it.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,38 @@
 
 namespace dermis::cli {
 
-/// What a mesh is made ready for.
+/// How meshes are prepared.
 struct MeshPreparation {
-  /// Refuse what could be repaired, and files that break a rule though their meaning is clear.
+  /// Refuse meshes that would have to be repaired, and files that break a rule even if the meaning
+  /// is clear.
   bool strict = false;
-  /// Find the centres of rotation, for methods that need them. It takes its time.
+  /// Compute centers of rotation, for methods that need them. This may take long.
   bool centersOfRotation = false;
   /// More terms of their sums (`CenterOfRotationSolver::termCount`) are not added up for a file:
   /// some 4 s on one core, or 40 s where a method that needs them was asked for by name.
   std::uint64_t mostCenterTerms = 1'000'000'000;
   float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< of every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
-  bool images = false;                                           ///< read what base colours show
+  bool images = false;                                           ///< read what base colors show
 };
 
-/// The limit of a command that names a method which needs centres of rotation.
+/// The limit of a command that names a method which needs centers of rotation.
 inline constexpr std::uint64_t mostCenterTermsAsked = 10'000'000'000;
 
-/// How many joints the mesh may tell apart: from there on, more make no difference.
+/// The number of joints that the mesh can refer to; more joints make no difference.
 std::uint32_t namedJoints(const gltf::Mesh& mesh);
 
 /// What `--strict` does, for its help.
 inline constexpr const char* strictHelp =
     "Refuse a file that breaks a rule of glTF, or a mesh that would have to be repaired";
 
-/// Gives the primitive's centres of rotation, 3 floats a vertex, or none.
+/// Gives the primitive's centers of rotation, 3 floats a vertex, or none.
 using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 
 /// Not movable: its views point into it.
 class PreparedMesh {
  public:
-  /// Spends what `prepare` will take; false if that is more than there is.
+  /// Spends the memory of `prepare`; false if the budget is too small.
   static bool spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget);
 
   /// The primitive has influences, and outlives this object. Fails with `invalidMesh`, if

@@ -1,4 +1,4 @@
-// Skins a scene, part by part, with the reference, on the CPU or on a device: what `skin` writes.
+// Skins a scene, part by part, with the reference, on the CPU or on a device, for `dermis skin`.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,8 @@
 
 namespace dermis::cli {
 
-/// Every part of the scene in a pose. Tangents where they are wanted and a mesh has them.
+/// Skins every part of the scene in a pose. With tangents, if they are requested and the mesh has
+/// them.
 using SkinParts = std::function<Result<std::vector<SkinnedPart>>(const ScenePose& pose)>;
 
 /// What a batch needs of each part that has a mesh, in the order of the parts; they refer to the

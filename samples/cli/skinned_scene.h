@@ -1,4 +1,4 @@
-// A glTF file made ready for skinning: what `skin`, `verify` and `info` have in common.
+// Prepares a glTF file for skinning: shared by `skin`, `verify` and `info`.
 #pragma once
 
 #include <cstddef>

@@ -52,7 +52,7 @@ std::string whereItWasMeasured(const ThroughputTitle& title) {
   return title.driver.empty() ? title.device : title.device + ", driver " + title.driver;
 }
 
-/// In the colours of their sections.
+/// In the colors of their sections.
 SheetColor colorOf(ThroughputSection section) {
   constexpr std::array<SheetColor, samples::throughputSectionCount> colors{
       {{148, 156, 168}, {43, 108, 176}, {44, 139, 118}, {124, 92, 176}, {196, 116, 44}}};

@@ -1,4 +1,4 @@
-// What `bench` measured, for people and for programs.
+// Reports the results of `bench`, as text, as JSON and as a picture.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ void printThroughput(const ThroughputTitle& title, std::span<const samples::Thro
 Result<void> writeJsonThroughput(const std::filesystem::path& path, const ThroughputTitle& title,
                                  std::span<const samples::ThroughputRow> rows);
 
-/// A bar for each row, in sections. `font` may be null: no words then.
+/// A bar for each row, in sections. `font` may be null: there is no text then.
 samples::render::Picture drawThroughput(const ThroughputTitle& title,
                                         std::span<const samples::ThroughputRow> rows,
                                         const samples::render::Font* font);

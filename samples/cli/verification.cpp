@@ -28,7 +28,7 @@ std::vector<Figure> figuresOf(const Scene& scene, std::span<const Method> method
   return figures;
 }
 
-/// What must come out, of every figure.
+/// The expected result of every figure.
 struct ReferencePose {
   ScenePose pose;
   std::vector<reference::SkinnedMesh> figures;
@@ -46,7 +46,7 @@ bool isFinite(std::span<const JointMatrix> palette) {
   return true;
 }
 
-/// A pose whose joints are all finite leaves no vertex without an answer.
+/// If all joints of a pose are finite, every vertex has a defined answer.
 Exemptions exemptionsIn(std::span<const JointMatrix> palette,
                         const reference::SkinnedMesh& skinned) {
   Exemptions exemptions = exemptionsOf(skinned);
@@ -54,8 +54,7 @@ Exemptions exemptionsIn(std::span<const JointMatrix> palette,
   return exemptions;
 }
 
-/// Nobody can be asked to compute in float32 what it does not hold. Sums on the way to a position
-/// reach a few times its size.
+/// Positions must fit in float32. Sums in the computation of a position reach a few times its size.
 Result<void> checkReach(const ScenePart& part, const PoseToVerify& pose,
                         const reference::SkinnedMesh& skinned) {
   constexpr double most = static_cast<double>(std::numeric_limits<float>::max()) / 8;
@@ -184,7 +183,7 @@ class PoseVerifier {
     return {};
   }
 
-  /// Not a bit may differ from the first division.
+  /// The result must have the same bits as that of the first division.
   Result<void> compareDivision(std::size_t index) {
     const SceneBatch& batch = batches_[index];
     Outcome& outcome = outcomes_[index];

@@ -1,4 +1,4 @@
-// Every method and variant of a device, or of the CPU path, against the reference.
+// Verifies every method and variant of a device, or of the CPU path, against the reference.
 #pragma once
 
 #include <functional>
@@ -39,7 +39,7 @@ struct PoseToVerify {
   std::string name;
 };
 
-/// The rest pose, and each clip at its beginning, two times within, and its end.
+/// The rest pose, and each clip at its beginning, at two times within it, and at its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
 /// The ways that a target has. Over all of them each of its methods meets every format that is

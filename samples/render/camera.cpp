@@ -36,7 +36,7 @@ void addCorners(const Box& box, std::vector<glm::vec3>& corners) {
   }
 }
 
-/// How far away the eye must be, on a line of its choice, so that |x - centre| <= slope · (distance
+/// How far away the eye must be, on a line of its choice, so that |x - center| <= slope · (distance
 /// - z) for every point x z.
 float fittingDistance(std::span<const glm::vec2> points, float slope) {
   // The one border is touched by the largest of x + slope·z, the other by that of -x + slope·z.
@@ -57,21 +57,21 @@ float middle(std::span<const glm::vec2> points, float distance, bool isOrthograp
     high = std::max(high, point.x);
   }
   for (int step = 0; step < 40; ++step) {
-    const float centre = (low + high) / 2;
+    const float center = (low + high) / 2;
     float left = 0, right = 0;
     for (const glm::vec2& point : points) {
-      const float place = (point.x - centre) / (isOrthographic ? 1 : distance - point.y);
+      const float place = (point.x - center) / (isOrthographic ? 1 : distance - point.y);
       left = std::max(left, -place);
       right = std::max(right, place);
     }
-    (right > left ? low : high) = centre;
+    (right > left ? low : high) = center;
   }
   return (low + high) / 2;
 }
 
-float halfWidth(std::span<const glm::vec2> points, float centre) {
+float halfWidth(std::span<const glm::vec2> points, float center) {
   float width = 0;
-  for (const glm::vec2& point : points) width = std::max(width, std::abs(point.x - centre));
+  for (const glm::vec2& point : points) width = std::max(width, std::abs(point.x - center));
   return width;
 }
 
@@ -89,7 +89,7 @@ Box unite(std::span<const Box> boxes) {
   return all;
 }
 
-glm::vec3 centreOf(const Box& box) {
+glm::vec3 centerOf(const Box& box) {
   return (glm::vec3(box.min[0], box.min[1], box.min[2]) +
           glm::vec3(box.max[0], box.max[1], box.max[2])) *
          0.5f;
@@ -104,7 +104,7 @@ Camera frameBoxes(std::span<const Box> boxes, const Box& depth, const CameraOpti
                   float aspect) {
   const Axes axes = axesOf(options);
   const Box all = unite(boxes);
-  const glm::vec3 target = centreOf(all);
+  const glm::vec3 target = centerOf(all);
   const float radius = radiusOf(all);
   std::vector<glm::vec3> corners;
   for (const Box& box : boxes) addCorners(box, corners);

@@ -32,7 +32,7 @@ Box unite(std::span<const Box> boxes);
 
 /// Half the diagonal, and never 0.
 float radiusOf(const Box& box);
-glm::vec3 centreOf(const Box& box);
+glm::vec3 centerOf(const Box& box);
 
 /// A camera in whose picture the boxes lie: as large as the margin allows, and in its middle.
 /// `depth` is what may be seen besides, a ground for one, and must not be cut off. `aspect` is the

@@ -40,7 +40,7 @@ struct Draw {
   /// Any that `isNormalFormat` allows, but three components of 1 or 2 bytes; or none: the surface
   /// is then flat between its edges.
   VertexStream normals;
-  /// One float32 a vertex, 0 to 1, shown as a colour instead of the base colour: a heat map. Its
+  /// One float32 a vertex, 0 to 1, shown as a color instead of the base color: a heat map. Its
   /// format is not looked at; no buffer: there is none.
   VertexStream values;
   const Geometry* geometry = nullptr;  ///< as many vertices as are skinned

@@ -1,4 +1,4 @@
-// The colours of a heat map, for what explains it.
+// The colors of a heat map, for what explains it.
 #pragma once
 
 #include <array>
@@ -6,7 +6,7 @@
 
 namespace dermis::samples::render {
 
-/// The colour of a value from 0 to 1, as shaders/mesh.frag has it, in sRGB: that of a surface in
+/// The color of a value from 0 to 1, as shaders/mesh.frag has it, in sRGB: that of a surface in
 /// even white light.
 std::array<std::uint8_t, 3> heatColor(float value);
 

@@ -22,8 +22,8 @@ struct LightView {
 
 LightView lightView(const Box& casters, const glm::vec3& towardsLight) {
   const glm::vec3 up = std::abs(towardsLight.y) > 0.95f ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
-  const glm::vec3 centre = centreOf(casters);
-  const glm::mat4 view = glm::lookAtRH(centre + towardsLight, centre, up);
+  const glm::vec3 center = centerOf(casters);
+  const glm::mat4 view = glm::lookAtRH(center + towardsLight, center, up);
   glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
   for (int corner = 0; corner < 8; ++corner) {
     const glm::vec4 point((corner & 1) != 0 ? casters.max[0] : casters.min[0],
@@ -104,8 +104,8 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.rimDirection = glm::vec4(rim, style.rim);
   block.horizonColor = glm::vec4(style.horizonColor, 1);
   block.zenithColor = glm::vec4(style.zenithColor, 1);
-  const glm::vec3 centre = centreOf(casters);
-  block.ground = glm::vec4(centre.x, groundHeight, centre.z, groundRadius);
+  const glm::vec3 center = centerOf(casters);
+  block.ground = glm::vec4(center.x, groundHeight, center.z, groundRadius);
   const float radius = radiusOf(casters);
   const bool isHazy = style.haze > 0 && !camera.isOrthographic;
   block.haze =

@@ -52,7 +52,7 @@ std::vector<int> codePoints(std::string_view text) {
   return points;
 }
 
-/// Mixes a colour into a pixel by a share of 0 to 255.
+/// Mixes a color into a pixel by a share of 0 to 255.
 void mix(std::uint8_t* pixel, const std::uint8_t* color, unsigned share) {
   for (int i = 0; i < 3; ++i)
     pixel[i] = static_cast<std::uint8_t>((pixel[i] * (255 - share) + color[i] * share + 127) / 255);

@@ -14,7 +14,7 @@
 namespace dermis::samples::render {
 namespace {
 
-/// The numbers of the shaders' specialisation constants, in their order.
+/// The numbers of the shaders' specialization constants, in their order.
 struct Specialization {
   std::int32_t blockerTaps = 0;
   std::int32_t penumbraTaps = 0;
@@ -129,7 +129,7 @@ VkPipelineColorBlendAttachmentState blendState(const PipelineKey& key) {
   return state;
 }
 
-/// The specialisation of both shaders. Not copied: its parts point at each other.
+/// The specialization of both shaders. Not copied: its parts point at each other.
 class SpecializedConstants {
  public:
   SpecializedConstants(const PipelineKey& key, const FilterTaps& taps)

@@ -29,7 +29,7 @@ struct PipelineKey {
   bool operator<(const PipelineKey& other) const { return tied() < other.tied(); }
 };
 
-/// How well shadows are filtered; specialises the fragment shaders.
+/// How well shadows are filtered; specializes the fragment shaders.
 struct FilterTaps {
   std::int32_t blockers = 20, penumbra = 32, sky = 4;
 };

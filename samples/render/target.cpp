@@ -48,7 +48,7 @@ std::array<VkSubpassDependency, 2> pictureDependencies() {
   return dependencies;
 }
 
-/// The largest image of a picture: four samples of colour.
+/// The largest image of a picture: four samples of color.
 constexpr std::uint64_t largestPerPixel = 4 * 4;
 /// All of it: as much of depth, the resolved image, and its copy.
 constexpr std::uint64_t bytesPerPixel = 2 * largestPerPixel + 4 + 4;

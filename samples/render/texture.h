@@ -1,4 +1,4 @@
-// Base-colour textures: from encoded bytes to an image that shaders read.
+// Base-color textures: from encoded bytes to an image that shaders read.
 #pragma once
 
 #include <cstddef>

@@ -20,7 +20,7 @@ class Canvas {
   /// As large as the window. The device must be idle.
   Result<void> resize(VkExtent2D pixels);
   VkExtent2D extent() const { return extent_; }
-  /// The pass that the interface is drawn in: its colours are bytes, not light.
+  /// The pass that the interface is drawn in: its colors are bytes, not light.
   VkRenderPass pass() const { return pass_.get(); }
 
   /// A picture, scaled to a part of the canvas, and `drawInterface` on it; nothing: an empty one.

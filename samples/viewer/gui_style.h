@@ -1,4 +1,4 @@
-// How the interface looks: its typeface, its colours.
+// How the interface looks: its typeface, its colors.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ void styleGui(float pixelsPerUnit);
 /// 0xRRGGBB and alpha, for draw lists.
 ImU32 color(std::uint32_t rgb, float alpha = 1);
 
-/// The colours of a heat map from 0 to 1, as render/shaders/mesh.frag has them.
+/// The colors of a heat map from 0 to 1, as render/shaders/mesh.frag has them.
 ImU32 heatColor(float value);
 
 inline constexpr std::uint32_t accentColor = 0x4FC3B4, warmColor = 0xFFB454, textColor = 0xE8ECF0,

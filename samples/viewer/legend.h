@@ -1,4 +1,4 @@
-// What the colours of a heat map mean.
+// What the colors of a heat map mean.
 #pragma once
 
 #include <imgui.h>
@@ -7,7 +7,7 @@
 
 namespace dermis::viewer {
 
-/// Where weights or errors are shown as colours.
+/// Where weights or errors are shown as colors.
 float legendHeight(const Facts& facts, const State& state);
 void drawLegend(const Facts& facts, const State& state, ImDrawList& list, float x, float y,
                 float width);

@@ -79,7 +79,7 @@ render::Camera OrbitCamera::camera(const Box& scene, float aspect) const {
   camera.right = rightOf(camera.towardsEye);
   camera.distance = distance_;
   camera.eye = target_ + camera.towardsEye * distance_;
-  const float reach = glm::length(render::centreOf(scene) - target_) + render::radiusOf(scene);
+  const float reach = glm::length(render::centerOf(scene) - target_) + render::radiusOf(scene);
   const float farthest = distance_ + reach;
   const float nearest = std::max(distance_ - 2 * radius_, std::min(distance_, radius_) * 0.02f);
   const glm::mat4 view = glm::lookAtRH(camera.eye, target_, glm::vec3(0, 1, 0));

@@ -9,14 +9,14 @@
 namespace dermis::viewer {
 namespace {
 
-enum class Align { left, centre, right };
+enum class Align { left, center, right };
 
 /// A line of text on a dark plate.
 void drawLabel(ImDrawList& list, const std::string& text, float x, float y, Align align,
                ImU32 tint) {
   const ImVec2 size = ImGui::CalcTextSize(text.c_str());
   const float left = align == Align::left     ? x + 10
-                     : align == Align::centre ? x - size.x / 2
+                     : align == Align::center ? x - size.x / 2
                                               : x - size.x - 10;
   list.AddRectFilled({left - 10, y}, {left + size.x + 10, y + size.y + 10},
                      color(panelColor, 0.78f), 6);
@@ -30,7 +30,7 @@ void drawEmpty(const Facts& facts, const Area& picture) {
                                color(0x2B333C), color(0x2B333C), color(0x474F58), color(0x474F58));
   const float x = picture.x + picture.width / 2, y = picture.y + picture.height / 2;
   if (facts.isLoading) {
-    drawLabel(list, facts.loading, x, y - 14, Align::centre, color(textColor));
+    drawLabel(list, facts.loading, x, y - 14, Align::center, color(textColor));
     return;
   }
   const float width = std::min(picture.width - 60, 420.0f) / 2, height = 80;
@@ -70,7 +70,7 @@ void drawViews(const Facts& facts, const Area& picture, const State& state) {
       list.AddLine({area.x, area.y}, {area.x, area.y + area.height}, color(0x0B0F14, 0.55f), 2);
     }
     drawLabel(list, std::string(methodName(facts.methods[index])), area.x + area.width / 2,
-              area.y + 16, Align::centre, color(textColor));
+              area.y + 16, Align::center, color(textColor));
   }
 }
 
@@ -90,7 +90,7 @@ void drawOverlay(const Facts& facts, const Area& picture, const State& state) {
   }
   if (!state.notice.empty()) {
     drawLabel(list, state.notice, picture.x + picture.width / 2, picture.y + picture.height - 110,
-              Align::centre, color(accentColor));
+              Align::center, color(accentColor));
   }
 }
 

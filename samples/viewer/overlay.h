@@ -1,4 +1,4 @@
-// What lies on the picture itself: names, joints, the scale of colours.
+// What lies on the picture itself: names, joints, the scale of colors.
 #pragma once
 
 #include "state.h"

@@ -87,7 +87,7 @@ Result<void> Presenter::resize() {
 }
 
 Result<bool> Presenter::prepare() {
-  if (window_.isMinimised()) return false;
+  if (window_.isMinimized()) return false;
   const VkExtent2D pixels = window_.pixels(), extent = swapchain_->extent();
   if (!image_ &&
       (swapchain_->isStale() || pixels.width != extent.width || pixels.height != extent.height)) {

@@ -13,7 +13,7 @@ namespace dermis::viewer {
 
 struct LoadRequest {
   std::string path;
-  /// Find the centres of rotation, which some methods need and which takes its time.
+  /// Find the centers of rotation, which some methods need and which takes its time.
   bool findsCenters = false;
 };
 

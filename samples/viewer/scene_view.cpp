@@ -163,7 +163,7 @@ void SceneView::setErrors(CheckResult result) {
   writeErrors();
 }
 
-/// The colours end at the greatest error of all that is shown.
+/// The colors end at the greatest error of all that is shown.
 void SceneView::writeErrors() {
   clearValues();
   if (!errors_) return;

@@ -80,9 +80,9 @@ void Viewer::waitForEvents() {
                          presenter_->gui().hasQueuedInput();
   const bool isBusy = !isSettled() || !screenshotName_.empty() || !state_.notice.empty();
   SDL_Event event;
-  const bool isMinimised = presenter_->window().isMinimised();
+  const bool isMinimized = presenter_->window().isMinimized();
   if (framesToTextField_ > 0) --framesToTextField_;
-  const int patience = isMinimised ? 100 : isHurried ? 0 : isBusy ? 15 : 250;
+  const int patience = isMinimized ? 100 : isHurried ? 0 : isBusy ? 15 : 250;
   if (patience > 0 && SDL_WaitEventTimeout(&event, patience) != 0) handle(event);
   while (!waitsForTextField() && !presenter_->gui().hasUnseenKey() && SDL_PollEvent(&event) != 0)
     handle(event);
@@ -284,7 +284,7 @@ void Viewer::beginWith(const std::string& path) {
   presenter_->window().setTitle(fileName(path) + " – Dermis");
 }
 
-/// Where a method needs centres of rotation the file is read once more, to find them.
+/// Where a method needs centers of rotation the file is read once more, to find them.
 void Viewer::chooseMethods() {
   bool waits = false;
   for (std::size_t index = 0; index < state_.views(); ++index) {

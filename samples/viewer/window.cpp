@@ -73,7 +73,7 @@ float Window::pixelsPerUnit() const {
   return width > 0 ? static_cast<float>(pixels().width) / static_cast<float>(width) : 1;
 }
 
-bool Window::isMinimised() const {
+bool Window::isMinimized() const {
   return (SDL_GetWindowFlags(window_) & (SDL_WINDOW_MINIMIZED | SDL_WINDOW_HIDDEN)) != 0 ||
          pixels().width == 0 || pixels().height == 0;
 }

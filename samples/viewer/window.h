@@ -32,7 +32,7 @@ class Window {
   VkExtent2D pixels() const;
   /// Pixels to such a unit.
   float pixelsPerUnit() const;
-  bool isMinimised() const;
+  bool isMinimized() const;
 
  private:
   SDL_Window* window_ = nullptr;

@@ -1,5 +1,5 @@
-// Reading attributes of a mesh view: for validation, repair and packing. The reference reads them
-// by its own means.
+// Reads attributes of a mesh view, for validation, repair and packing. The reference has its own
+// code for this.
 #pragma once
 
 #include <algorithm>
@@ -93,8 +93,8 @@ inline float loadMorphPosition(const MorphTargetView& target, std::uint32_t elem
                             static_cast<double>(target.positionScale[component]));
 }
 
-/// A weight times 65535. In these units weights that are stored as integers are integers, whose
-/// sums are exact: which influence is the strongest must not depend on how a quotient is rounded.
+/// A weight times 65535. In these units weights that are stored as integers remain integers, and
+/// their sums are exact: which influence is the strongest must not depend on rounding.
 inline double loadWeight(const AttributeView& view, std::uint32_t element,
                          std::uint32_t component) {
   switch (view.type) {

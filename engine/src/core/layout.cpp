@@ -10,7 +10,7 @@
 namespace dermis {
 namespace {
 
-/// Of all that one store may write of an attribute.
+/// A multiple of the size of every store that may write an attribute.
 constexpr std::uint64_t planarAlignment = 48;
 
 std::array<VertexFormat, streamCount> formatsOf(const VertexLayout& layout) {

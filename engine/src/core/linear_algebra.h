@@ -1,5 +1,5 @@
-// Vectors of three and four numbers, and 3×3 matrices by columns: what the sources of core need, so
-// that core needs no library. Engines that have GLM convert with glm.h.
+// Vectors of three and four numbers, and column-major 3×3 matrices, for the sources of core, so
+// that core needs no library. Engines with GLM convert with glm.h.
 #pragma once
 
 #include <algorithm>

@@ -104,7 +104,8 @@ BoundBuffers BindingsState::skinKernel(BufferRole joints, const Windows& windows
   bound.texels[abi::BINDING_MESH_WORDS - abi::BINDING_COUNT] = meshWords;
   bound.texels[abi::BINDING_PALETTE_TEXELS - abi::BINDING_COUNT] =
       joints == BufferRole::poses ? matrixTexels : paletteTexels;
-  // Not to an output: a layer would see results read there that another dispatch wrote.
+  // Not an output: the validation layer would report results that are read there and that another
+  // dispatch wrote.
   if (!oneOutput) {
     bound.buffers[abi::BINDING_RESULTS] =
         infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : buffers.tables);
@@ -119,7 +120,7 @@ BoundBuffers BindingsState::visibilityKernel(const FrameBuffers& frame) const {
   bound.buffers[abi::BINDING_HISTORY] = infoOf(frame.history);
   bound.buffers[abi::BINDING_COUNTERS] = infoOf(frame.counters);
   if (context->bindingCount() == abi::BINDING_COUNT) {
-    // Without bounds there is no such buffer, and no record that names one.
+    // Without bounds there is no results buffer, and no record refers to one.
     bound.buffers[abi::BINDING_RESULTS] =
         infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : frame.counters);
   }
@@ -146,8 +147,8 @@ Result<void> BindingsState::createTexelViews() {
     }
     return {};
   };
-  // Unsigned: no NaN is changed on its way. Every device has both formats for uniform texel
-  // buffers.
+  // Unsigned integers, so that no NaN is changed. Every device supports both formats for uniform
+  // texel buffers.
   constexpr VkFormat unit = VK_FORMAT_R32G32B32A32_UINT;
   if (Result<void> good = create(buffers.tables, unit, 16, tableTexels); !good) return good;
   if (Result<void> good = create(buffers.meshes, unit, 16, meshTexels); !good) return good;

@@ -31,7 +31,7 @@ Result<void> checkDescription(const DeviceDescription& description) {
   return checkPromises(description.promises);
 }
 
-/// The features that are used, among the structures of a pNext chain.
+/// Reads the features that Dermis uses from a pNext chain.
 void readFeatures(const void* chain, DeviceLimits& limits) {
   for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
        next = next->pNext) {
@@ -71,9 +71,8 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
   }
 }
 
-/// Reads through texel buffers where they can hold all that a storage buffer range must at least
-/// be able to. Ranges are no larger than they are then: NVIDIA has texel buffers of 512 MiB and
-/// ranges of 4 GiB.
+/// Uses texel buffers if they can hold the storage buffer range that Vulkan guarantees. The range
+/// is then limited to their size: on NVIDIA, texel buffers have 512 MiB and ranges 4 GiB.
 void chooseTexelBuffers(const VkPhysicalDeviceLimits& device, DeviceLimits& limits) {
   const std::uint64_t most = std::uint64_t{device.maxTexelBufferElements} * 4;
   if (limits.maxStorageBuffersPerStage < storageBuffersWanted ||
@@ -152,7 +151,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
 
   VkPhysicalDeviceProperties properties{};
   state.table.getPhysicalDeviceProperties(description.physicalDevice, &properties);
-  // Whole words: NVIDIA says 2^32 - 1.
+  // Whole words: NVIDIA reports 2^32 - 1.
   state.limits.maxStorageBufferRange = properties.limits.maxStorageBufferRange & ~3u;
   state.limits.minStorageBufferOffsetAlignment =
       static_cast<std::uint32_t>(properties.limits.minStorageBufferOffsetAlignment);
@@ -162,7 +161,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.separateRanges = state.pushesDescriptors();
   state.timestampPeriod = properties.limits.timestampPeriod;
   readFeatures(description.enabledFeatures, state.limits);
-  // What this build has kernels for.
+  // Whether this build has the kernels.
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
   state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
   state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();

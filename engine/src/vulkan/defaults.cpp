@@ -2,7 +2,7 @@
 
 namespace dermis::vulkan {
 
-// Each case says where it was measured, or that it is a guess; docs/gpus.md has the reasons.
+// Comments tell which values were measured and which are guesses; docs/gpus.md has the reasons.
 DeviceDefaults defaultsOf(VkPhysicalDeviceType type) {
   DeviceDefaults defaults;
   Tuning& tuning = defaults.tuning;

@@ -1,4 +1,4 @@
-// What kernels do on a class of devices if the engine does not say otherwise.
+// Defaults for a class of devices, if the engine does not choose.
 #pragma once
 
 #include <vulkan/vulkan_core.h>
@@ -7,7 +7,7 @@
 
 namespace dermis::vulkan {
 
-/// None of it changes a bit of the result.
+/// They do not change any bit of the result.
 struct DeviceDefaults {
   bool texelBuffers = false;  ///< `DeviceDescription::texelBuffers`
   bool stagedStores = false;  ///< `DeviceDescription::stagedStores`

@@ -53,7 +53,7 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description);
 /// "vkCreateBuffer failed: out of device memory (VK_ERROR_OUT_OF_DEVICE_MEMORY)".
 Error vulkanError(const char* function, VkResult result);
 
-/// Nothing where VK_EXT_debug_utils was not enabled.
+/// Does nothing if VK_EXT_debug_utils was not enabled.
 template <typename Handle>
 void nameObject(const DispatchTable& table, VkDevice device, VkObjectType type, Handle handle,
                 const std::string& name) {
@@ -66,7 +66,8 @@ void nameObject(const DispatchTable& table, VkDevice device, VkObjectType type, 
   table.setDebugUtilsObjectName(device, &info);
 }
 
-/// A stretch for as long as it lives; nothing where VK_EXT_debug_utils was not enabled.
+/// Labels the commands that are recorded during its lifetime. Does nothing if VK_EXT_debug_utils
+/// was not enabled.
 class Label {
  public:
   Label(const DispatchTable& table, VkCommandBuffer commandBuffer, const char* name)

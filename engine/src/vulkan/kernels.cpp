@@ -55,7 +55,7 @@ static_assert(sizeof(abi::MorphRecord) == abi::MORPH_WORDS * 4 && abi::MORPH_WOR
 static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
               abi::MORPH_BLOCK_WORDS == 4);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
-// What the engine sees has the layout of what kernels write and read.
+// Public structures have the layout of the records that kernels write and read.
 static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&
               offsetof(InstanceResult, clampedVertices) ==
                   offsetof(abi::ResultRecord, clampedVertices) &&
@@ -69,7 +69,8 @@ static_assert(sizeof(PoseStatus) == sizeof(abi::StatusRecord) &&
 
 namespace {
 
-/// Methods of modules of their own: with them all others would take drivers twice as long.
+/// These methods have separate modules: in one module they would double the compile time of all
+/// other methods.
 bool isAgainstBulge(Method method) {
   return method == Method::blended || method == Method::centerOfRotation ||
          method == Method::bulgeControlled;
@@ -77,7 +78,7 @@ bool isAgainstBulge(Method method) {
 
 }  // namespace
 
-/// As shaders/CMakeLists.txt names it.
+/// Must match the names in shaders/CMakeLists.txt.
 std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (variant.kernel == Kernel::palette) {

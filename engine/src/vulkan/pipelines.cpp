@@ -11,7 +11,7 @@ namespace dermis::vulkan {
 
 namespace {
 
-/// Whether a device with these features may have the module for a variant.
+/// Checks that a device with these features can use the module for a variant.
 Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
   for (const std::uint8_t unit : variant.units) {
     if (unit >= 4 || (limits.storage16Bit && (unit == 2 || limits.storage8Bit))) continue;
@@ -52,7 +52,7 @@ Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
     }
     table_.destroyPipeline(device_, *pipeline, allocator_);
     if (generation_ == began) return {};  // another thread was faster
-    // Its kernel may have been replaced meanwhile.
+    // Kernels were replaced in the meantime, so build it again.
   }
 }
 
@@ -96,7 +96,8 @@ Result<std::uint32_t> Pipelines::replace(std::span<const KernelModule> modules,
   std::vector<Built> replacements;
   std::vector<VkPipeline> complete;
   while (true) {
-    // What is to be replaced and has no replacement yet: `build` may add some meanwhile.
+    // Pipelines that must be replaced and have no replacement yet. `build` may add some in the
+    // meantime.
     std::vector<Variant> missing;
     {
       const std::unique_lock lock(mutex_);

@@ -1,4 +1,4 @@
-// The pipelines of a context: built by any thread, read by all.
+// The pipelines of a context. Any thread may build and read them.
 #pragma once
 
 #include <mutex>
@@ -30,7 +30,7 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Nothing if it has been built. Fails with `missingFeature` if the device, or this build
+  /// Builds a pipeline unless it exists. Fails with `missingFeature` if the device, or this build
   /// of Dermis, has no module for the variant.
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
 
@@ -38,7 +38,7 @@ class Pipelines {
   Result<std::uint32_t> replace(std::span<const KernelModule> modules, VkPipelineLayout layout,
                                 std::uint64_t frame, std::uint64_t completedFrame);
 
-  /// VK_NULL_HANDLE where the variant has not been built.
+  /// VK_NULL_HANDLE if the variant has not been built.
   VkPipeline find(const Variant& variant) const;
 
   VkPipelineCache cache() const { return cache_; }

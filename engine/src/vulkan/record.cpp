@@ -82,7 +82,7 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   return {};
 }
 
-/// Variants that store attributes together do it through the binding of the positions.
+/// Variants that store attributes together write through the binding of the positions.
 Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
   const bool stores =
       std::any_of(plan.variants().begin(), plan.variants().end(),
@@ -151,7 +151,7 @@ class Recorder {
 
   void operator()(const BarrierCommand& barrier) {
     const Scope before = scopeOf(barrier.before), after = scopeOf(barrier.after);
-    // What was only read before need not become visible.
+    // After reads alone, no memory has to be made visible.
     constexpr VkAccessFlags writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
     const VkMemoryBarrier memory =
         memoryBarrier({{before.stages, before.accesses & writes}, after});
@@ -164,7 +164,7 @@ class Recorder {
     table_.cmdFillBuffer(commandBuffer_, range.buffer, range.offset + clear.offset, clear.size, 0);
   }
 
-  /// As many at once as have the same buffers.
+  /// Copies with the same buffers are recorded in one call.
   std::span<const Command> copy(std::span<const Command> commands) {
     const auto& first = std::get<CopyCommand>(commands.front());
     const BufferRange from = rangeOf(first.from), to = rangeOf(first.to);

@@ -36,7 +36,8 @@ Scope scopeOf(Consumer consumer) {
   return {};
 }
 
-// The structures of Vulkan 1.0 and of synchronization2 have the same members, but for the stages.
+// The structures of Vulkan 1.0 and of synchronization2 have the same members, except for the
+// stages.
 
 template <typename Barrier>
 Barrier withAccesses(VkStructureType type, const Dependency& dependency) {
@@ -68,7 +69,7 @@ void setRange(Barrier& barrier, const BufferRange& range, std::uint32_t sourceFa
 Dependency inputScope(PreviousUse use) {
   const Scope reads{compute, VK_ACCESS_SHADER_READ_BIT};
   const Scope uses{compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT};
-  // Overwriting what was only read needs no memory made visible: an execution dependency.
+  // To overwrite data that was only read, an execution dependency is enough.
   const auto afterReader = [](Consumer reader) {
     return Dependency{{scopeOf(reader).stages, 0}, {compute, 0}};
   };

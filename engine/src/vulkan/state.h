@@ -1,4 +1,4 @@
-// What a Context and its Bindings consist of.
+// The state of a Context and its Bindings.
 #pragma once
 
 #include <array>
@@ -30,7 +30,8 @@ struct ContextState {
     return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::MIN_BINDING_COUNT
                                                                    : abi::BINDING_COUNT;
   }
-  /// They follow the storage buffers: a device with fewer of those reads no texels.
+  /// Texel bindings follow the storage buffers. Devices with fewer storage buffers do not use texel
+  /// buffers.
   std::uint32_t texelBindingCount() const {
     return limits.texelBuffers ? abi::TEXEL_BINDING_COUNT : 0;
   }
@@ -61,7 +62,7 @@ struct ContextState {
   std::unique_ptr<Pipelines> pipelines;
 };
 
-/// What is behind the bindings of a kernel, by binding number.
+/// The buffers of a kernel's bindings, by binding number.
 struct BoundBuffers {
   std::array<VkDescriptorBufferInfo, abi::BINDING_COUNT> buffers{};
   std::array<VkBufferView, abi::TEXEL_BINDING_COUNT> texels{};  ///< from BINDING_COUNT on
@@ -70,7 +71,7 @@ struct BoundBuffers {
 /// The windows of the four outputs that a kernel sees.
 using Windows = std::array<std::uint32_t, streamCount>;
 
-/// What the commands of a scene use besides what is bound.
+/// Buffers that commands of a scene use besides the bound ones.
 struct FrameBuffers {
   BufferRange upload, readBack, visibility, history, counters;
   /// For the visibility kernel, without push descriptors. It is written when it is recorded: the
@@ -85,7 +86,7 @@ struct BindingsState {
   BatchBuffers buffers;
   std::vector<BufferRange> poseBuffers;  ///< of a batch, its only one
   std::uint64_t windowStep = 0;
-  /// Of buffers that kernels read through texels, where there are such buffers.
+  /// Views of the buffers that kernels read through texel buffers, if they do.
   VkBufferView tableTexels = VK_NULL_HANDLE;
   VkBufferView meshTexels = VK_NULL_HANDLE;
   VkBufferView meshWords = VK_NULL_HANDLE;
@@ -95,8 +96,8 @@ struct BindingsState {
   const BufferRange& output(std::size_t stream) const;
   std::uint32_t windowCount(std::size_t stream) const;
 
-  /// Which buffers each kernel sees. What a variant does not use is bound to something that it
-  /// uses: a descriptor that the module names must be valid.
+  /// The buffers that each kernel sees. Bindings that a variant does not use are bound to a buffer
+  /// that it uses, since all descriptors that the module declares must be valid.
   BoundBuffers paletteKernel(std::uint32_t poseBuffer) const;
   BoundBuffers skinKernel(BufferRole joints, const Windows& windows) const;
   BoundBuffers visibilityKernel(const FrameBuffers& frame) const;
@@ -113,11 +114,11 @@ struct BindingsState {
   std::size_t skinSet(BufferRole joints, std::uint32_t window) const {
     return poseBuffers.size() + std::size_t{window} * 2 + (joints == BufferRole::poses ? 0 : 1);
   }
-  /// The number of the windows that a dispatch writes to, where it is one
+  /// The number of the window that all attributes of a dispatch are written to, if it is the same
   /// (`DeviceLimits::separateRanges`).
   static std::uint32_t commonWindow(const DispatchCommand& dispatch);
 
-  /// Whether a plan can be recorded with these buffers and the pipelines that there are.
+  /// Whether a plan can be recorded with these buffers and the existing pipelines.
   Result<void> check(const Plan& plan) const;
 
   Result<void> createSets();
@@ -135,7 +136,7 @@ struct Recorded {
   std::uint32_t copies = 0;      ///< calls of vkCmdCopyBuffer
 };
 
-/// Records the commands of a plan that `BindingsState::check` has passed. `frame` for those of a
+/// Records the commands of a plan that passed `BindingsState::check`. `frame` is for plans of a
 /// scene.
 Recorded recordCommands(VkCommandBuffer commandBuffer, const Plan& plan, const BindingsState& bound,
                         const FrameBuffers* frame);

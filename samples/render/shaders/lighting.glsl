@@ -83,8 +83,8 @@ vec2 skyLight(vec3 position, vec3 normal, float radius) {
 // As displayed, linear: lighter at the horizon, darker above and below.
 vec3 backgroundAt(vec2 pixel) {
   vec2 place = (pixel - view.viewport.xy) / view.viewport.zw;
-  vec2 fromCentre = place - vec2(0.5, 0.62);
-  float far = smoothstep(0.0, 1.0, length(fromCentre * vec2(0.75, 1.0)) * 1.1);
+  vec2 fromCenter = place - vec2(0.5, 0.62);
+  float far = smoothstep(0.0, 1.0, length(fromCenter * vec2(0.75, 1.0)) * 1.1);
   return mix(view.horizonColor.rgb, view.zenithColor.rgb, far);
 }
 

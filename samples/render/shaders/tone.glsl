@@ -1,7 +1,7 @@
 #ifndef DERMIS_RENDER_TONE_GLSL
 #define DERMIS_RENDER_TONE_GLSL
 
-// Khronos 2024, "PBR Neutral": base colours stay what they are, only highlights are compressed.
+// Khronos 2024, "PBR Neutral": base colors stay what they are, only highlights are compressed.
 vec3 toneMapped(vec3 color) {
   const float start = 0.8 - 0.04;
   const float desaturation = 0.15;
@@ -12,8 +12,8 @@ vec3 toneMapped(vec3 color) {
   float room = 1.0 - start;
   float compressed = 1.0 - room * room / (peak + room - start);
   color *= compressed / peak;
-  float grey = 1.0 - 1.0 / (desaturation * (peak - compressed) + 1.0);
-  return mix(color, vec3(compressed), grey);
+  float gray = 1.0 - 1.0 / (desaturation * (peak - compressed) + 1.0);
+  return mix(color, vec3(compressed), gray);
 }
 
 #endif

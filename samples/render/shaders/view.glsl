@@ -19,7 +19,7 @@ layout(std140, set = 0, binding = 0) uniform View {
   vec4 sky;                         // x: number of lights, y: 1 / map size; z: widest penumbra of the key light, w: of the sky, as a part of its map
   vec4 horizonColor;                // of the background, as displayed, linear
   vec4 zenithColor;
-  vec4 ground;                      // centre; w: radius at which it has faded into the background
+  vec4 ground;                      // center; w: radius at which it has faded into the background
   vec4 viewport;                    // origin and size in pixels
   vec4 haze;                        // x: distance at which it begins, y: 1 / distance to the full, z: most
 } view;

@@ -8,7 +8,7 @@
 namespace dermis::bounds {
 namespace {
 
-/// Where in `Extent::reach` the direction (x, y, z) of −1, 0 and 1 stands.
+/// The index in `Extent::reach` of a direction (x, y, z) with components −1, 0 and 1.
 constexpr std::uint8_t indexOf(int x, int y, int z) {
   for (int i = 0; i < 13; ++i) {
     const auto& d = Extent::directions[i];
@@ -23,8 +23,8 @@ struct Triangle {
 };
 
 /// The triangle by the signs of x, y and z (bits 0 to 2: negative) and by which is larger, without
-/// their signs (bit 3: y > x, bit 4: z > y, bit 5: z > x). A table, for branches would be guessed
-/// wrong.
+/// their signs (bit 3: y > x, bit 4: z > y, bit 5: z > x). A table, since branches would be
+/// mispredicted.
 constexpr std::array<Triangle, 64> makeTriangles() {
   std::array<Triangle, 64> triangles{};
   for (std::size_t code = 0; code < 64; ++code) {

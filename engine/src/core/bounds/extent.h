@@ -16,7 +16,7 @@ namespace dermis::bounds {
 
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Empty as it is made: min > max.
+/// Empty by default: min > max.
 struct Range {
   math::Vec3 min{infinity, infinity, infinity};
   math::Vec3 max{-infinity, -infinity, -infinity};
@@ -37,7 +37,7 @@ inline Range everything() {
 inline Range operator+(const Range& a, const Range& b) {
   return {a.min + b.min, a.max + b.max};
 }
-/// No point of the range is further from the origin.
+/// Maximum distance of a point of the range from the origin.
 inline double reachOf(const Range& range) {
   return math::length(math::max(math::abs(range.min), math::abs(range.max)));
 }
@@ -104,9 +104,9 @@ struct Reach {
   Extent extent() const;  ///< rounded outward
 };
 
-/// A range that holds the image of all points of an extent, which must not be empty. A row d of the
-/// map is a sum, with factors that are not negative, of the directions at the corners of the
-/// triangle around d: as far as they reach, no point reaches further.
+/// A range that contains the image of all points of an extent, which must not be empty. A row d of
+/// the map is a sum, with factors that are not negative, of the directions at the corners of the
+/// triangle around d. So the same sum of their reaches bounds the reach along d.
 Range imageOf(const Affine& map, const Extent& extent);
 
 /// The box around an extent.

@@ -42,7 +42,7 @@ math::Vec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {
   return position;
 }
 
-/// The joints that move a vertex, by rising index, each once.
+/// The joints that move a vertex, by ascending index, each once.
 void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
                       std::vector<Influence>& influences) {
   influences.clear();
@@ -127,7 +127,7 @@ struct PairRange {
   double minSum = bounds::infinity;
 };
 
-/// What is stored may err by a few roundings: outward.
+/// Stored ratios may err by a few roundings, so they are rounded outward.
 float below(double ratio) {
   return bounds::roundDown(ratio * (1 - 1e-7));
 }
@@ -165,7 +165,7 @@ class Collector {
       result.requiredJoints = joint + 1;
     }
     result.unweighted = bounds::boxOf(unweighted_);
-    // The order of a hash table is not the same everywhere; what is stored shall be.
+    // The order of a hash table differs between standard libraries; the stored data must not.
     for (const auto& [key, pair] : pairs_) {
       result.pairs.push_back(finish(compact[key >> 16], compact[key & 0xffffu], pair));
     }

@@ -16,14 +16,15 @@
 namespace dermis::bounds {
 namespace {
 
-/// What a joint's 3×3 is made of: C = R S.
+/// The polar decomposition of a joint's 3×3 matrix: C = R S.
 struct Parts {
   math::Mat3 scaleShear;        ///< exactly 1 where the joint is rigid but for rounding
   math::Vec4 real{0, 0, 0, 1};  ///< the unit quaternion of R: x y z w
   double largest = 1;           ///< no singular value of C is larger
   bool rigid = true;
-  /// R is a matter of rounding, a kernel's may be another: rank 1, or so near to a singular mirror
-  /// that its sense is. C = 0 is not: its R is 1, by agreement.
+  /// Rounding decides R, and a kernel's R may differ: the rank is 1, or C is so near to a singular
+  /// mirror that rounding decides the sign of its determinant. C = 0 is not ambiguous: its R is 1
+  /// by definition.
   bool ambiguous = false;
 };
 
@@ -162,7 +163,8 @@ using bounds::Range;
 struct Posed {
   Affine map;
   Parts parts;
-  /// The two smallest |q · q'| with joints that share vertices of more influences than trios have.
+  /// The two smallest |q · q'| with joints that share vertices of more than `maxTrioInfluences`
+  /// influences.
   double leastCosines[2] = {1, 1};
   /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
   bool split = false;
@@ -186,8 +188,8 @@ bool isFinite(const JointMatrix& matrix) {
                      [](float value) { return std::isfinite(value); });
 }
 
-/// How two joints turn against each other: the cosine of half the angle between them, not negative,
-/// and the axis, towards the first, times the sine.
+/// The rotation between two joints: the cosine of half its angle, not negative, and the axis,
+/// towards the first, times the sine.
 struct Turn {
   double cosine;
   math::Vec3 axis;
@@ -201,7 +203,7 @@ Turn turnBetween(const Posed& first, const Posed& second) {
   return cosine < 0 ? Turn{-cosine, -axis} : Turn{cosine, axis};
 }
 
-/// Below this cosine rounding may take the one or the other sign.
+/// Below this cosine rounding decides the sign.
 constexpr double ambiguousCosine = 2e-5;
 
 class PoseBounds {
@@ -324,7 +326,8 @@ class PoseBounds {
     }
   }
 
-  /// The part of the way from the second joint's point to the first's that vertices may stand at.
+  /// The range of the fraction of the way from the second joint's point to the first's at which
+  /// vertices may be.
   struct Share {
     double least, greatest;
   };
@@ -389,7 +392,7 @@ class PoseBounds {
     return factor;
   }
 
-  /// They are copied, and so need none of what `rounding` allows the rest.
+  /// They are copied, so they need no allowance for `rounding`.
   void addUnweighted() {
     const Range unweighted = bounds::rangeOf(bounds_.unweighted);
     if (unweighted.empty()) return;

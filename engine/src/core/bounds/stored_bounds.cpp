@@ -1,5 +1,5 @@
-// How `JointBounds` are stored: words, with the header of a packed mesh. What is read back is
-// checked, so that `skinnedBounds` reads nothing outside it and never meets a NaN.
+// Stores `JointBounds` as words with a header like that of a packed mesh. Stored data is checked
+// when it is read, so that `skinnedBounds` never reads out of range and never finds a NaN.
 
 #include <algorithm>
 #include <bit>
@@ -21,7 +21,8 @@ namespace {
 constexpr std::uint32_t magic = 0x42425344u;  // "DSBB"
 constexpr std::uint32_t version = 1;
 
-/// The first four words stand where those of a packed mesh do: the checksum is the same.
+/// The first four words are those of a packed mesh header, so that the checksum is computed in the
+/// same way.
 struct Header {
   std::uint32_t magic, version, checksum, wordCount;
   std::uint32_t joints, pairs, trios, requiredJoints;

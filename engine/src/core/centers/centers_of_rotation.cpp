@@ -1,5 +1,5 @@
-// Centers of rotation: what they depend on is read from the mesh's views, then each vertex is
-// solved by itself.
+// Computes centers of rotation: first reads the inputs from the views of the mesh, then solves each
+// vertex independently.
 
 #include "dermis/centers_of_rotation.h"
 
@@ -49,7 +49,7 @@ struct Vertices {
   InfluenceLists influences;  ///< as `pack` stores them, the strongest first
 };
 
-/// The triangles that matter, in their order.
+/// The triangles that contribute, in their order.
 struct Triangles {
   InfluenceLists influences;  ///< the mean of their vertices', by rising joint
   std::vector<Moment> moments;
@@ -117,7 +117,7 @@ bool equal(std::span<const Influence> a, std::span<const Influence> b) {
                     });
 }
 
-/// Triangles of equal weights become one group; groups of the same joints stand together.
+/// Triangles of equal weights become one group; groups with the same joints are consecutive.
 std::vector<Group> group(const Triangles& triangles) {
   std::vector<std::uint32_t> order(triangles.moments.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -204,7 +204,7 @@ Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
                    ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
                        std::to_string(jointCount));
   }
-  // Centers that the mesh has already, good or bad, have no say.
+  // Centers that the mesh already has are ignored, valid or not.
   MeshView bare = mesh;
   bare.centersOfRotation = {};
   if (Result<void> accepted = validate(bare, jointCount).accepted(); !accepted) return accepted;

@@ -8,15 +8,15 @@
 namespace dermis::centers {
 namespace {
 
-/// Entries that are worked on at a time. Fixed, and their sums in one order: the result is the same
-/// on every machine, however wide its registers.
+/// Number of entries processed at a time. It is fixed, and sums are in a fixed order, so the result
+/// does not depend on the SIMD width of the machine.
 constexpr std::size_t lanes = 8;
 
 constexpr double sigma = 0.1;
 constexpr double log2OfE = 1.4426950408889634;
 
-/// 2^y for y from -1000 to 0, within 1e-14 of it. Not the library's, which differs from one to the
-/// next and is called for one value at a time; compilers make this one work on several.
+/// 2^y for y from -1000 to 0, within 1e-14 of it. Not std::exp2, which differs between libraries
+/// and takes one value at a time; compilers vectorize this function.
 inline double exp2OfNegative(double y) {
   const auto whole = static_cast<std::int32_t>(y - 0.5);
   const double part = y - static_cast<double>(whole);

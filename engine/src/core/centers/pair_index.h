@@ -1,5 +1,5 @@
-// Triangles by the pairs of joints that move them: a pair that a vertex and a triangle do not share
-// adds nothing to their similarity.
+// Index of triangles by the pairs of joints that move them. A pair that a vertex and a triangle do
+// not share adds nothing to their similarity.
 #pragma once
 
 #include <cstddef>
@@ -29,8 +29,8 @@ struct Moment {
   }
 };
 
-/// Triangles of equal weights: they are similar to anything by the same measure, so that the sum of
-/// their moments stands for all of them. `influences` by rising joint.
+/// Triangles of equal weights. Their similarity to any vertex is the same, so one sum of moments
+/// represents them all. `influences` are by ascending joint.
 struct Group {
   std::span<const Influence> influences;
   Moment moment;  ///< weighted by area
@@ -40,11 +40,12 @@ class PairIndex {
  public:
   explicit PairIndex(std::span<const Group> groups);
 
-  /// Adds what two influences of a vertex contribute to its center: all groups' moments, times
-  /// their similarity by this pair, j and k in one order only. The factor of 2 cancels.
+  /// Adds the contribution of two influences of a vertex to its center: the moments of all groups,
+  /// times their similarity for this pair. j and k are taken in one order only; the factor of 2
+  /// cancels.
   void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
 
-  /// How many groups have both joints.
+  /// Number of groups that have both joints.
   std::size_t entryCount(const Influence& first, const Influence& second) const;
 
  private:

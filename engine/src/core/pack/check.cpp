@@ -9,17 +9,17 @@
 namespace dermis {
 namespace {
 
-/// Whether `count` words from `offset` on lie behind the header and inside the blob.
+/// Whether `count` words from `offset` on are after the header and inside the blob.
 bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t total) {
   return offset >= abi::MESH_HEADER_WORDS && offset <= total && count <= total - offset;
 }
 
-/// The same for what is read by units: `count` records of vertices.
+/// The same for `count` vertex records, which are read in units of four words.
 bool isUnitSection(std::uint64_t offset, std::uint64_t count, std::uint64_t total) {
   return offset % 4 == 0 && isSection(offset, count * abi::VERTEX_WORDS, total);
 }
 
-/// Positions are known to lie in the blob.
+/// Positions must have been checked before.
 Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::MeshHeader& header) {
   const std::size_t vertices = header.vertexCount;
   const std::uint32_t offset = header.influences;
@@ -51,8 +51,8 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::Me
   return {};
 }
 
-/// Checks a target whose blocks begin at word `behind` or later, and moves that behind them: as the
-/// blocks of two targets do not overlap, all targets together take no longer than the blob is.
+/// Checks a target whose blocks must begin at word `behind` or later, and sets `behind` to their
+/// end. Since blocks of targets do not overlap, checking all targets is O(words of the blob).
 Result<void> checkMorph(std::span<const std::uint32_t> words, const abi::MeshHeader& header,
                         std::uint32_t target, std::uint64_t& behind) {
   const std::uint32_t vertices = header.vertexCount;

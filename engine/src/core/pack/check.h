@@ -1,4 +1,4 @@
-// Whether stored bytes are a packed mesh that no kernel can be led astray by.
+// Checks that stored bytes are a packed mesh that is safe for kernels to read.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,14 @@
 
 namespace dermis {
 
-/// Of all words that follow the checksum's own: FNV-1a's step, turned by 15 bits, since multiplying
-/// carries changes upwards only. Each step is a bijection: no single damaged word goes unnoticed.
+/// Checksum of all words after the checksum itself: the step of FNV-1a, rotated by 15 bits, since
+/// multiplication carries changes upwards only. Each step is a bijection, so any single damaged
+/// word is detected.
 std::uint32_t checksumOfBlob(std::span<const std::uint32_t> words);
 
 Error damagedBlob(const std::string& what);
 
-/// The length, the version, the checksum, and every offset, count and index. O(words).
+/// Checks the length, the version, the checksum, and every offset, count and index. O(words).
 Result<void> checkBlob(std::span<const std::uint32_t> words);
 
 }  // namespace dermis

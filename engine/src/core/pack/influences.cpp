@@ -9,7 +9,7 @@
 namespace dermis {
 namespace {
 
-/// One order for everybody is what makes results equal to the bit.
+/// The same order everywhere makes results equal to the bit.
 void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInfluence>& influences) {
   influences.clear();
   for (const InfluenceSet& set : mesh.influenceSets) {
@@ -18,7 +18,7 @@ void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInflue
       if (weight != 0) influences.push_back({loadUnsigned(set.joints, vertex, slot), weight});
     }
   }
-  // By weight too: the order in which duplicates are added up must not depend on their slots.
+  // Also by weight: the order in which duplicates are added must not depend on their slots.
   std::sort(influences.begin(), influences.end(),
             [](const PackedInfluence& a, const PackedInfluence& b) {
               return a.joint != b.joint ? a.joint < b.joint : a.weight < b.weight;
@@ -51,8 +51,9 @@ double missing(const std::vector<PackedInfluence>& influences) {
 }
 
 /// Divides by the sum and rounds so that the sum is exactly 1: linear blending then does not scale
-/// the mesh. What rounding leaves over goes from the strongest to the weakest: float32 has ever
-/// finer steps there, of which the remainder is a multiple, so that in the end nothing is left.
+/// the mesh. The remainder of rounding is distributed from the strongest to the weakest weight. The
+/// steps of float32 become finer there, and the remainder is a multiple of them, so nothing is left
+/// in the end.
 void normalize(std::vector<PackedInfluence>& influences) {
   double sum = 0;
   for (const PackedInfluence& influence : influences) sum += influence.weight;

@@ -13,8 +13,9 @@ struct PackedInfluence {
   double weight = 0;  ///< a float32's value
 };
 
-/// The influences of a vertex: those of one joint added up, none of weight 0; the pivot first, the
-/// rest by falling weight. The weights sum to exactly 1; empty if the vertex has none.
+/// The influences of a vertex: those of the same joint are added, and those of weight 0 dropped.
+/// The pivot is first, the rest by descending weight. The weights sum to exactly 1; empty if the
+/// vertex has none.
 void packInfluences(const MeshView& mesh, std::uint32_t vertex,
                     std::vector<PackedInfluence>& influences);
 

@@ -142,7 +142,7 @@ std::uint32_t offsetOf(const std::vector<std::uint32_t>& words) {
   return static_cast<std::uint32_t>(words.size());
 }
 
-/// With one record more than there are vertices; where influences begin is not known yet.
+/// Appends one record more than there are vertices. The begin of the influences is filled in later.
 std::uint32_t appendPositions(const MeshView& mesh, std::vector<std::uint32_t>& words) {
   const std::uint32_t offset = offsetOf(words);
   words.resize(words.size() + (std::size_t{mesh.vertexCount} + 1) * abi::VERTEX_WORDS);
@@ -177,7 +177,8 @@ std::uint32_t appendFloats(const AttributeView& view, std::vector<std::uint32_t>
   return offset;
 }
 
-/// Behind the positions, whose records are told where the influences of their vertices begin.
+/// Appends the influences after the positions, and stores in each position record where the
+/// influences of the vertex begin.
 void appendInfluences(const MeshView& mesh, abi::MeshHeader& header,
                       std::vector<std::uint32_t>& words) {
   const std::size_t offset = words.size();
@@ -211,7 +212,7 @@ void appendInfluences(const MeshView& mesh, abi::MeshHeader& header,
   header.minInfluences = std::min(minInfluences, maxInfluences);
 }
 
-/// An upper limit of the words that a mesh takes, before any is written.
+/// An upper limit of the size of a packed mesh in words.
 std::uint64_t wordsNeeded(const MeshView& mesh) {
   std::uint64_t perVertex = abi::INFLUENCE_WORDS;  // of padding
   for (const AttributeView* view :

@@ -13,7 +13,8 @@
 namespace dermis {
 namespace {
 
-/// Kernels number workgroups in 32 bits, with those that fill the last row: up to twice as many.
+/// Kernels count workgroups in 32 bits, including those that fill the last row: up to twice as
+/// many.
 constexpr std::uint64_t maxWorkgroups = std::uint64_t{1} << 31;
 
 std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
@@ -294,7 +295,7 @@ Result<void> PlanBuilder::addPaletteDispatches() {
   return {};
 }
 
-/// A workgroup a palette.
+/// One workgroup per palette.
 Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
                                              std::span<const abi::PaletteRecord> records,
                                              BufferRole joints, std::uint32_t buffer) {
@@ -310,7 +311,7 @@ Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
   return {};
 }
 
-/// An invocation a result.
+/// One invocation per result.
 Result<void> PlanBuilder::addClearDispatch() {
   if (cleared_.empty()) return {};
   std::vector<std::uint32_t>& tables = plan_->tables;
@@ -350,7 +351,8 @@ void PlanBuilder::chooseVerticesPerInvocation(std::span<const std::uint32_t> gro
   }
 }
 
-/// Of one dispatch, given its groups: fewer than the tuning says if it has too few workgroups.
+/// Instances per invocation of a dispatch with these groups: fewer than the tuning says if there
+/// would be too few workgroups.
 std::uint32_t PlanBuilder::instancesPerInvocation(std::span<const std::uint32_t> groups) const {
   std::uint32_t instances = tuning_.instancesPerInvocation;
   for (; instances > 1 && tuning_.minWorkgroups > 0; instances = (instances + 1) / 2) {
@@ -371,7 +373,7 @@ Result<void> PlanBuilder::addDispatches() {
   };
   order_.resize(planGroups_.size());
   for (std::uint32_t index = 0; index < order_.size(); ++index) order_[index] = index;
-  // As a stable sort, which would allocate.
+  // Stable. std::stable_sort would allocate.
   std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return std::tuple_cat(dispatchOrder(a), std::tie(a)) <
            std::tuple_cat(dispatchOrder(b), std::tie(b));
@@ -436,7 +438,7 @@ Result<void> PlanBuilder::addDispatches() {
   return {};
 }
 
-/// The word of the first; nothing aligned needs to be.
+/// Returns the word of the first. Needs no alignment.
 std::uint32_t PlanBuilder::appendMorphs(std::span<const MorphWeight> morphs) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
@@ -499,7 +501,7 @@ namespace {
 
 using RecordWords = std::array<std::uint32_t, abi::INSTANCE_WORDS>;
 
-/// Whether each word of the records increases by the same value from one to the next.
+/// Whether each word increases by the same amount from record to record.
 bool areEvenlySpaced(std::span<const std::uint32_t> records) {
   if (records.size() < 2 * abi::INSTANCE_WORDS) return false;
   RecordWords expected, step;
@@ -591,7 +593,7 @@ void PlanBuilder::appendCulledDispatches() {
     abi::SkinPush push = pushOf(dispatches_[first + index]);
     store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
           abi::CulledDispatchRecord{push.groups, push.groupCount, push.instancesPerInvocation, 0});
-    // Only the GPU will know how many there are. Those too many find no instance in the last group.
+    // Only the GPU knows the number of workgroups. Excess ones find no instance in the last group.
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);
     dispatch.groupCountX = dispatch.groupCountY = dispatch.workgroupCount = 0;
@@ -600,7 +602,7 @@ void PlanBuilder::appendCulledDispatches() {
   visibility_[1].workgroupCount = static_cast<std::uint32_t>(count);
 }
 
-/// A workgroup for each group, then one for each indirect dispatch.
+/// First pass: a workgroup for each group. Second pass: one for each indirect dispatch.
 Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
   visibility_[0].workgroupCount = culledGroups_;
   const std::uint32_t most = std::max(culledGroups_, visibility_[1].workgroupCount);
@@ -646,7 +648,7 @@ void PlanBuilder::listFrame(const FrameWork& frame) {
   if (dispatches_.empty() && frame.moves.empty()) return;
   std::vector<Command>& commands = plan_->commands;
   const bool culls = !candidates_.empty();
-  // Frames before this one have finished with what is overwritten, and what they wrote is seen.
+  // Earlier frames have finished reading what this frame overwrites, and their writes are visible.
   commands.emplace_back(
       BarrierCommand{computeBoth | Access::copyRead | Access::copyWrite | Access::indirectRead,
                      computeBoth | Access::copyRead | Access::copyWrite});

@@ -1,5 +1,5 @@
-// What a plan consists of, and how it is made: `makePlan` and the scene hand in palettes and
-// instances, and this is the one place that writes their records.
+// The contents of a plan, and how they are made. `makePlan` and the scene pass palettes and
+// instances; only this code writes their records.
 #pragma once
 
 #include <algorithm>
@@ -55,14 +55,14 @@ struct Group {
   std::uint32_t filled = 0;
 };
 
-/// A run of an instance's vertices: the group it belongs to, and its record in the tables but for
-/// the palettes, the flags and the extension.
+/// A run of an instance's vertices: its group, and its record in the tables without palettes, flags
+/// and extension.
 struct PlacedRun {
   std::uint32_t group = notUsed;
   abi::InstanceRecord record{};
 };
 
-/// What decides on an instance's place besides its job.
+/// What the place of an instance depends on, besides its job.
 struct Placing {
   Subject subject;
   OutputWindows windows;
@@ -71,7 +71,7 @@ struct Placing {
   bool isCulled = false;         ///< the GPU chooses whether it is skinned
 };
 
-/// Groups live as long as instances are in them.
+/// Groups exist as long as they contain instances.
 class Groups {
  public:
   /// Appends a run for each output range that the vertices of a job lie in, and takes part in their
@@ -102,8 +102,9 @@ class Groups {
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> heads_;  ///< a hash table: a power of two of lists of entries
-  std::uint32_t last_ = notUsed;      ///< that was acquired: neighbors mostly belong together
-  LayoutNeeds lastLayout_;            ///< of the job that was placed last …
+  /// that was acquired: consecutive instances mostly have the same group
+  std::uint32_t last_ = notUsed;
+  LayoutNeeds lastLayout_;  ///< of the job that was placed last …
   FormNeeds lastForm_;
   Variant lastVariant_;        ///< … its variant …
   std::uint64_t lastKey_ = 0;  ///< … and the key of that; 0: there is none
@@ -112,9 +113,9 @@ class Groups {
 
 // -- Instances.
 
-/// What stands in the extension of an instance that has one.
+/// The contents of an instance's extension record.
 struct InstanceExtras {
-  std::vector<MorphWeight> morphs;  ///< in rising order, none of weight 0
+  std::vector<MorphWeight> morphs;  ///< in ascending order, without weights of 0
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
@@ -126,23 +127,23 @@ struct InstanceExtras {
   bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox || hasPrevious; }
 };
 
-/// The targets that are not of weight 0, in rising order: the order of a sum decides on its last
+/// The targets whose weight is not 0, in ascending order, since the order of a sum affects its last
 /// bits.
 void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active);
 
-/// What the GPU has to know of an instance to choose whether it is skinned.
+/// The data with which the GPU decides whether an instance is skinned.
 struct Candidate {
   std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
   std::uint32_t version = 0;  ///< of what it should show; different for all instances and poses
 };
 
-/// Where a frame's results and counters stand in its read-back buffer.
+/// Offsets of a frame's results and counters in its read-back buffer.
 inline constexpr std::uint64_t readBackCounters = 0;
 inline constexpr std::uint64_t readBackResults = sizeof(abi::CounterRecord);
 
 // -- Plans.
 
-/// Where joint matrices stand that become a palette.
+/// The joint matrices that are converted to a palette.
 struct PoseSource {
   std::uint32_t unit = 0;  ///< of the first
   std::uint32_t buffer = 0;
@@ -172,7 +173,7 @@ inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
   return std::max(limits.minStorageBufferOffsetAlignment, 16u);
 }
 
-/// What a frame of a scene does besides skinning.
+/// The work of a frame of a scene, besides skinning.
 struct FrameWork {
   std::uint32_t frame = 0;               ///< counts records, from 1
   std::uint32_t clearHistory = 0;        ///< its records that are clear, or in use
@@ -183,7 +184,7 @@ struct FrameWork {
 struct PlanData {
   DERMIS_CORE_API PlanData();
   DERMIS_CORE_API ~PlanData();
-  /// Made again where the plan was moved from.
+  /// Created again if the plan was moved from.
   static PlanData& of(Plan& plan) {
     if (plan.data_ == nullptr) plan.data_ = std::make_unique<PlanData>();
     return *plan.data_;
@@ -196,7 +197,7 @@ struct PlanData {
   /// Palette records, the numbers of results to clear, group records, instance records, then
   /// extensions and active morph targets; at last what is culled on the GPU.
   std::vector<std::uint32_t> tables;
-  /// Where each palette stands in the palettes buffer in each form, or notUsed.
+  /// Place of each palette in the palettes buffer, for each form, or notUsed.
   std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
   std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed
   PlanSizes sizes;
@@ -208,7 +209,7 @@ struct PlanData {
   std::unique_ptr<PlanMaker> maker;  ///< of `makePlan`, kept for its memory
 };
 
-/// Fills a plan: `begin`, what it consists of, `finish`.
+/// Fills a plan: call `begin`, add palettes and instances, then `finish`.
 class PlanBuilder {
  public:
   void begin(PlanData& plan, Groups& groups, const DeviceLimits& limits, const Tuning& tuning,
@@ -228,7 +229,7 @@ class PlanBuilder {
 
   void clearResult(std::uint32_t result) { cleared_.push_back(result); }
 
-  /// `run` and `extras` must stay until `finish`; `extras` is null if they are not needed.
+  /// `run` and `extras` must stay valid until `finish`; `extras` is null if they are not needed.
   void add(const PlacedRun& run, std::uint32_t palette, std::uint32_t flags,
            const InstanceExtras* extras) {
     count(run.group);

@@ -114,7 +114,7 @@ Result<void> checkMorphs(std::span<const MorphWeight> morphs, std::uint32_t targ
       return invalid(subject.name() + ": the weight of morph target " + std::to_string(target) +
                      " is not finite");
     }
-    // Mostly they stand in order; then nothing needs to be searched.
+    // Usually they are in order; then no search is needed.
     if (i == 0 || target > highest) {
       highest = target;
       continue;
@@ -286,7 +286,7 @@ Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
 
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
                        const Promises& promises) {
-  // Only where something is wrong: every pose of every plan comes by.
+  // Made only for errors, since this function runs for every pose of every plan.
   const auto name = [index] { return "pose " + std::to_string(index); };
   if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
     return invalid(name() + " has " + std::to_string(pose.jointCount) +
@@ -309,7 +309,7 @@ Result<void> checkPromises(const Promises& promises) {
 }
 
 Result<void> checkLimits(const DeviceLimits& limits) {
-  // Far below what Vulkan guarantees; what is asked here is that nothing below divides by zero.
+  // Far below what Vulkan guarantees: this only prevents divisions by zero.
   if (limits.maxWorkgroupCountX == 0 || limits.maxWorkgroupCountY == 0 ||
       limits.maxStorageBufferRange < 1024 ||
       !std::has_single_bit(limits.minStorageBufferOffsetAlignment) ||

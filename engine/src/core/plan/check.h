@@ -1,4 +1,4 @@
-// What a batch must keep to, said in sentences that name the job or pose at fault.
+// Checks the rules of a batch. Messages name the job or pose at fault.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace dermis {
 
 Error invalid(std::string message);
 
-/// Who is at fault, as sentences begin: "job 17", "the instance".
+/// The object at fault, at the beginning of a message: "job 17", "the instance".
 struct Subject {
   static constexpr std::size_t noIndex = ~std::size_t{0};
 
@@ -45,7 +45,7 @@ inline Result<void> checkJob(const Batch& batch, const Job& job, const Subject& 
 }
 /// Whether positions in snorm16 can be relative to it.
 DERMIS_CORE_API bool isBox(const Box& box);
-/// What positions in snorm16 are made of: less the center, times 1 / half the size.
+/// snorm16 positions are (p − center) × inverse, with inverse = 1 / half the size.
 struct BoxScale {
   float center[3], inverse[3];
 };

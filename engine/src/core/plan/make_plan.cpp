@@ -1,4 +1,4 @@
-// A whole batch handed to the builder.
+// Passes a whole batch to the builder.
 
 #include <algorithm>
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace dermis {
 
-/// Kept from plan to plan for its memory.
+/// Reused for the next plan, for its memory.
 class PlanMaker {
  public:
   Result<void> make(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,

@@ -23,7 +23,7 @@ bool hasActive(std::span<const MorphWeight> morphs) {
   return std::ranges::any_of(morphs, [](const MorphWeight& morph) { return morph.weight != 0; });
 }
 
-/// What follows from the outputs alone.
+/// The members that depend on the outputs only.
 Variant outputVariant(const Job& job) {
   Variant variant;
   variant.method = job.method;
@@ -44,7 +44,7 @@ Variant outputVariant(const Job& job) {
 // (docs/performance.md). Anything else about the instances of a group is a branch in the kernel.
 namespace {
 
-/// Fewer influences pay off where blending is most of the work.
+/// Forms for few influences pay off if blending is most of the work.
 bool hasFormsForFewInfluences(Method method) {
   return method == Method::linear || method == Method::dualQuaternion;
 }
@@ -78,7 +78,7 @@ std::uint32_t recordSize(const Job& job) {
          formatSize(job.tangents.format);
 }
 
-/// Whether there is a store of all of a vertex: of words, or of 6 bytes and 2 first.
+/// Whether one store can write a whole vertex: whole words, or 6 bytes and 2 bytes first.
 bool isRecord(const Job& job) {
   const std::uint32_t bytes = recordSize(job), positions = formatSize(job.positions.format),
                       normals = formatSize(job.normals.format);
@@ -94,7 +94,7 @@ std::uint64_t placeInVertex(const OutputStreams& streams, std::size_t stream) {
   return place < streams[0].stride ? place : 0;
 }
 
-/// Bytes that one store writes where kernels may store up to 16, if vertices begin at multiples of
+/// Bytes that one store writes if kernels may store up to 16 and vertices begin at multiples of
 /// that.
 std::uint8_t wideUnit(const OutputStreams& streams, std::size_t index) {
   const OutputStream& stream = streams[index];
@@ -108,8 +108,8 @@ bool storesWholeWords(const Variant& variant) {
   return std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit >= 4; });
 }
 
-/// The widest stores that strides and formats permit. Where all of a vertex is stored together,
-/// attributes may be smaller than a word. Unchanged where something else is stored by less.
+/// The widest stores that strides and formats permit. If a whole vertex is stored at once,
+/// attributes may be smaller than a word. Unchanged if another attribute needs smaller stores.
 Variant withWideStores(const Job& job, const Variant& variant) {
   Variant wide = variant;
   const OutputStreams streams = outputStreams(job);
@@ -124,7 +124,7 @@ Variant withWideStores(const Job& job, const Variant& variant) {
   return storesWholeWords(wide) ? wide : variant;
 }
 
-/// Whether vertices can go through workgroup memory: without gaps, and in a kernel for every day.
+/// Whether vertices can go through workgroup memory (`DeviceLimits::stagedStores`).
 bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimits& limits) {
   return limits.stagedStores && !limits.texelBuffers &&
          limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
@@ -144,7 +144,7 @@ bool isAligned(const OutputStreams& streams, const Variant& variant) {
   return variant.recordBytes == 0 || streams[0].offset % variant.recordBytes == 0;
 }
 
-/// The skin kernel for a job but for its form, if it `isAligned` for wide stores or not.
+/// The skin kernel for a job without its form, with wide stores if `areAligned`.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning,
                       bool areAligned) {
   Variant variant = outputVariant(job);
@@ -191,8 +191,8 @@ std::uint32_t residueOf(std::uint64_t offset) {
   return static_cast<std::uint32_t>(offset % 96);
 }
 
-/// How attributes stand to each other: a bit for each right behind the one before, and for each
-/// that stands in the vertex.
+/// How attributes are related: a bit for each that directly follows the one before it, and for each
+/// that is in the vertex.
 std::uint32_t relationsIn(const OutputStreams& streams) {
   std::uint64_t end = streams[0].offset;
   std::uint32_t relations = 0;
@@ -221,8 +221,8 @@ LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
   }
 }
 
-/// As if a LayoutNeeds were made of the job and compared, which would wait for its bytes to be
-/// stored.
+/// Same result as making a LayoutNeeds of the job and comparing it, which would wait for its bytes
+/// to be stored.
 bool LayoutNeeds::areThoseOf(const Job& job, const OutputStreams& streams) const {
   if (job.method != method || job.motion != motion || job.bounds != bounds ||
       job.positions.format != positions || job.normals.format != normals ||
@@ -293,7 +293,7 @@ std::uint64_t Variant::key() const {
 
 namespace {
 
-/// What is known of all instances, or every value that it may have.
+/// The values that are possible for all instances.
 struct FormRanges {
   FormRanges(const std::optional<MeshInfo>& mesh, std::optional<bool> mayScale,
              const Promises& promises) {
@@ -372,7 +372,7 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
 
 namespace {
 
-/// What two neighboring windows share.
+/// Bytes that two adjacent windows share.
 std::uint64_t windowOverlap(std::uint64_t range) {
   return range / 16;
 }

@@ -1,4 +1,5 @@
-// Which kernel skins an instance, and where its vertices go: known before there is a frame.
+// Chooses the kernel of an instance, and the place of its vertices. This is known before there is a
+// frame.
 #pragma once
 
 #include <array>
@@ -43,7 +44,7 @@ inline std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& siz
 
 const char* streamName(std::size_t stream);
 
-/// Bytes that one store may write on every device that can: 4, 2 or 1.
+/// Bytes that one store may write, if the device supports it: 4, 2 or 1.
 inline std::uint8_t storeUnit(const OutputStream& stream) {
   const std::uint64_t bits = stream.offset | stream.stride | stream.size;
   return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
@@ -56,12 +57,12 @@ inline bool hasResult(const Job& job) {
 
 // -- Palettes, and variants.
 
-/// What stands in the palettes buffer for a joint.
+/// The form of a joint in the palettes buffer.
 enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
 inline constexpr std::size_t paletteFormCount = 3;
 
-/// What a method reads. In a batch the matrices are not copied to the palettes buffer: they are
-/// read where they stand.
+/// The form that a method reads. In a batch, matrices are not copied to the palettes buffer but
+/// read in place.
 inline PaletteForm paletteForm(Method method) {
   if (method == Method::linear) return PaletteForm::matrices;
   return method == Method::logMatrix ? PaletteForm::logarithms : PaletteForm::dualQuaternions;
@@ -72,10 +73,10 @@ Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning);
 Variant clearVariant(const Tuning& tuning);
 Variant visibilityVariant(const Tuning& tuning);
 
-/// The skin kernel for a job, but for its form. It depends on nothing else in the batch.
+/// The skin kernel for a job, without its form. It depends on nothing else in the batch.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
-/// All that `layoutVariant` looks at, on one device with one tuning: neighbors mostly have the
+/// All inputs of `layoutVariant`, for one device and tuning. Consecutive instances mostly have the
 /// same.
 struct LayoutNeeds {
   LayoutNeeds() = default;
@@ -91,7 +92,7 @@ struct LayoutNeeds {
   std::array<std::uint32_t, streamCount> strides{}, residues{};
 };
 
-/// What decides on the form of a skin kernel besides the method.
+/// What the form of a skin kernel depends on, besides the method.
 struct FormNeeds {
   std::uint32_t influences = 0;  ///< of a vertex, at most
   bool full = false;             ///< every vertex has as many
@@ -135,7 +136,7 @@ inline bool standsTogether(const OutputStreams& streams) {
 // -- Windows: output that is larger than a storage buffer range may be is written through several
 // ranges.
 
-/// What windows of the outputs depend on besides jobs.
+/// What the windows of the outputs depend on, besides jobs.
 struct OutputWindows {
   OutputWindows() = default;
   OutputWindows(const OutputSizes& sizes, const DeviceLimits& limits);
@@ -153,8 +154,8 @@ struct VertexRun {
   std::array<std::uint32_t, streamCount> windows{};
 };
 
-/// Cuts a job's vertices into runs: one where all of an attribute lies in one window. Attributes
-/// that lie near to each other get windows of one number.
+/// Cuts the vertices of a job into runs: one if each attribute lies in one window. Attributes that
+/// are near each other get windows of the same number.
 void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
                  const OutputWindows& windows, std::vector<VertexRun>& runs);
 

@@ -1,4 +1,4 @@
-// What comes and goes, and what engines set.
+// Meshes and poses, capacities, and the begin of frames.
 
 #include "system/books.h"
 
@@ -17,14 +17,14 @@ Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
                                           (users == 1 ? "" : "s")};
 }
 
-/// Room for dual quaternions and scale of every joint, and the status of every pose of two joints,
-/// as far as a storage buffer range holds them.
+/// Initial palette units: dual quaternions and scale of every joint, and a status for every two
+/// joints, limited to a storage buffer range.
 std::uint64_t firstUnits(const SceneDescription& description) {
   return std::min((description.jointCapacity.initial + description.gpuJointCapacity.initial) * 5,
                   description.limits.maxStorageBufferRange / unitBytes);
 }
 
-/// Without a way to grow, what there is at first is all.
+/// Without a growth callback, the initial capacity is the maximum.
 Capacity capacityOf(const SceneDescription& description, const Capacity& capacity,
                     std::uint64_t most) {
   if (description.growth.grow == nullptr) return Capacity::fixed(capacity.initial);
@@ -40,7 +40,7 @@ SceneDescription withLimits(SceneDescription description) {
   limit(description.meshCapacity, range / packedMeshAlignment * packedMeshAlignment);
   limit(description.jointCapacity, mostIndices);
   limit(description.gpuJointCapacity, mostIndices);
-  // Far from where sums overflow.
+  // Small enough that sums do not overflow.
   limit(description.outputCapacity, std::uint64_t{1} << 60);
   limit(description.instanceCapacity, range / sizeof(abi::HistoryRecord));
   limit(description.boundsCapacity, range / sizeof(InstanceResult));
@@ -181,7 +181,7 @@ Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completed
 
 void SceneBooks::retire(RangeAllocator& store, const Range& range) {
   retired_.push_back({frame_, &store, range});
-  // What no frame has seen, or only complete ones, is free at once.
+  // Ranges that no frame uses, or only complete ones, are free at once.
   freeRetired();
 }
 

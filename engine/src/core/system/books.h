@@ -1,5 +1,5 @@
-// What a Scene consists of: its things by handle, the free ranges of its buffers, and what the next
-// frame has to do.
+// The state of a Scene: its objects by handle, the free ranges of its buffers, and the work of the
+// next frame.
 #pragma once
 
 #include <array>
@@ -20,10 +20,10 @@
 
 namespace dermis {
 
-/// The sizes of a scene's buffers at first; poses: of the first buffer of each kind.
+/// The initial sizes of a scene's buffers; for poses, of the first buffer of each kind.
 PlanSizes sceneSizes(const SceneDescription& description);
 
-/// Room in a buffer that grows.
+/// The free ranges of a buffer that may grow.
 struct Store {
   BufferRole role;
   Capacity capacity;            ///< in units
@@ -51,8 +51,8 @@ struct ScenePose {
   PoseWriter writer = PoseWriter::cpu;
   std::uint32_t buffer = 0;  ///< its number
   Range joints;              ///< in that buffer; of each slot
-  /// Which of its matrices are the pose of now. Those that the CPU writes have one for each frame
-  /// in flight.
+  /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
+  /// flight.
   std::uint32_t slot = 0;
   std::uint64_t poseFrame = 0;  ///< the frame that it was last written in
   std::uint64_t version = 1;
@@ -70,8 +70,8 @@ struct Place {
   friend bool operator==(const Place&, const Place&) = default;
 };
 
-/// What changes and frames look at of all instances. It stands apart from the rest, so that caches
-/// hold it for many.
+/// The part of an instance that changes and frames read for all instances. It is separate from the
+/// rest, so that caches hold it for many instances.
 struct InstanceState {
   std::uint32_t generation = 0;  ///< of its handle; 0: there is none
   std::uint32_t updateInterval = 1;
@@ -81,16 +81,15 @@ struct InstanceState {
   bool isCulled = false;
   bool hasMotion = false;
   bool restartsMotion = true;     ///< when it is skinned next
-  bool isUrgent = true;           ///< whatever its interval
+  bool isUrgent = true;           ///< skinned at once, regardless of its interval
   bool isMoving = false;          ///< its previous positions are others, as of the last record
   std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
   std::uint64_t hiddenAfter = 0;  ///< the last record that displayed it before it was hidden
 };
 
 struct SceneInstance {
-  // What a frame that skins it looks at stands together, the first of it in the cache line of the
-  // slot: where the GPU is the CPU, as in software Vulkan, the caches hold vertices when the next
-  // frame begins.
+  // The members that a frame reads to skin it are together, the first in the cache line of the
+  // slot: with lavapipe the caches hold vertices when the next frame begins.
   bool isShifting = false;  ///< among the shifting
   Method method = Method::dualQuaternion;
   std::uint32_t pose = 0;  ///< index
@@ -140,11 +139,11 @@ class SceneBooks {
   Result<bool> isDue(InstanceHandle instance) const;
   std::uint64_t compact(std::uint64_t maxBytes);
 
-  /// Plans all that has to be done; nothing of it counts as done before `commit`.
+  /// Plans all work. None of it counts as done before `commit`.
   Result<void> plan(Plan& out);
   Result<void> commit();
   Result<void> abandonFrame(std::uint64_t frame);
-  /// Something changes: what was planned cannot be committed.
+  /// Called if something changes: the current plan can no longer be committed.
   void unplan() { isPlanned_ = false; }
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
@@ -170,7 +169,7 @@ class SceneBooks {
     RangeAllocator* store;
     Range range;
   };
-  /// Where poses stand. Addresses stay: `Retired` has them.
+  /// A buffer of poses. Addresses must stay the same: `Retired` has them.
   struct PoseStore {
     PoseWriter writer;
     RangeAllocator joints;
@@ -308,7 +307,7 @@ class SceneBooks {
   std::vector<InstanceHandle> skinned_, settled_, moved_;
   FrameWorkStatistics planned_, committed_;
 
-  /// What a frame reads back.
+  /// The results that a frame reads back.
   struct ReadBack {
     std::uint64_t frame = 0;
     bool hasCounters = false;
@@ -321,8 +320,8 @@ class SceneBooks {
     }
   };
 
-  /// What the last `commit` changed, as it was before, so that `abandonFrame` can put it back.
-  /// `conversions_` and `settled_` last until the next plan and are not repeated here.
+  /// The state before the last `commit`, so that `abandonFrame` can restore it. `conversions_` and
+  /// `settled_` last until the next plan and are not repeated here.
   struct Abandonable {
     struct Instance {
       InstanceHandle handle;

@@ -1,4 +1,4 @@
-// What a frame has to do, and what is done when it has been recorded.
+// Collects the work of a frame, and updates the state when the frame is committed or abandoned.
 
 #include <algorithm>
 #include <bit>
@@ -21,8 +21,9 @@ std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion) {
 
 }  // namespace
 
-/// In frames that are the same for all instances of a pose with one interval, also where the
-/// engine leaves frames out: a multiple of the interval lies between the last record and this one.
+/// All instances of a pose with the same interval are due in the same frames, even if the engine
+/// skips frame numbers: they are due if a multiple of the interval lies between the last record and
+/// this one.
 bool SceneBooks::isDue(const InstanceState& state, std::uint32_t pose) const {
   const bool cameBack = state.visibleFrom == record_ + 1;
   if (state.isUrgent || cameBack || state.updateInterval == 1) return true;
@@ -35,7 +36,7 @@ std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
   return poses_.at(instance.pose).forms[form].unit;
 }
 
-/// Once for all instances that read it, and only where one does.
+/// Converts a pose once for all instances that read it, and only if one does.
 void SceneBooks::convertPalette(const SceneInstance& instance) {
   const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.pose);
@@ -91,7 +92,7 @@ void SceneBooks::addDue(std::uint32_t index) {
   planned_.writtenBytes += std::uint64_t{instance.vertexCount} * instance.vertexBytes;
 }
 
-/// Those that have to wait stay in the list; so do those that are due, until `commit`.
+/// Instances that are not due stay in the list; those that are due stay until `commit`.
 void SceneBooks::gatherPending() {
   std::size_t kept = 0;
   for (std::size_t entry = 0; entry < pending_.size(); ++entry) {
@@ -108,9 +109,9 @@ void SceneBooks::gatherPending() {
   pending_.resize(kept);
 }
 
-/// What moved when it was last displayed and is displayed without being skinned rests: its previous
-/// positions become the current ones. What leaves the view is left alone; mostly it is skinned when
-/// it returns.
+/// An instance that moved when it was last displayed, and is now displayed without being skinned,
+/// is at rest: its previous positions become the current ones. Instances that leave the view are
+/// not settled, since they are usually skinned when they return.
 void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
     SceneInstance* instance = instances_.find(handle);
@@ -123,7 +124,7 @@ void SceneBooks::gatherSettling() {
   }
 }
 
-/// All of them, in every frame: the CPU does not know which the GPU skinned.
+/// All culled instances, in every frame: the CPU does not know which ones the GPU skinned.
 void SceneBooks::gatherCulled() {
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
@@ -134,7 +135,8 @@ void SceneBooks::gatherCulled() {
       if (state.restartsMotion) instance.restartVersion = instance.version;
       versioned_.push_back(index);
     }
-    // Nobody knows when the GPU will skin it for the first time; until then there is no box.
+    // There is no box until the GPU skins it for the first time, and the CPU does not know when
+    // that is.
     if (instance.extras.result != notUsed) {
       if (instance.firstFrame == 0) builder_.clearResult(instance.extras.result);
       plannedResults_.push_back(instance.extras.result);
@@ -248,7 +250,7 @@ void SceneBooks::keepForAbandoning() {
   abandonable_.shifts.clear();
 }
 
-/// The instance shows what it should, as far as the books go.
+/// Marks the instance as up to date.
 void SceneBooks::commitInstance(std::uint32_t index) {
   InstanceState& state = states_[index];
   SceneInstance& instance = instances_.at(index);
@@ -287,7 +289,7 @@ Result<void> SceneBooks::commit() {
   for (const std::uint32_t index : due_) {
     InstanceState& state = states_[index];
     const InstanceHandle handle{index, state.generation};
-    // As it was when it was planned: nothing changed since.
+    // The same as when it was planned: nothing changed since.
     const bool moves = state.hasMotion && !restarts(state, record_);
     commitInstance(index);
     state.isListed = false;
@@ -326,7 +328,7 @@ void SceneBooks::abandonInstances() {
   for (std::uint32_t index = 0; index < states_.size(); ++index) {
     InstanceState& state = states_[index];
     if (state.generation == 0) continue;
-    // They count records, and the frame's does not count.
+    // These count records, and the abandoned record does not count.
     if (state.visibleFrom == record_ + 1)
       state.visibleFrom = state.hiddenAfter + 1 == record_ ? 0 : record_;
     if (state.hiddenAfter == record_)
@@ -405,7 +407,7 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     culling_.settledInstances = counted.settled;
     culling_.workgroups = counted.workgroups;
   }
-  // A frame that found nothing out about an instance does not take away what an earlier one did.
+  // A frame without results keeps those of earlier frames.
   if (!found->results.empty()) latestResultsFrame_ = frame;
   for (const CopyCommand& copy : found->results) {
     // All of it is in `bytes`.

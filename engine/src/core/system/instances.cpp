@@ -39,7 +39,7 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
 
 }  // namespace
 
-/// Whether it could be skinned, were there room.
+/// Checks everything except room in the buffers.
 Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t updateInterval) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
   if (mesh == nullptr) return unknownHandle("mesh", instance.mesh);
@@ -84,7 +84,8 @@ void SceneBooks::freeResult(const SceneInstance& instance) {
   if (instance.extras.result != notUsed) resultStore_.ranges.free({instance.extras.result, 1});
 }
 
-/// The pose's place in the form that the method reads; it stays until the pose is removed.
+/// Reserves palette units for the pose in the form that the method reads, until the pose is
+/// removed.
 Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
   const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.poseHandle.index);
@@ -166,7 +167,8 @@ void SceneBooks::releaseRuns(SceneInstance& instance) {
   instance.furtherRuns.clear();
 }
 
-/// What was recorded is still drawn from, and stays `shown`; what never was is free at once.
+/// An output that was recorded is still drawn, and stays `shown`. One that was never recorded is
+/// free at once.
 void SceneBooks::releaseTarget(SceneInstance& instance) {
   releaseRuns(instance);
   if (instance.shown != instance.target) outputStore_.ranges.free(instance.target.bytes);
@@ -346,7 +348,7 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
   std::vector<MorphWeight>& active = instance.extras.morphs;
   assignActive(morphs, morphsScratch_);
   active.swap(morphsScratch_);
-  // With and without are two kernels.
+  // Instances with and without active morph targets use different kernels.
   if (active.empty() != morphsScratch_.empty()) {
     if (Result<void> good = remakeRuns(instance, states_[handle.index].isCulled); !good) {
       active.swap(morphsScratch_);
@@ -366,7 +368,7 @@ void SceneBooks::show(InstanceState& state, InstanceHandle handle) {
   if (state.isStale) makePending(state, handle.index);
 }
 
-/// What decides by which kernel the instance is skinned, from where, and to where.
+/// Changes that affect the kernel, the inputs or the output of the instance.
 Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
   SceneInstance& instance = instances_.at(change.instance.index);
   const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
@@ -379,7 +381,7 @@ Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
   return {};
 }
 
-/// All the rest, which cannot fail.
+/// All other changes, which cannot fail.
 void SceneBooks::changeState(InstanceState& state, const InstanceChange& change) {
   if (change.updateInterval) state.updateInterval = *change.updateInterval;
   if (change.visible && *change.visible != state.isVisible) {
@@ -423,7 +425,7 @@ Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
 }
 
 Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> instances) {
-  // Copies, which no store into a state can change.
+  // Local copies, so that the compiler knows that stores to a state do not change them.
   const std::span<InstanceState> states = states_;
   const std::uint64_t record = record_;
   for (const InstanceVisibility& wanted : instances) {

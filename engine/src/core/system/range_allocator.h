@@ -1,4 +1,4 @@
-// Which parts of a buffer are taken.
+// Allocates ranges of a buffer.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ struct Range {
   friend bool operator==(const Range&, const Range&) = default;
 };
 
-/// Gives out ranges of [0, capacity), which may grow. O(log of the number of gaps), but where an
-/// alignment makes gaps unfit.
+/// Allocates ranges of [0, capacity); the capacity may grow. O(log of the number of gaps), unless
+/// gaps do not fit because of alignment.
 class DERMIS_CORE_API RangeAllocator {
  public:
-  /// Alignments count from so many units before the first one.
+  /// `base`: alignments count from this number of units before the first one.
   explicit RangeAllocator(std::uint64_t capacity = 0, std::uint64_t base = 0);
 
   /// The smallest gap that holds `size` at a multiple of `alignment`, which need not be a power of
@@ -35,7 +35,7 @@ class DERMIS_CORE_API RangeAllocator {
                                      std::uint64_t end);
   void free(const Range& range);
 
-  /// The least capacity with which `allocate` finds a place at the end.
+  /// The smallest capacity with which `allocate` finds a range at the end.
   std::uint64_t capacityFor(std::uint64_t size, std::uint64_t alignment) const;
   /// `capacity` is larger than now.
   void grow(std::uint64_t capacity);

@@ -1,4 +1,4 @@
-// Things by handle: found in O(1), noticed where they are gone.
+// Objects by handle: found in O(1). Handles of removed objects are rejected.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace dermis {
 
-/// Indices are given again, to the newest hole first; generations tell who had them when. A thing's
-/// address changes when others are added.
+/// Indices are reused, the last removed one first; generations distinguish their users. The address
+/// of an object changes when others are added.
 template <typename Thing, typename ThingHandle>
 class SlotMap {
  public:
@@ -37,8 +37,7 @@ class SlotMap {
     Slot& slot = slots_[handle.index];
     slot.thing = Thing{};
     slot.isUsed = false;
-    // After 2^32 things in one place a handle could come again, or be the null one: leave the
-    // place.
+    // After 2^32 objects a slot is never used again: otherwise a handle could repeat or be null.
     if (++slot.generation != 0) free_.push_back(handle.index);
     --size_;
   }

@@ -46,8 +46,8 @@ Result<void> SceneBooks::growBuffer(BufferRole role, const PlanSizes& sizes,
                      {role, sizes.requirement(role, 0, description_.limits), poseBuffer});
 }
 
-/// To at least so many units, which is not more than the maximum. To twice as many as now if it
-/// can, so that a scene that grows by small steps copies little.
+/// Grows to at least `least` units, which are at most the maximum. Doubles the size if possible, so
+/// that a scene that grows in small steps copies little.
 Result<void> SceneBooks::grow(Store& store, std::uint64_t least) {
   const std::uint64_t twice = store.ranges.capacity() * 2;
   std::uint64_t capacity = std::min(std::max(least, twice), store.capacity.maximum);
@@ -84,7 +84,7 @@ Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
   return store.ranges.allocate(size, alignment);
 }
 
-/// A store that is as large as it may become has no room.
+/// The error of a store that has its maximum size and no room.
 Error SceneBooks::noRoom(const std::string& what, const Store& store, const char* unit) {
   const RangeAllocator& ranges = store.ranges;
   return {ErrorCode::limitExceeded,
@@ -111,7 +111,7 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);
-  // So that what the GPU writes can be bound where it begins.
+  // So that poses that the GPU writes can be bound at their offset.
   const std::uint64_t bound = description_.limits.minStorageBufferOffsetAlignment;
   const std::uint64_t alignment =
       writer == PoseWriter::gpu ? bound / std::gcd(bound, sizeof(JointMatrix)) : 1;
@@ -163,8 +163,8 @@ Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, PoseWriter wr
               std::to_string(capacity.maximum)};
 }
 
-/// Whether there may be one more instance. Nothing is allocated for it here: history and visibility
-/// words are as many as the next plan says.
+/// Makes room for one more instance; false at the maximum. Allocates nothing: the next plan sets
+/// the sizes of the history and visibility buffers.
 bool SceneBooks::makeSlot() {
   if (instances_.hasHole() || instances_.capacity() < slotCapacity_) return true;
   if (slotCapacity_ >= description_.instanceCapacity.maximum) return false;

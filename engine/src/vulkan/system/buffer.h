@@ -11,11 +11,11 @@
 
 namespace dermis::vulkan {
 
-/// What buffers are made with; outlives them.
+/// What buffers are created with. Outlives them.
 struct BufferSource {
   const ContextState* context = nullptr;
   BufferCallbacks callbacks;
-  std::uint64_t bytes = 0;  ///< of the buffers that there are
+  std::uint64_t bytes = 0;  ///< of all existing buffers
 };
 
 class SystemBuffer {
@@ -48,8 +48,8 @@ class SystemBuffer {
   std::uint64_t size_ = 0;
 };
 
-/// A buffer that a larger one replaces with the next `record`, which copies what it holds; or a
-/// range of the engine's, which stays.
+/// A buffer that a larger one may replace in the next `record`, which copies its contents; or a
+/// range of the engine, which never grows.
 struct GrowingBuffer {
   SystemBuffer own;     ///< as of the last `record`
   SystemBuffer larger;  ///< from the next one on

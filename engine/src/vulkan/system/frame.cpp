@@ -78,8 +78,9 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
   return {};
 }
 
-/// Packed meshes. No frame in flight reads their bytes, but those around them: layers do not tell
-/// them apart. The first barrier of the plan, or of a later one, makes them visible.
+/// Uploads packed meshes. No frame in flight reads these bytes, but frames read bytes around them,
+/// and the validation layer does not distinguish them. The first barrier of this plan, or of a
+/// later one, makes the copies visible.
 Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   if (uploads.empty()) return recorded;
@@ -99,7 +100,7 @@ Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   return recorded;
 }
 
-/// The GPU has seen nothing of it: its slot is free again, its meshes are not uploaded yet.
+/// The GPU never executes the frame: its slot is free again, and its meshes must be uploaded again.
 void SkinningSystem::State::abandonRecord() {
   --recordCount;
   slot().frame = 0;

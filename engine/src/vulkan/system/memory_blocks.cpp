@@ -6,12 +6,12 @@
 namespace dermis::vulkan {
 namespace {
 
-// A block has a quarter of what there is of its kind, so that little scenes take little memory, and
-// large ones few blocks.
+// A new block has a quarter of the memory that blocks of its kind already have, so that small
+// scenes take little memory and large scenes few blocks.
 constexpr VkDeviceSize leastBlock = VkDeviceSize{128} << 10;
 constexpr VkDeviceSize largestBlock = VkDeviceSize{64} << 20;
 
-/// Other properties need features that the engine may not have enabled, or are for other ends.
+/// Other properties need features that the engine may not have enabled, or serve other purposes.
 constexpr VkMemoryPropertyFlags usualProperties =
     VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
     VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
@@ -94,7 +94,7 @@ Result<CreatedBuffer> MemoryBlocks::create(const BufferRequest& request) {
   return buffer;
 }
 
-/// The types that will do: first those that have all that is preferred, each in the order of the
+/// The usable types: first those with all preferred properties, each group in the order of the
 /// device.
 std::vector<std::uint32_t> MemoryBlocks::typesFor(const Need& need) const {
   const auto [required, preferred] = wishesOf(need.use);
@@ -130,8 +130,8 @@ Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type, const Ne
     if (isOfKind(*other, type, need)) usual += other->ranges.capacity() / 4;
   usual = std::clamp(usual, leastBlock, largestBlock);
   VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
-  // What is large gets a block of its own. Where a whole block is too much, what is needed may
-  // still be there.
+  // A large buffer gets its own block. If there is no memory for a whole block, there may still be
+  // enough for the buffer alone.
   const VkDeviceSize needed = need.requirements.size;
   for (const VkDeviceSize size : {needed > usual / 2 ? needed : usual, needed}) {
     info.allocationSize = size;
@@ -153,8 +153,8 @@ Result<MemoryBlocks::Block*> MemoryBlocks::addBlock(std::uint32_t type, const Ne
   return blocks_.back().get();
 }
 
-/// A heap may be full, such as the 256 MiB of many GPUs that are device-local and mapped, although
-/// another type that will do has memory.
+/// A heap may be full (on many GPUs only 256 MiB are device-local and mapped) while another usable
+/// type has memory.
 Result<MemoryBlocks::Part> MemoryBlocks::allocate(const Need& need, const char* name) {
   Result<Part> part =
       Error{ErrorCode::missingFeature,

@@ -1,5 +1,5 @@
-// Where a SkinningSystem has its buffers from if the engine has no allocator: parts of large blocks
-// of memory.
+// Allocates the buffers of a SkinningSystem from large blocks of memory, if the engine has no
+// allocator.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class MemoryBlocks {
     Block* block;
     Range range;
   };
-  /// What a buffer needs of memory.
+  /// Memory requirements of a buffer.
   struct Need {
     VkMemoryRequirements requirements{};
     BufferUse use = BufferUse::device;

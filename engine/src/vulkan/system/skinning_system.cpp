@@ -1,4 +1,4 @@
-// The interface of SkinningSystem: what is not the books' is done here.
+// The interface of SkinningSystem, and everything that the Scene does not do.
 
 #include "dermis/vulkan/skinning_system.h"
 
@@ -52,7 +52,7 @@ Result<void> checkRanges(const SkinningSystemDescription& description, const Dev
   return {};
 }
 
-/// A range holds what it holds.
+/// The size of a range is its capacity: it does not grow.
 SceneDescription sceneOf(const SkinningSystemDescription& description,
                          const ContextState& context) {
   const auto capacity = [](const Capacity& wanted, const BufferRange& range, std::uint64_t unit) {
@@ -183,7 +183,7 @@ Result<void> SkinningSystem::addPoses(std::span<PoseHandle> poses, std::uint32_t
                                       const PoseOptions& options) {
   Result<void> added = state_->scene.addPoses(poses, jointCount, options);
   if (!added || options.writer == PoseWriter::gpu) return added;
-  // No frame under way reads their memory: that of poses before them was free.
+  // No frame in flight reads their memory: it was free.
   for (const PoseHandle pose : poses)
     std::ranges::fill(state_->poseAt(*state_->scene.posePlace(pose)), JointMatrix{});
   return added;
@@ -267,7 +267,7 @@ Result<void> SkinningSystem::abandonFrame(std::uint64_t frame) {
   return {};
 }
 
-// -- What came of it.
+// -- Results.
 
 VkBuffer SkinningSystem::outputBuffer() const {
   return state_->output.lastRange().buffer;
@@ -309,7 +309,7 @@ Result<std::optional<Box>> SkinningSystem::bounds(InstanceHandle instance) const
   return state_->scene.bounds(instance);
 }
 
-/// Slots are used again soon: what is in those of complete frames is read, the oldest first.
+/// Reads the results of complete frames, the oldest first, before their slots are reused.
 void SkinningSystem::State::readBackUpTo(std::uint64_t completedFrame) {
   std::vector<const FrameSlot*>& complete = completeScratch;
   complete.clear();

@@ -1,4 +1,4 @@
-// What a SkinningSystem consists of: a Scene and its buffers.
+// The state of a SkinningSystem: a Scene and its buffers.
 #pragma once
 
 #include <deque>
@@ -15,7 +15,7 @@
 
 namespace dermis::vulkan {
 
-/// What one frame in flight has for itself.
+/// Resources of one frame in flight.
 struct FrameSlot {
   std::uint64_t frame = 0;  ///< that last used it; 0 if none did
   SystemBuffer upload;
@@ -23,14 +23,14 @@ struct FrameSlot {
   bool hasTimestamps = false;
 };
 
-/// A packed mesh on its way to the GPU.
+/// A packed mesh that the next `record` uploads.
 struct MeshUpload {
   MeshHandle mesh;
   std::uint64_t offset = 0;  ///< in the mesh buffer
   SystemBuffer staging;
 };
 
-/// A buffer that poses stand in: the system's, or a range of the engine's.
+/// A buffer of poses: one of the system, or a range of the engine.
 struct PoseMemory {
   SystemBuffer own;
   BufferRange range;
@@ -69,7 +69,7 @@ struct SkinningSystem::State {
     return {reinterpret_cast<JointMatrix*>(begin), place.jointCount};
   }
 
-  ContextState* context;  ///< stays where it is when the Context is moved
+  ContextState* context;  ///< its address stays the same when the Context is moved
   SystemFunctions functions;
   std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
   BufferSource source;
@@ -94,14 +94,14 @@ struct SkinningSystem::State {
   std::vector<FrameSlot> slots;
   std::vector<MeshUpload> uploads;
   std::vector<MeshUpload> recordedUploads;  ///< by the last `record`
-  /// What the last `record` replaced by larger buffers.
+  /// Buffers that the last `record` replaced by larger ones.
   struct Replaced {
     GrowingBuffer* buffer;
     SystemBuffer old;
   };
   std::vector<Replaced> replaced;
 
-  /// What frames in flight may still use.
+  /// Buffers that frames in flight may still use.
   struct Retired {
     std::uint64_t frame;
     SystemBuffer buffer;

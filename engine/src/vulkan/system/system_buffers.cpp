@@ -82,7 +82,7 @@ Result<void> SkinningSystem::State::createBuffers(const SkinningSystemDescriptio
       return made;
     }
   }
-  // Nothing stands in them yet.
+  // They are still empty.
   for (GrowingBuffer* buffer : {&meshes, &palettes, &output, &results})
     buffer->own = std::exchange(buffer->larger, {});
   isGrowing = false;
@@ -122,8 +122,8 @@ Result<void> SkinningSystem::State::grow(const BufferGrowth& growth) {
   return {};
 }
 
-/// What is as large as a plan says. Tables that are too small are replaced, and the old ones kept
-/// until their frames are complete.
+/// Creates the buffers whose size depends on the plan. Tables that are too small are replaced; the
+/// old ones are kept until their frames are complete.
 Result<void> SkinningSystem::State::makeRoom() {
   if (const BufferRequirement needed = plan.buffer(BufferRole::history);
       needed.size > history.range().size) {
@@ -183,7 +183,7 @@ Result<void> SkinningSystem::State::makeRoom() {
   return {};
 }
 
-/// What frames in flight and this one read, write or copy stays in order by two barriers.
+/// Two barriers order the copies with the accesses of frames in flight and of this frame.
 Recorded SkinningSystem::State::recordGrowth(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   if (!isGrowing) return recorded;
@@ -224,8 +224,8 @@ void SkinningSystem::State::retireReplaced() {
   recordedUploads.clear();
 }
 
-/// The old buffers hold what there is. What was to replace them still is, unless something larger
-/// is.
+/// The old buffers hold the contents. Their replacements will still replace them, unless there is a
+/// larger one.
 void SkinningSystem::State::abandonGrowth() {
   for (Replaced& old : replaced) {
     GrowingBuffer& buffer = *old.buffer;

@@ -1,4 +1,4 @@
-// How long the GPU takes for what a SkinningSystem records.
+// Measures the GPU time of what a SkinningSystem records.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class Timestamps {
 
   void begin(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
   void end(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
-  /// Of a frame that is complete; nothing if the queue has no timestamps.
+  /// The GPU time of a complete frame; empty if the queue has no timestamps.
   std::optional<double> seconds(std::uint32_t frame) const;
 
  private:
