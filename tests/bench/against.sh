@@ -4,8 +4,9 @@
 #   tests/bench/against.sh COMMIT [FILTER]   FILTER: a regular expression of benchmark names, "." for all (the default)
 #
 # For each benchmark that both have: the time of COMMIT divided by the time of this tree (over 1: this tree is faster), each the
-# best of ROUNDS rounds; the median of RUNS runs, and the lowest and the highest of them. DERMIS_DEVICE names another device than
-# the best. Leave the machine idle. Shorter: RUNS=1 ROUNDS=1.
+# best of ROUNDS rounds; the median of RUNS runs, and the lowest and the highest of them. If FILTER includes output/float32, also
+# the times of COMMIT and of this tree divided by COMMIT's time of output/float32, medians too. DERMIS_DEVICE names another device
+# than the best. Leave the machine idle. Shorter: RUNS=1 ROUNDS=1.
 set -eu
 commit=${1:?usage: tests/bench/against.sh COMMIT [FILTER]}
 filter=${2:-.}
@@ -57,22 +58,34 @@ awk -F, -v runs="$RUNS" -v commit="$commit" '
   { key = $1 "," $2 "," $3
     if (!(key in best) || $4 + 0 < best[key]) best[key] = $4 + 0
     if (!($3 in seen)) { seen[$3] = 1; names[++count] = $3 } }
+  function median(values, count,    i, j, value) { # sorts them
+    for (i = 1; i < count; ++i) {
+      value = values[i]
+      for (j = i; j > 0 && values[j - 1] > value; --j) values[j] = values[j - 1]
+      values[j] = value
+    }
+    return count % 2 ? values[(count - 1) / 2] : (values[count / 2 - 1] + values[count / 2]) / 2
+  }
   END {
-    printf "%-44s %8s %8s %8s\n", commit " / this tree", "median", "lowest", "highest"
+    printf "%-44s %8s %8s %8s %8s %8s\n", commit " / this tree", "median", "lowest", "highest", commit, "now"
     for (n = 1; n <= count; ++n) {
       name = names[n]
-      m = 0
+      m = units = 0
       for (run = 1; run <= runs; ++run) {
         before = best[run ",before," name]; after = best[run ",after," name]
         if (before == 0 || after == 0) continue
-        ratio = before / after
-        for (i = m++; i > 0 && sorted[i] > ratio; --i) sorted[i + 1] = sorted[i]
-        sorted[i + 1] = ratio
+        ratios[m++] = before / after
+        unit = best[run ",before,output/float32"]
+        if (unit == 0) continue
+        befores[units] = before / unit
+        afters[units++] = after / unit
       }
       if (m == 0) continue
-      median = m % 2 ? sorted[(m + 1) / 2] : (sorted[m / 2] + sorted[m / 2 + 1]) / 2
-      printf "%-44s %8.3f %8.3f %8.3f\n", name, median, sorted[1], sorted[m]
-      logs += log(median); ++compared
+      middle = median(ratios, m)
+      printf "%-44s %8.3f %8.3f %8.3f", name, middle, ratios[0], ratios[m - 1]
+      if (units > 0) printf " %8.2f %8.2f", median(befores, units), median(afters, units)
+      print ""
+      logs += log(middle); ++compared
     }
     if (compared == 0) { print "no benchmark is in both"; exit 1 }
     printf "%-44s %8.3f\n", "geometric mean of " compared, exp(logs / compared)
