@@ -5,7 +5,7 @@
 layout(push_constant) uniform Draw {
   vec4 rows[3];     // model to world, row-major
   vec4 baseColor;
-  vec4 surface;     // metallic, roughness, alpha cutoff, 1 where colors come from a value a vertex
+  vec4 surface;     // metallic, roughness, alpha cutoff, 1 if colors come from a value per vertex
   int shadowIndex;  // -1: the key light, otherwise a sky light
 } draw;
 
