@@ -39,7 +39,7 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #include "stream.glsl"
 
 #if defined(WIDE) || defined(STAGED)
-// All attributes of a vertex, which are adjacent in memory. Each size is a number of whole words, or the sizes are 6 bytes and 2.
+// All attributes of a vertex, which are adjacent in memory. Sizes are whole words, or positions have 6 bytes and normals 2.
 // Sizes are constants, so that only moves remain after compilation.
 uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
