@@ -24,7 +24,7 @@ vec3 meshVector(uint word) {
   return vec3(uintBitsToFloat(meshWord(word)), uintBitsToFloat(meshWord(word + 1u)), uintBitsToFloat(meshWord(word + 2u)));
 }
 
-// Compilers remove what is not used.
+// Compilers remove unused loads.
 MeshHeader loadMeshHeader(uint mesh) {
   uvec4 a = meshUnit(mesh / 4u);
   uvec4 b = meshUnit(mesh / 4u + 1u);

@@ -303,7 +303,7 @@ void main() {
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x * vertices + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED
-  // All invocations reach each barrier. Those without a vertex skin the last vertex again; what they stage is never stored.
+  // All invocations reach each barrier. Those without a vertex skin the last vertex again; their staged records are never stored.
   stagedRecords = min(group.vertexEnd - (vertex - gl_LocalInvocationID.x), gl_WorkGroupSize.x);
   vertex = min(vertex, group.vertexEnd - 1u);
 #else
