@@ -1,4 +1,4 @@
-// dermis_viewer: shows a skinned model in a window, by every method, with what it costs.
+// dermis_viewer: shows a skinned model in a window, with any method and its cost.
 
 #include <string>
 

@@ -1,4 +1,4 @@
-// What each draw is pushed: samples/render/draw_block.h has the same in C++.
+// Push constants of each draw. samples/render/blocks.h declares the same in C++.
 #ifndef DERMIS_RENDER_DRAW_GLSL
 #define DERMIS_RENDER_DRAW_GLSL
 
