@@ -1,15 +1,15 @@
-# cmake --install: the libraries that were built, their headers, the kernels' sources, the CMake package `dermis`, and files for
-# pkg-config; and the command. The build folder is a CMake package, too, for an engine that uses Dermis from there.
+# cmake --install: installs the libraries that were built, their headers, the kernels' sources, the CMake package `dermis`, files
+# for pkg-config, and the command. The build folder is a CMake package too, for an engine that uses Dermis from there.
 #
-# Each library is a component of the package with an export file of its own, dermis_NAME_targets.cmake, so that a consumer
-# of dermis::core needs none of what the others are linked with.
+# Each library is a component of the package with its own export file, dermis_NAME_targets.cmake, so that a consumer of dermis::core
+# needs none of the dependencies of the other libraries.
 
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(dermisPackageDir ${CMAKE_INSTALL_LIBDIR}/cmake/dermis)
 set(dermisShaderDir ${CMAKE_INSTALL_DATADIR}/dermis/shaders)
-# The headers that belong to one component; those left over belong to core.
+# The headers that belong to one component. All others belong to core.
 set(dermisHeaders_cpu cpu)
 set(dermisHeaders_verify verify)
 set(dermisHeaders_vulkan vulkan)
@@ -43,8 +43,8 @@ endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/engine/include/dermis DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dermis
         FILES_MATCHING PATTERN "*.h" ${excluded})
 
-# For an engine with an RHI of its own, which compiles the kernels itself and reads the records of abi.h; and for an engine's own
-# shaders dermis_decode.glsl and dermis_skin.glsl.
+# For engines with their own RHI, which compile the kernels themselves and read the records of abi.h. dermis_decode.glsl and
+# dermis_skin.glsl are for an engine's own shaders.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/shaders/ DESTINATION ${dermisShaderDir} COMPONENT dermis
         FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp" PATTERN skin_include.glsl EXCLUDE)
 get_property(skinInclude GLOBAL PROPERTY DERMIS_SKIN_INCLUDE)
@@ -60,7 +60,7 @@ foreach(sample IN ITEMS minimal allocator gpu_poses)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples/${sample} DESTINATION ${dermisDocDir}/samples COMPONENT dermis)
 endforeach()
 
-# As it is installed, and as it lies in the build folder.
+# Once for the installed package, and once for the build folder.
 file(RELATIVE_PATH shaderDirFromPackage /${dermisPackageDir} /${dermisShaderDir})
 configure_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake @ONLY)
 set(shaderDirFromPackage shaders/include)
@@ -71,7 +71,8 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
 install(FILES ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
         DESTINATION ${dermisPackageDir} COMPONENT dermis)
 
-# pkg-config: dermis is core and vulkan, dermis_NAME each of the libraries but the two compilers. Paths count from the file.
+# pkg-config: `dermis` is core and vulkan; `dermis_NAME` is one of the libraries, except the two compilers. Paths are relative to
+# the file.
 file(RELATIVE_PATH pkgConfigPrefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 set(pkgConfigFlags)
 if(BUILD_SHARED_LIBS)

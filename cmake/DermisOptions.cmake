@@ -1,6 +1,6 @@
-# Every option of Dermis, with defaults that suit both a checkout of its own and an engine's add_subdirectory.
+# Every option of Dermis. The defaults suit both a checkout of Dermis itself and an engine's add_subdirectory.
 
-# The source package has the kernels compiled, in shaders/embedded.
+# The source package contains the compiled kernels, in shaders/embedded.
 set(embeddedShaders)
 if(EXISTS ${PROJECT_SOURCE_DIR}/shaders/embedded/dermis_kernels.cpp)
   set(embeddedShaders ${PROJECT_SOURCE_DIR}/shaders/embedded)
@@ -25,21 +25,21 @@ option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${dermisIsDeveloped})
 option(DERMIS_BUILD_VIEWER "Build the viewer, one of the samples; needs SDL 2 and Dear ImGui" ON)
-# The tests look inside: a shared library hides what they look at.
+# The tests use internal functions, which a shared library hides.
 set(dermisTestsByDefault ${dermisIsDeveloped})
 if(BUILD_SHARED_LIBS)
   set(dermisTestsByDefault OFF)
 endif()
 option(DERMIS_BUILD_TESTS "Build the tests" ${dermisTestsByDefault})
 option(DERMIS_BUILD_FUZZERS "Build the libFuzzer programs; needs Clang, and instruments everything" OFF)
-# An engine that wants a small library leaves these kernels out; what needs them fails with missingFeature.
+# An engine that needs a small library leaves these kernels out. Using them then fails with missingFeature.
 option(DERMIS_COMPARISON_METHODS "Kernels of the methods that are there for comparison: iterative, log_matrix, spherical_blend, quaternion_translation" ON)
 option(DERMIS_SUBWORD_STORES "Kernels that store attributes at multiples of 2 bytes or of 1" ON)
 option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_WARNINGS_AS_ERRORS "Stop at the first compiler warning" OFF)
 set(DERMIS_SANITIZE "" CACHE STRING "Sanitizers to build Dermis with: address, thread, or empty for none")
 set_property(CACHE DERMIS_SANITIZE PROPERTY STRINGS "" address thread)
-# Half of what a build with the address sanitizer takes is for the tests' own code.
+# The tests' own code takes half of the time of a build with the address sanitizer.
 option(DERMIS_SANITIZE_TESTS "With DERMIS_SANITIZE=address: sanitize the tests' own code too" ON)
 
 if(DERMIS_RUNTIME_COMPILER AND NOT (DERMIS_BUILD_VULKAN AND DERMIS_BUILD_SHADER_COMPILER))
@@ -69,7 +69,7 @@ if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYP
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 
-# An engine may have brought its own glslang and SPIRV-Tools. Debian's packages would define some of these names again.
+# An engine may already have added glslang and SPIRV-Tools. Debian's packages would define some of these targets again.
 set(DERMIS_ENGINE_HAS_GLSLANG OFF)
 foreach(target IN ITEMS glslang glslang::glslang SPIRV glslang::SPIRV OSDependent glslang::OSDependent MachineIndependent
     GenericCodeGen OGLCompiler glslang-default-resource-limits glslang::glslang-default-resource-limits

@@ -1,9 +1,9 @@
-# Debian packages: `cmake --build BUILD --target package`, or cpack, or from the start `cmake --workflow --preset debian`.
+# Debian packages: `cmake --build BUILD --target package`, or cpack, or all steps by `cmake --workflow --preset debian`.
 #
 #   libdermis-dev   the libraries, their headers, the CMake package, pkg-config's files, the shaders, the documents
 #   dermis          the command, if the samples are built
 #
-# The libraries are static, so the package serves the release of Debian that it was built on. -DCPACK_PACKAGE_CONTACT names another
+# The libraries are static, so the package is for the release of Debian that it was built on. -DCPACK_PACKAGE_CONTACT sets another
 # maintainer.
 
 set(notes ${PROJECT_BINARY_DIR}/install/debian)
@@ -24,7 +24,7 @@ License: Expat
  ${license}
 ")
 
-# changelog.Debian.gz: what the package is; what changed in Dermis is in CHANGELOG.md.
+# changelog.Debian.gz describes the package. The changes of Dermis are in CHANGELOG.md.
 if(NOT CPACK_PACKAGE_CONTACT)
   set(CPACK_PACKAGE_CONTACT "The Dermis authors <dermis@packages.invalid>")
 endif()
@@ -38,7 +38,7 @@ file(WRITE ${notes}/changelog "dermis (${PROJECT_VERSION}-1) unstable; urgency=m
 execute_process(COMMAND gzip -9 -n -c changelog WORKING_DIRECTORY ${notes} OUTPUT_FILE ${notes}/changelog.Debian.gz
                 COMMAND_ERROR_IS_FATAL ANY)
 
-# dermis_debian_package(COMPONENT PACKAGE SECTION DESCRIPTION FIELD=VALUE...): its first line is the project's description.
+# dermis_debian_package(COMPONENT PACKAGE SECTION DESCRIPTION FIELD=VALUE...). The first line of the description is the project's.
 function(dermis_debian_package component package section description)
   string(TOUPPER ${component} upper)
   set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)

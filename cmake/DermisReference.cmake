@@ -1,5 +1,5 @@
-# The target dermis_reference makes the reference of the public headers: HTML in BUILD/reference/html. The test reference.doxygen
-# does the same in another folder, and fails on any warning. Both need doxygen.
+# The target dermis_reference generates the reference of the public headers: HTML in BUILD/reference/html. The test
+# reference.doxygen does the same in another folder, and fails on any warning. Both need doxygen.
 find_program(DERMIS_DOXYGEN doxygen DOC "doxygen, for the reference")
 mark_as_advanced(DERMIS_DOXYGEN)
 set(doxygen)

@@ -1,9 +1,9 @@
-# Kernels as part of a library: compiled, checked and embedded by the build, or taken from DERMIS_EMBEDDED_SHADERS.
+# Kernels as part of a library: the build compiles, checks and embeds them, or takes them from DERMIS_EMBEDDED_SHADERS.
 
-# dermis_shader_tool(COMMAND DEPENDS): the program that compiles and embeds kernels, and what it depends on.
+# dermis_shader_tool(COMMAND DEPENDS): the program that compiles and embeds kernels, and its dependencies.
 #
-# It is a target of this build, unless this build cannot run it (it is for another system) or an engine has targets of its own
-# with the names that glslang's and SPIRV-Tools' packages would make. Then the host's compiler builds it, in a build of its own.
+# It is a target of this build, except in two cases: this build cannot run it (cross build), or an engine has its own targets with
+# the names that the packages of glslang and SPIRV-Tools use. Then the host's compiler builds it, in a separate build.
 function(dermis_shader_tool command depends)
   find_program(DERMIS_SPIRV_VAL spirv-val DOC "SPIRV-Tools' validator, run on each kernel")
   mark_as_advanced(DERMIS_SPIRV_VAL)
@@ -13,7 +13,7 @@ function(dermis_shader_tool command depends)
   endif()
   get_property(isBuiltApart GLOBAL PROPERTY DERMIS_SHADER_TOOL_IS_BUILT_APART)
   if(TARGET dermis_embed_shaders OR isBuiltApart)
-    # made before
+    # exists already
   elseif(CMAKE_CROSSCOMPILING OR (NOT DERMIS_BUILD_SHADER_COMPILER AND DERMIS_ENGINE_HAS_GLSLANG))
     dermis_build_shader_tool_apart()
   else()
@@ -28,7 +28,7 @@ function(dermis_shader_tool command depends)
   endif()
 endfunction()
 
-# The target dermis_shader_tool: Dermis' shader compiler, configured again with nothing of this build but its generator.
+# The target dermis_shader_tool: builds Dermis' shader compiler separately. Only the generator is taken from this build.
 function(dermis_build_shader_tool_apart)
   include(ExternalProject)
   set(DERMIS_HOST_CXX "" CACHE STRING "The compiler that builds programs for this machine, in a cross build; empty: c++")
@@ -45,7 +45,7 @@ function(dermis_build_shader_tool_apart)
     list(APPEND options -DDERMIS_BUILD_${part}=OFF)
   endforeach()
   set(program ${folder}/engine/src/shader_compiler/dermis_embed_shaders${CMAKE_HOST_EXECUTABLE_SUFFIX})
-  # What a cross build sets for the other system in the environment is not for this one.
+  # Environment variables of a cross build are for the other system, and must not affect this build.
   set(clean ${CMAKE_COMMAND} -E env --unset=CXX --unset=CXXFLAGS --unset=LDFLAGS --unset=PKG_CONFIG_LIBDIR)
   ExternalProject_Add(dermis_shader_tool
     SOURCE_DIR ${PROJECT_SOURCE_DIR}
@@ -104,7 +104,7 @@ function(dermis_embed_shaders)
     set(arg_NAMESPACE dermis::kernels)
   endif()
 
-  # Of each module its name and source; macros_NAME, layoutFlags_NAME and unless_NAME of what it is compiled with.
+  # Stores the name and source of each module, and how it is compiled in macros_NAME, layoutFlags_NAME and unless_NAME.
   set(names)
   set(sources)
   set(recipes)
@@ -193,7 +193,8 @@ inline constexpr Recipe recipes[] = {
     endforeach()
     cmake_path(ABSOLUTE_PATH kernel BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} NORMALIZE)
     set(module ${folder}/${name}.spv)
-    # Only a module that spirv-val accepts gets its name: a failed build does not leave one behind.
+    # A module gets its name only after spirv-val has accepted it, so that a failed build does not
+    # leave an invalid one behind.
     set(unchecked ${folder}/${name}.unchecked.spv)
     add_custom_command(
       OUTPUT ${module}
@@ -236,5 +237,5 @@ function(dermis_link_shaders library shaders)
   target_sources(${library} PRIVATE $<TARGET_OBJECTS:${shaders}>)
   target_include_directories(${library} PRIVATE
     $<BUILD_INTERFACE:$<TARGET_PROPERTY:${shaders},INTERFACE_INCLUDE_DIRECTORIES>>)
-  add_dependencies(${library} ${shaders})  # The header has to be there before LIBRARY is compiled.
+  add_dependencies(${library} ${shaders})  # the header must exist before LIBRARY is compiled
 endfunction()

@@ -1,26 +1,26 @@
-# How a target of Dermis is compiled. What is set here stays inside: nothing reaches a target that links Dermis.
+# Compiler flags of Dermis' targets. They are private: nothing reaches a target that links Dermis.
 
-# GCC and Clang, MinGW among them.
+# GCC and Clang, including MinGW.
 set(dermisGnuFlags
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Wold-style-cast
   -Wimplicit-fallthrough -Wundef
-  # One rounding an operation, on every machine: the reference and the packing must not depend on fused operations.
+  # One rounding per operation, on every machine: the reference and the packing must not depend on fused operations.
   -ffp-contract=off
-  # NaN and infinities are looked for, and signs of zeros matter, whatever flags an engine compiles with. GCC keeps
-  # what was set by an option of its own when -fno-fast-math comes, so each is named.
+  # Dermis tests for NaN and infinities, and signs of zeros matter, whatever flags an engine compiles with. -fno-fast-math does not
+  # reset options of GCC that were set separately, so each is listed.
   -fno-fast-math -fno-finite-math-only -fsigned-zeros -fno-associative-math -fno-reciprocal-math -fno-unsafe-math-optimizations)
-# cl. Exceptions stay on: its standard library is not meant to be without.
+# cl. Exceptions stay on, because its standard library expects them.
 set(dermisMsvcFlags /W4 /permissive- /utf-8 /Zc:__cplusplus /Zc:preprocessor /fp:precise)
 # clang-cl ignores Clang's options without "/clang:", and has no /Zc:preprocessor.
 set(dermisClangClFlags /W4 /permissive- /utf-8 /Zc:__cplusplus /fp:precise /clang:-ffp-contract=off /clang:-fno-fast-math
   /clang:-fno-finite-math-only /clang:-fsigned-zeros /clang:-fno-associative-math /clang:-fno-reciprocal-math)
 
-# Their flags, as properties of a target: not linked, so that what is exported names only targets that are.
+# The flags as properties of a target. It is not linked, so that exported targets only name exported targets.
 add_library(dermis_build_flags INTERFACE)
 if(NOT MSVC)
   target_compile_options(dermis_build_flags INTERFACE ${dermisGnuFlags})
   if(NOT WIN32 AND NOT APPLE)
-    # Position-independent code may be inlined too: nobody replaces a function of Dermis while a program is loaded.
+    # Allows inlining in position-independent code: no program replaces functions of Dermis at load time.
     target_compile_options(dermis_build_flags INTERFACE -fno-semantic-interposition)
   endif()
 elseif(CMAKE_CXX_COMPILER_ID STREQUAL "MSVC")
@@ -31,11 +31,11 @@ endif()
 if(MSVC)
   target_compile_definitions(dermis_build_flags INTERFACE _CRT_SECURE_NO_WARNINGS)
 elseif(CMAKE_SIZEOF_VOID_P EQUAL 4)
-  # Compilers for 32-bit x86 calculate with the x87 unit, which rounds later.
+  # On 32-bit x86, compilers use the x87 unit, which rounds later.
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(i[3-6]86|x86|x86_64|AMD64)$")
     target_compile_options(dermis_build_flags INTERFACE -msse2 -mfpmath=sse)
   endif()
-  # Files of 2 GiB and more.
+  # Supports files of 2 GiB and more.
   target_compile_definitions(dermis_build_flags INTERFACE _FILE_OFFSET_BITS=64)
 endif()
 if(WIN32)
@@ -58,15 +58,15 @@ elseif(DERMIS_SANITIZE)
   message(FATAL_ERROR "DERMIS_SANITIZE is '${DERMIS_SANITIZE}': it may be address, thread or empty")
 endif()
 
-# dermis_use_privately(TARGET USED): compiles TARGET with what USED hands on, and lets nobody know: for libraries that are
-# headers only.
+# dermis_use_privately(TARGET USED): compiles TARGET with the interface properties of USED, but does not export this dependency. For
+# header-only libraries.
 function(dermis_use_privately target used)
   target_compile_options(${target} PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_COMPILE_OPTIONS>)
   target_compile_definitions(${target} PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_COMPILE_DEFINITIONS>)
   target_include_directories(${target} SYSTEM PRIVATE $<TARGET_PROPERTY:${used},INTERFACE_INCLUDE_DIRECTORIES>)
 endfunction()
 
-# dermis_configure_target(TARGET): the language level and the private flags of every target.
+# dermis_configure_target(TARGET): sets the language level and the private flags of a target.
 function(dermis_configure_target target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
@@ -75,8 +75,8 @@ function(dermis_configure_target target)
   target_link_options(${target} PRIVATE $<TARGET_PROPERTY:dermis_build_flags,INTERFACE_LINK_OPTIONS>)
 endfunction()
 
-# dermis_add_library(NAME SOURCES...): a library dermis_NAME with the alias dermis::NAME, public headers from
-# engine/include, installed with the package: static, or shared with BUILD_SHARED_LIBS.
+# dermis_add_library(NAME SOURCES...): adds the library dermis_NAME with the alias dermis::NAME and the public headers in
+# engine/include. It is installed with the package. Static, or shared with BUILD_SHARED_LIBS.
 function(dermis_add_library name)
   set(type STATIC)
   if(BUILD_SHARED_LIBS)
@@ -92,7 +92,7 @@ function(dermis_add_library name)
   string(TOUPPER ${name} upperName)
   if(BUILD_SHARED_LIBS)
     target_compile_definitions(dermis_${name} PUBLIC DERMIS_SHARED)
-    # While the version is 0.x, a minor version may change the interface. Libraries find each other where they lie.
+    # While the version is 0.x, a minor version may change the interface. Libraries find each other in their own folder.
     set(soversion ${PROJECT_VERSION_MAJOR})
     if(soversion EQUAL 0)
       set(soversion 0.${PROJECT_VERSION_MINOR})
@@ -103,12 +103,12 @@ function(dermis_add_library name)
       target_link_options(dermis_${name} PRIVATE -Wl,--no-undefined)
     endif()
   endif()
-  if(name MATCHES "^(core|runtime_compiler)$" OR DERMIS_BUILD_${upperName})  # and not only as a tool of the build
+  if(name MATCHES "^(core|runtime_compiler)$" OR DERMIS_BUILD_${upperName})  # not if it is only a tool of the build
     set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})
   endif()
 endfunction()
 
-# Code on the engine's side of the interface: no exception leaves it, so none is compiled in.
+# Code that runs in the engine. No exception may leave it, so exceptions are disabled.
 function(dermis_without_exceptions target)
   target_compile_options(${target} PRIVATE $<IF:$<BOOL:${MSVC}>,/GR-,-fno-exceptions;-fno-rtti>)
 endfunction()

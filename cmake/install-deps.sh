@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). Does nothing, and needs no
-# rights, where all of it is there. On another system it lists what is needed and ends with an error.
+# Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). If everything is installed, it does
+# nothing and needs no privileges. On another system it lists the packages and ends with an error.
 #
 #   cmake/install-deps.sh [nightly|windows|x86|arm64|libcxx]
 #

@@ -1,5 +1,5 @@
-# Makes the source package: what git tracks of Dermis but its tests, and the kernels compiled. Who builds from it needs neither
-# glslang nor SPIRV-Tools. `cmake --build BUILD --target source_package` runs it.
+# Makes the source package: the files of Dermis that git tracks, except the tests, and the compiled kernels. Building from it needs
+# neither glslang nor SPIRV-Tools. `cmake --build BUILD --target source_package` runs this script.
 #
 #   cmake -DSOURCE=folder -DKERNELS=folder -DVERSION=x.y.z -DOUTPUT=folder -P source_package.cmake
 #
@@ -7,7 +7,7 @@
 cmake_minimum_required(VERSION 3.25)
 
 find_program(git git REQUIRED)
-# What is there and not ignored, so that it can be made before a commit, too.
+# Includes untracked files that are not ignored, so that the package can be made before a commit.
 execute_process(COMMAND ${git} -C ${SOURCE} ls-files --cached --others --exclude-standard -- CMakeLists.txt CHANGELOG.md LICENSE README.md
                         SECURITY.md cmake docs engine samples shaders
                 OUTPUT_VARIABLE files OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
@@ -17,7 +17,7 @@ set(name dermis-${VERSION})
 set(staging ${OUTPUT}/source_package)
 file(REMOVE_RECURSE ${staging})
 foreach(file IN LISTS files)
-  if(EXISTS ${SOURCE}/${file})  # one that was removed and not committed is listed
+  if(EXISTS ${SOURCE}/${file})  # git also lists a file whose removal is not committed
     get_filename_component(folder ${file} DIRECTORY)
     file(COPY ${SOURCE}/${file} DESTINATION ${staging}/${name}/${folder})
   endif()

@@ -40,8 +40,8 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;
   skinned.position = position;
-  // The handedness is that of the dual quaternions: mirrors are in the scale parts. Where joints cancel, linear blending may
-  // differ.
+  // The handedness is that of the dual quaternions, whose scale parts contain mirrors. If joints cancel, that of linear blending
+  // may differ.
   if (withNormal) {
     precise vec3 normal = rest * straight.normal + share * skinned.normal;
     skinned.normal = unitOr(normal, skinned.normal);

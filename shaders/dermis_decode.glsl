@@ -26,7 +26,8 @@ vec3 dermisDecodePosition(vec3 stored, vec3 boxMin, vec3 boxMax) {
   return 0.5 * (boxMin + boxMax) + stored * (0.5 * (boxMax - boxMin));
 }
 
-// For attributes that a shader reads as words from a storage buffer, not through vertex input: to what the functions above take.
+// For shaders that read attributes as words from a storage buffer instead of vertex input. The results are arguments for the
+// functions above.
 vec4 dermisUnpackSnorm16(uvec2 words) { return vec4(unpackSnorm2x16(words.x), unpackSnorm2x16(words.y)); }
 vec2 dermisUnpackOctahedral16(uint word) { return unpackSnorm2x16(word); }
 vec4 dermisUnpackSnorm8(uint word) { return unpackSnorm4x8(word); }

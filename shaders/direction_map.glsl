@@ -5,8 +5,8 @@
 #include "exact.glsl"
 #include "vertex.glsl"
 
-// The rows of a blended 3×3 matrix, scaled so that no product of two of them leaves the range of a float, and the sign of its
-// determinant.
+// The rows of a blended 3×3 matrix, and the sign of its determinant. The matrix is scaled so that no product of two entries leaves
+// the range of a float.
 struct DirectionMap {
   vec3 r0;
   vec3 r1;

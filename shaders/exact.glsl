@@ -33,8 +33,8 @@ bool isFinite(vec4 v) {
   return all(notEqual(floatBitsToUint(v) & exponent, exponent));
 }
 
-// A power of two. Multiplied by it, a normal number is between a half and 4, and a subnormal number at least 2^-23, so that its
-// square neither overflows nor vanishes. The multiplication does not round, and takes less time than a division.
+// A power of two. It scales a normal number to between a half and 4, and a subnormal number to at least 2^-23, so that the square
+// neither overflows nor underflows to 0. The multiplication does not round, and takes less time than a division.
 float powerScale(float largest) {
   uint exponent = floatBitsToUint(largest) >> 23u;
   return uintBitsToFloat((253u - min(exponent, 252u)) << 23u);

@@ -1,9 +1,9 @@
-# Makes one GLSL file that an engine can include from one that includes others: puts what it includes in its place, once, and
-# `dermis_` before the name of every function, struct and constant that does not begin with it already.
+# Makes one GLSL file that an engine can include: replaces each #include by the included file, once, and puts `dermis_` before the
+# name of every function, struct and constant that does not begin with it already.
 #
 #   cmake -DINPUT=shaders/skin_include.glsl -DOUTPUT=dermis_skin.glsl -P make_include.cmake
 #
-# Names are found where the kernels' sources have them: at the beginning of a line.
+# Finds names by the layout of the kernels' sources: at the beginning of a line.
 
 cmake_minimum_required(VERSION 3.25)
 get_filename_component(folder ${INPUT} DIRECTORY)

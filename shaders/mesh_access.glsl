@@ -24,7 +24,7 @@ vec3 meshVector(uint word) {
   return vec3(uintBitsToFloat(meshWord(word)), uintBitsToFloat(meshWord(word + 1u)), uintBitsToFloat(meshWord(word + 2u)));
 }
 
-// Compilers remove what is not used.
+// Compilers remove unused loads.
 MeshHeader loadMeshHeader(uint mesh) {
   uvec4 a = meshUnit(mesh / 4u);
   uvec4 b = meshUnit(mesh / 4u + 1u);
@@ -133,10 +133,10 @@ uint influenceJoint(Influences influences, uint slot) {
 // Data of a vertex that only some methods use.
 struct MethodInputs {
   vec3 center;
-  float share;  // the share of dual quaternions, or the strength of bulge control
+  float share;  // weight of the dual quaternion result, or bulge control strength
 };
 
-// A value of each vertex from `section`, or `value` for all vertices if the mesh has no such section.
+// Reads a value per vertex from `section`, or returns `value` if the mesh has no such section.
 float meshShare(uint mesh, uint vertex, uint section, float value) {
   return section == 0u ? value : uintBitsToFloat(meshWord(mesh + section + vertex));
 }

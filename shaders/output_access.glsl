@@ -1,5 +1,5 @@
-// How skinned attributes are written. Each has a buffer of its own, which may be one and the same; with ONE_OUTPUT it is, for
-// devices that have no more storage buffers a stage.
+// Stores skinned attributes. Each attribute has its own binding; several bindings may refer to the same buffer. With ONE_OUTPUT,
+// all attributes use one binding, for devices that permit only few storage buffers per stage.
 #ifndef DERMIS_OUTPUT_ACCESS_GLSL
 #define DERMIS_OUTPUT_ACCESS_GLSL
 
@@ -8,7 +8,7 @@
 #if defined(PAIRS) || defined(WIDE)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
 
-// A position and the normal behind it, two words at a time: drivers that store lane by lane take half as long.
+// Stores a position and the normal after it, two words at a time. This takes half as long with drivers that store lane by lane.
 void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
   uint pair = place / 8u;
   positionsPairs[pair] = packUint2x32(position.xy);
@@ -39,8 +39,8 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #include "stream.glsl"
 
 #if defined(WIDE) || defined(STAGED)
-// All attributes of a vertex, which stand one behind the other. Sizes are whole words, or 6 bytes and 2. They are constants: all of
-// it is moves.
+// All attributes of a vertex, which are adjacent in memory. Sizes are whole words, or positions have 6 bytes and normals 2.
+// Sizes are constants, so that only moves remain after compilation.
 uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
   uint positions = formatBytes(POSITION_FORMAT);
@@ -59,10 +59,10 @@ uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 
-// `index` counts records: it is counted up from instance to instance, since lavapipe divides slowly.
+// `index` counts records. It is incremented from instance to instance, because lavapipe divides slowly.
 uint recordPlace(uint byte) { return byte / max(RECORD, 1u); }
 
-// By one store of RECORD bytes. Drivers that store lane by lane take less time for it.
+// Stores RECORD bytes at once. This takes less time with drivers that store lane by lane.
 void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = recordWords(position, normal, tangent);
   uvec4 low = uvec4(words[0], words[1], words[2], words[3]);
@@ -87,21 +87,22 @@ void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
 #elif defined(STAGED)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsUnits { uvec4 positionsUnits[]; };
 
-// A GPU stores memory by 32 or 64 bytes at a time: neighbors that store 4 bytes each of records of 24 would reach for all of them six
-// times. So the records of a workgroup are brought together first. There is room for them twice: those of the next instance may
-// come while these are being read, and one barrier for each is enough.
+// A GPU writes memory in units of 32 or 64 bytes. If each invocation stored the words of a 24-byte record one by one, neighbors
+// would write to the same units six times. Therefore the records of a workgroup are first gathered in shared memory. There is space
+// for two sets: the next instance may be written while this one is read, so one barrier per instance is enough.
 const uint RECORD_WORDS = RECORD / 4u;
 const uint STAGED_WORDS = gl_WorkGroupSize.x * RECORD_WORDS + 3u;
 shared uint staged[STAGED_WORDS * 2u];
-uint stagedRecords;     // of this workgroup: at the end of a mesh fewer than invocations
-uint firstStaged = 0u;  // where the half begins that is filled next
+uint stagedRecords;     // records of this workgroup: at the end of a mesh, fewer than its
+                        // invocations
+uint firstStaged = 0u;  // start of the half that is filled next
 
 uint recordPlace(uint byte) { return byte; }
 
 void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint own = gl_LocalInvocationID.x;
-  uint begin = place / 4u - own * RECORD_WORDS;  // the word at which the workgroup's records begin
-  uint first = begin % 4u;                       // counted from the 16 bytes that it lies in
+  uint begin = place / 4u - own * RECORD_WORDS;  // word at which the workgroup's records begin
+  uint first = begin % 4u;                       // relative to the 16-byte unit that contains it
   uint words[12] = recordWords(position, normal, tangent);
   if (RECORD == 16u && first == 0u) {
     if (own < stagedRecords) positionsUnits[place / 16u] = uvec4(words[0], words[1], words[2], words[3]);

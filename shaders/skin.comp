@@ -1,19 +1,19 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Skins vertices: a workgroup takes a run of vertices of one mesh, and each invocation skins its vertex for several instances of
-// that mesh, so that a vertex is read once. Macros say what of it a module has (CMakeLists.txt lists the modules); one module for
-// all would take drivers several times as long for each pipeline:
+// Skins vertices. A workgroup processes consecutive vertices of one mesh. Each invocation skins its vertex for several instances of
+// that mesh, so that a vertex is read once. Macros select the features of a module (CMakeLists.txt lists the modules). With all
+// features in one module, drivers would take several times as long to create each pipeline. The macros:
 //   HALVES, BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
-//   EXTRAS          previous positions and results; kept out of other modules, since layers and drivers take what a module names
-//                   for used, whatever its constants say
-//   BULGE           the methods against the bulge (blended, centre of rotation, bulge-controlled), instead of linear and dual
+//   EXTRAS          previous positions and results; separate modules, since layers and drivers treat everything that a module
+//                   declares as used, whatever its specialization constants are
+//   BULGE           the methods that reduce the bulge (blended, center of rotation, bulge-controlled), instead of linear and dual
 //                   quaternions
-//   COMPARISON      the methods that are there for comparison
+//   COMPARISON      the methods that are only for comparison
 //   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
 //   PAIRS           positions and normals, float32x3 each, are stored together, 8 bytes at a time (needs 64-bit integers)
-//   WIDE            an attribute, or all of a vertex, by one store (needs scalar block layout and 64-bit integers)
-//   STAGED          all of a vertex by way of workgroup memory, from which neighbours store 16 bytes each, one behind the other
+//   WIDE            one store writes an attribute, or a whole vertex (needs scalar block layout and 64-bit integers)
+//   STAGED          whole vertices are gathered in shared memory, from which consecutive invocations store 16 bytes each
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #ifdef BYTES
@@ -94,7 +94,7 @@ void countClamped(uint result) {}
 
 layout(push_constant) uniform Push { SkinPush push; };
 
-// The group that a workgroup belongs to: the first whose end lies behind it.
+// Finds the group of a workgroup: the first whose end is after it.
 uint findGroup(uint number) {
   uint low = 0u;
   uint high = push.groupCount - 1u;
@@ -109,7 +109,7 @@ uint findGroup(uint number) {
   return low;
 }
 
-// `first` says where the influences begin.
+// `first` receives the place of the influences.
 Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
   PositionRecord position = loadPosition(sections.positions + vertex);
@@ -132,11 +132,11 @@ BoxScale boxOf(InstanceRecord instance) {
   return BoxScale(vec3(r.centerX, r.centerY, r.centerZ), vec3(r.inverseX, r.inverseY, r.inverseZ));
 }
 
-// An instance, and the bytes at which this invocation's vertex goes: positions, normals, tangents, previous positions.
+// An instance, and the byte offsets of this invocation's vertex: positions, normals, tangents, previous positions.
 struct Instance {
   InstanceRecord record;
   uvec4 places;
-  uint recordPlace;  // of storeRecord
+  uint recordPlace;  // for storeRecord
   BoxScale box;
 };
 
@@ -148,7 +148,8 @@ Instance readInstance(uint word, uvec4 offsets) {
   return Instance(record, places, recordPlace(places.x), boxOf(record));
 }
 
-// From one instance to the next where they are evenly spaced: such instances have the same box.
+// The difference between consecutive instances that are evenly spaced. Such instances have the same
+// box.
 Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   InstanceRecord step = a;
   step.palette = b.palette - a.palette;
@@ -168,13 +169,13 @@ void advance(inout Instance instance, Instance by) {
   instance.recordPlace += by.recordPlace;
 }
 
-// A position as it is stored.
+// Encodes a position in its format.
 uvec4 encodePosition(vec3 position, Instance instance, bool mayCount) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
     precise vec3 relative = (position - instance.box.center) * instance.box.inverse;
     v.xyz = relative;
-    // A vertex of the engine's own box may be outside by a rounding error.
+    // A vertex on a face of the engine's box may be outside by a rounding error.
     if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) {
       countClamped(loadExtension(instance.record.extension).result);
     }
@@ -182,7 +183,7 @@ uvec4 encodePosition(vec3 position, Instance instance, bool mayCount) {
   return encodeComponents(POSITION_FORMAT, v);
 }
 
-// What an invocation has read of its vertex, for all its instances.
+// What an invocation reads once for all its instances.
 struct Work {
   uint mesh;
   uint vertex;
@@ -227,7 +228,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
   if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
   uvec4 position = encodePosition(skinned.position, instance, true);
 #ifdef HAS_MOTION
-  // Those that were kept stand where the new ones will.
+  // The kept positions must be read before the new ones overwrite them.
   if (MOTION == MOTION_KEPT) {
     uvec4 words = previousPosition(instance, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
@@ -247,7 +248,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
     if (TANGENTS) storeTangents(instance.places.z, tangent, formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
   }
 #ifdef HAS_MOTION
-  // At last: little of the vertex is needed any more.
+  // Last, when most of the vertex' data is no longer needed.
   if (MOTION == MOTION_RESKINNED) {
     uvec4 words = previousPosition(instance, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
@@ -266,8 +267,8 @@ const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u && MOTIO
 const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u;
 #endif
 
-// Skins some of an invocation's instances, a bit each, in order. Records are read once for a run of instances that follow each
-// other and are evenly spaced: it is as long as the bits are, or one instance.
+// Skins some of an invocation's instances, one per bit, in order. Records are read once for a run of evenly spaced consecutive
+// instances. A run has as many instances as there are consecutive bits, or one if instances are not evenly spaced.
 void skinInstances(uint left, uint records, uvec4 offsets, bool even, Instance by, Work work, bool scales) {
   // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
   // lanes off, which doubles the work of an invocation with one instance.
@@ -297,17 +298,18 @@ void main() {
 #else
   const uint vertices = 1u;
 #endif
-  // Workgroups go over the vertices for some instances, then over the vertices again for the next: their palettes stay near.
+  // Workgroups process all vertices for some instances, then all vertices for the next instances, so that palettes stay in the
+  // cache.
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x * vertices + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED
-  // All invocations reach each barrier. Those without a vertex skin the last vertex again; what they stage is never stored.
+  // All invocations reach each barrier. Those without a vertex skin the last vertex again; their staged records are never stored.
   stagedRecords = min(group.vertexEnd - (vertex - gl_LocalInvocationID.x), gl_WorkGroupSize.x);
   vertex = min(vertex, group.vertexEnd - 1u);
 #else
   if (vertex >= group.vertexEnd) return;
 #endif
-  // Shares of equal size but for the last: of workgroups that take as long as each other, no thread gets the short ones.
+  // All shares except the last have the same size, so that workgroups take equally long and the load of threads is balanced.
   uint share = INSTANCES;
   if (INSTANCES > 1u) {
     uint maxShare = push.instancesPerInvocation;
@@ -318,10 +320,10 @@ void main() {
   if (firstInstance >= group.instanceCount) return;
   uint count = min(share, group.instanceCount - firstInstance);
 
-  // Outside the loops, because lavapipe reads a push constant each time it is named.
+  // Outside the loops, because lavapipe reads a push constant at every use.
   uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
   uvec4 strides = uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
-  uint left = 0xffffffffu >> (32u - count);  // a bit an instance
+  uint left = 0xffffffffu >> (32u - count);  // one bit per instance
   bool even = group.evenlySpaced != 0u;
   Instance by = stepBetween(loadInstance(records), loadInstance(records + min(1u, count - 1u) * INSTANCE_WORDS));
   uint scaling = 0u;

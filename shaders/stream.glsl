@@ -1,5 +1,5 @@
-// One output attribute: the buffer it goes to, as words and, where the kernel may store less or more at a time, as halves, bytes
-// and vectors. Included once for each attribute, with STREAM_BINDING and the names to declare defined.
+// One output attribute: declares its buffer as words and, if the kernel may store smaller or larger units, as halves, bytes and
+// vectors. Included once for each attribute, with STREAM_BINDING and the names to declare defined.
 
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_WORDS_BLOCK { uint STREAM_WORDS[]; };
 #ifdef HALVES
@@ -15,7 +15,7 @@ layout(set = 0, binding = STREAM_BINDING, scalar) buffer STREAM_VECTORS_3_BLOCK 
 layout(set = 0, binding = STREAM_BINDING, scalar) buffer STREAM_VECTORS_4_BLOCK { uvec4 STREAM_VECTORS_4[]; };
 #endif
 
-// Stores the first `size` bytes of `words`, `unit` bytes at a time; nothing else is touched. `place` counts bytes.
+// Stores the first `size` bytes of `words`, `unit` bytes at a time, and changes no other bytes. `place` is a byte offset.
 void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
 #ifdef BYTES
   if (unit == 1u) {
@@ -46,7 +46,7 @@ void STREAM_STORE(uint place, uvec4 words, uint size, uint unit) {
 }
 
 #ifdef STREAM_LOAD
-// What stands there.
+// Loads what is stored at `place`.
 uvec4 STREAM_LOAD(uint place, uint size, uint unit) {
   uvec4 words = uvec4(0u);
 #ifdef BYTES

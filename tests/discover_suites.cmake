@@ -1,14 +1,15 @@
-# Read by ctest, with `program`, `cost`, `sanitized` and `nightly` set: one test for each suite of a GoogleTest program.
+# ctest includes this file, with `program`, `cost`, `sanitized` and `nightly` set. Adds one test for each suite of a GoogleTest
+# program.
 #
-# A process opens a device and compiles kernels, which takes longer than most tests of them. A suite with a skipped test ends
-# with 77, unless another test failed; tests/run.sh lists which were skipped.
+# A process opens a device and compiles kernels, which takes longer than most of its tests. A suite with a skipped test exits with
+# 77, unless another test failed; tests/run.sh lists the skipped tests.
 execute_process(COMMAND ${program} --gtest_list_tests OUTPUT_VARIABLE suites RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
   cmake_path(GET program FILENAME name)
   add_test(${name}_NOT_BUILT ${program})
   return()
 endif()
-# Suites stand at the beginning of a line, their tests are indented.
+# Suites begin at the start of a line; their tests are indented.
 string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${suites}")
 foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)

@@ -1,17 +1,17 @@
 #!/bin/sh
-# Builds Dermis with every warning an error and runs its tests; installs what is missing first.
+# Builds Dermis with all warnings as errors and runs its tests. Installs missing packages first.
 #
 #   tests/run.sh [PRESET]          ci (the default), dev, release, asan or tsan: builds all, runs all tests
 #   tests/run.sh sanitized         Dermis and the samples with address and undefined-behaviour sanitizers: tests of what works on the
 #                                  CPU, and a small suite on a device
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
-# Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, else in ../shared, and
-# skip where they are absent. With CI set in the environment, a missing Vulkan device or validation layer is a failure, and so
-# is data that is not there where $DERMIS_TEST_DATA names it, or not whole where ../shared is there.
+# Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, or else in ../shared, and are
+# skipped if they are absent. If CI is set in the environment, a missing Vulkan device or validation layer is a failure. So is
+# missing data in the folder that $DERMIS_TEST_DATA names, and incomplete data in an existing ../shared.
 #
-# Prints what failed or was skipped, and how long each step took; all the rest is in build/PRESET/tests.log. A test that failed
-# is run three times more, alone, to tell whether it always fails; the run has failed either way.
+# Prints which tests failed or were skipped, and how long each step took. Everything else is in build/PRESET/tests.log. Failed tests
+# are run three more times, alone, to tell whether they always fail; the run has failed in either case.
 set -eu
 cd "$(dirname "$0")/.."
 run=${1:-ci}
@@ -47,7 +47,7 @@ step install ./cmake/install-deps.sh
 step configure cmake --preset "$preset" $options
 step build cmake --build "build/$preset" --target "$build_target"
 
-# LLVM, inside lavapipe, keeps memory until the process ends.
+# LLVM, which lavapipe uses, keeps memory until the process ends.
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}"
 log=build/$preset/tests.log
 echo "Running the tests; the log is $log ..."
@@ -58,11 +58,11 @@ run_tests() {
 }
 step tests run_tests || failed=$?
 grep -v -E '^ +Start +[0-9]+: | Passed +[0-9.]+ sec$' "$log"
-# ctest names the suite only.
+# ctest names only the suite.
 awk '/: Skipped$/ { getline reason } /^\[  SKIPPED \] .* ms\)$/ { print "Skipped: " $4 ": " reason }' \
   "build/$preset/Testing/Temporary/LastTest.log" | sort -u
 [ "$failed" -eq 0 ] && exit 0
-[ -s "build/$preset/Testing/Temporary/LastTestsFailed.log" ] || exit "$failed" # no test, but ctest itself
+[ -s "build/$preset/Testing/Temporary/LastTestsFailed.log" ] || exit "$failed" # ctest itself failed, and no test
 
 echo
 echo "Running what failed again, three times, one after the other ..."

@@ -67,7 +67,7 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
   mesh.positions = view(&first.position, ComponentType::float32, 3);
   mesh.normals = view(&first.normal, ComponentType::float32, 3);
-  // What a method that reads centers costs does not depend on where they are.
+  // The positions of the centers do not affect the time of methods that read them.
   mesh.centersOfRotation = mesh.positions;
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);
@@ -128,7 +128,7 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
 
   const std::uint32_t clip = model->clips.empty() ? gltf::none : 0;
   const double duration = clip == gltf::none ? 0 : model->clips[clip].duration;
-  // Multiples of the golden ratio spread evenly: no two instances are in step.
+  // Multiples of the golden ratio are evenly distributed: no two instances are in step.
   const double step = (std::sqrt(5.0) - 1) / 2;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {
     const double phase = std::fmod(instance * step, 1.0);
@@ -152,7 +152,7 @@ Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount)
     for (float& w : vertex.weights) sum += w = weight(random);
     std::ranges::sort(vertex.weights, std::greater<>());
     for (std::size_t k = 0; k < 4; ++k) {
-      // Around at the ends: four different joints.
+      // Wraps around at the ends, so that the four joints differ.
       vertex.joints[k] = static_cast<std::uint16_t>((middle + steps[k] + jointCount) % jointCount);
       vertex.weights[k] /= sum;
     }

@@ -1,4 +1,4 @@
-// A crowd of one model: what both Dermis and the plain kernel are given to skin.
+// A crowd of one model: the input of both Dermis and the plain kernels.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace dermis::samples {
 
-/// A vertex as the plain kernel reads it, with four influences whether it needs them or not.
+/// A vertex as the plain kernel reads it, always with four influences.
 struct PlainVertex {
   std::array<float, 3> position;
   std::array<float, 3> normal;
@@ -26,24 +26,26 @@ static_assert(sizeof(PlainVertex) == 48);
 struct Crowd {
   std::string name;
   std::vector<PlainVertex> vertices;
-  std::optional<PackedMesh> mesh;               ///< of the same vertices
-  std::vector<std::vector<JointMatrix>> poses;  ///< one an instance
+  std::optional<PackedMesh> mesh;               ///< the same vertices
+  std::vector<std::vector<JointMatrix>> poses;  ///< one per instance
 
   std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(vertices.size()); }
   std::uint32_t jointCount() const { return static_cast<std::uint32_t>(poses.front().size()); }
   std::uint32_t instanceCount() const { return static_cast<std::uint32_t>(poses.size()); }
-  /// Whether no joint scales or shears, by a thousandth. The plain kernels know of neither.
+  /// Whether no joint scales or shears by more than a thousandth. The plain kernels support
+  /// neither.
   bool isRigid() const;
-  /// The first instances. Scale is ignored, as the plain kernels do.
+  /// Requests for the first `count` instances. Scale is ignored, as in the plain kernels.
   std::vector<SkinRequest> requests(Method method, std::uint32_t count) const;
 };
 
-/// All primitives of a file that the first one's skin moves, as one mesh, so many times, each
-/// instance at another time of the file's first clip. Fails if the file has no skinned
-/// primitive, or one without normals or four influences a vertex.
+/// Joins all primitives of a file that the first one's skin moves to one mesh. Makes
+/// `instanceCount` instances, each at a different time of the file's first clip. Fails if the file
+/// has no skinned primitive, or one without normals or with other than four influences per vertex.
 Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
 
-/// A long figure of 60 joints, four influences everywhere: the joints of a vertex are neighbors.
+/// A long figure of 60 joints with four influences per vertex. The joints of a vertex are
+/// neighbors.
 Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount);
 
 }  // namespace dermis::samples

@@ -13,10 +13,10 @@ namespace {
 
 constexpr std::uint32_t workgroupSize = 64;  // of all kernels
 constexpr std::uint64_t outputStride = 24;
-constexpr std::uint64_t copiedTogether = 24;  // instances, by an invocation of plain_copy.comp
+constexpr std::uint64_t copiedTogether = 24;  // instances per invocation of plain_copy.comp
 constexpr std::uint32_t bindingCount = 3;
-/// Whole instances to a dispatch, so many at a time: with 24 bytes a vertex their output begins at
-/// a multiple of 256 bytes, the largest alignment that a device may ask for.
+/// A dispatch skins whole instances, in multiples of this. With 24 bytes per vertex, their output
+/// then begins at a multiple of 256 bytes, the largest alignment that a device may require.
 constexpr std::uint64_t instanceStep = 32;
 
 Result<void> check(VkResult result, const char* function) {
@@ -29,7 +29,7 @@ std::uint32_t groupsOf(std::uint64_t invocations) {
   return static_cast<std::uint32_t>((invocations + workgroupSize - 1) / workgroupSize);
 }
 
-/// Instances of a dispatch.
+/// The number of instances per dispatch.
 std::uint64_t instancesTogether(std::uint64_t maxRange, std::uint64_t instanceSize) {
   const std::uint64_t most = maxRange / instanceSize;
   return std::max(most - most % instanceStep, instanceStep);
@@ -156,7 +156,7 @@ Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
                 "vkCreatePipelineLayout");
       !good)
     return good;
-  // Those of the three kernels, and the palettes'.
+  // The sets of the three kernels, and that of the palettes.
   const std::uint32_t sets = dispatches * std::uint32_t{plainKernelCount} + 1;
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets * bindingCount};
   VkDescriptorPoolCreateInfo poolInfo{};

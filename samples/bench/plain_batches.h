@@ -1,5 +1,5 @@
-// The baselines: a crowd skinned by plain kernels, plain_palette.comp with plain_skin.comp, or
-// plain_linear.comp; and only copied, by plain_copy.comp.
+// The baselines: a crowd skinned by plain kernels (plain_palette.comp with plain_skin.comp, or
+// plain_linear.comp), or only copied (plain_copy.comp).
 #pragma once
 
 #include <array>
@@ -20,26 +20,26 @@ namespace dermis::samples {
 enum class PlainKernel : std::uint8_t { dualQuaternion, linear, copy };
 inline constexpr std::size_t plainKernelCount = 3;
 
-/// A crowd on a device, skinned by each of the kernels into the same memory. As many dispatches as
-/// the output needs storage buffer ranges, each of whole instances.
+/// A crowd on a device. Each kernel skins it into the same memory. The number of dispatches is that
+/// of the storage buffer ranges that the output needs; each has whole instances.
 class PlainBatches {
  public:
-  /// Skins it once by each kernel: the first time drivers compile, and memory is touched. `open`
-  /// must outlive this object. Fails with `vulkanError`.
+  /// Skins the crowd once with each kernel, so that drivers have compiled and memory has been
+  /// touched. `open` must outlive this object. Fails with `vulkanError`.
   static Result<std::unique_ptr<PlainBatches>> create(OpenDevice& open, const Crowd& crowd);
   ~PlainBatches();
   PlainBatches(const PlainBatches&) = delete;
   PlainBatches& operator=(const PlainBatches&) = delete;
 
-  /// Skins the crowd, conversion of its poses included, and returns the seconds that it took: on
-  /// the device where it has timestamps, from submission to the end of waiting otherwise.
+  /// Skins the crowd, including the conversion of its poses, and returns the seconds that it took:
+  /// on the device if it has timestamps, otherwise from submission to the end of waiting.
   Result<double> skin(PlainKernel kernel);
 
   /// Position and normal of every vertex of every instance, interleaved.
   Result<std::vector<std::byte>> output() const { return output_.read(); }
 
  private:
-  /// The entry points that the baselines need besides those of `Device`.
+  /// The entry points that the baselines need in addition to those of `Device`.
   struct Functions {
     PFN_vkCreateShaderModule createShaderModule = nullptr;
     PFN_vkDestroyShaderModule destroyShaderModule = nullptr;

@@ -1,7 +1,7 @@
 #version 450
 
-// What no skinning can be faster than: the positions and normals of the mesh, copied for each instance. One invocation a vertex,
-// for up to 24 instances, as Dermis' kernels have it on lavapipe.
+// An upper bound of the speed of skinning: copies the positions and normals of the mesh for each instance. One invocation per
+// vertex, for up to 24 instances, as in Dermis' kernels on lavapipe.
 
 layout(local_size_x = 64) in;
 

@@ -1,7 +1,7 @@
 #version 450
 
-// The linear twin of plain_skin.comp: linear blend skinning of positions and normals as engines ship it, from the joint matrices
-// as they are. Normals go by the blended matrix, as if no joint scaled differently along its axes.
+// The linear counterpart of plain_skin.comp: linear blend skinning of positions and normals as in many engines, with unmodified
+// joint matrices. Normals are transformed by the blended matrix, which assumes uniform scale.
 
 layout(local_size_x = 64) in;
 
@@ -11,7 +11,7 @@ layout(push_constant) uniform Push {
   uint firstInstance;  // of this dispatch, in the matrices; its output begins the range
 };
 
-// 48 bytes a vertex: position, normal, four 16-bit joints, four weights.
+// 48 bytes per vertex: position, normal, four 16-bit joints, four weights.
 layout(set = 0, binding = 0, std430) restrict readonly buffer Vertices { uvec4 vertices[]; };
 layout(set = 0, binding = 1, std430) restrict readonly buffer Matrices { vec4 matrices[]; };  // 3×4 by rows
 layout(set = 0, binding = 2, std430) restrict writeonly buffer Skinned { float skinned[]; };

@@ -1,6 +1,7 @@
 #version 450
 
-// The baseline's palettes: rigid joint matrices (3×4 by rows) to unit dual quaternions, one invocation a joint of an instance.
+// The baseline's palettes: converts rigid joint matrices (3×4, row-major) to unit dual quaternions, one invocation per joint of an
+// instance.
 
 layout(local_size_x = 64) in;
 
@@ -9,7 +10,7 @@ layout(push_constant) uniform Push { uint jointTotal; };
 layout(set = 0, binding = 0, std430) restrict readonly buffer Matrices { vec4 matrices[]; };
 layout(set = 0, binding = 1, std430) restrict writeonly buffer Palettes { vec4 palettes[]; };
 
-// By the largest component, as Shepperd (1978) has it.
+// From the largest component (Shepperd 1978).
 vec4 quaternionOf(vec3 r0, vec3 r1, vec3 r2) {
   float trace = r0.x + r1.y + r2.z;
   vec4 q;

@@ -1,7 +1,7 @@
 #version 450
 
-// The baseline: dual-quaternion skinning of positions and normals as engines ship it. One invocation a vertex and instance, a
-// vertex of fixed size with four influences, storage buffers, nothing reused from one instance to the next.
+// The baseline: dual-quaternion skinning of positions and normals as in many engines. One invocation per vertex and instance,
+// vertices of fixed size with four influences, storage buffers, nothing reused between instances.
 
 layout(local_size_x = 64) in;
 
@@ -11,7 +11,7 @@ layout(push_constant) uniform Push {
   uint firstInstance;  // of this dispatch, in the palettes; its output begins the range
 };
 
-// 48 bytes a vertex: position, normal, four 16-bit joints, four weights.
+// 48 bytes per vertex: position, normal, four 16-bit joints, four weights.
 layout(set = 0, binding = 0, std430) restrict readonly buffer Vertices { uvec4 vertices[]; };
 layout(set = 0, binding = 1, std430) restrict readonly buffer Palettes { vec4 palettes[]; };
 layout(set = 0, binding = 2, std430) restrict writeonly buffer Skinned { float skinned[]; };

@@ -9,7 +9,7 @@
 namespace dermis::samples {
 namespace {
 
-/// Seconds. The device is there already, as an engine's is.
+/// Returns seconds. The device exists already, as in an engine.
 Result<double> skinFirstFrame(Device& device, VkCommandBuffer commandBuffer, const Crowd& crowd,
                               bool mayScale) {
   const auto start = std::chrono::steady_clock::now();

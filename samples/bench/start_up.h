@@ -1,4 +1,4 @@
-// How long a scene takes from nothing to its first skinned frame.
+// Measures how long a new scene takes to its first skinned frame.
 #pragma once
 
 #include "crowd.h"
@@ -6,9 +6,9 @@
 
 namespace dermis::samples {
 
-/// From `Context::create` to the end of the first frame, for one instance that is skinned by dual
-/// quaternions. Most of it is the driver's compiler, unless the driver finds the pipelines in a
-/// cache of its own.
+/// Time from `Context::create` to the end of the first frame, for one instance skinned by dual
+/// quaternions. Most of it is spent in the driver's compiler, unless the driver finds the pipelines
+/// in its own cache.
 struct StartUp {
   double seconds = 0;
   double secondsWithoutScale = 0;  ///< if the pose may not scale

@@ -18,12 +18,12 @@ namespace {
 
 using Section = ThroughputSection;
 
-/// Comparison methods are slow: one round of them is of fewer instances.
+/// Comparison methods are slow: one round of them has fewer instances, by this factor.
 constexpr std::uint32_t comparisonShare = 10;
-/// Instances of one job of the CPU.
+/// Instances per job of the CPU.
 constexpr std::uint32_t instancesOfJob = 16;
 
-// -- What Dermis skins on a device.
+// -- Skinning on a device.
 
 struct Case {
   std::string name;
@@ -31,7 +31,7 @@ struct Case {
   Method method = Method::dualQuaternion;
   OutputLayout layout = {};
   std::uint32_t instances = 0;
-  std::size_t place = 0;  ///< among the cases
+  std::size_t place = 0;  ///< index among the cases
 };
 
 OutputLayout layoutOf(VertexFormat positions, VertexFormat normals) {
@@ -85,7 +85,7 @@ std::vector<Case> gpuCases(std::uint32_t instances) {
   return cases;
 }
 
-/// Of all that the plain kernels skin.
+/// The box around the output of the plain kernels.
 Box boxOf(std::span<const std::byte> output) {
   constexpr std::size_t stride = 24;
   Box box{{HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
@@ -97,7 +97,7 @@ Box boxOf(std::span<const std::byte> output) {
       box.max[axis] = std::max(box.max[axis], position[axis]);
     }
   }
-  // A side of no length is none.
+  // Every side must have a length above 0.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] -= 1e-3f;
     box.max[axis] += 1e-3f;
@@ -105,10 +105,11 @@ Box boxOf(std::span<const std::byte> output) {
   return box;
 }
 
-// -- What the plain kernels skin is what Dermis does.
+// -- Checks that the plain kernels skin the same as Dermis.
 
-/// How far the floats of two outputs are apart, at most; NaN counts as infinitely far. The plain
-/// linear kernel's normals go by the blended matrix, which is not what they should.
+/// The greatest difference between the floats of two outputs; NaN counts as infinite. With
+/// `ofPositions`, ignores normals: the plain linear kernel transforms them by the blended matrix,
+/// which is not correct in general.
 double greatestDifference(std::span<const std::byte> plain, std::span<const std::byte> dermis,
                           bool ofPositions) {
   constexpr std::size_t stride = 24, positionSize = 12;
@@ -144,7 +145,7 @@ Result<void> compare(std::span<const std::byte> plain, std::span<const std::byte
 
 // -- On the CPU.
 
-/// Output begins where engines let buffers begin.
+/// Alignment of output buffers as in engines.
 struct alignas(64) CacheLine {
   std::byte bytes[64];
 };
@@ -160,7 +161,7 @@ class CpuCrowd {
     return CpuCrowd(crowd, std::move(*mesh), *places);
   }
 
-  /// Each thread skins as many instances as the others. Returns seconds.
+  /// Each thread skins the same number of instances. Returns seconds.
   Result<double> skin(Method method, std::uint32_t threads) {
     const std::uint32_t count = crowd_->instanceCount();
     std::vector<Result<void>> done(threads);
@@ -220,7 +221,7 @@ class CpuCrowd {
   std::vector<CacheLine> output_;
 };
 
-/// Powers of two, and as many as the processor runs.
+/// Powers of two, and the number of hardware threads.
 std::vector<std::uint32_t> threadCounts() {
   const std::uint32_t most = std::max(std::thread::hardware_concurrency(), 1u);
   std::vector<std::uint32_t> counts;
@@ -231,7 +232,7 @@ std::vector<std::uint32_t> threadCounts() {
 
 constexpr std::array cpuMethods{Method::dualQuaternion, Method::linear};
 
-// -- All of them.
+// -- All rows.
 
 class Rows : public Throughput {
  public:
@@ -303,7 +304,7 @@ class Rows : public Throughput {
     const Result<std::vector<std::byte>> plainOutput = plain_->output();
     if (!plainOutput) return plainOutput.error();
     const Box box = boxOf(*plainOutput);
-    // The first one decides how large the output is.
+    // The first one determines the size of the output.
     std::ranges::stable_sort(cases, std::greater<>(), [](const Case& one) {
       return std::pair(one.layout.motion != Motion::none, one.instances);
     });
@@ -312,7 +313,7 @@ class Rows : public Throughput {
       for (SkinRequest& request : requests) request.box = box;
       Result<void> added = batches_->add(requests, one.layout, open.context.tuning());
       step();
-      // A device that cannot store bytes, or a build without some methods.
+      // The device cannot store bytes, or this build lacks some methods.
       if (!added && added.error().code == ErrorCode::missingFeature) continue;
       if (!added) return added;
       const std::size_t number = batchCount_++;

@@ -1,5 +1,5 @@
-// How many vertices a second a crowd is skinned at: by Dermis on a device and on the CPU, by plain
-// kernels, and by one that only copies.
+// How many vertices per second are skinned in a crowd: by Dermis on a device and on the CPU, by
+// plain kernels, and by a kernel that only copies.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace dermis::samples {
 
-/// What a row belongs to, in the order of the rows.
+/// The group of a row, in the order of the rows.
 enum class ThroughputSection : std::uint8_t { baselines, methods, formats, instances, cpu };
 inline constexpr std::size_t throughputSectionCount = 5;
 
@@ -22,17 +22,17 @@ struct ThroughputRow {
   std::string name;  ///< gpu/METHOD/FORMATS, gpu/plain/METHOD, gpu/copy, cpu/METHOD/THREADS
   ThroughputSection section = ThroughputSection::methods;
   std::uint32_t instances = 0;
-  double bestSeconds = 0;  ///< of all rounds
+  double bestSeconds = 0;  ///< best of all rounds
   double millionVerticesPerSecond = 0;
 };
 
-/// Rows that take turns.
+/// The rows, measured in turns.
 class Throughput {
  public:
-  /// Prepares all rows, and skins each once. Without a device, those of the CPU only. `open` and
-  /// `crowd` must outlive this object. `step` is called once a row. Fails if a device fails, and
-  /// with `invalidData` if plain kernels and Dermis skin differently: a baseline that does not
-  /// do the same work is none.
+  /// Prepares all rows, and skins each once. Without a device, only the rows of the CPU. `open` and
+  /// `crowd` must outlive this object. `step` is called once per row. Fails if a device fails, and
+  /// with `invalidData` if the plain kernels and Dermis skin differently: a baseline must do the
+  /// same work.
   static Result<std::unique_ptr<Throughput>> create(OpenDevice* open, const Crowd& crowd,
                                                     const std::function<void()>& step);
   virtual ~Throughput() = default;
@@ -41,7 +41,7 @@ class Throughput {
   virtual Result<void> runRound() = 0;
 
   const std::vector<ThroughputRow>& rows() const { return rows_; }
-  /// How many `create` will make.
+  /// The number of rows that `create` makes.
   static std::size_t rowCount(const OpenDevice* open, const Crowd& crowd);
 
  protected:

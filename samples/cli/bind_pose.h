@@ -10,9 +10,9 @@ namespace dermis::cli {
 
 /// One part in one pose.
 struct SkinnedPart {
-  std::vector<float> positions;  ///< 3 a vertex
-  std::vector<float> normals;    ///< 3 a vertex, or empty
-  std::vector<float> tangents;   ///< 4 a vertex, or empty
+  std::vector<float> positions;  ///< 3 per vertex
+  std::vector<float> normals;    ///< 3 per vertex, or empty
+  std::vector<float> tangents;   ///< 4 per vertex, or empty
 };
 
 /// A part without influences: morphed, but not skinned. Normals and tangents are not normalized.

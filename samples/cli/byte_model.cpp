@@ -15,7 +15,7 @@
 namespace dermis::cli {
 namespace {
 
-constexpr double sector = 32;  // bytes that a cache moves together
+constexpr double sector = 32;  // bytes that a cache transfers together
 constexpr std::uint32_t influences = 4, instancesEach = 4;
 
 // SPIR-V 1.3, section 3.32.
@@ -55,9 +55,9 @@ struct Operations {
   double all = 0, fused = 0;
 };
 
-/// Of a kernel with everything in `main`. Outside its loops over instances, two within each other,
-/// stands what an invocation does once; in loops within those, what it does for each influence but
-/// the first.
+/// Counts the operations of a kernel with all functions inlined into `main`. It has two nested
+/// loops over instances. Code outside them runs once per invocation; loops inside them run for each
+/// influence except the first.
 Operations countOperations(std::span<const std::uint32_t> words) {
   const std::vector<Instruction> instructions = instructionsOf(words);
   std::unordered_map<std::uint32_t, double> floats;  // of types
@@ -70,7 +70,7 @@ Operations countOperations(std::span<const std::uint32_t> words) {
     if (isProduct(opcode)) products.insert(operands[1]);
     for (std::size_t operand = 2; operand < operands.size(); ++operand) ++uses[operands[operand]];
     if (opcode != opFAdd && opcode != opFSub) continue;
-    // One product of a sum can be part of it.
+    // A fused operation contains a sum and one of its products.
     for (const std::uint32_t term : {operands[2], operands[3]}) {
       if (!products.contains(term)) continue;
       summed.insert(term);
@@ -105,8 +105,8 @@ struct Layout {
   VertexFormat positions, normals;
 };
 
-/// Bytes of sectors that a subgroup's stores touch, for each of its vertices: if each store writes
-/// some bytes of every record, all sectors of all records.
+/// Bytes of the sectors that a subgroup's stores touch, per vertex. If each store writes some bytes
+/// of every record, it touches all sectors of all records.
 double storedBytes(const Variant& variant, double stride) {
   if (variant.staged) return stride;
   double stores = 0;
@@ -137,7 +137,7 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   model.name = fmt::format("{}, {}, {}", methodName(method), layout.name, way);
   model.written = formatSize(layout.positions) + formatSize(layout.normals);
   model.stored = storedBytes(variant, model.written);
-  // Positions and normals 16 bytes each, an influence 8.
+  // Positions and normals have 16 bytes each, an influence has 8.
   model.meshRead =
       (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
   model.paletteRead = influences * (method == Method::linear ? 48 : 32);

@@ -1,5 +1,5 @@
-// The bytes and operations that a kernel needs for a vertex of an instance, on paper: an estimate
-// for GPUs, on which nothing has been measured yet.
+// A theoretical estimate of the bytes and operations that a kernel needs per vertex of an instance,
+// for GPUs on which nothing has been measured yet.
 #pragma once
 
 #include <optional>

@@ -23,7 +23,7 @@ namespace dermis::cli {
 namespace {
 
 constexpr std::uint32_t mostRounds = 10'000, mostInstances = 100'000;
-/// The figure of the crowd, if there is no model.
+/// Size of the built-in figure, used if there is no model.
 constexpr std::uint32_t figureVertices = 10'000;
 
 struct BenchOptions {

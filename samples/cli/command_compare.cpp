@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint32_t mostRepetitions = 10'000;
 constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
-/// Narrower columns have no room for the names of the methods.
+/// Narrower columns have no space for the names of the methods.
 constexpr std::uint32_t leastColumnWidth = 110;
 
 struct CompareOptions {

@@ -97,7 +97,7 @@ ExitStatus info(const InfoOptions& options) {
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene);
   if (options.json) {
-    // Names come from a file: what is not UTF-8 in them is replaced.
+    // Names come from a file: invalid UTF-8 in them is replaced.
     fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
   } else {
     printText(json);

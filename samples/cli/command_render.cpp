@@ -157,8 +157,8 @@ Result<void> Film::prepare() {
   return {};
 }
 
-/// Each shadow map draws everything again. Large crowds get fewer and finer maps, since their
-/// figures are small.
+/// Each shadow map draws everything again. Large crowds get fewer shadow maps with higher
+/// resolution, since their figures are small.
 render::ShadowSizes Film::shadowSizes() const {
   double triangles = 0;
   for (const ScenePart& part : scene_.parts)
@@ -201,8 +201,8 @@ Result<std::optional<Box>> Film::lookThrough(const Role& role, std::uint32_t pos
   return around;
 }
 
-/// For a crowd the camera is higher and nearer, so that the last rows are visible and the first are
-/// large.
+/// For a crowd, the camera is higher and nearer, so that the last rows are visible and the first
+/// rows are large.
 render::CameraOptions Film::cameraOptions() const {
   const bool isCrowd = options_.instances > 1;
   render::CameraOptions camera;
@@ -216,9 +216,9 @@ render::CameraOptions Film::cameraOptions() const {
   return camera;
 }
 
-/// The ground is at the lowest point of the clip, so that no foot goes through it; in a still that
-/// hovers only slightly, directly under the foot. It is slightly lower, for soles that are as flat
-/// as the ground.
+/// The ground is at the lowest point of the clip, so that no foot goes through it. In a still that
+/// hovers only slightly, it is at the lowest point of the pose. It is slightly lower, because a
+/// flat sole would otherwise coincide with it.
 float groundUnder(const Box& pose, const Box& extent) {
   const float height = extent.max[1] - extent.min[1];
   const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
@@ -267,7 +267,7 @@ Result<void> Film::frameFigures() {
   return {};
 }
 
-/// Skins what was posed.
+/// Skins the figures that have been posed.
 Result<void> Film::skin() {
   const samples::VulkanFunctions& functions = device_.device->functions();
   const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
@@ -281,7 +281,7 @@ Result<void> Film::skin() {
   return done;
 }
 
-/// Skins what was posed and draws it, in one command buffer.
+/// Skins the posed figures and draws them, in one command buffer.
 Result<void> Film::skinAndDraw() {
   const std::uint32_t passes = 1 + render::Renderer::passCount(*frame_, 1);
   Result<render::PassCounter> counter = render::PassCounter::create(*device_.device, passes);
@@ -366,7 +366,7 @@ samples::RequestedOutput requestedOutput(const RenderOptions& options) {
   return {"-o", options.output, options.frames.value_or(1)};
 }
 
-/// Checks that should not fail only after all pictures are drawn.
+/// Checks the output files before anything is drawn.
 ExitStatus checkOutput(const RenderOptions& options) {
   const samples::RequestedOutput output = requestedOutput(options);
   if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)

@@ -47,7 +47,7 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
     if (!part.normals.empty()) {
       part.tangents = std::move(skinned[index].tangents);
     } else {
-      // glTF 2.0, 3.7.2.1: without normals tangents are ignored, and both are computed.
+      // glTF 2.0, 3.7.2.1: if there are no normals, tangents are ignored and both are computed.
       part.normals = computeNormals(part.positions, from.primitive->triangles);
     }
   }

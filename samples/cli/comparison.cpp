@@ -20,13 +20,13 @@
 namespace dermis::cli {
 namespace {
 
-/// Enough that a run takes milliseconds, or keeps a whole GPU busy.
+/// Enough for a run to take milliseconds on the CPU, or to keep a whole GPU busy.
 constexpr std::uint64_t verticesOnCpu = 1'500'000;
 constexpr std::uint64_t verticesOnGpu = 8'000'000;
-/// A small mesh with many joints: joint matrices and palettes of all methods.
+/// For small meshes with many joints: limits the joint matrices and palettes of all methods.
 constexpr std::uint64_t mostPaletteBytes = std::uint64_t{1} << 26;
 constexpr std::uint64_t mostInstances = 20'000;
-/// Of all instances, even if the number of instances was given.
+/// Limit for all instances together, even if the number of instances was given.
 constexpr std::uint64_t mostVertices = 100'000'000;
 
 /// Whether a kernel treats a joint as rigid (docs/accuracy.md).
@@ -50,7 +50,7 @@ bool isRigid(const JointMatrix& joint) {
   return determinant > 0 && farthest <= 8e-6;
 }
 
-/// One instance: its parts.
+/// The requests for one instance: its parts.
 std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose& pose) {
   std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
   for (samples::SkinRequest& request : requests)
@@ -244,7 +244,7 @@ class MethodComparer {
     return {};
   }
 
-  /// `run` returns what a method takes; less than 0 if it is not timed.
+  /// `run` returns the time of a method, or less than 0 if it is not timed.
   template <typename Run>
   Result<void> repeat(const Run& run) {
     // Methods take turns, so that other load on the machine affects all of them equally.

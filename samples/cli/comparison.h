@@ -1,4 +1,4 @@
-// Compares the methods: what they cost, and what they do.
+// Compares the methods: their cost and their results.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,10 @@ struct ComparedMethod {
   std::optional<std::uint64_t> instructions;
   std::uint32_t bytesPerJoint = 0;  ///< of the palette, as the skin kernel reads it
   TubeComparison tube;
-  // Distances from `dualQuaternion` in the model's pose, as a share of its size. Nothing if no
+  // Distances from `dualQuaternion` in the model's pose, as a fraction of its size. Empty if no
   // vertex is finite.
   std::optional<double> largestDifference;
-  std::optional<double> meanSquareDifference;  ///< its root
+  std::optional<double> meanSquareDifference;  ///< root mean square
 };
 
 enum class Clock : std::uint8_t { none, timestamps, submission, oneThread };
@@ -43,7 +43,7 @@ struct MethodComparison {
 };
 
 struct ComparisonOptions {
-  std::optional<std::uint32_t> instances;  ///< nothing: enough to keep the device busy
+  std::optional<std::uint32_t> instances;  ///< empty: enough to keep the device busy
   std::uint32_t repetitions = 1;
   MethodShares shares;
 };
@@ -58,10 +58,10 @@ struct ComparisonTimer {
 /// How many times `compareMethods` calls `step`.
 std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTimer& timer);
 
-/// Compares all methods on a scene that has a part with a mesh, each prepared with centers of
-/// rotation, in one pose. Without a timer nothing is timed. `step` is called after each step.
-/// Fails if the device does, with `invalidArgument` if so many instances have too many
-/// vertices.
+/// Compares all methods in one pose of a scene that has a part with a mesh. All parts must have
+/// been prepared with centers of rotation. Without a timer, nothing is timed. `step` is called
+/// after each step. Fails if the device does, or with `invalidArgument` if this number of instances
+/// has too many vertices.
 Result<MethodComparison> compareMethods(const Scene& scene, const ScenePose& pose,
                                         const ComparisonTimer& timer,
                                         const ComparisonOptions& options,

@@ -12,7 +12,7 @@
 namespace dermis::cli {
 namespace {
 
-// SPIR-V 1.3, section 3.32: opcodes, by which the groups of instructions that count begin and end.
+// SPIR-V 1.3, section 3.32: first and last opcodes of the groups of instructions that are counted.
 constexpr std::uint32_t opFunction = 54, opFunctionEnd = 56;
 constexpr std::uint32_t opExtInst = 12;
 constexpr std::uint32_t opLoad = 61, opStore = 62;

@@ -9,7 +9,7 @@
 
 namespace dermis::cli {
 
-/// A kernel with its constants specialized, all functions inlined, and dead code removed. Empty if
+/// A kernel with specialized constants, all functions inlined, and dead code removed. Empty if
 /// SPIRV-Tools fail.
 std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
 

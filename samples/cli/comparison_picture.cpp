@@ -20,13 +20,13 @@ namespace {
 
 namespace render = samples::render;
 
-/// In columns of usual width.
+/// Sizes for columns of usual width.
 constexpr Sheet::Style titleStyle{27, sheetInk};
 constexpr Sheet::Style remarkStyle{22, sheetPaleInk};
 constexpr Sheet::Style nameStyle{26, sheetInk};
 constexpr Sheet::Style numberStyle{23, sheetPaleInk};
 constexpr float lineGap = 1.22f;
-/// Free at each border of a picture, as a part of it.
+/// Free space at each border of a picture, as a fraction of it.
 constexpr double cameraMargin = 0.07;
 
 Sheet::Style scaled(Sheet::Style style, float scale) {
@@ -39,17 +39,17 @@ float linearOf(std::uint8_t encoded) {
   return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
 }
 
-/// In front of one color, neither white nor black: figures may be either.
+/// A uniform background that is neither white nor black, because figures may be either.
 render::LightingStyle styleOfPictures() {
   render::LightingStyle style;
   style.horizonColor = style.zenithColor = {linearOf(sheetPanel[0]), linearOf(sheetPanel[1]),
                                             linearOf(sheetPanel[2])};
-  style.keyElevation = 62;  // Shadows are short: there is little room beside a figure.
+  style.keyElevation = 62;  // short shadows: there is little space next to a figure
   return style;
 }
 
-/// Light from everywhere, so that a color is what the scale says, and just enough from one side to
-/// see a shape.
+/// Light from all directions, so that colors match the scale, and just enough light from one side
+/// to make shapes visible.
 render::LightingStyle styleOfHeatMaps() {
   render::LightingStyle style = styleOfPictures();
   style.keyColor = glm::vec3(0.45f);
@@ -59,7 +59,7 @@ render::LightingStyle styleOfHeatMaps() {
   return style;
 }
 
-/// The next of such numbers, times a power of ten, that people read at a glance.
+/// Rounds up to a simple number (1, 1.2, 1.5, …) times a power of ten.
 double roundedUp(double value) {
   const double power = std::pow(10, std::floor(std::log10(value)));
   for (const double factor : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0}) {
@@ -68,7 +68,7 @@ double roundedUp(double value) {
   return 10 * power;
 }
 
-/// How high a picture must be for its width, so that a box fills it.
+/// The height that a picture of a given width needs, so that a box fills it.
 float heightForWidth(const Box& box, const render::CameraOptions& options) {
   const render::Camera camera = render::frameBoxes({&box, 1}, box, options, 1);
   const glm::vec3 up = glm::cross(camera.towardsEye, camera.right);
@@ -119,7 +119,7 @@ class ComparisonDrawer {
  private:
   void space(float pixels) { sheet_.advance(std::round(pixels * sheet_.scale())); }
 
-  /// A line of its own.
+  /// Writes a text on its own line.
   void write(const std::string& text, const Sheet::Style& usual) {
     const Sheet::Style style = scaled(usual, sheet_.scale());
     sheet_.left(text, style);
@@ -134,7 +134,7 @@ class ComparisonDrawer {
     sheet_.left(title, style);
     const Sheet::Style pale = scaled(remarkStyle, sheet_.scale());
     const float from = sheet_.width(title, style) + 24 * sheet_.scale();
-    // On one base line.
+    // All on one base line.
     const float lower = std::round((style.height - pale.height) * 0.8f);
     sheet_.advance(lower);
     if (!remark.empty() && from < sheet_.innerWidth() * 0.8f) sheet_.left(remark, pale, from);
@@ -142,7 +142,7 @@ class ComparisonDrawer {
     space(6);
   }
 
-  /// Names, and lines of numbers below them.
+  /// Writes names, and lines of numbers below them.
   void writeCaptions(const std::vector<std::vector<std::string>>& numbers) {
     const Sheet::Style name = scaled(nameStyle, sheet_.scale());
     const Sheet::Style number = scaled(numberStyle, sheet_.scale());
@@ -195,7 +195,8 @@ class ComparisonDrawer {
     return numbers;
   }
 
-  /// Linear blending is what all know: its largest distance is the yardstick if there is one.
+  /// The distance with the last color. Linear blending is the common reference: if it is shown, its
+  /// largest distance is used.
   double hottest(const ComparedFigures& figures) const {
     double largest = 0, linear = 0;
     for (std::size_t column = 0; column < methods_.size(); ++column) {
@@ -204,7 +205,7 @@ class ComparisonDrawer {
       if (methods_[column] == Method::linear) linear = distance;
     }
     const double share = (linear > 0 ? linear : largest) / figures.size();
-    // Below a millionth, which is what float32 makes of the same place, there is nothing to see.
+    // The limit keeps rounding errors of float32, about a millionth, invisible.
     return roundedUp(std::max(share, 1e-4)) * figures.size();
   }
 
@@ -241,7 +242,7 @@ class ComparisonDrawer {
     space(6);
   }
 
-  /// A picture of each column, all from one place and in one light.
+  /// Draws the picture of each column, all with the same camera and light.
   Result<void> drawCells(const ComparisonStrip& strip, const ComparedFigures& figures,
                          bool asHeatMap) {
     render::FrameDescription description;
@@ -275,7 +276,7 @@ class ComparisonDrawer {
     render::View view;
     view.area.extent = {description.width, description.height};
     view.casters = box;
-    // A hair lower, for soles that are as flat as the ground.
+    // Slightly lower, because a flat sole would otherwise coincide with the ground.
     view.groundHeight = figures.floor() - 1e-3f * radius;
     view.groundRadius = 2.5f * radius;
     Box ground = box;

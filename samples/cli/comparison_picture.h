@@ -19,7 +19,7 @@ namespace dermis::cli {
 
 struct ComparisonColumn {
   Method method = Method::linear;
-  std::vector<std::string> cost;  ///< lines below its name, in the strips that show it
+  std::vector<std::string> cost;  ///< lines below its name, in strips that show the cost
 };
 
 /// A row of pictures of one scene; the columns differ only in the method.
@@ -28,15 +28,15 @@ struct ComparisonStrip {
   ScenePose pose;
   std::string title, remark;
   samples::render::CameraOptions camera;
-  /// For a scene of one part: the smallest cross-section relative to bind pose is written below the
-  /// picture.
+  /// For a scene of one part: where to measure the smallest cross-section relative to bind pose,
+  /// which is written below the picture.
   std::optional<SectionRange> sections;
   bool showsCost = false;
-  bool hasHeatMap = false;  ///< one more strip, below it
+  bool hasHeatMap = false;  ///< adds another strip below this one
 };
 
 struct ComparisonSheet {
-  std::uint32_t width = 1800;  ///< pixels; the height follows
+  std::uint32_t width = 1800;  ///< pixels; the height is computed
   std::vector<ComparisonColumn> columns;
   std::vector<ComparisonStrip> strips;
   std::string footer;
@@ -45,9 +45,9 @@ struct ComparisonSheet {
 /// How many times `drawComparison` calls `step`.
 std::size_t comparisonPictures(const ComparisonSheet& sheet);
 
-/// Draws on a device that was opened for graphics. `font` may be null: there is no text then.
-/// `step` is called after each picture. Problems of materials are added to `notes`. Fails if the
-/// device does, and with `invalidData` if there is nothing to draw.
+/// Draws on a device that was opened for graphics. If `font` is null, there is no text. `step` is
+/// called after each picture. Problems of materials are added to `notes`. Fails if the device does,
+/// or with `invalidData` if there is nothing to draw.
 Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
                                                 const ComparisonSheet& sheet,
                                                 const samples::render::Font* font,

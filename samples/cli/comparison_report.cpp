@@ -147,7 +147,7 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
   json["methods"] = Json::array();
   for (const ComparedMethod& compared : comparison.methods)
     json["methods"].push_back(describe(compared));
-  // Names come from a file: what is not UTF-8 in them is replaced.
+  // Names come from a file: invalid UTF-8 in them is replaced.
   const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   return samples::writeFile(path, text);
 }

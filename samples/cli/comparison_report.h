@@ -16,7 +16,7 @@ struct ComparisonTitle {
   std::string pose;  ///< "rest pose", "clip 0 'walk' at 0.341 s"
 };
 
-/// Prints a table, after lines that explain it.
+/// Prints lines that explain the comparison, and a table.
 void printComparison(const ComparisonTitle& title, const MethodComparison& comparison);
 
 /// Fails with `ioError`.

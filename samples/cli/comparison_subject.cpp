@@ -12,8 +12,8 @@
 namespace dermis::cli {
 namespace {
 
-/// The paper's own comparison, with what everyone uses and what is newer. All nine are too many to
-/// be large.
+/// The comparison of the paper, plus a widely used method and a newer one. With all nine, the
+/// pictures would be too small.
 constexpr std::array usualMethods{Method::linear,         Method::quaternionTranslation,
                                   Method::logMatrix,      Method::sphericalBlend,
                                   Method::dualQuaternion, Method::centerOfRotation};
@@ -22,7 +22,7 @@ std::string counted(std::uint32_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-/// With three digits, and no exponent.
+/// Formats with three digits and no exponent.
 std::string nanoseconds(double value) {
   return fmt::format("{:.{}f} ns a vertex", value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }

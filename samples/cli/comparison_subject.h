@@ -13,20 +13,20 @@
 namespace dermis::cli {
 
 struct ComparisonSubject {
-  std::optional<BuiltInScenes> builtIn;  ///< where there is a picture
-  std::optional<Scene> model;            ///< nothing: it is the built-in arm
-  std::string name;                      ///< of the model, as it was asked for
+  std::optional<BuiltInScenes> builtIn;  ///< if a picture is drawn
+  std::optional<Scene> model;            ///< empty: the built-in arm
+  std::string name;                      ///< of the model, as requested
   std::string poseName;                  ///< "rest pose", "clip 0 'walk' at 0.341 s"
   ScenePose pose;
 
   const Scene& scene() const { return model ? *model : builtIn->arm; }
 };
 
-/// The default columns of a picture: those that the scene allows.
+/// The default columns of a picture: those of the usual methods that the scene allows.
 std::vector<Method> usualColumns(const Scene& scene);
 
-/// A picture of a subject with built-in scenes: these, then the model with what skinning it takes,
-/// and the heat map. Refers to the subject.
+/// Describes the picture of a subject with built-in scenes: these first, then the model with the
+/// cost of skinning it, and the heat map. Refers to the subject.
 ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vector<Method>& columns,
                               const ComparisonTitle& title, const MethodComparison& comparison);
 

@@ -17,10 +17,10 @@
 namespace dermis::cli {
 namespace {
 
-// The volume's error falls with the square of both.
+// The error of the volume decreases with the square of both.
 constexpr std::uint32_t zoneRings = 129;  // odd: one is in the middle
 constexpr std::uint32_t sides = 96;
-constexpr std::uint32_t firstOfZone = 1;  // a ring at either end of the tube
+constexpr std::uint32_t firstOfZone = 1;  // after one ring at the end of the tube
 constexpr std::uint32_t rings = zoneRings + 2;
 constexpr double length = 1;
 constexpr double radius = 0.1;
@@ -72,7 +72,7 @@ struct Tube {
   }
 };
 
-/// A turn about a line through the tube's middle, where the second joint is.
+/// A rotation about a line through the tube's middle, where the second joint is.
 JointMatrix turnAboutMiddle(const glm::dmat3& turn) {
   const glm::dvec3 translation = middle - turn * middle;
   JointMatrix joint;
@@ -106,7 +106,7 @@ glm::dvec3 ringMiddle(const Points& points, std::uint32_t ring) {
   return sum / double{sides};
 }
 
-/// Of the ring's projection onto the plane in which that is largest.
+/// The area of the ring's projection onto the plane in which it is largest.
 double ringArea(const Points& points, std::uint32_t ring) {
   const glm::dvec3 center = ringMiddle(points, ring);
   glm::dvec3 area(0);
@@ -118,8 +118,8 @@ double ringArea(const Points& points, std::uint32_t ring) {
   return glm::length(area);
 }
 
-/// Six times the signed volume of a tetrahedron with the tube's middle, which is near, so that
-/// little is lost.
+/// Six times the signed volume of a tetrahedron whose apex is the tube's middle. The middle is
+/// near, so little precision is lost.
 double sixVolumes(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
   return glm::dot(a - middle, glm::cross(b - middle, c - middle));
 }
@@ -132,7 +132,8 @@ double zoneVolume(const Points& points) {
       const glm::dvec3 &a = pointOf(points, ring, side), &b = pointOf(points, ring, side + 1),
                        &c = pointOf(points, ring + 1, side + 1),
                        &d = pointOf(points, ring + 1, side);
-      // Both ways to cut the quad in two, for neither prefers a sense of the twist.
+      // Average of both ways to split the quad, because neither should favor a direction of the
+      // twist.
       sum +=
           (sixVolumes(a, c, b) + sixVolumes(a, d, c) + sixVolumes(a, d, b) + sixVolumes(b, d, c)) /
           2;

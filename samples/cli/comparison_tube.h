@@ -16,11 +16,11 @@ struct TubeShape {
   /// The smallest distance of a vertex from the axis of the tube in bind pose, in radii. Meaningful
   /// only for a twist.
   double leastRadius = 1;
-  /// The least area of a ring of vertices, across the tube.
+  /// The smallest area of a ring of vertices across the tube.
   double leastSection = 1;
-  /// The signed volume of the zone alone, closed at its end rings.
+  /// The signed volume of the zone only, closed at its end rings.
   double volume = 1;
-  /// The largest distance of a vertex from the bones, in radii: 1 where nothing bulges.
+  /// The largest distance of a vertex from the bones, in radii: 1 if nothing bulges.
   double reach = 1;
 };
 
@@ -29,9 +29,10 @@ struct TubeComparison {
   TubeShape bent;     ///< by `tubeBendDegrees` about a line through its axis
 };
 
-/// By the reference. The tube is the sample bar's, more finely divided: length 1, radius 0.1,
-/// weights that change linearly over the 0.4 about its middle, which is where the second joint is;
-/// bind space begins at its other end. Centers of rotation are the rings' middles.
+/// Compares with the reference. The tube is that of the sample bar, with finer subdivision: length
+/// 1, radius 0.1. Weights change linearly over the zone of length 0.4 about its middle, where the
+/// second joint is. Bind space begins at the other end. Centers of rotation are the centers of the
+/// rings.
 Result<TubeComparison> compareTube(Method method, const MethodShares& shares);
 
 }  // namespace dermis::cli

@@ -17,8 +17,8 @@ glm::dvec3 at(std::span<const float> positions, std::uint32_t vertex) {
   return {positions[first], positions[first + 1], positions[first + 2]};
 }
 
-/// The areas of one section in bind pose and skinned, as normals of that length: half the sum of
-/// the cross products of its corners, wherever the origin is.
+/// The areas of one section in bind pose and skinned, as vectors: the length is the area. Half the
+/// sum of the cross products of its corners, which does not depend on the origin.
 struct Areas {
   glm::dvec3 rest{0}, skinned{0};
 };
@@ -28,8 +28,8 @@ class Plane {
   Plane(std::span<const float> rest, std::span<const float> skinned, double x)
       : rest_(rest), skinned_(skinned), x_(x) {}
 
-  /// A section runs from edges that go down through the plane to edges that go up: so neighboring
-  /// triangles agree which way.
+  /// A segment of the section runs from the edge that goes down through the plane to the edge that
+  /// goes up, so that all triangles have the same orientation.
   void cut(std::span<const std::uint32_t, 3> triangle, Areas& areas) const {
     std::array<glm::dvec3, 2> rest{}, skinned{};
     int crossed = 0;

@@ -1,4 +1,4 @@
-// Measures how much of the cross-section of a limb is left after skinning.
+// Measures how much of a limb's cross-section remains after skinning.
 #pragma once
 
 #include <span>
@@ -12,10 +12,10 @@ struct SectionRange {
   double from = 0, to = 0;
 };
 
-/// The smallest area that a section of a closed mesh has when it is skinned, as a share of what it
-/// has in bind pose. A section is where a plane cuts the mesh in bind pose, moved along with the
-/// skin; its area is that of its projection onto the plane in which it is largest. `positions` are
-/// the skinned ones. 1 where no plane meets the mesh.
+/// The smallest ratio of a section's area after skinning to its area in bind pose. The mesh must be
+/// closed. A section is the intersection of a plane and the mesh in bind pose, moved with the skin.
+/// Its area is that of its projection onto the plane in which it is largest. `positions` are the
+/// skinned positions. 1 if no plane meets the mesh.
 double leastSection(const gltf::Primitive& primitive, std::span<const float> positions,
                     const SectionRange& range);
 

@@ -55,7 +55,7 @@ std::vector<JointMatrix> placeCrowd(const Box& extent, std::uint32_t figures) {
   const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(0.8 * figures)));
   for (std::uint32_t figure = 0; figure < figures; ++figure) {
     const double row = figure / columns, column = figure % columns;
-    // Every other row looks between the heads of the one before.
+    // Every other row is visible between the heads of the row before.
     const double shift = static_cast<std::uint32_t>(row) % 2 == 0 ? 0.0 : 0.5;
     const double x = column + shift - columns / 2.0 + 0.24 * (chance(figure, 2) - 0.5);
     const double z = -row + 0.24 * (chance(figure, 3) - 0.5);

@@ -12,20 +12,19 @@ namespace dermis::cli {
 /// The clip and phase of one figure.
 struct Role {
   std::uint32_t clip = gltf::none;
-  double phase = 0;  ///< seconds that it is ahead
+  double phase = 0;  ///< seconds ahead of the first figure
 };
 
-/// The first plays the clip as it is; the others the same clip, or where `isVaried` one clip of the
-/// model after the other, each ahead by some time of its own. The same crowd every time.
+/// The first figure plays `clip` unchanged. The others play the same clip, or successive clips of
+/// the model if `isVaried`, each with its own phase. The result is the same every time.
 std::vector<Role> castCrowd(const gltf::Model& model, std::uint32_t clip, bool isVaried,
                             std::uint32_t figures);
 
-/// Seconds into the clip, which repeats.
+/// The time within the clip in seconds. The clip repeats.
 double timeInClip(const gltf::Model& model, const Role& role, double time);
 
-/// Where figures stand that keep within `extent`: in rows, a little out of line and turned a
-/// little, so that they neither look like soldiers nor run into each other. A single one stands
-/// where it is.
+/// Places figures whose vertices stay within `extent` in rows, with small offsets and rotations, so
+/// that they look natural and do not intersect. A single figure is not moved.
 std::vector<JointMatrix> placeCrowd(const Box& extent, std::uint32_t figures);
 
 /// The box around a transformed box.

@@ -27,7 +27,7 @@ void include(std::optional<Box>& all, const Box& box) {
   }
 }
 
-/// Around what is finite; its sides are reversed where nothing is.
+/// The box around all finite positions. If there are none, its sides are reversed.
 Box boxOf(std::span<const float> positions) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   Box box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
@@ -78,7 +78,7 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
   for (const gltf::Skin& skin : scene_->model->skins) joints += skin.joints.size();
   for (const ScenePart& part : scene_->parts) {
     if (part.mesh == nullptr) continue;
-    // Each begins at a multiple of its stride.
+    // The offset of each attribute is a multiple of its stride.
     outputs += (std::uint64_t{part.primitive->vertexCount} + 2) * 2 * bytesPerVector;
     meshes += part.mesh->packed().bytes().size() + packedMeshAlignment;
     ++instances;
@@ -181,7 +181,7 @@ Result<void> DrawnScene::setMethod(std::uint32_t index, Method method) {
     if (Result<void> removed = system_->removeInstance(*part.instance); !removed) return removed;
     part.instance.reset();
   }
-  // There is room for the new ones when what the old ones had is free.
+  // The memory of the old instances must be free before there is space for the new ones.
   if (Result<void> begun = beginFrame(); !begun) return begun;
   return addInstances(figure, method);
 }

@@ -1,4 +1,4 @@
-// A scene, once or many times, skinned by a SkinningSystem and drawn from its output.
+// A scene, drawn once or many times from the output of a SkinningSystem.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@
 
 namespace dermis::cli {
 
-/// Every figure of a crowd is the whole scene, in a pose of its own.
+/// Every figure of a crowd is the whole scene in its own pose.
 class DrawnScene {
  public:
   /// `device`, `renderer` and `scene` must outlive it. The scene's method must be allowed.
   static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
                                    const Scene& scene, std::uint32_t figures, Method method);
-  /// A figure for each method, in this order.
+  /// Creates one figure for each method, in this order.
   static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
                                    const Scene& scene, std::span<const Method> methods);
 
@@ -39,8 +39,8 @@ class DrawnScene {
   /// Adds the draws of a figure in its last pose, transformed by `transform`.
   Result<void> addDraws(std::uint32_t figure, const JointMatrix& transform,
                         std::vector<samples::render::Draw>& draws) const;
-  /// Around a figure as it was skinned in the last complete frame; nothing if no vertex of it is
-  /// finite. Call `beginFrame` before.
+  /// The box around a figure as skinned in the last complete frame; nothing if none of its vertices
+  /// is finite. Call `beginFrame` first.
   Result<std::optional<Box>> bounds(std::uint32_t figure) const;
 
   vulkan::SystemStatistics statistics() const { return system_->statistics(); }
@@ -60,7 +60,7 @@ class DrawnScene {
     bool isMirrored = false;
   };
   struct Figure {
-    std::vector<PoseHandle> poses;  ///< by skin; a null handle where no part uses it
+    std::vector<PoseHandle> poses;  ///< by skin; null if no part uses it
     std::vector<FigurePart> parts;
   };
   /// The data of a part that all figures share.

@@ -53,9 +53,8 @@ double lengthOf(const Vector& v) {
   return std::hypot(v[0], v[1], v[2]);
 }
 
-/// Makes the three floats from `first` on a unit vector: in their direction or, where they have
-/// none, in that of the fallback, which has one. One that is of unit length but for rounding stays
-/// as it is.
+/// Normalizes the three floats from `first` on, or replaces them by the normalized fallback if they
+/// have no direction. A vector whose length is 1 except for rounding is unchanged.
 void makeUnit(std::vector<float>& values, std::size_t first, const Vector& fallback) {
   constexpr double tolerance = 1e-4;
   Vector direction = vectorAt(values, first);
@@ -69,18 +68,18 @@ void makeUnit(std::vector<float>& values, std::size_t first, const Vector& fallb
     values[first + axis] = static_cast<float>(direction[axis] / length);
 }
 
-/// glTF 2.0, 3.7.2.1: normals are of unit length.
+/// glTF 2.0, 3.7.2.1: normals have unit length.
 std::vector<float> unitNormals(std::vector<float> normals) {
   for (std::size_t i = 0; i + 2 < normals.size(); i += 3) makeUnit(normals, i, {0, 0, 1});
   return normals;
 }
 
-/// Some vector at right angles to a unit vector.
+/// A vector perpendicular to a unit vector.
 Vector squareTo(const Vector& n) {
   return std::abs(n[0]) < 0.5 ? Vector{0, n[2], -n[1]} : Vector{-n[2], 0, n[0]};
 }
 
-/// glTF 2.0, 3.7.2.1: tangents are of unit length, their handedness is 1 or -1.
+/// glTF 2.0, 3.7.2.1: tangents have unit length, and their handedness is 1 or -1.
 std::vector<float> unitTangents(std::vector<float> tangents, const std::vector<float>& normals) {
   for (std::size_t vertex = 0; vertex * 4 < tangents.size(); ++vertex) {
     makeUnit(tangents, vertex * 4, squareTo(vectorAt(normals, vertex * 3)));
@@ -96,7 +95,7 @@ std::vector<float> finiteTexcoords(std::vector<float> texcoords) {
   return texcoords;
 }
 
-/// Between 0 and 1; 0 for NaN.
+/// Clamps to [0, 1]; NaN becomes 0.
 float clamped(float value) {
   return value > 0 ? std::min(value, 1.0f) : 0;
 }
@@ -106,7 +105,8 @@ std::vector<float> clampedColors(std::vector<float> colors) {
   return colors;
 }
 
-/// The largest value of an index type must not be used: it restarts a strip in some interfaces.
+/// The largest value of an index type must not be used: some graphics APIs use it to restart a
+/// strip.
 int putIndices(GlbBuffer& buffer, const gltf::Primitive& primitive) {
   const bool isShort = primitive.vertexCount <= 0xffff;
   buffer.begin();
@@ -138,8 +138,7 @@ Json putPrimitive(GlbBuffer& buffer, const OutputPart& part) {
   return json;
 }
 
-/// The number of the fewest digits that is this float, as the file had it: 0.8, not
-/// 0.800000011920929.
+/// The shortest decimal number that reads back as this float: 0.8, not 0.800000011920929.
 double shortest(float value) {
   std::array<char, 32> digits;
   const std::to_chars_result end = std::to_chars(digits.begin(), digits.end(), value);
@@ -178,7 +177,7 @@ Json describeMaterial(const gltf::Material& material) {
   return json;
 }
 
-/// The materials that are used, once each, in the order of their first use.
+/// The materials in use, without duplicates, in the order of their first use.
 class MaterialList {
  public:
   explicit MaterialList(std::span<const gltf::Material> materials) : materials_(materials) {}

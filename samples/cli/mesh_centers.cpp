@@ -15,11 +15,11 @@
 namespace dermis::cli {
 namespace {
 
-/// Maximum influences per vertex; the weakest beyond it are ignored for centers. Otherwise one
-/// vertex with very many would give all vertices as many slots.
+/// Maximum influences per vertex; weaker ones are ignored for centers. Otherwise one vertex with
+/// many influences would give all vertices as many slots.
 constexpr std::uint32_t mostSlots = 32;
 
-/// The 20 bytes of the solver, and temporarily as many again.
+/// 20 bytes in the solver, and temporarily the same again.
 constexpr std::uint64_t bytesPerPair = 40;
 
 struct JointWeight {
@@ -27,10 +27,11 @@ struct JointWeight {
   std::uint32_t joint;
 };
 
-/// Primitives one behind the other, with as many slots as the widest vertex needs.
+/// Concatenates primitives, with as many slots per vertex as the vertex with the most influences
+/// needs.
 class JoinedMesh {
  public:
-  /// `mesh` is a repaired one: tightly packed.
+  /// `mesh` must be repaired, and so tightly packed.
   void add(const MeshView& mesh, std::span<const std::uint32_t> indices) {
     const auto first = static_cast<std::uint32_t>(positions_.size() / 3);
     const auto* position = static_cast<const float*>(mesh.positions.data);
@@ -58,7 +59,7 @@ class JoinedMesh {
 
   std::span<const std::uint32_t> triangles() const { return triangles_; }
 
-  /// Number of pairs of joints of all triangles, which is what the solver stores.
+  /// The number of pairs of joints of all triangles, which the solver stores.
   std::uint64_t pairCount() const {
     std::uint64_t pairs = 0;
     std::vector<std::uint32_t> joints;
@@ -77,7 +78,7 @@ class JoinedMesh {
     return pairs;
   }
 
-  /// Valid while this object lives and nothing is added.
+  /// Valid while this object lives and no mesh is added.
   MeshView view(const std::string& name) {
     const auto vertexCount = static_cast<std::uint32_t>(ends_.size());
     joints_.assign(std::size_t{vertexCount} * slots_, 0);

@@ -11,18 +11,18 @@
 
 namespace dermis::cli {
 
-/// Computes the centers of rotation of the meshes of one file, each once.
+/// Computes the centers of rotation of the meshes of one file, once for each mesh.
 class MeshCenters {
  public:
-  /// `mostTerms`: of the sums of all meshes together, some 4 ns each. The budget, which must
-  /// outlive this object, is the file's.
+  /// `mostTerms` limits the terms of the sums of all meshes together; each takes about 4 ns. The
+  /// budget is the file's, and must outlive this object.
   MeshCenters(std::uint64_t mostTerms, gltf::MemoryBudget& budget)
       : termsLeft_(mostTerms), budget_(budget) {}
 
   /// The centers of a primitive, 3 floats per vertex. They depend on all primitives of the mesh, so
   /// that primitives agree where they meet. `jointCount` is at most `namedJoints` of the mesh.
-  /// Shows progress. Fails with `limitExceeded` if they are too much work: dense meshes cost the
-  /// square of their size.
+  /// Shows progress. Fails with `limitExceeded` if there are too many terms: their number grows
+  /// with the square of a mesh's density.
   Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                                 std::uint32_t jointCount);
 

@@ -19,9 +19,9 @@ struct OutputPart {
   std::string name;  ///< never empty
   /// Data that skinning does not change: triangles, texture coordinates, colors, material.
   const gltf::Primitive* primitive = nullptr;
-  std::vector<float> positions;  ///< 3 a vertex, in the scene's space
-  std::vector<float> normals;    ///< 3 a vertex
-  std::vector<float> tangents;   ///< 4 a vertex, the last the handedness; or empty
+  std::vector<float> positions;  ///< 3 per vertex, in the scene's space
+  std::vector<float> normals;    ///< 3 per vertex
+  std::vector<float> tangents;   ///< 4 per vertex, the last is the handedness; or empty
 };
 
 struct OutputMesh {
@@ -31,26 +31,26 @@ struct OutputMesh {
 
 enum class OutputFormat { ply, obj, glb };
 
-/// The format that a file's ending means, in any case, or nothing.
+/// The format of a file by its extension, ignoring case; or nothing.
 std::optional<OutputFormat> outputFormat(std::string_view fileName);
 
-/// The name of a part: that of its node, or of its mesh, or the number of the node; and the number
+/// The name of a part: that of its node, or of its mesh, or the index of the node; plus the index
 /// of the primitive if the mesh has several.
 std::string partName(const gltf::Model& model, const gltf::SkinnedPrimitive& source);
 
-/// Vertices with a position or normal that is NaN or infinite.
+/// The number of vertices with a position or normal that is NaN or infinite.
 std::size_t countNonFinite(const OutputMesh& mesh);
 
-/// Only PLY stores floats as they are. glTF forbids what is not finite, and few readers of OBJ know
-/// how to spell it.
+/// Whether the format can store NaN and infinity. Only PLY can: glTF forbids them, and few readers
+/// of OBJ can parse them.
 bool holdsNonFinite(OutputFormat format);
 
-/// Only GLB: for the others tangents need not be skinned.
+/// Whether the format stores tangents. Only GLB does; for the others, tangents need not be skinned.
 bool holdsTangents(OutputFormat format);
 
-/// Writes a file whole or not at all. Fails with `ioError`, and with `limitExceeded` if the
-/// format cannot hold so large a mesh. What is not finite must
-/// have been refused before, unless the format holds it.
+/// Writes the file completely or not at all. Fails with `ioError`, or with `limitExceeded` if the
+/// format cannot store such a large mesh. Values that are not finite must have been refused before,
+/// unless the format holds them.
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh);
 

@@ -10,7 +10,7 @@
 namespace dermis::cli {
 
 void addShares(CLI::App& command, MethodShares& shares) {
-  // An empty word would be taken for 0.
+  // An empty string would be parsed as 0.
   command
       .add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
                   fmt::format("For blended: from 0 (linear) to 1 (dual quaternions) [{}]",
@@ -29,7 +29,7 @@ samples::ExitStatus checkShares(const MethodShares& shares) {
       {{"--dual-quaternion-weight", shares.dualQuaternionWeight},
        {"--bulge-strength", shares.bulgeStrength}}};
   for (const auto& [name, value] : options) {
-    // Not a number is neither.
+    // Also refuses NaN.
     if (!(value >= 0 && value <= 1))
       return samples::reportWrongUsage(fmt::format("{} must be from 0 to 1", name));
   }

@@ -10,13 +10,13 @@
 
 namespace dermis::cli {
 
-/// Of every vertex; 0 to 1.
+/// The shares of every vertex, 0 to 1.
 struct MethodShares {
   double dualQuaternionWeight = static_cast<double>(MeshView().dualQuaternionWeight);
   double bulgeStrength = static_cast<double>(MeshView().bulgeStrength);
 };
 
-/// --dual-quaternion-weight and --bulge-strength.
+/// Adds --dual-quaternion-weight and --bulge-strength.
 void addShares(CLI::App& command, MethodShares& shares);
 
 /// Reports wrong usage if a share is not from 0 to 1.

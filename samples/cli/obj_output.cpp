@@ -13,7 +13,8 @@
 namespace dermis::cli {
 namespace {
 
-/// One word: a backslash would join two lines, a number sign starts a comment.
+/// Makes a name one word. A backslash would join two lines, and a number sign would start a
+/// comment.
 std::string oneWord(const std::string& name) {
   std::string word = samples::plainLine(name);
   std::replace_if(
@@ -62,8 +63,8 @@ class ObjWriter {
     }
   }
 
-  /// Indices count from 1 and through all parts. Normals have the numbers of their vertices,
-  /// texture coordinates fall behind where a part had none.
+  /// Indices start at 1 and continue through all parts. Normals have the indices of their vertices.
+  /// Those of texture coordinates are lower if an earlier part has none.
   void addFaces(const std::vector<std::uint32_t>& triangles, bool hasTexcoords) {
     for (std::size_t corner = 0; corner + 2 < triangles.size(); corner += 3) {
       text_ += 'f';

@@ -10,7 +10,7 @@ namespace {
 using samples::render::Font;
 using samples::render::Picture;
 
-/// Lengths are given for such columns, on a sheet that is at least so wide.
+/// Lengths are given for columns of this width, on a sheet of at least this width.
 constexpr float usualColumnWidth = 280, usualWidth = 1000;
 
 /// Bytes that follow the first of a UTF-8 character.

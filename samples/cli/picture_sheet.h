@@ -37,19 +37,19 @@ class Sheet {
 
   /// Moves down by this number of pixels.
   void advance(float pixels);
-  /// A thin line across.
+  /// Draws a thin horizontal line.
   void rule();
-  /// Writes at the left of a line; the text is cut if there is no room.
+  /// Writes at the left of a line; the text is cut off if there is no space.
   void left(std::string_view text, const Style& style, float from = 0, float room = 0);
   /// The width of a text; 0 without a font.
   float width(std::string_view text, const Style& style) const;
-  /// Writes in the middle of a column, smaller if there is no room.
+  /// Writes in the middle of a column, smaller if there is too little space.
   void centered(std::size_t column, std::string_view text, Style style);
-  /// A picture of the width of a column or less, in its middle.
+  /// Pastes a picture, not wider than the column, in the middle of it.
   void paste(std::size_t column, const samples::render::Picture& picture);
-  /// A box of colors from left to right, in a line of text; `from` as in `left`.
+  /// Draws a color gradient from left to right, in a line of text; `from` as in `left`.
   void gradient(const std::vector<SheetColor>& colors, float from, float length, float height);
-  /// Of what is inside the margins.
+  /// The width inside the margins.
   float innerWidth() const { return static_cast<float>(innerWidth_); }
 
   samples::render::Picture take();
@@ -65,7 +65,7 @@ class Sheet {
   float scale_, y_ = 0;
 };
 
-/// A name in as few lines as possible, broken after underscores.
+/// Splits a name into as few lines as possible, after underscores.
 std::vector<std::string> brokenName(const Sheet& sheet, std::string_view name,
                                     const Sheet::Style& style);
 

@@ -8,11 +8,11 @@
 namespace dermis::cli {
 namespace {
 
-/// Of a packed mesh, and of a repaired one: positions, normals, tangents, centers.
+/// In the packed mesh and in the repaired one: positions, normals, tangents, centers.
 constexpr std::uint64_t bytesPerVertex = 2 * 4 * 16;
-/// Weight and joint, packed, repaired, and while one is made of the other.
+/// Weight and joint: packed, repaired, and temporarily during the conversion.
 constexpr std::uint64_t bytesPerInfluence = 3 * 8;
-/// Packed and as views, once repaired.
+/// Packed, and as views of the repaired mesh.
 constexpr std::uint64_t bytesPerTarget = sizeof(MorphTargetView) + 48;
 
 template <typename Joint>

@@ -17,40 +17,40 @@ namespace dermis::cli {
 
 /// How meshes are prepared.
 struct MeshPreparation {
-  /// Refuse meshes that would have to be repaired, and files that break a rule even if the meaning
-  /// is clear.
+  /// Refuse meshes that would have to be repaired, and files that break a rule even if their
+  /// meaning is clear.
   bool strict = false;
   /// Compute centers of rotation, for methods that need them. This may take long.
   bool centersOfRotation = false;
-  /// More terms of their sums (`CenterOfRotationSolver::termCount`) are not added up for a file:
-  /// some 4 s on one core, or 40 s where a method that needs them was asked for by name.
+  /// Maximum terms of the sums (`CenterOfRotationSolver::termCount`) for one file. They take about
+  /// 4 s on one core, or 40 s if the user named a method that needs centers.
   std::uint64_t mostCenterTerms = 1'000'000'000;
-  float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< of every vertex
+  float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< for every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
-  bool images = false;                                           ///< read what base colors show
+  bool images = false;                                           ///< read the images of base colors
 };
 
-/// The limit of a command that names a method which needs centers of rotation.
+/// The limit if the user named a method that needs centers of rotation.
 inline constexpr std::uint64_t mostCenterTermsAsked = 10'000'000'000;
 
-/// The number of joints that the mesh can refer to; more joints make no difference.
+/// The number of joints that the mesh can refer to. Further joints make no difference.
 std::uint32_t namedJoints(const gltf::Mesh& mesh);
 
-/// What `--strict` does, for its help.
+/// The help text of `--strict`.
 inline constexpr const char* strictHelp =
     "Refuse a file that breaks a rule of glTF, or a mesh that would have to be repaired";
 
-/// Gives the primitive's centers of rotation, 3 floats a vertex, or none.
+/// Returns the primitive's centers of rotation, 3 floats per vertex, or none.
 using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 
-/// Not movable: its views point into it.
+/// Not movable, because its views point to its own data.
 class PreparedMesh {
  public:
   /// Spends the memory of `prepare`; false if the budget is too small.
   static bool spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget);
 
-  /// The primitive has influences, and outlives this object. Fails with `invalidMesh`, if
-  /// `strict` also for what could be repaired, and if `centers`, which is asked last, does.
+  /// The primitive must have influences, and outlive this object. Fails with `invalidMesh` (if
+  /// `strict`, also for faults that could be repaired), or if `centers` does, which is called last.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
@@ -58,14 +58,14 @@ class PreparedMesh {
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;
 
-  /// The mesh to skin: the repaired one where `pack` would have refused it.
+  /// The mesh to skin: the repaired one if `pack` would have refused the original.
   MeshView view() const;
   const PackedMesh& packed() const { return *packed_; }
-  /// Whether it has what the method needs.
+  /// Whether the mesh has the data that the method needs.
   bool allows(Method method) const {
     return !needsCentersOfRotation(method) || packed_->info().hasCentersOfRotation;
   }
-  /// Of the mesh as the file has it.
+  /// The report on the mesh as the file has it.
   const MeshReport& report() const { return report_; }
 
  private:
@@ -75,7 +75,7 @@ class PreparedMesh {
   MeshView original_;
   MeshReport report_;
   std::optional<RepairedMesh> repaired_;
-  std::vector<float> centersOfRotation_;  ///< 3 a vertex, or empty
+  std::vector<float> centersOfRotation_;  ///< 3 per vertex, or empty
   std::optional<PackedMesh> packed_;
 };
 

@@ -1,4 +1,4 @@
-// Skins a scene, part by part, with the reference, on the CPU or on a device, for `dermis skin`.
+// Skins a scene part by part, with the reference, on the CPU or on a device, for `dermis skin`.
 #pragma once
 
 #include <functional>
@@ -11,15 +11,15 @@
 
 namespace dermis::cli {
 
-/// Skins every part of the scene in a pose. With tangents, if they are requested and the mesh has
-/// them.
+/// Skins every part of the scene in a pose. Includes tangents if they are requested and the mesh
+/// has them.
 using SkinParts = std::function<Result<std::vector<SkinnedPart>>(const ScenePose& pose)>;
 
-/// What a batch needs of each part that has a mesh, in the order of the parts; they refer to the
-/// scene and the pose.
+/// The requests of a batch: one for each part with a mesh, in the order of the parts. They refer to
+/// the scene and the pose.
 std::vector<samples::SkinRequest> skinRequests(const Scene& scene, const ScenePose& pose);
 
-/// Both refer to the scene, and the second to the target.
+/// Both results refer to the scene, and the second also to the target.
 SkinParts referenceSkinner(const Scene& scene, Method method);
 SkinParts targetSkinner(const Scene& scene, Method method, bool tangents,
                         samples::BatchTarget& target);

@@ -15,13 +15,13 @@
 namespace dermis::cli {
 namespace {
 
-/// What a part takes besides its vertices: itself, its names, what `info` says of it.
+/// Memory of a part except its vertices: the part, its names, and the output of `info` about it.
 constexpr std::uint64_t bytesPerPart = 1024;
-/// What a vertex of a pose takes: float32 positions and normals, as they are and in a file.
+/// Memory per vertex of a pose: float32 positions and normals, in memory and in a file.
 constexpr std::uint64_t bytesPerPosedVertex = 48;
-/// The weight of a morph target: sampled, and in the list of those that are not 0.
+/// Memory per weight of a morph target: sampled, and in the list of active ones.
 constexpr std::uint64_t bytesPerTarget = 2 * sizeof(MorphWeight);
-/// In several copies, where the part's name goes into a file.
+/// A part's name is copied several times when it is written to a file.
 constexpr std::uint64_t copiesOfName = 8;
 
 std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
@@ -43,7 +43,7 @@ void addFindings(Scene& scene, const MeshReport& report) {
   }
 }
 
-/// Counts, before any is made, the parts: a few nodes and a few primitives make many of them.
+/// Counts the parts before any is made, because a few nodes and a few primitives can make many.
 bool spendOnParts(gltf::Model& model) {
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Mesh& mesh = model.meshes[source.mesh];
@@ -58,7 +58,7 @@ bool spendOnParts(gltf::Model& model) {
   return true;
 }
 
-/// Meshes of the scene, each made ready once for all skins that it cannot tell apart.
+/// Prepares the meshes of the scene, once for all skins for which the result is the same.
 class Preparer {
  public:
   Preparer(Scene& scene, const MeshPreparation& preparation)
@@ -101,7 +101,7 @@ class Preparer {
   Scene& scene_;
   const MeshPreparation& preparation_;
   MeshCenters centers_;
-  std::set<std::string> refused_;  ///< meshes that are too much work, each said once
+  std::set<std::string> refused_;  ///< meshes that need too much work, each reported once
   std::map<std::uint32_t, std::uint32_t> namedJoints_;  ///< by mesh
   std::map<std::pair<const gltf::Primitive*, std::uint32_t>, std::shared_ptr<const PreparedMesh>>
       prepared_;
@@ -183,7 +183,7 @@ ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
     std::vector<JointMatrix>& palette = pose.poses[part.source.skin];
     if (palette.empty()) palette = gltf::pose(*scene.model, part.source.skin, globals);
     std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
-    // A primitive may have fewer targets than its mesh names.
+    // A primitive may have fewer targets than the mesh has weights.
     const std::size_t targets = part.primitive->morphTargets.size();
     if (targets == 0) continue;
     const std::vector<float> weights =

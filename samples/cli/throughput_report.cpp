@@ -35,8 +35,8 @@ const ThroughputRow* find(std::span<const ThroughputRow> rows, std::string_view 
   return row == rows.end() ? nullptr : &*row;
 }
 
-/// What a row is compared with: the plain kernel of linear blending for that, the other for the
-/// rest.
+/// The baseline of a row: the plain linear kernel for linear blending, otherwise the plain dual
+/// quaternion kernel.
 const ThroughputRow* baselineOf(const ThroughputRow& row, std::span<const ThroughputRow> rows) {
   const bool isLinear = row.name.find("/linear") != std::string::npos;
   return find(rows, isLinear ? "gpu/plain/linear" : "gpu/plain/dual_quaternion");
@@ -52,7 +52,7 @@ std::string whereItWasMeasured(const ThroughputTitle& title) {
   return title.driver.empty() ? title.device : title.device + ", driver " + title.driver;
 }
 
-/// In the colors of their sections.
+/// The color of the row's section.
 SheetColor colorOf(ThroughputSection section) {
   constexpr std::array<SheetColor, samples::throughputSectionCount> colors{
       {{148, 156, 168}, {43, 108, 176}, {44, 139, 118}, {124, 92, 176}, {196, 116, 44}}};

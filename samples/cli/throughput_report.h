@@ -20,14 +20,14 @@ struct ThroughputTitle {
   std::optional<samples::StartUp> startUp;  ///< of the device
 };
 
-/// A line for each row on standard output.
+/// Prints a line for each row.
 void printThroughput(const ThroughputTitle& title, std::span<const samples::ThroughputRow> rows);
 
 /// Fails with `ioError`.
 Result<void> writeJsonThroughput(const std::filesystem::path& path, const ThroughputTitle& title,
                                  std::span<const samples::ThroughputRow> rows);
 
-/// A bar for each row, in sections. `font` may be null: there is no text then.
+/// Draws a bar for each row, in sections. If `font` is null, there is no text.
 samples::render::Picture drawThroughput(const ThroughputTitle& title,
                                         std::span<const samples::ThroughputRow> rows,
                                         const samples::render::Font* font);

@@ -32,7 +32,7 @@ std::vector<Figure> figuresOf(const Scene& scene, std::span<const Method> method
 struct ReferencePose {
   ScenePose pose;
   std::vector<reference::SkinnedMesh> figures;
-  std::vector<Exemptions> exemptions;  ///< of the figures
+  std::vector<Exemptions> exemptions;  ///< by figure
 };
 
 bool isFinite(std::span<const JointMatrix> palette) {
@@ -46,7 +46,7 @@ bool isFinite(std::span<const JointMatrix> palette) {
   return true;
 }
 
-/// If all joints of a pose are finite, every vertex has a defined answer.
+/// If all joints of a pose are finite, every vertex has a defined result.
 Exemptions exemptionsIn(std::span<const JointMatrix> palette,
                         const reference::SkinnedMesh& skinned) {
   Exemptions exemptions = exemptionsOf(skinned);
@@ -88,12 +88,12 @@ Result<ReferencePose> skinReference(samples::TargetPool& pool, const Scene& scen
   return skinned;
 }
 
-/// All figures of a scene in one pose, and from which pose they move.
+/// All figures of a scene in one pose, and the pose that their motion starts from.
 struct PosedFigures {
   const PoseToVerify& pose;
   const std::vector<reference::SkinnedMesh>& expected;
   std::vector<samples::InstanceToVerify> instances;
-  std::vector<const ScenePart*> parts;  ///< of the instances
+  std::vector<const ScenePart*> parts;  ///< by instance
 
   PosedFigures(const Scene& scene, std::span<const Figure> figures, const PoseToVerify& name,
                const ReferencePose& now, const ReferencePose& before)
@@ -119,7 +119,7 @@ struct PosedFigures {
   }
 };
 
-/// The batches of one pose. Whichever runs first, they come out in their order.
+/// The batches of one pose. Results are in the order of the batches, whichever runs first.
 class PoseVerifier {
  public:
   PoseVerifier(const SceneCases& cases, const PosedFigures& pose,
@@ -151,7 +151,7 @@ class PoseVerifier {
     std::vector<samples::SkinnedVertices> divided;
     std::vector<VerifiedCase> cases;
   };
-  /// Of the first division.
+  /// The results of the first division.
   struct First {
     const samples::SkinnedVertices* skinned;
     Comparison comparison;
@@ -218,7 +218,7 @@ class PoseVerifier {
     std::vector<samples::InstanceToVerify> instances;
     std::vector<std::size_t> figures;
     for (const std::size_t figure : batch.figures) {
-      // Every other box of positions in snorm16 is too small, so that some are clamped.
+      // Every other box for snorm16 positions is too small, so that some positions are clamped.
       for (std::size_t copy = 0; copy < (isSnormPosition(output.layout.positions) ? 2 : 1);
            ++copy) {
         instances.push_back(pose_.instances[figure]);
@@ -242,7 +242,7 @@ class PoseVerifier {
   const SceneCases& cases_;
   const PosedFigures& pose_;
   std::span<const SceneBatch> batches_;
-  std::vector<Outcome> outcomes_;        ///< of the batches
+  std::vector<Outcome> outcomes_;        ///< by batch
   std::map<std::size_t, First> firsts_;  ///< by figure
 };
 

@@ -16,7 +16,7 @@
 
 namespace dermis::cli {
 
-/// One primitive in one pose with one method, stored in one way.
+/// One primitive in one pose, with one method and one output layout.
 struct VerifiedCase {
   std::string part;
   std::string method;
@@ -24,13 +24,13 @@ struct VerifiedCase {
   std::string variant;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
   Comparison comparison;
   std::optional<PoseStatus> status;
-  std::string wrong;  ///< what else is wrong; empty if nothing is
+  std::string wrong;  ///< any other fault; empty if there is none
 
   bool passed() const {
     return comparison.passed() && wrong.empty() &&
            comparison.compared + comparison.exempt.onlyFinite != 0;
   }
-  std::string failure() const;  ///< a sentence, where it did not pass
+  std::string failure() const;  ///< a sentence, if it did not pass
 };
 
 struct PoseToVerify {
@@ -42,26 +42,26 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, at two times within it, and at its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// The ways that a target has. Over all of them each of its methods meets every format that is
-/// verified.
+/// The outputs that a target supports. Together they combine each of its methods with every format
+/// that is verified.
 std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
                                             samples::Coverage coverage = samples::Coverage::full);
 
-/// What is verified of a scene in so many poses.
+/// The cases of a scene for this number of poses.
 SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount,
                    samples::Coverage coverage = samples::Coverage::full);
 
-/// The cases of a scene, on all targets of the pool: the result is the same for any number of them.
-/// However the work is cut up, not a bit may change. Motion goes from the pose before, in the first
-/// from the last. `done` is called after each batch. Fails with `invalidMesh` if a pose has
-/// positions that float32 cannot hold.
+/// Verifies the cases of a scene on all targets of the pool. The result does not depend on their
+/// number. Any division of the work must give the same bits. Motion starts from the previous pose;
+/// for the first pose, from the last one. `done` is called after each batch. Fails with
+/// `invalidMesh` if a pose has positions that are out of range for float32.
 Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,
                                               std::span<const PoseToVerify> poses,
                                               const SceneCases& cases,
                                               const std::function<void()>& done);
 
-/// The product of methods, inputs and outputs over random meshes, by pairs, on all targets of the
-/// pool. `done` is called after each case.
+/// Verifies combinations of methods, inputs and outputs, chosen to cover all pairs, on random
+/// meshes, on all targets of the pool. `done` is called after each case.
 Result<std::vector<VerifiedCase>> verifyRandomMeshes(samples::TargetPool& pool,
                                                      std::span<const samples::RandomCase> cases,
                                                      const std::function<void()>& done);

@@ -1,4 +1,4 @@
-// Which cases `dermis verify` goes through for a scene.
+// The cases that `dermis verify` checks for a scene.
 #pragma once
 
 #include <cstddef>
@@ -15,33 +15,33 @@ struct Figure {
   Method method = Method::linear;
 };
 
-/// A way to store the result, and the methods to verify in it.
+/// An output layout, and the methods to verify with it.
 struct OutputToVerify {
   samples::OutputCase output;
   std::vector<Method> methods;
 };
 
-/// Positions, normals and tangents as float32, however the work is cut up.
+/// The output for all divisions of the work: positions, normals and tangents as float32.
 samples::OutputCase divisionOutput(const samples::Division& division);
 
-/// Figures that are skinned together, in one pose and one way. Ways are numbered: those to cut up
-/// the work, then those to store the result.
+/// Figures that are skinned together, in one pose and one way. Ways have consecutive indices: first
+/// the divisions of the work, then the outputs.
 struct SceneBatch {
   std::size_t pose = 0;
   std::size_t way = 0;
   std::vector<std::size_t> figures;
 };
 
-/// All of what is verified of a scene.
+/// All cases of a scene.
 struct SceneCases {
   std::vector<Figure> figures;
   std::vector<samples::Division> divisions;
   std::vector<OutputToVerify> outputs;
-  std::vector<SceneBatch> batches;  ///< by pose, then by way
+  std::vector<SceneBatch> batches;  ///< ordered by pose, then by way
 };
 
-/// In each pose all figures in each division, and in each way to store the result, which are shared
-/// out among the poses, all figures of its methods.
+/// Makes the cases. In each pose, all figures are skinned with each division. The outputs are
+/// distributed among the poses; each is verified with all figures of its methods.
 SceneCases sceneCases(std::vector<Figure> figures, std::vector<samples::Division> divisions,
                       std::vector<OutputToVerify> outputs, std::size_t poseCount);
 

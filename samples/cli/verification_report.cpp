@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Text as XML 1.0 takes it: markup escaped, control characters and what is not ASCII replaced,
-/// since names come from files.
+/// Converts text for XML 1.0: escapes markup, and replaces control characters and everything that
+/// is not ASCII, since names come from files.
 std::string xmlText(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
@@ -48,7 +48,7 @@ struct Summary {
   std::size_t failures = 0;
 };
 
-/// What was not held against a bound, if there is any.
+/// Lists vertices that were not compared with a bound, if there are any.
 std::string exceptions(const Summary& summary) {
   std::string text;
   if (summary.exempt.onlyFinite != 0)
@@ -95,7 +95,7 @@ std::size_t ModelVerification::failures() const {
 
 void printReport(const std::vector<ModelVerification>& models) {
   for (const ModelVerification& model : models) {
-    if (!model.error.empty()) continue;  // said on standard error
+    if (!model.error.empty()) continue;  // already reported on standard error
     std::map<std::string, Summary> byMethod;
     for (const VerifiedCase& verified : model.cases) {
       Summary& summary = byMethod[verified.method];

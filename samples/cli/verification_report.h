@@ -1,4 +1,4 @@
-// What `verify` found, for people and for CI.
+// Reports the results of `verify`, as text and for CI.
 #pragma once
 
 #include <filesystem>
@@ -11,16 +11,16 @@ namespace dermis::cli {
 
 struct ModelVerification {
   std::string model;
-  std::string error;  ///< why it could not be verified, or empty
+  std::string error;  ///< why the model could not be verified, or empty
   std::vector<VerifiedCase> cases;
 
   std::size_t failures() const;
 };
 
-/// A line for each model and method on standard output, then a line for each failure.
+/// Prints a line for each model and method, then a line for each failure.
 void printReport(const std::vector<ModelVerification>& models);
 
-/// Fail with `ioError`.
+/// Both fail with `ioError`.
 Result<void> writeJsonReport(const std::filesystem::path& path, const std::string& device,
                              const std::vector<ModelVerification>& models);
 Result<void> writeJunitReport(const std::filesystem::path& path,

@@ -1,4 +1,4 @@
-// Normals for a mesh that has none.
+// Computes normals for a mesh that has none.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace dermis::cli {
 
-/// Area-weighted normals of the triangles (3 indices each, all within `positions`, 3 floats a
-/// vertex); 0 0 1 for a vertex in none.
+/// Area-weighted normals of the triangles (3 indices each, all within `positions`, 3 floats per
+/// vertex). A vertex without triangles gets 0 0 1.
 std::vector<float> computeNormals(std::span<const float> positions,
                                   std::span<const std::uint32_t> triangles);
 

@@ -1,4 +1,4 @@
-// What the shaders are given: shaders/view.glsl and shaders/draw.glsl have the same in GLSL.
+// Uniform data of the shaders. shaders/view.glsl and shaders/draw.glsl declare the same in GLSL.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace dermis::samples::render {
 
 inline constexpr std::uint32_t maxSkyLights = 32;
 
-/// std140: matrices and vectors of four only, so that nothing is padded.
+/// std140: only matrices and vectors of four components, so that there is no padding.
 struct ViewBlock {
   glm::mat4 viewProjection{1.0f};
   glm::mat4 keyMatrix{1.0f};

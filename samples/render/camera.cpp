@@ -19,7 +19,7 @@ struct Axes {
 
 Axes axesOf(const CameraOptions& options) {
   const auto azimuth = static_cast<float>(glm::radians(options.azimuth));
-  // At the pole there would be no direction to the right.
+  // At a pole, the direction to the right would be undefined.
   const auto elevation =
       static_cast<float>(glm::radians(std::clamp(options.elevation, -89.9, 89.9)));
   const glm::vec3 back(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
@@ -36,10 +36,10 @@ void addCorners(const Box& box, std::vector<glm::vec3>& corners) {
   }
 }
 
-/// How far away the eye must be, on a line of its choice, so that |x - center| <= slope · (distance
-/// - z) for every point x z.
+/// The distance that the eye must have, along a line that may be chosen, so that |x - center| <=
+/// slope · (distance - z) for every point (x, z).
 float fittingDistance(std::span<const glm::vec2> points, float slope) {
-  // The one border is touched by the largest of x + slope·z, the other by that of -x + slope·z.
+  // One border is determined by the largest x + slope·z, the other by the largest -x + slope·z.
   float high = std::numeric_limits<float>::lowest(), low = high;
   for (const glm::vec2& point : points) {
     high = std::max(high, point.x + slope * point.y);
@@ -48,8 +48,8 @@ float fittingDistance(std::span<const glm::vec2> points, float slope) {
   return (high + low) / (2 * slope);
 }
 
-/// Where the eye stands so that both borders are equally far from what is seen. The farther it goes
-/// to one side the farther that is on the other: found by halving.
+/// The position of the eye for which both borders are equally far from the points. Moving the eye
+/// to one side increases the distance on the other, so the position is found by bisection.
 float middle(std::span<const glm::vec2> points, float distance, bool isOrthographic) {
   float low = std::numeric_limits<float>::max(), high = -low;
   for (const glm::vec2& point : points) {

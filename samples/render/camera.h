@@ -1,4 +1,4 @@
-// Where a picture is taken from.
+// The camera of a picture.
 #pragma once
 
 #include <span>
@@ -15,28 +15,28 @@ struct CameraOptions {
   double azimuth = 30;    ///< degrees around the model; 0 in front of it (+Z), 90 at its left (+X)
   double elevation = 12;  ///< degrees above the ground
   double fieldOfView = 28;  ///< degrees, vertical; a portrait lens
-  double margin = 0.08;     ///< free at each border, as a part of the picture
+  double margin = 0.08;     ///< free space at each border, as a fraction of the picture
 };
 
 struct Camera {
   glm::mat4 viewProjection{1.0f};
-  glm::vec3 eye{0.0f};                     ///< orthographic: of no meaning
-  glm::vec3 towardsEye{0.0f, 0.0f, 1.0f};  ///< from what it looks at
+  glm::vec3 eye{0.0f};                     ///< meaningless if orthographic
+  glm::vec3 towardsEye{0.0f, 0.0f, 1.0f};  ///< direction from the target
   glm::vec3 right{1.0f, 0.0f, 0.0f};
-  float distance = 1;  ///< from the eye to what it looks at
+  float distance = 1;  ///< from the eye to the target
   bool isOrthographic = false;
 };
 
 /// The box around all of them.
 Box unite(std::span<const Box> boxes);
 
-/// Half the diagonal, and never 0.
+/// Half the diagonal, always above 0.
 float radiusOf(const Box& box);
 glm::vec3 centerOf(const Box& box);
 
-/// A camera in whose picture the boxes lie: as large as the margin allows, and in its middle.
-/// `depth` is what may be seen besides, a ground for one, and must not be cut off. `aspect` is the
-/// picture's width divided by its height.
+/// A camera that shows the boxes centered and as large as the margin allows. `depth` is everything
+/// else that may be visible, such as a ground, and must not be clipped. `aspect` is the picture's
+/// width divided by its height.
 Camera frameBoxes(std::span<const Box> boxes, const Box& depth, const CameraOptions& options,
                   float aspect);
 

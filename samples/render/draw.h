@@ -1,4 +1,4 @@
-// One draw of a picture: skinned vertices, where Dermis wrote them, and how their surface looks.
+// One draw of a picture: skinned vertices in the buffer that Dermis wrote, and their surface.
 #pragma once
 
 #include <array>
@@ -34,19 +34,19 @@ struct Surface {
 };
 
 struct Draw {
-  /// float32x3, float32x4 or float16x4. The barrier between what wrote them and the draw,
-  /// `vulkan::outputScope(Consumer::vertexInput)`, is the caller's.
+  /// float32x3, float32x4 or float16x4. The caller must record the barrier between the writes and
+  /// the draw, `vulkan::outputScope(Consumer::vertexInput)`.
   VertexStream positions;
-  /// Any that `isNormalFormat` allows, but three components of 1 or 2 bytes; or none: the surface
-  /// is then flat between its edges.
+  /// Any format that `isNormalFormat` allows, except three components of 1 or 2 bytes; or none, for
+  /// flat shading.
   VertexStream normals;
-  /// One float32 a vertex, 0 to 1, shown as a color instead of the base color: a heat map. Its
-  /// format is not looked at; no buffer: there is none.
+  /// Heat map: one float32 per vertex, from 0 to 1, shown as a color instead of the base color. The
+  /// format is ignored. No buffer: no heat map.
   VertexStream values;
-  const Geometry* geometry = nullptr;  ///< as many vertices as are skinned
+  const Geometry* geometry = nullptr;  ///< must have as many vertices as are skinned
   Surface surface;
-  JointMatrix transform;    ///< to the world: turned, moved, and scaled by one number
-  bool isMirrored = false;  ///< The pose has turned the triangles inside out.
+  JointMatrix transform;    ///< to the world: rotation, translation and uniform scale
+  bool isMirrored = false;  ///< the pose has turned the triangles inside out
 };
 
 }  // namespace dermis::samples::render

@@ -9,7 +9,7 @@ namespace dermis::samples::render {
 namespace {
 
 std::uint16_t toUnorm16(float value) {
-  // What is not a number becomes 0.
+  // NaN becomes 0.
   return static_cast<std::uint16_t>(
       std::lround(std::clamp(value > 0 ? value : 0, 0.f, 1.f) * 65535));
 }

@@ -1,4 +1,4 @@
-// What of a mesh does not change when it is skinned.
+// The data of a mesh that skinning does not change.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@ namespace dermis::samples::render {
 struct GeometryData {
   std::uint32_t vertexCount = 0;
   std::span<const std::uint32_t> triangles;  ///< 3 indices each, all below `vertexCount`
-  std::span<const float> texcoords;          ///< 2 a vertex, or none
-  std::span<const float> colors;             ///< 4 a vertex, linear, or none: white
+  std::span<const float> texcoords;          ///< 2 per vertex, or empty
+  std::span<const float> colors;             ///< 4 per vertex, linear; empty: white
 };
 
-/// As it stands in the vertex buffer.
+/// The layout in the vertex buffer.
 struct StaticVertex {
   float texcoord[2];
   std::uint16_t color[4];

@@ -1,4 +1,4 @@
-// The colors of a heat map, for what explains it.
+// The colors of a heat map, for legends.
 #pragma once
 
 #include <array>
@@ -6,8 +6,8 @@
 
 namespace dermis::samples::render {
 
-/// The color of a value from 0 to 1, as shaders/mesh.frag has it, in sRGB: that of a surface in
-/// even white light.
+/// The color of a value from 0 to 1 in sRGB: that of shaders/mesh.frag for a surface in uniform
+/// white light.
 std::array<std::uint8_t, 3> heatColor(float value);
 
 }  // namespace dermis::samples::render

@@ -1,4 +1,4 @@
-// Images with memory of their own, and views of them.
+// Images with their own memory, and views of them.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@ namespace dermis::samples::render {
 
 struct ImageDescription {
   VkFormat format = VK_FORMAT_UNDEFINED;
-  VkFormat viewFormat = VK_FORMAT_UNDEFINED;  ///< of its views, where that is another
+  VkFormat viewFormat = VK_FORMAT_UNDEFINED;  ///< of its views, if different
   std::uint32_t width = 0, height = 0;
-  std::uint32_t layers = 0;  ///< 0: one, and not seen as an array
+  std::uint32_t layers = 0;  ///< 0: one layer, not viewed as an array
   std::uint32_t levels = 1;
   VkSampleCountFlagBits samples = VK_SAMPLE_COUNT_1_BIT;
   VkImageUsageFlags usage = 0;
@@ -23,21 +23,21 @@ class Image {
   static Result<Image> create(Device& device, const ImageDescription& description);
 
   VkImage handle() const { return image_.get(); }
-  /// Of all of it.
+  /// A view of the whole image.
   VkImageView view() const { return view_.get(); }
-  /// Of one layer, to draw into.
+  /// A view of one layer, to draw into.
   Result<Owned<VkImageView>> layerView(Device& device, std::uint32_t layer) const;
   const ImageDescription& description() const { return description_; }
 
  private:
   ImageDescription description_;
-  // The image goes before its memory, the view before the image.
+  // The image must be destroyed before its memory, and the view before the image.
   Owned<VkDeviceMemory> memory_;
   Owned<VkImage> image_;
   Owned<VkImageView> view_;
 };
 
-/// A barrier for a part of an image that need not be one of these.
+/// A barrier for a part of an image, which need not be an `Image`.
 void recordTransition(const Device& device, VkCommandBuffer commandBuffer, VkImage image,
                       const VkImageSubresourceRange& part, VkImageLayout from, VkImageLayout to,
                       VkPipelineStageFlags sourceStages, VkAccessFlags sourceAccesses,

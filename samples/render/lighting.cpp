@@ -16,8 +16,8 @@ namespace {
 /// An orthographic view along a light, around all casters.
 struct LightView {
   glm::mat4 matrix{1.0f};
-  float widest = 0;  ///< a side of the map, in the world
-  float depth = 0;   ///< from its nearest to its farthest, in the world
+  float widest = 0;  ///< longest side of the map, in world units
+  float depth = 0;   ///< from its nearest to its farthest point, in world units
 };
 
 LightView lightView(const Box& casters, const glm::vec3& towardsLight) {
@@ -32,11 +32,11 @@ LightView lightView(const Box& casters, const glm::vec3& towardsLight) {
     low = glm::min(low, glm::vec3(view * point));
     high = glm::max(high, glm::vec3(view * point));
   }
-  // Filters reach a little beyond what is drawn.
+  // Filters read a little beyond what is drawn.
   const float margin = 0.03f * radiusOf(casters);
   low -= margin;
   high += margin;
-  // As wide as high, so that a penumbra is round.
+  // A square, so that a penumbra is round.
   const float half = std::max(high.x - low.x, high.y - low.y) * 0.5f;
   const glm::vec2 middle = (glm::vec2(low) + glm::vec2(high)) * 0.5f;
   LightView light;
@@ -48,7 +48,7 @@ LightView lightView(const Box& casters, const glm::vec3& towardsLight) {
   return light;
 }
 
-/// Directions spread evenly over the upper half of a sphere: a Fibonacci spiral (Swinbank and
+/// Directions distributed evenly over the upper half of a sphere: a Fibonacci spiral (Swinbank and
 /// Purser 2006, "Fibonacci grids").
 glm::vec3 skyDirection(std::uint32_t index, std::uint32_t count) {
   const float height = (static_cast<float>(index) + 0.5f) / static_cast<float>(count);
@@ -68,7 +68,7 @@ void lightSky(const Box& casters, const ShadowSizes& sizes, ViewBlock& block) {
     const glm::vec3 direction = skyDirection(index, sizes.skyLights);
     const LightView view = lightView(casters, direction);
     block.skyMatrices[index] = view.matrix;
-    // An upward surface is given 1 by a sky of even light: the sum of cosines is half their number.
+    // A uniform sky gives an upward surface 1: the cosines sum to half their number.
     block.skyDirections[index] = glm::vec4(direction, 2 / static_cast<float>(sizes.skyLights));
     widest = std::max(widest, view.widest);
   }
@@ -91,7 +91,7 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.shadow.y = keyView.depth;
   block.shadow.w = 1 / static_cast<float>(sizes.keyMap);
   lightSky(casters, sizes, block);
-  // Of the shadow that the top of a figure throws on the ground, or a little less.
+  // About the length of the shadow of a figure's top on the ground, or a little less.
   const float height = casters.max[1] - casters.min[1];
   block.sky.w = 0.03f * height * block.sky.y / block.shadow.z;
   block.sky.z = 0.6f * height * style.keySize / key.y;

@@ -1,4 +1,4 @@
-// A Vulkan object that goes when its owner goes.
+// A Vulkan object that is destroyed with its owner.
 #pragma once
 
 #include <string>
@@ -54,7 +54,7 @@ Result<Owned<Handle>> make(const Device& device, const char* name,
 
 }  // namespace dermis::samples::render
 
-/// `make` for the object of that name: DERMIS_MAKE(device, Image, info).
+/// Calls `make` for the named type of object: DERMIS_MAKE(device, Image, info).
 #define DERMIS_MAKE(device, name, info)                                                          \
   ::dermis::samples::render::make((device), "vkCreate" #name, (device).functions().Create##name, \
                                   (device).functions().Destroy##name, (info))

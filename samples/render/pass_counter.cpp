@@ -45,7 +45,7 @@ Result<void> PassCounter::wait(VkFence fence, const std::function<void()>& onPas
   while (result == VK_TIMEOUT) {
     result =
         device_->functions().WaitForFences(device_->handle(), 1, &fence, VK_TRUE, pollInterval);
-    // What is read before the fence may be old, which here means: a moment late.
+    // A value read before the fence may be outdated; then a pass is only reported a moment later.
     for (; told < recorded_; ++told) {
       std::uint32_t word = 0;
       std::memcpy(&word, words_.bytes().data() + std::size_t{told} * sizeof(word), sizeof(word));

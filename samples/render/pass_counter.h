@@ -1,4 +1,4 @@
-// How far the device has come with one long submission.
+// Reports the progress of the device in one long submission.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,19 @@ class PassCounter {
   /// `device` must outlive it.
   static Result<PassCounter> create(Device& device, std::uint32_t passes);
 
-  /// Between two passes: one more is done when the device comes here.
+  /// Record this between two passes: it marks one more pass as done.
   void record(VkCommandBuffer commandBuffer);
 
-  /// Waits for the fence of the submission, and calls `onPass` with each pass that is done, about
-  /// when it is. Fails with `vulkanError`.
+  /// Waits for the fence of the submission, and calls `onPass` for each completed pass, at about
+  /// the time when it completes. Fails with `vulkanError`.
   Result<void> wait(VkFence fence, const std::function<void()>& onPass) const;
-  /// The same, with a fence of its own.
+  /// The same, with its own fence.
   Result<void> submitAndWait(VkCommandBuffer commandBuffer,
                              const std::function<void()>& onPass) const;
 
  private:
   Device* device_ = nullptr;
-  MappedBuffer words_;  ///< one a pass, not 0 when it is done
+  MappedBuffer words_;  ///< one per pass; not 0 when it is done
   std::uint32_t passes_ = 0, recorded_ = 0;
 };
 

@@ -22,7 +22,7 @@ constexpr std::array<const char*, 3> fontFiles{
     "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
 };
 
-/// Nothing if it cannot be read.
+/// Empty if the file cannot be read.
 std::vector<unsigned char> readBytes(const std::string& name) {
   std::ifstream stream(name, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -34,7 +34,7 @@ bool isFont(const std::vector<unsigned char>& file) {
   return offset >= 0 && stbtt_InitFont(&info, file.data(), offset) != 0;
 }
 
-/// The code points of a text; a byte that begins none counts as U+FFFD.
+/// The code points of a UTF-8 text. A byte that does not start a code point becomes U+FFFD.
 std::vector<int> codePoints(std::string_view text) {
   std::vector<int> points;
   for (std::size_t i = 0; i < text.size();) {
@@ -52,7 +52,7 @@ std::vector<int> codePoints(std::string_view text) {
   return points;
 }
 
-/// Mixes a color into a pixel by a share of 0 to 255.
+/// Blends a color into a pixel. `share` is from 0 to 255.
 void mix(std::uint8_t* pixel, const std::uint8_t* color, unsigned share) {
   for (int i = 0; i < 3; ++i)
     pixel[i] = static_cast<std::uint8_t>((pixel[i] * (255 - share) + color[i] * share + 127) / 255);
@@ -68,7 +68,7 @@ stbtt_fontinfo infoOf(const std::vector<unsigned char>& file) {
 
 Result<std::vector<std::byte>> encodePng(const Picture& picture) {
   constexpr int channels = 3;
-  // stb counts in `int`, and stores a byte for each row beside the pixels.
+  // stb uses `int` sizes, and stores one extra byte per row.
   const std::uint64_t rowBytes = std::uint64_t{picture.width} * channels + 1;
   if (rowBytes > std::numeric_limits<int>::max() / std::max(picture.height, 1u))
     return Error{ErrorCode::limitExceeded, "the picture is too large for a PNG"};

@@ -14,7 +14,7 @@
 namespace dermis::samples::render {
 namespace {
 
-/// The numbers of the shaders' specialization constants, in their order.
+/// The IDs of the shaders' specialization constants, in order.
 struct Specialization {
   std::int32_t blockerTaps = 0;
   std::int32_t penumbraTaps = 0;
@@ -42,7 +42,7 @@ Result<void> checkFormats(const PipelineKey& key) {
                    (positions ? " normals" : " positions")};
 }
 
-/// Buffers 0 positions, 1 normals, 2 what is static, 3 values.
+/// Vertex buffer bindings: 0 positions, 1 normals, 2 static data, 3 values.
 struct VertexState {
   std::vector<VkVertexInputBindingDescription> bindings;
   std::vector<VkVertexInputAttributeDescription> attributes;
@@ -58,8 +58,8 @@ VertexState vertexState(const PipelineKey& key) {
       {3, 2, VK_FORMAT_R16G16B16A16_UNORM, offsetof(StaticVertex, color)},
   };
   if (key.step == Step::shadow) return state;
-  // The shader reads every attribute, whether it needs it or not: what there is not is something
-  // else that is there.
+  // The shader declares every attribute, even if it does not need it. A missing attribute is
+  // replaced by another one that exists.
   if (key.normals == VertexFormat::none) {
     state.attributes.push_back({1, 0, vulkan::vertexInputFormat(key.positions), 0});
   } else {
@@ -129,12 +129,12 @@ VkPipelineColorBlendAttachmentState blendState(const PipelineKey& key) {
   return state;
 }
 
-/// The specialization of both shaders. Not copied: its parts point at each other.
+/// The specialization constants of both shaders. Not copyable: its members point to each other.
 class SpecializedConstants {
  public:
   SpecializedConstants(const PipelineKey& key, const FilterTaps& taps)
       : numbers_{taps.blockers, taps.penumbra,
-                 // The ground is large and even: what is coarse is seen there first.
+                 // The ground is large and uniform, so coarse filtering is most visible there.
                  key.step == Step::ground ? 2 * taps.sky : taps.sky,
                  isOctahedral(key.normals) ? VK_TRUE : VK_FALSE,
                  key.normals == VertexFormat::none ? VK_TRUE : VK_FALSE,
@@ -154,7 +154,7 @@ class SpecializedConstants {
   VkSpecializationInfo info_{};
 };
 
-/// Everything of a pipeline but its shaders. Not copied, likewise.
+/// All state of a pipeline except its shaders. Not copyable, for the same reason.
 class FixedState {
  public:
   FixedState(const PipelineKey& key, const VertexState& vertices)
@@ -313,7 +313,7 @@ Result<Owned<VkPipeline>> Pipelines::build(const Device& device, const PipelineK
   const auto& [vertex, fragment] = modules[static_cast<std::size_t>(key.step)];
   const std::array stages{stage(VK_SHADER_STAGE_VERTEX_BIT, vertex, constants.info()),
                           stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment, constants.info())};
-  // Shadows of what is opaque need no fragment shader.
+  // Shadows of opaque surfaces need no fragment shader.
   const bool colors = key.step != Step::shadow;
   const bool hasFragmentShader = colors || key.transparency != Transparency::opaque;
   const VertexState vertices = drawsMesh ? vertexState(key) : VertexState();

@@ -1,4 +1,4 @@
-// The pipelines of the renderer, built when they are first wanted.
+// The pipelines of the renderer, created when they are first needed.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace dermis::samples::render {
 
 enum class Step : std::uint8_t { shadow, background, ground, mesh };
 
-/// What a pipeline is built for. Of a background or ground only the step counts.
+/// Identifies a pipeline. For a background or ground, only the step matters.
 struct PipelineKey {
   Step step = Step::mesh;
   VertexFormat positions = VertexFormat::none, normals = VertexFormat::none;
@@ -29,7 +29,7 @@ struct PipelineKey {
   bool operator<(const PipelineKey& other) const { return tied() < other.tied(); }
 };
 
-/// How well shadows are filtered; specializes the fragment shaders.
+/// Number of filter samples for shadows; specializes the fragment shaders.
 struct FilterTaps {
   std::int32_t blockers = 20, penumbra = 32, sky = 4;
 };
@@ -40,7 +40,7 @@ class Pipelines {
   static Result<Pipelines> create(const Device& device, VkRenderPass shadowPass,
                                   VkRenderPass picturePass, const FilterTaps& taps);
 
-  /// Fails with `invalidArgument` for formats that cannot be drawn from.
+  /// Fails with `invalidArgument` for formats that cannot be drawn.
   Result<VkPipeline> get(const Device& device, const PipelineKey& key);
 
   VkPipelineLayout layout() const { return layout_.get(); }

@@ -59,7 +59,7 @@ PipelineKey keyOf(const Draw& draw, Step step) {
   key.positionStride = draw.positions.stride;
   key.transparency = draw.surface.transparency;
   if (step == Step::shadow) {
-    // What is transparent throws the shadow of what is at least half opaque.
+    // Transparent surfaces cast the shadow of their parts that are at least half opaque.
     if (key.transparency == Transparency::blend) key.transparency = Transparency::mask;
     return key;
   }
@@ -98,7 +98,7 @@ void setArea(const VulkanFunctions& functions, VkCommandBuffer commandBuffer,
 
 void bindVertices(const VulkanFunctions& functions, VkCommandBuffer commandBuffer,
                   const Draw& draw) {
-  // Bindings that a draw does not have are not in its pipeline either.
+  // A binding that a draw lacks is not used by its pipeline either.
   const auto orPositions = [&](const VertexStream& stream) {
     return stream.buffer != VK_NULL_HANDLE ? stream : draw.positions;
   };
@@ -112,13 +112,13 @@ void bindVertices(const VulkanFunctions& functions, VkCommandBuffer commandBuffe
                                  buffers.data(), offsets.data());
 }
 
-/// Opaque ones first; those that blend in the order they are given in, behind.
+/// Opaque draws first, then blended ones in the given order.
 std::vector<const Draw*> inOrder(std::span<const Draw> draws) {
   std::vector<const Draw*> ordered;
   for (const Draw& draw : draws) {
     if (draw.geometry != nullptr && draw.geometry->indexCount() != 0) ordered.push_back(&draw);
   }
-  // Not std::ranges: Clang 14 and GCC's library do not agree about what that returns.
+  // Not std::ranges: Clang 14 and libstdc++ disagree about the return type.
   std::stable_partition(ordered.begin(), ordered.end(), [](const Draw* draw) {
     return draw->surface.transparency != Transparency::blend;
   });
@@ -158,7 +158,7 @@ Result<void> Renderer::makeSamplers() {
   info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
   info.addressModeU = info.addressModeV = info.addressModeW =
       VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_BORDER;
-  // Beyond the map there is nothing in the way of the light.
+  // Outside the map, nothing blocks the light.
   info.borderColor = VK_BORDER_COLOR_FLOAT_OPAQUE_WHITE;
   Result<Owned<VkSampler>> depth = DERMIS_MAKE(*device_, Sampler, info);
   if (!depth) return depth.error();
@@ -345,7 +345,7 @@ Result<void> Renderer::recordView(VkCommandBuffer commandBuffer,
           recordDraws(commandBuffer, frame.set, {draws.begin(), blended}, Step::mesh, -1);
       !done)
     return done;
-  // Behind what hides it, and not at all from below.
+  // Drawn after what hides it, and not at all from below.
   if (view.groundHeight && (view.camera.isOrthographic ? view.camera.towardsEye.y > 0
                                                        : view.camera.eye.y > *view.groundHeight)) {
     key.step = Step::ground;
@@ -366,7 +366,7 @@ Result<void> Renderer::recordDraws(VkCommandBuffer commandBuffer, VkDescriptorSe
   std::optional<std::uint32_t> lastTexture;
   const Geometry* lastGeometry = nullptr;
   for (const Draw* draw : draws) {
-    // In a crowd the same parts follow one another: only what differs is bound.
+    // In a crowd, equal parts are adjacent: only bind what differs.
     const PipelineKey key = keyOf(*draw, step);
     if (!lastKey || key < *lastKey || *lastKey < key) {
       const Result<VkPipeline> pipeline = pipelines_->get(*device_, key);

@@ -1,5 +1,5 @@
-// Draws skinned meshes: straight from the buffers that Dermis wrote, in the command buffer that it
-// recorded into. For pictures and films of the samples; an engine has its own renderer.
+// Draws skinned meshes directly from the buffers that Dermis wrote, in the same command buffer. For
+// pictures and films of the samples; an engine has its own renderer.
 //
 //   Renderer renderer = *Renderer::create(device);
 //   RenderFrame frame = *renderer.createFrame(device, {1280, 720});
@@ -26,28 +26,29 @@
 
 namespace dermis::samples::render {
 
-/// One scene in a part of the picture.
+/// One scene, drawn into a part of the picture.
 struct View {
   VkRect2D area{};  ///< pixels
   Camera camera;
   LightingStyle style;
   std::span<const Draw> draws;
-  /// What throws the shadows, where coarser triangles do for that; empty: `draws`.
+  /// Draws that cast shadows, if they differ (coarser triangles); empty: `draws`.
   std::span<const Draw> shadowDraws;
-  Box casters;  ///< Around all that is drawn.
-  /// Where it stands, and how far from the middle the ground reaches; nothing: there is none.
+  Box casters;  ///< box around everything that is drawn
+  /// The height of the ground, and its radius around the center; nothing: no ground.
   std::optional<float> groundHeight;
   float groundRadius = 0;
 };
 
 struct FrameDescription {
   std::uint32_t width = 1280, height = 720;
-  std::uint32_t views = 1;  ///< at most so many in one picture
+  std::uint32_t views = 1;  ///< maximum number of views in one picture
   ShadowSizes shadows;
 };
 
-/// What a picture is drawn into, and what only one picture at a time can use: one for each frame in
-/// flight. Must outlive the GPU's use of it, and go before the renderer.
+/// The images of a picture, and other resources that only one picture can use at a time: one object
+/// for each frame in flight. It must outlive the GPU's use of it, and be destroyed before the
+/// renderer.
 class RenderFrame {
  public:
   const RenderTarget& target() const { return target_; }
@@ -67,21 +68,22 @@ class RenderFrame {
 /// Not thread-safe.
 class Renderer {
  public:
-  /// `device` was made with `DeviceOptions::graphics`, and must outlive it.
+  /// `device` must have been created with `DeviceOptions::graphics`, and must outlive the renderer.
   static Result<Renderer> create(Device& device, const FilterTaps& taps = {});
 
-  /// For `Surface::texture`.
+  /// Returns a value for `Surface::texture`.
   Result<std::uint32_t> addTexture(const TexturePixels& pixels, const TextureOptions& options);
-  /// The pixels of a texture that was added, wrapped in another way. They are not stored again.
+  /// Adds a texture with the pixels of an existing one and another wrap mode. The pixels are not
+  /// stored again.
   Result<std::uint32_t> addTexture(std::uint32_t pixelsOf, const TextureOptions& options);
 
   Result<RenderFrame> createFrame(const FrameDescription& description);
 
-  /// Records shadow maps and picture, outside a render pass. What is in the views need not live
-  /// longer than the call, but for buffers and geometry. Builds pipelines when they are first
-  /// wanted. Fails with `invalidArgument` for more views than the frame was made for, or a format
-  /// that cannot be drawn from. `afterPass` is called when each shadow map and the picture is
-  /// recorded, outside a render pass, `passCount` times.
+  /// Records the shadow maps and the picture, outside a render pass. The contents of the views,
+  /// except buffers and geometry, need not outlive the call. Creates pipelines when they are first
+  /// needed. Fails with `invalidArgument` for more views than the frame was made for, or a format
+  /// that cannot be drawn. `afterPass` is called outside a render pass after each shadow map and
+  /// the picture have been recorded, `passCount` times in all.
   Result<void> record(VkCommandBuffer commandBuffer, RenderFrame& frame,
                       std::span<const View> views, const std::function<void()>& afterPass = {});
   static std::uint32_t passCount(const RenderFrame& frame, std::size_t views);

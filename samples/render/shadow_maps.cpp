@@ -28,7 +28,7 @@ Result<Owned<VkFramebuffer>> makeFramebuffer(Device& device, VkRenderPass pass, 
   return DERMIS_MAKE(device, Framebuffer, info);
 }
 
-/// The last picture has read the maps before, this one reads them behind.
+/// The previous picture reads the maps before this pass, and this picture reads them after it.
 std::array<VkSubpassDependency, 2> shadowDependencies() {
   constexpr VkPipelineStageFlags depthTests =
       VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;

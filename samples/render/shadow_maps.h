@@ -1,4 +1,4 @@
-// The depths that the lights of one view see.
+// Shadow maps of the lights of one view.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,11 @@
 
 namespace dermis::samples::render {
 
-/// 16 bits, which every device can draw into and read: the views of the lights fit what is drawn.
+/// 16 bits, which every device can draw into and read. That is enough, because the lights' views
+/// are fitted to the scene.
 inline constexpr VkFormat shadowFormat = VK_FORMAT_D16_UNORM;
 
-/// The pass that draws one map. It leaves it ready to be read by fragment shaders.
+/// The render pass for one map. After it, fragment shaders can read the map.
 Result<Owned<VkRenderPass>> makeShadowPass(const Device& device);
 
 class ShadowMaps {

@@ -1,14 +1,14 @@
-// stb as the renderer uses it: declarations here, its code in stb_implementation.cpp.
+// stb for the renderer: declarations here, code in stb_implementation.cpp.
 #pragma once
 
-// The switches change what is compiled: PNG and JPEG from memory are all that glTF needs.
+// The macros limit what is compiled: glTF needs only PNG and JPEG from memory.
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
 #define STBI_NO_STDIO
 #define STBI_WRITE_NO_STDIO
 
-// Before stb_truetype.h, which otherwise declares rectangles of its own: Dear ImGui, in a program
-// that has both, calls these functions with those of stb_rect_pack.h.
+// Must come before stb_truetype.h, which otherwise declares its own rectangles. If a program also
+// contains Dear ImGui, its calls of these functions use those of stb_rect_pack.h.
 #include <stb/stb_rect_pack.h>
 
 #include <stb/stb_image.h>

@@ -1,4 +1,4 @@
-// The one translation unit that holds stb's code. Its warnings are not ours to mend.
+// The only translation unit with stb's code. Its warnings are disabled.
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #pragma GCC diagnostic ignored "-Wold-style-cast"

@@ -24,7 +24,8 @@ VkAttachmentDescription attachment(VkFormat format, VkSampleCountFlagBits sample
   return description;
 }
 
-/// What was last done with the images before, and what is done with the picture behind.
+/// Waits for the last use of the images before the pass, and for the picture before its use after
+/// the pass.
 std::array<VkSubpassDependency, 2> pictureDependencies() {
   constexpr VkPipelineStageFlags drawing = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT |
                                            VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT |
@@ -48,9 +49,9 @@ std::array<VkSubpassDependency, 2> pictureDependencies() {
   return dependencies;
 }
 
-/// The largest image of a picture: four samples of color.
+/// Bytes per pixel of the largest image of a picture: four samples of color.
 constexpr std::uint64_t largestPerPixel = 4 * 4;
-/// All of it: as much of depth, the resolved image, and its copy.
+/// Bytes per pixel in all: the same for depth, the resolved image, and its copy.
 constexpr std::uint64_t bytesPerPixel = 2 * largestPerPixel + 4 + 4;
 
 Error tooLarge(const Device& device, std::uint32_t width, std::uint32_t height,
@@ -64,7 +65,7 @@ std::string mebibytes(std::uint64_t bytes) {
   return std::to_string(bytes >> 20) + " MiB";
 }
 
-/// The longest side that an image may have.
+/// Maximum size of an image along one side.
 std::uint32_t longestSide(const Device& device, VkFormat format, VkImageUsageFlags usage) {
   VkImageFormatProperties properties{};
   if (device.functions().GetPhysicalDeviceImageFormatProperties(
@@ -74,7 +75,7 @@ std::uint32_t longestSide(const Device& device, VkFormat format, VkImageUsageFla
   return std::min(properties.maxExtent.width, properties.maxExtent.height);
 }
 
-/// What can be known before anything is made. The memory that is free is not.
+/// Checks limits before anything is created. The amount of free memory is unknown.
 Result<void> checkSize(const Device& device, VkFormat depthFormat, std::uint32_t width,
                        std::uint32_t height) {
   VkPhysicalDeviceProperties properties{};
@@ -92,8 +93,8 @@ Result<void> checkSize(const Device& device, VkFormat depthFormat, std::uint32_t
   std::uint64_t largestHeap = 0;
   for (std::uint32_t heap = 0; heap < memory.memoryHeapCount; ++heap)
     largestHeap = std::max(largestHeap, memory.memoryHeaps[heap].size);
-  // Vulkan forbids an allocation larger than its heap. Several may fit all the same: lavapipe 22.3
-  // calls its heap 2 GiB and allocates as much as the machine has.
+  // Vulkan forbids an allocation larger than its heap. Several allocations may exceed it: lavapipe
+  // 22.3 reports a heap of 2 GiB, but allocates as much as the machine has.
   const std::uint64_t bytes = largestPerPixel * width * height;
   if (bytes <= largestHeap) return {};
   return tooLarge(device, width, height,
@@ -150,7 +151,7 @@ Result<RenderTarget> RenderTarget::create(Device& device, VkRenderPass pass, VkF
     return checked.error();
   Result<RenderTarget> target = make(device, pass, depthFormat, width, height);
   if (target || target.error().code == ErrorCode::missingFeature) return target;
-  // Drivers find different words, and different calls, for too little memory.
+  // Drivers report a lack of memory with different results, from different calls.
   Error error = tooLarge(
       device, width, height,
       "it takes " + mebibytes(bytesPerPixel * width * height) + ", and " + target.error().message);

@@ -53,7 +53,8 @@ VkImageMemoryBarrier levelBarrier(VkImage image, std::uint32_t level, VkImageLay
   return barrier;
 }
 
-/// Every level from the one before it. Ends with all of them as the source of a copy.
+/// Computes every mip level from the previous one. Afterwards all levels are in the layout for
+/// copying from.
 void recordLevels(const VulkanFunctions& functions, VkCommandBuffer commandBuffer,
                   const Image& image) {
   const ImageDescription& description = image.description();

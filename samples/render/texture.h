@@ -1,4 +1,4 @@
-// Base-color textures: from encoded bytes to an image that shaders read.
+// Base-color textures: decodes images and uploads them for shaders.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace dermis::samples::render {
 
-/// Red, green, blue and alpha, a byte each, in sRGB; row by row from the top.
+/// Red, green, blue and alpha, one byte each, in sRGB; top row first.
 struct TexturePixels {
   std::uint32_t width = 0, height = 0;
   std::vector<std::uint8_t> pixels;
@@ -24,18 +24,18 @@ struct TextureOptions {
   Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
 };
 
-/// Decodes a PNG or JPEG. Fails with `invalidData` if it is broken or something else, and with
-/// `limitExceeded` if it is larger than 8192 pixels a side, or than the budget, if there is one:
-/// before memory is taken for it.
+/// Decodes a PNG or JPEG. Fails with `invalidData` if it is broken or has another format, and with
+/// `limitExceeded` if it is larger than 8192 pixels on a side, or than the budget if there is one.
+/// This is checked before memory is allocated.
 Result<TexturePixels> decodeImage(std::span<const std::byte> encoded,
                                   gltf::MemoryBudget* budget = nullptr);
 
 class Texture {
  public:
-  /// Uploads it with all its levels, and waits.
+  /// Uploads the texture with all mip levels, and waits.
   static Result<Texture> create(Device& device, const TexturePixels& pixels,
                                 const TextureOptions& options);
-  /// The same image, wrapped in another way.
+  /// The same image, with another wrap mode.
   static Result<Texture> create(Device& device, const Texture& other,
                                 const TextureOptions& options);
 

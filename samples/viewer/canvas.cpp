@@ -20,7 +20,7 @@ bool isBlueFirst(VkFormat format) {
   return format == VK_FORMAT_B8G8R8A8_SRGB;
 }
 
-/// The same bytes without a curve.
+/// The same format without the sRGB curve.
 VkFormat plainFormat(VkFormat format) {
   return isBlueFirst(format) ? VK_FORMAT_B8G8R8A8_UNORM : VK_FORMAT_R8G8B8A8_UNORM;
 }

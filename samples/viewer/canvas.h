@@ -1,5 +1,6 @@
-// What the window shows, before it is shown: the picture of the scene, and the interface on it. An
-// image of our own, because those of a window need not be readable, and screenshots are.
+// The contents of the window before they are shown: the picture of the scene, and the interface on
+// top. This is a separate image, because those of a window need not be readable, and screenshots
+// read it.
 #pragma once
 
 #include <cstdint>
@@ -14,24 +15,24 @@ namespace dermis::viewer {
 
 class Canvas {
  public:
-  /// `format` is an sRGB format of four bytes a pixel. `device` must outlive it.
+  /// `format` is an sRGB format with four bytes per pixel. `device` must outlive the canvas.
   static Result<Canvas> create(samples::Device& device, VkFormat format);
 
-  /// As large as the window. The device must be idle.
+  /// Takes the size of the window. The device must be idle.
   Result<void> resize(VkExtent2D pixels);
   VkExtent2D extent() const { return extent_; }
-  /// The pass that the interface is drawn in: its colors are bytes, not light.
+  /// The pass for drawing the interface, whose colors are sRGB bytes, not linear light.
   VkRenderPass pass() const { return pass_.get(); }
 
-  /// A picture, scaled to a part of the canvas, and `drawInterface` on it; nothing: an empty one.
-  /// Behind it the image is ready to be copied from.
+  /// Draws a picture, scaled to a part of the canvas, and then the interface by `drawInterface`.
+  /// Without a picture the part is empty. Afterwards the image is ready to be copied from.
   void record(VkCommandBuffer commandBuffer, const samples::render::RenderTarget* picture,
               const VkRect2D& area, const std::function<void()>& drawInterface) const;
-  /// Copies it into an image of the same size and bytes, whose contents are lost, and makes that
-  /// ready to be presented.
+  /// Copies the canvas to an image of the same size and format, whose contents are lost, and makes
+  /// that image ready to be presented.
   void recordCopy(VkCommandBuffer commandBuffer, VkImage image) const;
 
-  /// Copies it to memory; after the GPU is done, `picture` has it.
+  /// Copies the canvas to memory. When the GPU is done, `picture` returns it.
   Result<void> recordReadBack(VkCommandBuffer commandBuffer);
   samples::render::Picture picture() const;
 

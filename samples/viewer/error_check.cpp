@@ -31,7 +31,7 @@ Result<void> checkPart(const cli::ScenePart& part, std::size_t index, const Chec
   for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
     const reference::VertexBounds& bounds = expected->bounds[vertex];
     if (bounds.onlyFinite || bounds.undefined) continue;
-    // What is not finite is as wrong as can be told.
+    // A value that is not finite counts as the largest possible error.
     constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
     const double apart = distance(expected->positions[vertex], &positions[3 * vertex]);
     const double error = apart < most ? apart : most;

@@ -1,5 +1,5 @@
-// How far what the device skinned is from the reference in double precision: on a thread of its
-// own, for the reference is made to be right, not fast.
+// The distance of skinned vertices from the reference in double precision. Computed on another
+// thread, because the reference is slow.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace dermis::viewer {
 
-/// What a scene looked like: a pose, and what was skinned by it.
+/// The last state of a scene: a pose, and the vertices skinned with it.
 struct SkinnedFigure {
   Method method = Method::dualQuaternion;
-  std::vector<std::vector<float>> positions;  ///< by part, 3 a vertex; empty: a fixed part
+  std::vector<std::vector<float>> positions;  ///< by part, 3 per vertex; empty for a fixed part
 };
 struct CheckRequest {
   std::uint32_t clip = gltf::none;
@@ -29,7 +29,7 @@ struct FigureError {
   Method method = Method::dualQuaternion;
   std::vector<std::vector<float>> errors;  ///< by part and vertex, in the model's unit
   double greatest = 0;                     ///< of all of them
-  double greatestPartOfBound = 0;          ///< the largest error ÷ what is allowed there
+  double greatestPartOfBound = 0;          ///< the largest error ÷ its bound
 };
 struct CheckResult {
   std::uint32_t clip = gltf::none;
@@ -39,13 +39,13 @@ struct CheckResult {
 
 class ErrorCheck {
  public:
-  /// `scene` must outlive it.
+  /// `scene` must outlive this object.
   explicit ErrorCheck(const cli::Scene& scene) : scene_(&scene) {}
 
   bool isBusy() const { return isBusy_; }
-  /// Not while it is busy.
+  /// Must not be called while the check is busy.
   void begin(CheckRequest request);
-  /// What came of it, once. Fails as `reference::skin`.
+  /// Returns the result, once. Fails like `reference::skin`.
   std::optional<Result<CheckResult>> poll();
 
  private:
@@ -56,7 +56,7 @@ class ErrorCheck {
   std::jthread thread_;  // last, so that it ends first
 };
 
-/// The same, now.
+/// The same check, synchronously.
 Result<CheckResult> checkErrors(const cli::Scene& scene, const CheckRequest& request);
 
 }  // namespace dermis::viewer

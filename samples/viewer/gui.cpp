@@ -16,10 +16,11 @@
 namespace dermis::viewer {
 namespace {
 
-/// One that acts on it, one in which nobody asks for text any more, and one that begins by knowing.
+/// Number of frames after a key: one that acts on it, one in which text is no longer wanted, and
+/// one that starts with this known.
 constexpr int framesPerKey = 3;
 
-/// Only the fonts' texture.
+/// A pool for the font texture only.
 Result<samples::render::Owned<VkDescriptorPool>> makePool(const samples::Device& device) {
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 4};
   VkDescriptorPoolCreateInfo info{};
@@ -51,7 +52,7 @@ Result<void> uploadFonts(samples::Device& device) {
 }
 #endif
 
-/// Whether a key stands for a character, and not for a command.
+/// Whether a key produces a character, and is not a command.
 bool isLetter(const SDL_Keysym& key) {
   return key.sym >= SDLK_SPACE && key.sym != SDLK_DELETE && (key.sym & SDLK_SCANCODE_MASK) == 0 &&
          (key.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI)) == 0;
@@ -72,7 +73,7 @@ Result<Gui> Gui::create(const Window& window, samples::Device& device, VkRenderP
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   gui.hasContext_ = true;
-  ImGui::GetIO().IniFilename = nullptr;  // Nothing is left behind in the folder.
+  ImGui::GetIO().IniFilename = nullptr;  // Do not leave a file in the folder.
   styleGui(window.pixelsPerUnit());
   gui.hasWindow_ = ImGui_ImplSDL2_InitForVulkan(window.handle());
 
@@ -112,8 +113,8 @@ Gui& Gui::operator=(Gui&& other) noexcept {
 
 void Gui::handle(const SDL_Event& event) {
   if (event.type == SDL_KEYDOWN && wantsText()) {
-    // What is typed comes as text. Its keys beside it would have ImGui take a frame for each
-    // letter, and frames are slow here.
+    // Typed characters arrive as text. If their key events were passed on too, ImGui would use a
+    // frame for each letter, and frames are slow here.
     if (isLetter(event.key.keysym)) return;
     if (!isModifier(event.key.keysym)) framesToSeeKey_ = framesPerKey;
   }

@@ -1,5 +1,5 @@
-// Dear ImGui on SDL and Vulkan: what differs between the versions of Debian 12 (1.86) and 13 (1.90)
-// is in gui.cpp alone.
+// Dear ImGui on SDL and Vulkan. All differences between the versions of Debian 12 (1.86) and 13
+// (1.90) are handled in gui.cpp.
 #pragma once
 
 #include <SDL.h>
@@ -10,10 +10,10 @@
 
 namespace dermis::viewer {
 
-/// Only one at a time. Window and device must outlive it.
+/// There can only be one at a time. Window and device must outlive it.
 class Gui {
  public:
-  /// `pass` is what it is drawn in. Fails with `vulkanError`.
+  /// The interface is drawn in `pass`. Fails with `vulkanError`.
   static Result<Gui> create(const Window& window, samples::Device& device, VkRenderPass pass);
   Gui() = default;
   ~Gui();
@@ -21,15 +21,15 @@ class Gui {
   Gui& operator=(Gui&& other) noexcept;
 
   void handle(const SDL_Event& event);
-  /// Whether it wants what the mouse does, and what is typed, for itself.
+  /// Whether the interface uses mouse input, or typed text, itself.
   bool wantsMouse() const;
   bool wantsText() const;
-  /// Whether there is input for more frames: since 1.87 what came at once is spread over several,
-  /// so that a key that was pressed and let go is seen.
+  /// Whether there is input for more frames. Since 1.87, events that arrive together are spread
+  /// over several frames, so that a key that was pressed and released is seen.
   bool hasQueuedInput() const;
-  /// Whether a key that may end its typing is still to be seen: what is pressed after that key has
-  /// to wait for a frame, for it is not known whose it is. Before 1.87 a key that is let go before
-  /// there was a frame was never pressed.
+  /// Whether a key that may end text input has not been processed yet. Later keys must wait for a
+  /// frame, because it is not known who receives them. Before 1.87, a key that is released before a
+  /// frame is lost.
   bool hasUnseenKey() const { return framesToSeeKey_ > 0; }
 
   void beginFrame();

@@ -16,7 +16,7 @@ void useFont(float pixelsPerUnit) {
   ImGuiIO& io = ImGui::GetIO();
   static const std::array<ImWchar, 7> glyphs{0x20, 0xff, 0x2010, 0x2030, 0x2190, 0x2193, 0};
   const Result<std::string> file = samples::render::findFontFile();
-  // Without the file Dear ImGui's own typeface is used.
+  // Without the file, Dear ImGui's own font is used.
   if (file) {
     io.Fonts->AddFontFromFileTTF(file->c_str(), letterHeight * pixelsPerUnit, nullptr,
                                  glyphs.data());

@@ -1,4 +1,4 @@
-// How the interface looks: its typeface, its colors.
+// The style of the interface: its font and its colors.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,14 @@
 
 namespace dermis::viewer {
 
-/// Of Dear ImGui's context. `pixelsPerUnit`: how fine the display is; letters are drawn as fine.
+/// Sets the style of Dear ImGui's context. `pixelsPerUnit` is the resolution of the display, and so
+/// of letters.
 void styleGui(float pixelsPerUnit);
 
 /// 0xRRGGBB and alpha, for draw lists.
 ImU32 color(std::uint32_t rgb, float alpha = 1);
 
-/// The colors of a heat map from 0 to 1, as render/shaders/mesh.frag has them.
+/// The colors of a heat map from 0 to 1, as in render/shaders/mesh.frag.
 ImU32 heatColor(float value);
 
 inline constexpr std::uint32_t accentColor = 0x4FC3B4, warmColor = 0xFFB454, textColor = 0xE8ECF0,

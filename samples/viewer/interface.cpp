@@ -16,7 +16,7 @@ namespace {
 
 constexpr float panelWidth = 300;
 
-/// Text as it is: `Text` would read it as a format.
+/// Draws text literally; `Text` would treat it as a format string.
 void say(const std::string& text) {
   ImGui::TextUnformatted(text.c_str());
 }
@@ -72,7 +72,7 @@ void drawFile(const Facts& facts, State& state) {
   const float button = ImGui::CalcTextSize("Open").x + 2 * ImGui::GetStyle().FramePadding.x;
   ImGui::SetNextItemWidth(-button - ImGui::GetStyle().ItemSpacing.x);
   if (state.editsPath) {
-    ImGui::SetWindowFocus();  // ImGui 1.90 looks for what is to be focused in the window before
+    ImGui::SetWindowFocus();  // ImGui 1.90 needs this: it sets the focus within the focused window
     ImGui::SetKeyboardFocusHere();
   }
   state.editsPath = false;
@@ -219,7 +219,7 @@ void drawScrubber(State& state) {
   say(text);
 }
 
-/// Along the foot of the picture: play, where in the clip, which clip.
+/// Below the picture: the play button, the time in the clip, and the choice of a clip.
 void drawTransport(const SceneView& view, const Area& picture, State& state) {
   const float height = 48, margin = 16;
   ImGui::SetNextWindowPos({picture.x + margin, picture.y + picture.height - height - margin});
@@ -261,7 +261,7 @@ void drawHelp(const Area& picture, State& state) {
   ImGui::End();
 }
 
-/// What went wrong, until it is closed or something else goes right.
+/// The last error, until it is closed or something else succeeds.
 void drawError(const Area& picture, State& state) {
   const float width = std::min(picture.width - 32, 620.0f);
   ImGui::SetNextWindowPos({picture.x + picture.width / 2, picture.y + 56}, ImGuiCond_Always,

@@ -1,14 +1,14 @@
-// The panel, and what lies over the picture.
+// The panel, and the overlay of the picture.
 #pragma once
 
 #include "state.h"
 
 namespace dermis::viewer {
 
-/// Where the picture of the scene goes, beside the panel.
+/// The area of the picture of the scene, next to the panel.
 Area pictureArea(const State& state, float windowWidth, float windowHeight);
 
-/// Between `Gui::beginFrame` and `endFrame`. Changes the state as the user does.
+/// Call between `Gui::beginFrame` and `endFrame`. Changes the state as the user requests.
 void drawInterface(const Facts& facts, const Area& picture, State& state);
 
 }  // namespace dermis::viewer

@@ -15,7 +15,7 @@ ImVec2 at(const std::array<float, 2>& place) {
   return {place[0], place[1]};
 }
 
-/// A slender kite, thick near the joint that turns it.
+/// A slender kite, thick near the joint that rotates it.
 void drawBone(ImDrawList& list, const ImVec2& from, const ImVec2& to, bool isChosen) {
   const ImVec2 along{to.x - from.x, to.y - from.y};
   const float length = std::sqrt(along.x * along.x + along.y * along.y);

@@ -1,4 +1,4 @@
-// Kernels from a folder of GLSL that somebody may be working on.
+// Kernels from a folder of GLSL files that may be edited while the viewer runs.
 #pragma once
 
 #include <memory>
@@ -12,25 +12,25 @@
 namespace dermis::viewer {
 
 struct KernelUpdate {
-  bool isOther = false;  ///< what is skinned from now on may look otherwise
-  std::string text;      ///< what was done, in a few words
+  bool isOther = false;  ///< vertices skinned from now on may differ
+  std::string text;      ///< a short description of what was done
 };
 
 class KernelFolder {
  public:
   virtual ~KernelFolder() = default;
 
-  /// For the context; valid as long as this object lives.
+  /// For the context. Valid while this object lives.
   virtual vulkan::KernelSource source() const = 0;
-  /// Looks for changed files, once all pictures before are complete. Nothing: there are none. Fails
-  /// once if a kernel cannot be compiled; the old ones stay.
+  /// Looks for changed files; call when all earlier pictures are complete. Returns nothing if no
+  /// file has changed. Fails once if a kernel cannot be compiled; the old kernels stay.
   virtual Result<std::optional<KernelUpdate>> reload(const vulkan::Context& context) = 0;
-  /// How many modules there are, and where from.
+  /// The number of modules, and their source.
   virtual std::string summary() const = 0;
 };
 
 #ifdef DERMIS_RUNTIME_COMPILER
-/// That of `Options::shaders`.
+/// Opens the folder of `Options::shaders`.
 Result<std::unique_ptr<KernelFolder>> openKernelFolder(const Options& options);
 #endif
 

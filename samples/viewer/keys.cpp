@@ -60,7 +60,7 @@ void stepJoint(const SceneView& view, bool isBack, State& state) {
   if (state.coloring != Coloring::weights) state.showsJoints = true;
 }
 
-/// Esc closes what is open, one after the other.
+/// Esc closes what is open, one thing at a time.
 void leave(State& state) {
   if (state.showsHelp) {
     state.showsHelp = false;
@@ -156,7 +156,7 @@ void handleLooks(SDL_Keycode key, bool isShifted, const SceneView& view, State& 
   }
 }
 
-/// By the place of the key, for Shift makes other signs of digits.
+/// Uses the position of the key, because Shift changes the characters of digits.
 void handleDigit(SDL_Scancode code, bool isShifted, State& state) {
   if (code < SDL_SCANCODE_1 || code > SDL_SCANCODE_9) return;
   const auto index = static_cast<std::size_t>(code - SDL_SCANCODE_1);
@@ -172,7 +172,7 @@ std::span<const KeyHelp> keyHelp() {
 }
 
 void handleKey(const SDL_KeyboardEvent& key, const SceneView* view, State& state) {
-  // Ctrl, Alt and the like are the window manager's.
+  // Combinations with Ctrl, Alt and the like belong to the window manager.
   if ((key.keysym.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI)) != 0) return;
   const SDL_Keycode code = key.keysym.sym;
   const bool isShifted = (key.keysym.mod & KMOD_SHIFT) != 0;

@@ -1,4 +1,4 @@
-// What each key does, and the help that says so.
+// What each key does, and the help text for it.
 #pragma once
 
 #include <span>
@@ -17,10 +17,10 @@ struct KeyHelp {
 /// In the order of the help; null keys begin a new group.
 std::span<const KeyHelp> keyHelp();
 
-/// `view` may be null: no model.
+/// `view` is null if there is no model.
 void handleKey(const SDL_KeyboardEvent& key, const SceneView* view, State& state);
 
-/// Plays another clip, by its number, from its beginning; `gltf::none`: the rest pose.
+/// Starts a clip, given by its index, from its beginning; `gltf::none`: the rest pose.
 void chooseClip(const SceneView& view, std::uint32_t clip, State& state);
 
 }  // namespace dermis::viewer

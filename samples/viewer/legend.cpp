@@ -29,7 +29,7 @@ void addError(const FigureError& error, Legend& legend) {
 }
 
 Legend errorLegend(const Facts& facts, const State& state) {
-  // What unit that is only the model knows.
+  // Only the author of the model knows the unit.
   Legend legend{"error of position", "0", "", {}};
   if (facts.errors == nullptr) {
     legend.lines.push_back("computing the reference …");

@@ -1,4 +1,4 @@
-// What the colors of a heat map mean.
+// The legend of a heat map.
 #pragma once
 
 #include <imgui.h>
@@ -7,7 +7,7 @@
 
 namespace dermis::viewer {
 
-/// Where weights or errors are shown as colors.
+/// The height of the legend. Weights or errors must be shown as colors.
 float legendHeight(const Facts& facts, const State& state);
 void drawLegend(const Facts& facts, const State& state, ImDrawList& list, float x, float y,
                 float width);

@@ -1,4 +1,4 @@
-// dermis_viewer: shows a skinned model in a window, by every method, with what it costs.
+// dermis_viewer: shows a skinned model in a window, with any method and its cost.
 
 #include <string>
 
@@ -12,7 +12,7 @@ namespace {
 using namespace dermis;
 using samples::ExitStatus;
 
-/// What the validation layer said is a failure.
+/// Messages of the validation layer make the program fail.
 ExitStatus reportValidation(samples::Device& device, ExitStatus status) {
   for (const std::string& message : device.takeValidationMessages())
     status = samples::reportError(ExitStatus::stopped, message);

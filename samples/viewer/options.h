@@ -1,4 +1,4 @@
-// What the viewer is started with.
+// The command line options of the viewer.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 namespace dermis::viewer {
 
 struct Options {
-  std::string model;  ///< empty: none
+  std::string model;  ///< empty: no model
   Method method = Method::dualQuaternion;
-  std::optional<Method> comparison;  ///< beside it
+  std::optional<Method> comparison;  ///< shown next to `method`
   std::optional<std::string> animation;
   double time = 0;  ///< seconds
   bool isPaused = false;
   std::uint32_t width = 1280, height = 800;  ///< of the window
   std::string device = "auto";
-  std::string shaders;      ///< the folder that kernels are compiled from; empty: the library's
-  std::string shaderCache;  ///< where compiled ones are kept; empty: nowhere
-  std::optional<std::uint32_t> frames;  ///< End after so many.
+  std::string shaders;      ///< folder of the kernels to compile; empty: those of the library
+  std::string shaderCache;  ///< cache folder for compiled kernels; empty: no cache
+  std::optional<std::uint32_t> frames;  ///< end after this number of frames
   std::string screenshot;               ///< written at the end; empty: none
   bool validates = false;
 };

@@ -1,4 +1,4 @@
-// A camera that the mouse moves around what it looks at.
+// A camera that the mouse moves around its target.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,32 +10,32 @@ namespace dermis::viewer {
 
 class OrbitCamera {
  public:
-  /// Looks at all of a box, from where it stands. `aspect`: width divided by height.
+  /// Shows all of a box, from the current direction. `aspect`: width divided by height.
   void frame(const Box& box, float aspect);
-  /// Whether it is as `frame` left it.
+  /// Whether the camera has not been moved since `frame`.
   bool isFramed() const { return isFramed_; }
-  /// Back to the view from the front and a little from above.
+  /// Resets the view to the front, slightly from above.
   void resetDirection();
 
-  /// By parts of the picture's height, to the right and down.
+  /// Turns the camera. Arguments are fractions of the picture's height, to the right and down.
   void orbit(float right, float down);
   void pan(float right, float down);
-  /// Steps of the wheel; positive: nearer.
+  /// Zooms by steps of the wheel; positive: nearer.
   void zoom(float steps);
 
-  /// `scene` is around all that is to be seen, the ground included.
+  /// `scene` is the box around everything visible, including the ground.
   samples::render::Camera camera(const Box& scene, float aspect) const;
 
-  /// Two that are equal take the same picture.
+  /// Equal cameras take the same picture.
   bool operator==(const OrbitCamera&) const = default;
 
  private:
   glm::vec3 towardsEye() const;
 
   glm::vec3 target_{0.0f};
-  float azimuth_ = 28, elevation_ = 10;  ///< degrees, as those of `CameraOptions`
+  float azimuth_ = 28, elevation_ = 10;  ///< degrees, as in `CameraOptions`
   float distance_ = 4;
-  float radius_ = 1;  ///< of what was framed
+  float radius_ = 1;  ///< of the framed box
   bool isFramed_ = false;
 };
 

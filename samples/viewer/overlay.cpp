@@ -11,7 +11,7 @@ namespace {
 
 enum class Align { left, center, right };
 
-/// A line of text on a dark plate.
+/// A line of text on a dark background.
 void drawLabel(ImDrawList& list, const std::string& text, float x, float y, Align align,
                ImU32 tint) {
   const ImVec2 size = ImGui::CalcTextSize(text.c_str());
@@ -40,7 +40,7 @@ void drawEmpty(const Facts& facts, const Area& picture) {
   list.AddText({x - size.x / 2, y - size.y / 2}, color(textColor), text.c_str());
 }
 
-/// If there is no panel for it.
+/// Draws the legend on the picture if there is no panel for it.
 void drawFreeLegend(const Facts& facts, const Area& picture, const State& state) {
   const float width = 250, pad = 12;
   const float height = legendHeight(facts, state);
@@ -52,7 +52,7 @@ void drawFreeLegend(const Facts& facts, const Area& picture, const State& state)
 }
 
 samples::render::Camera cameraOf(const Area& area, const State& state) {
-  // How far away things are cut off does not matter here.
+  // The clipping planes do not matter here.
   return state.camera.camera(Box{{0, 0, 0}, {0, 0, 0}}, area.width / area.height);
 }
 

@@ -1,11 +1,11 @@
-// What lies on the picture itself: names, joints, the scale of colors.
+// The overlay of the picture: names, joints, and the color scale.
 #pragma once
 
 #include "state.h"
 
 namespace dermis::viewer {
 
-/// Behind all windows of the interface.
+/// Drawn behind all windows of the interface.
 void drawOverlay(const Facts& facts, const Area& picture, const State& state);
 
 }  // namespace dermis::viewer

@@ -1,5 +1,5 @@
-// How well pictures are drawn, so that the window keeps up while something moves: worse then where
-// the device is slow, and as well as it can once nothing does.
+// The quality of pictures. While something moves, it is reduced on slow devices so that the window
+// keeps up; when nothing moves, it is the best.
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,15 @@ namespace dermis::viewer {
 
 class Pace {
  public:
-  /// Software Vulkan begins where a graphics card hardly ever gets.
+  /// Software Vulkan starts at a level that a GPU hardly ever reaches.
   explicit Pace(bool isSoftware);
 
   Quality moving() const;
   Quality still() const;
-  /// Whether the two differ.
+  /// Whether the two qualities differ.
   bool hasTwo() const { return isSoftware_ || level_ != 0; }
 
-  /// How long a picture took that was drawn as `moving` said.
+  /// Reports how long a picture with the quality `moving` took.
   void measured(double seconds);
 
  private:

@@ -31,7 +31,7 @@ void Playback::wrap() {
     time_ = 0;
     return;
   }
-  // The end itself is a pose worth standing at; only what lies beyond begins anew.
+  // The end of the clip is a valid pose; only later times wrap around.
   if (time_ >= 0 && time_ <= duration_) return;
   time_ = std::fmod(time_, duration_);
   if (time_ < 0) time_ += duration_;

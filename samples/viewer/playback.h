@@ -1,23 +1,23 @@
-// Where in a clip we are.
+// The current time in a clip.
 #pragma once
 
 namespace dermis::viewer {
 
-/// A clip is played again and again. Times are in seconds.
+/// Plays a clip repeatedly. Times are in seconds.
 class Playback {
  public:
-  /// From its beginning; goes on playing where it played. 0: a pose that does not move.
+  /// Goes to the beginning, and keeps playing if it was. A duration of 0 is a static pose.
   void begin(double duration);
   void seek(double time);
-  /// Stops, and goes a step on or back.
+  /// Stops, and moves by a step forwards or backwards.
   void step(double seconds);
   void setPlaying(bool isPlaying) { isPlaying_ = isPlaying; }
-  /// So much time has gone by.
+  /// Call when this much time has passed.
   void advance(double seconds);
 
   double time() const { return time_; }
   double duration() const { return duration_; }
-  /// Whether there is something to play, and it plays.
+  /// Whether there is something to play, and it is playing.
   bool isPlaying() const { return isPlaying_ && duration_ > 0; }
 
  private:

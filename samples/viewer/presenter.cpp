@@ -76,7 +76,7 @@ Result<void> Presenter::open(const Options& options) {
 }
 
 Result<void> Presenter::resize() {
-  // What was shown last may not be on the display yet.
+  // The last picture may not be on the display yet.
   device_->device->functions().DeviceWaitIdle(device_->device->handle());
   if (Result<void> done = swapchain_->resize(window_.pixels()); !done) return done;
   const VkExtent2D extent = swapchain_->extent();

@@ -1,4 +1,4 @@
-// A window on a device: what it takes to show pictures in it, one after the other.
+// A window on a device, and everything needed to show pictures in it.
 #pragma once
 
 #include <functional>
@@ -17,11 +17,11 @@ namespace dermis::viewer {
 
 /// One picture in the window.
 struct WindowFrame {
-  /// Records what comes before; outside a render pass.
+  /// Records the commands that precede the picture, outside a render pass.
   std::function<Result<void>(VkCommandBuffer)> record;
-  /// What was drawn of the scene, once that is recorded; null: nothing.
+  /// The picture of the scene after `record`; null: none.
   std::function<const samples::render::RenderTarget*()> picture;
-  VkRect2D area{};  ///< where it goes, in pixels
+  VkRect2D area{};  ///< area of the picture, in pixels
   bool isReadBack = false;
 };
 
@@ -32,17 +32,18 @@ class Presenter {
   ~Presenter();
 
   samples::OpenDevice& device() { return *device_; }
-  /// Null: the kernels are the library's.
+  /// Null if the kernels are those of the library.
   KernelFolder* kernels() const { return kernels_.get(); }
   const Window& window() const { return window_; }
   Gui& gui() { return gui_; }
 
-  /// Makes images that fit the window. Whether there is anything to draw on.
+  /// Makes images that fit the window. Returns whether there is something to draw on.
   Result<bool> prepare();
-  /// Draws, shows and waits; the interface's frame has been ended. False: there was no image to
-  /// draw on this time. Fails with `vulkanError`, or as `frame.record` does; then nothing is shown.
+  /// Draws, shows and waits. The interface's frame must have ended. Returns false if there was no
+  /// image to draw on this time. Fails with `vulkanError`, or like `frame.record`; then nothing is
+  /// shown.
   Result<bool> show(const WindowFrame& frame);
-  /// What the window showed, if `isReadBack`.
+  /// The contents of the window, if `isReadBack`.
   samples::render::Picture picture() const { return canvas_->picture(); }
 
  private:
@@ -52,7 +53,7 @@ class Presenter {
   Result<void> record(const WindowFrame& frame, const Swapchain::Image& image);
   Result<void> submit(const Swapchain::Image& image);
 
-  // What is declared later goes first.
+  // Members are destroyed in reverse order of declaration.
   Window window_;
   std::unique_ptr<KernelFolder> kernels_;
   std::optional<samples::OpenDevice> device_;

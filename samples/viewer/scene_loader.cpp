@@ -47,7 +47,7 @@ std::optional<LoadedScene> SceneLoader::poll() {
   LoadedScene loaded{*std::exchange(current_, std::nullopt), *std::exchange(done_, std::nullopt)};
   if (!next_) return loaded;
   begin(*std::exchange(next_, std::nullopt));
-  return std::nullopt;  // Nobody wants it any more.
+  return std::nullopt;  // superseded by a later request
 }
 
 }  // namespace dermis::viewer

@@ -1,4 +1,4 @@
-// Reads models on a thread of its own, so that the window goes on.
+// Reads models on another thread, so that the window stays responsive.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ namespace dermis::viewer {
 
 struct LoadRequest {
   std::string path;
-  /// Find the centers of rotation, which some methods need and which takes its time.
+  /// Compute the centers of rotation, which some methods need. This takes some time.
   bool findsCenters = false;
 };
 
@@ -24,11 +24,11 @@ struct LoadedScene {
 
 class SceneLoader {
  public:
-  /// What was asked for before and has not begun is forgotten.
+  /// Cancels an earlier request that has not begun.
   void load(LoadRequest request);
-  /// What is being read, or nothing.
+  /// The current request, or null.
   const LoadRequest* current() const { return current_ ? &*current_ : nullptr; }
-  /// What has been read since, once. To be called again and again.
+  /// Returns a finished model, once. Call it repeatedly.
   std::optional<LoadedScene> poll();
 
  private:

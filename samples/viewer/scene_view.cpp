@@ -16,7 +16,7 @@ double durationOf(const gltf::Model& model, std::uint32_t clip) {
   return clip < model.clips.size() ? model.clips[clip].duration : 0;
 }
 
-/// Software Vulkan has no time for more.
+/// Software Vulkan is too slow for more.
 render::FilterTaps tapsOf(const samples::Device& device) {
   if (device.info().type != "CPU") return {};
   return {10, 16, 2};
@@ -163,7 +163,7 @@ void SceneView::setErrors(CheckResult result) {
   writeErrors();
 }
 
-/// The colors end at the greatest error of all that is shown.
+/// The color scale ends at the greatest error of all parts shown.
 void SceneView::writeErrors() {
   clearValues();
   if (!errors_) return;
@@ -177,7 +177,7 @@ void SceneView::writeErrors() {
   }
 }
 
-/// Whether there is something to skin.
+/// Returns whether there is something to skin.
 Result<bool> SceneView::pose(const Shot& shot) {
   bool isNew = !posed_ || posed_->clip != shot.clip || posed_->time != shot.time ||
                posed_->views < shot.views;

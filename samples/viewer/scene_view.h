@@ -19,7 +19,8 @@ namespace dermis::viewer {
 
 enum class Coloring : std::uint8_t { surface, weights, error };
 
-/// What is to be seen. Two that are equal look the same, as long as no new errors are shown.
+/// Everything that determines a picture. Equal shots look the same, as long as errors do not
+/// change.
 struct Shot {
   std::uint32_t clip = gltf::none;
   double time = 0;
@@ -27,27 +28,27 @@ struct Shot {
   std::uint32_t views = 1;  ///< 2: side by side
   OrbitCamera camera;
   Coloring coloring = Coloring::surface;
-  std::uint32_t joint = 0;  ///< whose weights: in `SceneView::joints`
+  std::uint32_t joint = 0;  ///< joint whose weights are shown, in `SceneView::joints`
   VkExtent2D pixels{};      ///< of both views together
 
   bool operator==(const Shot& other) const;
 };
 
-/// How well it is drawn, and so how long that takes.
+/// The quality of drawing, which determines how long it takes.
 struct Quality {
-  float scale = 1;  ///< pixels drawn to a pixel shown, on each side
+  float scale = 1;  ///< drawn pixels per shown pixel, along each side
   samples::render::ShadowSizes shadows;
 };
 
-/// What the last picture cost; 0 if it is not known.
+/// The cost of the last picture; 0 if unknown.
 struct SceneTimes {
-  double skinningSeconds = 0;  ///< of the GPU, the last time that there was something to skin
-  double drawingSeconds = 0;   ///< of the GPU
-  double planSeconds = 0;      ///< of the CPU: `SkinningSystem::record`, likewise
+  double skinningSeconds = 0;  ///< GPU time of the last skinning
+  double drawingSeconds = 0;   ///< GPU time
+  double planSeconds = 0;      ///< CPU time of `SkinningSystem::record` at the last skinning
 };
 
-/// One picture at a time: what was recorded must be complete before the next call that is not
-/// const.
+/// Handles one picture at a time: recorded commands must be complete before the next call that is
+/// not const.
 class SceneView {
  public:
   /// `device` must outlive it. Fails with `invalidData` if nothing of the scene is skinned.
@@ -55,25 +56,27 @@ class SceneView {
 
   const cli::Scene& scene() const { return scene_; }
   const std::vector<Joint>& joints() const { return joints_; }
-  /// What of its materials could not be had.
+  /// Problems of materials that could not be loaded.
   const std::vector<std::string>& notes() const { return drawn_->notes(); }
   std::uint64_t vertexCount() const;
 
-  /// Around all poses of a clip, and the ground. The first time skins some of them, and waits.
+  /// The box around all poses of a clip and the ground. The first call for a clip skins some poses,
+  /// and waits.
   Result<Box> extent(std::uint32_t clip);
   static Box withGround(const Box& extent);
 
-  /// Shows them from now on, where errors are to be seen.
+  /// Shows these errors from now on, if errors are shown.
   void setErrors(CheckResult result);
 
-  /// The next picture skins everything: kernels are other ones.
+  /// The next picture skins everything, because the kernels have changed.
   void skinAgain() { posed_.reset(); }
 
-  /// Skins what has changed and draws it, in one command buffer. `copiesPositions`: then
-  /// `skinned` has them. Where the scene does not allow a method it fails with `invalidArgument`.
+  /// Skins what has changed and draws it, in one command buffer. With `copiesPositions`, `skinned`
+  /// returns the positions afterwards. Fails with `invalidArgument` if the scene does not allow a
+  /// method.
   Result<void> record(VkCommandBuffer commandBuffer, const Shot& shot, const Quality& quality,
                       bool isStill, bool copiesPositions);
-  /// To be called when the GPU is done with it.
+  /// Call this when the GPU is done with the picture.
   Result<void> finish();
 
   /// The last picture; null before the first.
@@ -89,10 +92,10 @@ class SceneView {
     std::uint32_t width = 0, height = 0, skyLights = 0;
     std::optional<samples::render::RenderFrame> frame;
   };
-  /// Where a part's positions stand in what was copied.
+  /// The place of a part's positions in the copied data.
   struct CopiedPart {
     std::uint64_t offset = 0;
-    std::uint32_t stride = 0;  ///< 0: it is fixed
+    std::uint32_t stride = 0;  ///< 0: the part is fixed
   };
 
   SceneView(samples::OpenDevice& device, cli::Scene scene)
@@ -116,13 +119,13 @@ class SceneView {
   samples::OpenDevice* device_;
   cli::Scene scene_;
   std::vector<Joint> joints_;
-  // What is declared later goes first: frames before the renderer.
+  // Members are destroyed in reverse order of declaration: frames before the renderer.
   std::optional<samples::render::Renderer> renderer_;
   std::optional<cli::DrawnScene> drawn_;
   std::array<Method, 2> methods_{Method::dualQuaternion, Method::dualQuaternion};
   std::map<std::uint32_t, Box> extents_;    ///< by clip
   std::vector<PartValues> values_;          ///< by part
-  std::optional<std::uint32_t> weightsOf_;  ///< the joint, where weights are shown
+  std::optional<std::uint32_t> weightsOf_;  ///< the joint whose weights are shown
   std::optional<CheckResult> errors_;
   std::array<PictureSlot, 2> slots_;
   const PictureSlot* shown_ = nullptr;

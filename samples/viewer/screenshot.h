@@ -1,4 +1,4 @@
-// Pictures of the window as files.
+// Screenshots of the window.
 #pragma once
 
 #include <string>
@@ -8,11 +8,10 @@
 
 namespace dermis::viewer {
 
-/// "dermis-viewer-1.png" in the folder that the program was started in, or the first number that
-/// is free.
+/// "dermis-viewer-1.png" in the current folder, or the first unused number.
 std::string nextScreenshotName();
 
-/// A PNG. It is there as a whole or not at all. Fails with `ioError`.
+/// Writes a PNG file completely or not at all. Fails with `ioError`.
 Result<void> writeScreenshot(const samples::render::Picture& picture, const std::string& name);
 
 }  // namespace dermis::viewer

@@ -52,12 +52,12 @@ std::vector<Joint> jointsOf(const cli::Scene& scene) {
     for (const std::uint32_t node : model.skins[part.source.skin].joints) isJoint[node] = true;
   }
   std::vector<std::vector<std::uint32_t>> children(model.nodes.size());
-  std::vector<std::uint32_t> next;  // from the end on
+  std::vector<std::uint32_t> next;  // used as a stack
   for (std::uint32_t node = 0; node < model.nodes.size(); ++node) {
     const std::uint32_t parent = model.nodes[node].parent;
     (parent == gltf::none ? next : children[parent]).push_back(node);
   }
-  // A limb after the other, as one would name them.
+  // Depth first: one limb after the other.
   std::ranges::reverse(next);
   std::vector<std::uint32_t> place(model.nodes.size(), gltf::none);
   std::vector<Joint> joints;

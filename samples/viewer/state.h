@@ -1,4 +1,4 @@
-// What keys, mouse and panel change, and the viewer then does.
+// The state that keys, mouse and panel change, and that the viewer acts on.
 #pragma once
 
 #include <array>
@@ -25,11 +25,11 @@ struct State {
   std::uint32_t clip = gltf::none;
   Playback playback;
   OrbitCamera camera;
-  std::string error;   ///< what went wrong last; empty: nothing
-  std::string notice;  ///< what was done last, for a short while
-  std::string path;    ///< in the text field
+  std::string error;   ///< last error; empty: none
+  std::string notice;  ///< last action, shown for a short time
+  std::string path;    ///< contents of the text field
 
-  // To be done once.
+  // Requests, each done once.
   std::optional<std::string> opens;
   bool frames = false;
   bool takesScreenshot = false;
@@ -39,33 +39,33 @@ struct State {
   std::uint32_t views() const { return isSideBySide ? 2 : 1; }
 };
 
-/// What the panel tells.
+/// Information that the panel shows.
 struct Facts {
   const SceneView* view = nullptr;  ///< null: no model
-  std::string file;                 ///< its name, without folders
-  /// What is shown, where another method still has to wait for something.
+  std::string file;                 ///< file name without folders
+  /// The methods that are shown, which differ from the chosen ones while those still wait for data.
   std::array<Method, 2> methods{};
-  std::vector<std::string> notes;  ///< what was found wrong in it, or left out
+  std::vector<std::string> notes;  ///< problems of the file, or what was left out
   std::string device;
-  std::string kernels;         ///< the folder that they are compiled from; empty: the library's
+  std::string kernels;         ///< folder that they are compiled from; empty: the library's
   std::string kernelsSummary;  ///< how many were compiled
-  std::string kernelsUpdate;   ///< what the last change of a file led to; empty: none so far
+  std::string kernelsUpdate;   ///< result of the last change of a file; empty: none so far
   bool kernelsAreBroken = false;
   bool isLoading = false;
-  std::string loading;  ///< what is being done meanwhile
+  std::string loading;  ///< what is being loaded
   const CheckResult* errors = nullptr;
   double framesPerSecond = 0;  ///< 0: nothing moves
   float scale = 1;             ///< `Quality::scale` of the last picture
 };
 
-/// A part of the window in the units of mouse and interface.
+/// A part of the window, in the units of mouse and interface.
 struct Area {
   float x = 0, y = 0, width = 0, height = 0;
 
   bool holds(float px, float py) const {
     return px >= x && px < x + width && py >= y && py < y + height;
   }
-  /// One of several parts of the same width.
+  /// One of `count` parts of equal width.
   Area part(std::uint32_t index, std::uint32_t count) const {
     const float each = width / static_cast<float>(count);
     return {x + each * static_cast<float>(index), y, each, height};

@@ -12,7 +12,7 @@ namespace {
 
 using samples::render::Owned;
 
-// Long enough for any picture; short enough that the window closes where the display has gone.
+// Long enough for any picture, but short enough that the window closes if the display is gone.
 constexpr std::uint64_t patience = 2'000'000'000;  // nanoseconds
 
 Error failed(const char* function, VkResult result) {
@@ -62,7 +62,7 @@ Result<void> Swapchain::chooseFormat() {
   vkGetPhysicalDeviceSurfaceFormatsKHR(device_->physicalDevice(), surface_, &count, nullptr);
   std::vector<VkSurfaceFormatKHR> formats(count);
   vkGetPhysicalDeviceSurfaceFormatsKHR(device_->physicalDevice(), surface_, &count, formats.data());
-  // What is copied into them is bytes, so that it does not matter what they are taken for.
+  // Bytes are copied to the images, so it does not matter whether the format is sRGB.
   for (const VkFormat wanted : {VK_FORMAT_B8G8R8A8_UNORM, VK_FORMAT_R8G8B8A8_UNORM,
                                 VK_FORMAT_B8G8R8A8_SRGB, VK_FORMAT_R8G8B8A8_SRGB}) {
     for (const VkSurfaceFormatKHR& format : formats) {
@@ -109,7 +109,7 @@ Result<void> Swapchain::resize(VkExtent2D pixels) {
   info.imageSharingMode = VK_SHARING_MODE_EXCLUSIVE;
   info.preTransform = capabilities.currentTransform;
   info.compositeAlpha = alphaOf(capabilities);
-  info.presentMode = VK_PRESENT_MODE_FIFO_KHR;  // Every device has it.
+  info.presentMode = VK_PRESENT_MODE_FIFO_KHR;  // every device supports it
   info.clipped = VK_TRUE;
   info.oldSwapchain = swapchain_.get();
   Result<Owned<VkSwapchainKHR>> made = samples::render::make(
@@ -146,7 +146,7 @@ Result<std::optional<Swapchain::Image>> Swapchain::acquire() {
     isStale_ = true;
     return std::optional<Image>();
   }
-  if (result == VK_SUBOPTIMAL_KHR) isStale_ = true;  // after this picture
+  if (result == VK_SUBOPTIMAL_KHR) isStale_ = true;  // recreated after this picture
   if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR)
     return failed("vkAcquireNextImageKHR", result);
   return std::optional<Image>(Image{index, images_[index], acquired_.get(), drawn_[index].get()});

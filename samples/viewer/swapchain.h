@@ -18,20 +18,21 @@ class Swapchain {
     VkSemaphore drawn = VK_NULL_HANDLE;     ///< for the submission to signal
   };
 
-  /// `device` and `surface` must outlive it. Fails with `missingFeature` if images of the
-  /// surface have no bytes of red, green and blue, or cannot be copied to. Has no images yet.
+  /// `device` and `surface` must outlive it. Fails with `missingFeature` if the surface has no
+  /// format with bytes of red, green and blue, or its images cannot be copied to. Initially has no
+  /// images.
   static Result<Swapchain> create(samples::Device& device, VkSurfaceKHR surface);
 
-  /// Four bytes a pixel, as they are shown.
+  /// The format of the images, four bytes per pixel.
   VkFormat format() const { return format_; }
-  /// The same bytes, taken for sRGB.
+  /// The same format, as sRGB.
   VkFormat srgbFormat() const;
   VkExtent2D extent() const { return extent_; }
 
-  /// New images, for a surface of that size where it does not say itself. The device must be idle.
-  /// Without any where the surface has no size now.
+  /// Makes new images of the given size, unless the surface specifies its size. The device must be
+  /// idle. Makes none if the surface currently has no size.
   Result<void> resize(VkExtent2D pixels);
-  /// The next image; nothing if there is none now, or new ones must be made first: `isStale`.
+  /// The next image. Nothing if there is none now, or if new ones must be made first (`isStale`).
   Result<std::optional<Image>> acquire();
   Result<void> present(const Image& image);
   bool isStale() const { return isStale_ || swapchain_.get() == VK_NULL_HANDLE; }

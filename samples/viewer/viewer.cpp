@@ -58,7 +58,7 @@ Result<samples::ExitStatus> Viewer::run() {
     update();
     if (status_ == samples::ExitStatus::wrongUsage) return status_;
     if (status_ != samples::ExitStatus::done && options_.frames) return status_;
-    // A model that is still being read may be the error that they are to end with.
+    // Wait for a model that is still being read: it may cause the error that the run ends with.
     const bool hasShownAll = options_.frames && shownFrames_ >= *options_.frames && hasBegun_ &&
                              loader_.current() == nullptr;
     const bool isOver = state_.quits || hasShownAll;
@@ -88,8 +88,8 @@ void Viewer::waitForEvents() {
     handle(event);
 }
 
-/// What is typed behind the key that opens the text field is meant for it, and it takes some frames
-/// until it has the keyboard.
+/// Text typed after the key that opens the text field is meant for the field, which gets the
+/// keyboard only after some frames.
 bool Viewer::waitsForTextField() {
   if (state_.editsPath) {
     framesToTextField_ = 4;
@@ -100,7 +100,7 @@ bool Viewer::waitsForTextField() {
   return framesToTextField_ > 0;
 }
 
-/// The key that opens the text field is a letter too, which does not belong into it.
+/// The key that opens the text field is also a letter, which must not be added to the field.
 bool Viewer::isOpeningLetter(const SDL_TextInputEvent& text) {
   const char letter = text.text[0];
   const bool isIt = opensTextField_ && (letter == 'o' || letter == 'O') && text.text[1] == 0;
@@ -238,7 +238,7 @@ void Viewer::adopt(LoadedScene loaded) {
     state_.error.clear();
     hasSoughtCenters_ = loaded.request.findsCenters;
   } else {
-    state_.methods = methods_;  // What was asked for may have been wanted for another method.
+    state_.methods = methods_;  // The requested file may have been for another method.
     const std::string name = fileName(path), message = done.error().message;
     fail(samples::ExitStatus::badInput,
          message.find(name) == std::string::npos ? name + ": " + message : message);
@@ -269,7 +269,7 @@ Result<void> Viewer::adoptScene(const std::string& path, cli::Scene scene) {
   return {};
 }
 
-/// A file that was not there before.
+/// Called for a file that was not shown before.
 void Viewer::beginWith(const std::string& path) {
   path_ = path;
   const bool isFirst = !hasBegun_;
@@ -284,7 +284,7 @@ void Viewer::beginWith(const std::string& path) {
   presenter_->window().setTitle(fileName(path) + " – Dermis");
 }
 
-/// Where a method needs centers of rotation the file is read once more, to find them.
+/// If a method needs centers of rotation, the file is read again to compute them.
 void Viewer::chooseMethods() {
   bool waits = false;
   for (std::size_t index = 0; index < state_.views(); ++index) {
@@ -309,7 +309,7 @@ float Viewer::aspect() const {
   return part.width / std::max(part.height, 1.0f);
 }
 
-/// What has not been moved by hand follows the window's shape and the clip.
+/// Unless the user has moved it, the camera follows the window's shape and the clip.
 void Viewer::placeCamera() {
   const Result<Box> box = view_->extent(state_.clip);
   if (!box) {
@@ -369,7 +369,7 @@ Shot Viewer::shot() const {
   return shot;
 }
 
-/// Whether the errors are of what is shown.
+/// Whether the errors belong to what is shown.
 bool Viewer::isChecked(const Shot& shot) const {
   if (!errors_ || errors_->clip != shot.clip || errors_->time != shot.time ||
       errors_->figures.size() != shot.views)
@@ -380,7 +380,7 @@ bool Viewer::isChecked(const Shot& shot) const {
   return true;
 }
 
-/// Whether the picture is as good as it gets.
+/// Whether the picture has its best quality.
 bool Viewer::isSettled() const {
   if (state_.opens || loader_.current() != nullptr) return false;
   if (view_ == nullptr || state_.playback.isPlaying()) return true;
@@ -469,7 +469,7 @@ Result<void> Viewer::afterPicture(bool isStill, bool wasCopied) {
   if (!isStill) pace_.measured(view_->times().drawingSeconds);
   if (wasCopied) check_->begin(view_->skinned());
   countPicture();
-  framesToDraw_ = std::max(framesToDraw_, 1);  // so that the panel tells its times
+  framesToDraw_ = std::max(framesToDraw_, 1);  // so that the panel shows its times
   return {};
 }
 
@@ -477,7 +477,7 @@ void Viewer::countPicture() {
   ++counted_;
   const double elapsed = seconds(Clock::now() - countedSince_);
   if (elapsed < 0.5) return;
-  // What was at rest for a while says nothing.
+  // A rate that includes a pause is meaningless.
   framesPerSecond_ = elapsed < 3 ? counted_ / elapsed : 0;
   counted_ = 0;
   countedSince_ = Clock::now();
@@ -499,8 +499,8 @@ void Viewer::keepScreenshot() {
   tell("wrote " + name);
 }
 
-/// In the window and on standard error. What follows from the command line decides how the program
-/// ends, and so does everything if nobody is there.
+/// Reports an error in the window and on standard error. Errors caused by the command line
+/// determine the exit status, and so do all errors in a run with a fixed number of frames.
 void Viewer::fail(samples::ExitStatus status, std::string error) {
   state_.error = std::move(error);
   framesToDraw_ = framesAfterEvent;

@@ -1,4 +1,4 @@
-// The program: what is loaded, what is shown, and the loop around it.
+// The program: the loaded model, the shown picture, and the main loop.
 #pragma once
 
 #include <chrono>
@@ -18,9 +18,10 @@ class Viewer {
  public:
   Viewer(const Options& options, Presenter& presenter);
 
-  /// Until the user ends it, or until it has shown the frames that were asked for; those end with
-  /// the first error, which nobody is there to read. Returns what the program ends with: not `done`
-  /// if it could not do what the command line asks. Fails with `vulkanError` if the device does.
+  /// Runs until the user quits, or until the requested number of frames has been shown. The latter
+  /// runs end at the first error, because nobody is there to read it. Returns the exit status: not
+  /// `done` if the program could not do what the command line requests. Fails with `vulkanError` if
+  /// the device does.
   Result<samples::ExitStatus> run();
 
  private:
@@ -34,7 +35,7 @@ class Viewer {
   void handleMouseMotion(const SDL_MouseMotionEvent& motion);
   void handleMouseButton(const SDL_MouseButtonEvent& button);
 
-  // What follows from it
+  // Reactions
   void update();
   void openFiles();
   void reloadKernels();
@@ -65,28 +66,28 @@ class Viewer {
   State state_;
   SceneLoader loader_;
   std::unique_ptr<SceneView> view_;
-  std::unique_ptr<ErrorCheck> check_;  // after the view, whose scene it reads
+  std::unique_ptr<ErrorCheck> check_;  // declared after the view, whose scene it reads
   std::optional<CheckResult> errors_;
   std::string path_;  ///< of the view's file
   std::vector<std::string> notes_;
-  bool hasSoughtCenters_ = false;    ///< those of rotation, in the view's file
-  std::array<Method, 2> methods_{};  ///< that are shown
+  bool hasSoughtCenters_ = false;    ///< in the view's file
+  std::array<Method, 2> methods_{};  ///< methods that are shown
   std::string kernelsUpdate_, kernelError_;
-  bool hasBegun_ = false;  ///< The first model has been read, or could not be.
+  bool hasBegun_ = false;  ///< the first model has been read, or reading it has failed
 
   Pace pace_;
   std::optional<Shot> drawn_;
   bool hasNewColors_ = false, isStillDrawn_ = false, wasScaled_ = false;
   Clock::time_point lastChange_ = Clock::now(), lastUpdate_ = Clock::now(), noticeEnd_;
-  int framesToDraw_ = 3;  ///< of the interface, which takes some to come to rest
+  int framesToDraw_ = 3;  ///< of the interface, which needs some to settle
   int framesToTextField_ = 0;
   bool opensTextField_ = false;
   std::uint32_t shownFrames_ = 0;
-  std::string screenshotName_;  ///< of the one to be taken; empty: none
+  std::string screenshotName_;  ///< of the next screenshot; empty: none
   bool isEnding_ = false;
   samples::ExitStatus status_ = samples::ExitStatus::done;
   float framedAspect_ = 0;
-  std::uint32_t framedClip_ = gltf::none;  ///< the last that could be shown
+  std::uint32_t framedClip_ = gltf::none;  ///< the last clip that could be shown
   int pressedX_ = 0, pressedY_ = 0;
   bool isDragging_ = false, hasDragged_ = false;
   Clock::time_point countedSince_ = Clock::now();

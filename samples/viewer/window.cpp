@@ -4,7 +4,7 @@
 #include <utility>
 
 #include <SDL_vulkan.h>
-// The window's functions are those of the loader that Dear ImGui is linked to.
+// The window uses the functions of the loader that Dear ImGui is linked to.
 #include <vulkan/vulkan.h>
 
 namespace dermis::viewer {
@@ -17,7 +17,7 @@ Error failed(const std::string& what) {
 }  // namespace
 
 Result<Window> Window::create(std::uint32_t width, std::uint32_t height) {
-  // Ctrl+C ends the program at once, as it does any other.
+  // Ctrl+C ends the program at once, as usual.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO) != 0) return failed("there is no display to open a window on");
   Window window;

@@ -1,4 +1,4 @@
-// A window, its Vulkan surface, and how many pixels it has.
+// A window, its Vulkan surface, and its size in pixels.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@
 
 namespace dermis::viewer {
 
-/// SDL, and one window of it. Only one at a time.
+/// SDL and its only window. There can only be one at a time.
 class Window {
  public:
-  /// Fails with `missingFeature`: no display, or none with Vulkan.
+  /// Fails with `missingFeature` if there is no display, or none with Vulkan.
   static Result<Window> create(std::uint32_t width, std::uint32_t height);
   Window() = default;
   ~Window();
@@ -28,9 +28,9 @@ class Window {
   Result<std::vector<std::string>> surfaceExtensions() const;
   void setTitle(const std::string& title) const;
 
-  /// Of what can be drawn to, which may be more than the units that the mouse is told in.
+  /// The size of the drawable area. It may have more pixels than mouse units.
   VkExtent2D pixels() const;
-  /// Pixels to such a unit.
+  /// Pixels per mouse unit.
   float pixelsPerUnit() const;
   bool isMinimized() const;
 
@@ -38,7 +38,7 @@ class Window {
   SDL_Window* window_ = nullptr;
 };
 
-/// What the device shows its pictures on. The device and the window must outlive it.
+/// The Vulkan surface of the window. The device and the window must outlive it.
 class Surface {
  public:
   /// Fails with `missingFeature` if the device cannot show anything in the window.

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Compares the speed of this tree with that of another commit: both are built for release, and their benchmarks alternate.
+# Compares the speed of this tree with that of another commit. Builds both for release, and runs their benchmarks alternately.
 #
 #   tests/bench/against.sh COMMIT [FILTER]   FILTER: a regular expression of benchmark names, "." for all (the default)
 #
-# For each benchmark that both have: the time of COMMIT divided by the time of this tree (over 1: this tree is faster), each the
-# best of ROUNDS rounds; the median of RUNS runs, and the lowest and the highest of them. If FILTER includes output/float32, also
-# the times of COMMIT and of this tree divided by COMMIT's time of output/float32, medians too. DERMIS_DEVICE names another device
-# than the best. Leave the machine idle. Shorter: RUNS=1 ROUNDS=1.
+# For each benchmark that both trees have, prints the time of COMMIT divided by the time of this tree (above 1: this tree is
+# faster). Each time is the best of ROUNDS rounds; printed are the median, lowest and highest ratio of RUNS runs. If FILTER includes
+# output/float32, also prints the times of COMMIT and of this tree divided by COMMIT's time of output/float32, as medians too.
+# DERMIS_DEVICE names a device other than the best one. Leave the machine idle. For a shorter run: RUNS=1 ROUNDS=1.
 set -eu
 commit=${1:?usage: tests/bench/against.sh COMMIT [FILTER]}
 filter=${2:-.}
@@ -35,7 +35,7 @@ measure() { # RUN SIDE TREE
   "$3/build/release/tests/bench/dermis_benchmarks" --benchmark_filter="$filter" --benchmark_repetitions=3 \
     --benchmark_min_time=0.03 --benchmark_enable_random_interleaving=true --benchmark_out="$out" \
     --benchmark_out_format=json >"$folder/console.log"
-  # A member stands on a line of its own: "name": "…", … "run_type": "iteration", … "real_time": …,
+  # Each member is on its own line: "name": "…", … "run_type": "iteration", … "real_time": …,
   awk -v run="$1" -v side="$2" '
     { gsub(/[",]/, "") }
     $1 == "name:" { name = $2; sub(/\/manual_time/, "", name) }

@@ -1,9 +1,9 @@
 #!/bin/sh
-# Whether rows of `dermis bench --json FILE` are as fast, beside others of the same run, as they have to be.
+# Checks that rows of `dermis bench --json FILE` are fast enough relative to other rows of the same run.
 #
 #   tests/bench/check_ratios.sh FILE ROW BASELINE LEAST [ROW BASELINE LEAST]...
 #
-# LEAST: million vertices a second of ROW, divided by those of BASELINE.
+# LEAST: minimum of the million vertices per second of ROW, divided by those of BASELINE.
 set -eu
 file=${1:?usage: tests/bench/check_ratios.sh FILE ROW BASELINE LEAST...}
 shift

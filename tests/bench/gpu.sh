@@ -1,10 +1,11 @@
 #!/bin/sh
-# Makes a folder of programs that measure and verify Dermis on another machine: a Linux with a Vulkan driver, and nothing else.
+# Makes a folder of programs that measure and verify Dermis on another Linux machine, which needs only a Vulkan driver.
 #
 #   tests/bench/gpu.sh FOLDER [BUILD]
 #
-# BUILD: a build folder that exists; else build/release is configured. Then take FOLDER to the machine and start FOLDER/measure.sh
-# there (docs/gpus.md). The programs bring along all libraries but glibc, which must be as new as FOLDER/glibc says, and the driver's.
+# BUILD is an existing build folder; without it, build/release is configured. Take FOLDER to the machine and run FOLDER/measure.sh
+# there (docs/gpus.md). The folder contains all libraries except those of the driver and glibc, which must be at least the version
+# in FOLDER/glibc.
 set -eu
 cd "$(dirname "$0")/../.."
 folder=${1:?usage: tests/bench/gpu.sh FOLDER [BUILD]}
@@ -22,7 +23,7 @@ cp tests/bench/gpu_measure.sh "$folder/measure.sh"
 strip "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_benchmark"
 git describe --always --dirty --abbrev=12 >"$folder/commit"
 
-# Where the machine has a compiler's run-time libraries, they are newer than these or older: the driver needs its own.
+# In a separate folder: if the machine has a compiler's run-time libraries, its driver needs those, which may be newer or older.
 ldd "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_benchmark" | awk '$2 == "=>" { print $3 }' | sort -u |
   while read -r library; do
     case $(basename "$library") in
@@ -31,7 +32,7 @@ ldd "$folder/dermis" "$folder/dermis_gpu_benchmark" "$folder/dermis_system_bench
       *) cp -L "$library" "$folder/lib" ;;
     esac
   done
-# Not linked, but opened: for a machine with a driver and without a loader.
+# Programs open it at run time. For a machine with a driver but without a loader.
 loader=$(ldconfig -p | awk '/libvulkan\.so\.1 .*x86-64|libvulkan\.so\.1 .*AArch64/ { print $NF; exit }')
 cp -L "$loader" "$folder/loader/libvulkan.so.1"
 

@@ -1,10 +1,10 @@
 #!/bin/sh
-# Verifies and measures Dermis on this machine's GPU, in less than 8 minutes: the programs that tests/bench/gpu.sh put beside this
-# script. Writes gpu.json and gpu.txt, a table, to the folder OUT.
+# Verifies and measures Dermis on this machine's GPU in less than 8 minutes, with the programs that tests/bench/gpu.sh put next to
+# this script. Writes gpu.json, and a table in gpu.txt, to the folder OUT.
 #
 #   measure.sh OUT [SECONDS [INSTANCES]]
 #
-# SECONDS: for the search, 120 if nothing is said. DERMIS_DEVICE: a part of a device's name, for another than the best.
+# SECONDS: for the search; the default is 120. DERMIS_DEVICE: a part of the name of a device other than the best one.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 out=${1:?usage: measure.sh OUT [SECONDS [INSTANCES]]}
@@ -14,7 +14,7 @@ device=${DERMIS_DEVICE:-auto}
 commit=$(cat "$here/commit")
 mkdir -p "$out"
 
-# What the machine has is used first; the compiler's libraries and the loader that lie here are for a machine without.
+# The machine's own libraries come first; those of the compiler and the loader in this folder are only used if the machine has none.
 export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 "$here/dermis" --version >/dev/null 2>&1 || LD_LIBRARY_PATH="$LD_LIBRARY_PATH:$here/runtime"
 "$here/dermis" --version >/dev/null || { echo "measure.sh: the programs need glibc $(cat "$here/glibc")" >&2; exit 1; }
@@ -23,7 +23,7 @@ case $("$here/dermis" devices 2>&1) in
 esac
 
 status=0
-run() { # NAME COMMAND...: into the table, and how it ended
+run() { # NAME COMMAND...: runs it, and adds its outcome to the table
   name=$1
   shift
   begin=$(date +%s)

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds the benchmarks for release and prints what things cost relative to each other. Arguments go to Google Benchmark;
-# DERMIS_DEVICE in the environment names another Vulkan device than the best.
+# Builds the benchmarks for release and prints relative costs. Arguments go to Google Benchmark. DERMIS_DEVICE in the environment
+# names a Vulkan device other than the best one.
 set -eu
 cd "$(dirname "$0")/../.."
 ./cmake/install-deps.sh

@@ -1,7 +1,7 @@
-# What Dermis needs of others, for a system for which Debian has no packages: libraries that are headers only are used from this
-# machine, Highway and GoogleTest are compiled from their sources. The `find_package` calls of Dermis find what is here.
+# Dermis' dependencies, for a system for which Debian has no packages: header-only libraries are taken from this machine, and
+# Highway and GoogleTest are compiled from their sources. The `find_package` calls of Dermis find these.
 #
-# /usr/include as a whole must not be in reach: it has this machine's C library. So links to what is needed are made in a folder.
+# /usr/include itself must not be an include folder, because it contains this machine's C library. So a folder of links is made.
 
 set(headers ${CMAKE_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${headers})
@@ -25,8 +25,8 @@ header_package(fmt fmt::fmt)
 header_package(glm glm::glm)
 header_package(nlohmann_json nlohmann_json::nlohmann_json)
 header_package(vulkanheaders Vulkan::Headers)
-header_package(vulkan Vulkan::Vulkan) # without a loader: the samples that are linked with it are not built
-foreach(package IN ITEMS spirv-tools spirv-tools-opt) # optional, and not used: they would have to be compiled, too
+header_package(vulkan Vulkan::Vulkan) # without a loader: samples that link it are not built
+foreach(package IN ITEMS spirv-tools spirv-tools-opt) # optional, and not used: they would have to be compiled too
   file(WRITE ${CMAKE_FIND_PACKAGE_REDIRECTS_DIR}/${package}-config.cmake "")
 endforeach()
 target_compile_definitions(fmt::fmt INTERFACE FMT_HEADER_ONLY)

@@ -3,7 +3,7 @@
 #
 #   tests/cross/unpack_highway.sh FOLDER
 #
-# They come from the mirror that this machine's own apt uses. Does nothing if they are there.
+# They come from the mirror that apt on this machine uses. Does nothing if they exist already.
 set -eu
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)

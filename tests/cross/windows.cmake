@@ -1,4 +1,4 @@
-# 64-bit Windows, by MinGW-w64 with POSIX threads. Programs take no DLL of the compiler along, and are run by Wine.
+# 64-bit Windows, by MinGW-w64 with POSIX threads. Programs need no DLL of the compiler, and are run by Wine.
 set(CMAKE_SYSTEM_NAME Windows)
 set(CMAKE_SYSTEM_PROCESSOR x86_64)
 set(CMAKE_CXX_COMPILER x86_64-w64-mingw32-g++-posix)

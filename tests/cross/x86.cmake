@@ -1,5 +1,5 @@
-# 32-bit x86, by Debian's cross compiler. That Dermis' targets use SSE2 and not the x87 unit is for its own CMake files to see to.
-# Linked statically: this machine runs it without the C library of that architecture.
+# 32-bit x86, by Debian's cross compiler. Dermis' own CMake files must select SSE2 instead of the x87 unit. Linked statically, so
+# that this machine can run it without the C library of that architecture.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR i686)
 set(CMAKE_CXX_COMPILER i686-linux-gnu-g++)

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Writes into the documents what they show of samples, tests and programs: code, --help texts, tables.
+# Updates the parts of the documents that are copied from samples, tests and programs: code, --help texts, tables.
 #
-#   tests/documentation/regenerate.sh [BUILD]     a build folder with tests; build/ci if it is left out
+#   tests/documentation/regenerate.sh [BUILD]     BUILD: a build folder with tests; the default is build/ci
 set -eu
 cd "$(dirname "$0")/../.."
 build=${1:-build/ci}

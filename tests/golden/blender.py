@@ -1,6 +1,7 @@
-# Writes blender.tsv: poses of the sample models as Blender's armature modifier skins them, with
+# Writes blender.tsv: poses of the sample models skinned by Blender's armature modifier, with
 # "preserve volume" off (linear blending) and on (dual quaternions). Blender imports the files,
-# plays the clips and evaluates the modifier; in float, so that about six digits are its own.
+# plays the clips and evaluates the modifier. It computes in float, so about six digits are
+# accurate.
 #
 #   blender -b --factory-startup --python blender.py -- FOLDER OUT
 
@@ -9,11 +10,12 @@ import sys
 import bpy
 import numpy
 
-numpy.bool = bool  # the importer of 3.4 wants it, numpy 1.24 has dropped it
+numpy.bool = bool  # the importer of Blender 3.4 needs it, but numpy 1.24 has removed it
 
 FOLDER, OUT = sys.argv[sys.argv.index("--") + 1:]
-# Model, clip, time in seconds: times of keys, for between them Blender's curves do not turn as
-# glTF's do; and of a clip that moves every joint, for the others are not put back.
+# Model, clip, time in seconds. The times are those of keys, because Blender's curves rotate
+# differently from glTF's between them. The clips move every joint, because Blender does not reset
+# the others.
 POSES = [("figure", "walk", 0.375), ("figure", "walk", 0.75), ("arm", "bend", 0.75),
          ("arm", "bend", 1), ("bar", "twist", 0.75), ("bar", "twist", 1.125)]
 VERTICES = {"figure": 240, "arm": 200, "bar": 200}
@@ -28,7 +30,7 @@ def load(model):
 
 
 def pose(armature, clip, time):
-    # The importer makes an action of each clip; only the wanted one may play.
+    # The importer makes an action of each clip. Only the requested one may play.
     data = armature.animation_data
     for track in data.nla_tracks:
         track.mute = True
@@ -46,7 +48,7 @@ def skin(skinned, preserves_volume):
 
 
 def gltf(v):
-    # Blender's z points upwards, glTF's y does.
+    # Blender's z axis points upwards; in glTF it is the y axis.
     return v.x, v.z, -v.y
 
 

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Dermis on clean Debian systems, which have only what docs/building.md tells a reader to install: from the Debian packages, and
-# from the source package where no glslang is. Programs are built there, and skin on lavapipe.
+# Tests Dermis on clean Debian systems, which contain only what docs/building.md tells a reader to install: from the Debian
+# packages, and from the source package without glslang. Builds programs there, and runs them on lavapipe.
 #
 #   tests/nightly/debian.sh FOLDER SOURCE-PACKAGE RELEASE [PACKAGE.deb...]
 #
-# Makes the system of that release in FOLDER, by debootstrap from the mirror that this machine's own apt uses; needs root. The
-# packages have to be built on the same release. The source package is made into Debian packages there, too. Removes FOLDER if all
-# went well.
+# Makes a system of that release in FOLDER, by debootstrap from the mirror that apt on this machine uses; needs root. The packages
+# must have been built on the same release. Debian packages are also built there from the source package. Removes FOLDER if
+# everything passed.
 set -eu
 [ "$(id -u)" -eq 0 ] || { echo "debian: debootstrap needs root" >&2; exit 1; }
 mkdir -p "$1"
@@ -22,14 +22,14 @@ version=${version#dermis-}
 
 say() { echo "debian: $release: $*"; }
 
-inside() { # COMMAND...: runs it in the clean system; prints what it printed only if it fails
+inside() { # COMMAND...: runs it in the clean system; prints its output only if it fails
   chroot "$root" /usr/bin/env -i PATH=/sbin:/bin:/usr/sbin:/usr/bin HOME=/root LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
     "$@" >"$root/log" 2>&1 || { cat "$root/log"; say "failed: $*"; exit 1; }
 }
 
 apt() { inside apt-get -q -y --no-install-recommends "$@"; }
 
-expect() { # TEXT: the command before has printed it
+expect() { # TEXT: must be in the output of the last command
   grep -q -e "$1" "$root/log" || { cat "$root/log"; say "it does not say '$1'"; exit 1; }
 }
 
@@ -38,7 +38,7 @@ has_no_glslang() {
   grep -q none "$root/log" || { cat "$root/log"; say "the system is not clean"; exit 1; }
 }
 
-check() { # PREFIX: Dermis is installed there; programs find it, and skin
+check() { # PREFIX: checks that programs find Dermis there, and skin
   say "building programs against $1"
   rm -rf "$root/root/try"
   mkdir -p "$root/root/try"
@@ -64,7 +64,7 @@ check() { # PREFIX: Dermis is installed there; programs find it, and skin
   expect "every vertex is right"
 }
 
-check_packages() { # PACKAGE...: installs them with what they depend on, checks and removes them
+check_packages() { # PACKAGE...: installs them with their dependencies, checks and removes them
   say "installing $*"
   apt install "$@"
   check /usr

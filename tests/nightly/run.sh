@@ -60,7 +60,7 @@ part_asan_rest() {
 }
 
 part_tsan() {
-  # What lavapipe and the validation layer do among themselves is not ours: they were not built with the sanitizer.
+  # Races between lavapipe and the validation layer are ignored: neither was built with the sanitizer.
   export TSAN_OPTIONS="suppressions=$PWD/tests/nightly/tsan.supp halt_on_error=1 ${TSAN_OPTIONS:-}"
   build tsan gpu_test system_test
   tests tsan -R 'ThreadsTest|ModelTest'
@@ -69,7 +69,7 @@ part_tsan() {
 }
 
 part_clang() {
-  # Without precompiled headers, so that a file that includes too little is found.
+  # Without precompiled headers, to find files that include too little.
   cmake --preset clang -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON
   build clang
   tests clang -L sanitized
@@ -89,8 +89,9 @@ part_debian() {
   lintian --fail-on error build/debian/*.deb
 }
 
-# tests/cross: the tests that need no device, models made, skinned and verified by the command; the vertices must be, to the bit,
-# those that it skins here. Kernels are those of build/ci, but for arm64, whose build compiles them by the host's compiler.
+# tests/cross: runs the tests that need no device. The command generates, skins and verifies models; the vertices must have the same
+# bits as those that it skins on this machine. Kernels are taken from build/ci, except for arm64, whose build compiles them with the
+# host's compiler.
 cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross
   system=$1
   emulator=${2:-}
@@ -130,14 +131,14 @@ dermis_of() { # SYSTEM: the command
   echo "$program"
 }
 
-# Wine looks for a screen before it gives a program Vulkan: lavapipe of this system.
+# Wine requires a screen before it provides Vulkan, here this system's lavapipe.
 part_windows() {
   export WINEDEBUG=-all WINEPREFIX="$PWD/build/cross/wine"
   wine=$(PATH=/usr/lib/wine:$PATH command -v wine64 || command -v wine)
   cross windows "$wine"
   xvfb-run -a "$wine" "$(dermis_of windows)" devices
   xvfb-run -a "$wine" "$(dermis_of windows)" verify build/ci/samples/models/bar.glb
-  # File names are UTF-8.
+  # File names are in UTF-8.
   name=$(printf 'build/cross/windows/gr\303\274n \346\227\245')
   cp build/ci/samples/models/bar.glb "$name.glb"
   "$wine" "$(dermis_of windows)" skin "$name.glb" --device cpu -o "$name.ply"
@@ -181,7 +182,7 @@ part_mesa() {
   build/ci/samples/cli/dermis verify build/ci/samples/models/*.glb
 }
 
-# What is measured on a quiet machine is in docs/performance.md; a third less fails.
+# Minimum ratios: about two thirds of those measured on a quiet machine (docs/performance.md).
 check_speed() { # JSON PLAIN LINEAR COMPACT
   gpu=gpu/dual_quaternion/float32x3
   ./tests/bench/check_ratios.sh "$1" $gpu gpu/plain/dual_quaternion "$2" gpu/linear/float32x3 gpu/plain/linear "$3" \
@@ -204,7 +205,7 @@ part_gpu() {
   build ci gpu_test
   tests ci -R '^profile\.'
   ./tests/bench/gpu.sh build/nightly/gpu build/ci
-  # In an environment with nothing of this build.
+  # Without the environment variables of this build.
   (cd build/nightly && env -i PATH="$PATH" HOME="$HOME" gpu/measure.sh gpu/out 10 50)
   grep -q '"passed": true' build/nightly/gpu/out/gpu.json
 }
@@ -214,7 +215,7 @@ part_exhaustive() {
   tests ci -R 'ExhaustiveTest|RealModelsTest'
 }
 
-# Whether two tables of numbers are the same but for roundings.
+# Whether two tables of numbers are equal except for rounding.
 same_numbers() { # EXPECTED MADE
   [ "$(wc -l <"$1")" -eq "$(wc -l <"$2")" ] || { echo "$2 has another number of lines than $1"; return 1; }
   paste -d '\n' "$1" "$2" | awk -F '\t' -v name="$2" '
@@ -256,7 +257,7 @@ part_programs() {
   tests ci -R RealFilmTest
 }
 
-if [ "${1:-}" = --alone ]; then # how this script calls itself: each part in a process of its own, in which `set -e` holds
+if [ "${1:-}" = --alone ]; then # this script calls itself so: each part runs in its own process, in which `set -e` is effective
   "part_$(echo "$2" | tr - _)"
   exit
 fi

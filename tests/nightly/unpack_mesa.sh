@@ -3,8 +3,8 @@
 #
 #   tests/nightly/unpack_mesa.sh FOLDER
 #
-# Prints the two settings that make programs use it. Packages come from the mirror that this machine's own apt uses; what is
-# already installed is used as it is. Does nothing but print if FOLDER already holds a driver.
+# Prints the two settings that make programs use it. Packages come from the mirror that apt on this machine uses; packages that are
+# already installed are used as they are. If FOLDER already contains a driver, only prints.
 set -eu
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)

@@ -1,4 +1,4 @@
-# An engine that uses dermis::core and dermis::verify alone, on a machine without Vulkan headers and glslang.
+# An engine that uses only dermis::core and dermis::verify, on a machine without Vulkan headers and glslang.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(disabled)
@@ -8,7 +8,7 @@ foreach(package IN ITEMS Vulkan VulkanHeaders VulkanLoader glslang SPIRV-Tools S
 endforeach()
 build_consumer(core ${disabled})
 
-# The same program with GLM set up in the ways of engines: what the library computes must not change.
+# The same program with engines' configurations of GLM, which must not change the library's results.
 run(expected "Run core_consumer" "${BUILD}/core_consumer")
 say("${expected}")
 foreach(settings IN ITEMS aligned plain)

@@ -1,5 +1,4 @@
-# dermis::core compiles where the headers of the other layers' dependencies are an error: the files in poison/ are found
-# before the real ones.
+# dermis::core must compile without the headers of other layers' dependencies. The files in poison/ replace them by errors.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(flags -std=c++20 -fsyntax-only -fno-exceptions -fno-rtti -Wall -Wextra -Werror -I "${scriptFolder}/poison"
@@ -10,9 +9,9 @@ endforeach()
 
 list(TRANSFORM coreSources PREPEND "${coreFolder}/")
 file(GLOB headers "${sourceFolder}/engine/include/dermis/*.h")
-list(FILTER headers EXCLUDE REGEX "/runtime_compiler.h$")  # it is for a Context
+list(FILTER headers EXCLUDE REGEX "/runtime_compiler.h$")  # needs a Context
 file(GLOB_RECURSE privateHeaders "${sourceFolder}/engine/src/core/*.h")
-# Preprocessed only: the poison is #error, and the build compiles them.
+# Only preprocesses, which finds #error; the build compiles the headers.
 run(ignored "Preprocess the sources" "${ownCompiler}" ${flags} -M ${coreSources})
 foreach(file IN LISTS headers privateHeaders)
   file(RELATIVE_PATH name "${sourceFolder}" "${file}")

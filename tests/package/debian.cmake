@@ -1,5 +1,5 @@
-# The Debian packages of this build: CPack makes them, they need what they should, and their files are a prefix that a program can be
-# built from. tests/nightly/debian.sh installs them in a clean system.
+# Tests the Debian packages of this build: CPack makes them, they have the right dependencies, and programs can be built with their
+# files as a prefix. tests/nightly/debian.sh installs them in a clean system.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(work "${testFolder}/${NAME}.packages")
@@ -12,7 +12,7 @@ if(NOT count EQUAL 2)
   wrong("CPack made ${packages}")
 endif()
 
-# Unpacks PACKAGE and looks at its fields.
+# Unpacks PACKAGE and reads its fields.
 function(unpack package)
   file(GLOB file "${work}/${package}_${version}-1_*.deb")
   run(ignored "Unpack ${package}" "${dpkgDeb}" -x "${file}" "${work}/root")

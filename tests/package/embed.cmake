@@ -1,4 +1,4 @@
-# The sample that embeds Dermis, with the validation layer where there is one.
+# The sample that embeds Dermis, with the validation layer if it is installed.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(ENV{VK_INSTANCE_LAYERS} VK_LAYER_KHRONOS_validation)

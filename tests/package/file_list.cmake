@@ -17,7 +17,7 @@ endforeach()
 file(GLOB_RECURSE sources "${source}/engine/src/core/*.cpp" "${source}/engine/src/vulkan/*.cpp")
 list(APPEND sources "${source}/shaders/embedded/dermis_kernels.cpp" "${scriptFolder}/consumers/vulkan/main.cpp")
 
-# A build file for Ninja, which uses both cores.
+# Writes a build file for Ninja, to use all cores.
 set(objects)
 set(rules)
 set(number 0)

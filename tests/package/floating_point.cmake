@@ -1,5 +1,5 @@
-# Flags that let a compiler take NaN for impossible: Dermis' sources refuse them, its public headers do not, and a file that
-# computes does not forget to. Subprojects are tested by package.subproject.
+# Flags that let a compiler ignore NaN: Dermis' sources must refuse them, its public headers must not, and every source file that
+# computes must include this check. Subprojects are tested by package.subproject.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(flags -std=c++20 -fsyntax-only -I "${sourceFolder}/engine/include" -I "${sourceFolder}/engine/src" -I "${coreFolder}"
@@ -39,7 +39,7 @@ if(forgetful)
   wrong("strict_floating_point.h is missing in: ${forgetful}")
 endif()
 
-# What cmake/DermisTarget.cmake passes to compilers that are not here must at least be what they know.
+# cmake/DermisTarget.cmake has flags for several compilers. Those that can be tested here must undo the fast-math flags.
 set(strictFlags ${dermisGnuFlags})
 list(FILTER strictFlags INCLUDE REGEX "^-f")
 foreach(flag IN ITEMS -ffast-math -Ofast "-ffinite-math-only;-fno-signed-zeros")

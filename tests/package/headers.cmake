@@ -1,4 +1,5 @@
-# Dermis' headers before and after those of others, and whose headers they include. Programs are only compiled.
+# Includes Dermis' headers before and after those of other libraries, and checks which headers they include. Programs are only
+# compiled.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(core dermis/dermis.h dermis/cpu/skinning_system.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
@@ -10,7 +11,7 @@ endif()
 set(loaders dermis/vulkan/vertex_input.h dermis/vulkan/acceleration_structure.h)
 set(create "int main() { return static_cast<int>(vkCreateInstance(nullptr, nullptr, nullptr)); }")
 
-# compiles(WHAT BODY HEADERS...): "-DX" among the headers is a definition.
+# compiles(WHAT BODY HEADERS...): a "-DX" among the headers is a definition.
 function(compiles what body)
   set(text)
   set(flags)
@@ -35,11 +36,11 @@ compiles("vulkan.h after all that is Dermis'" "${create}" ${vulkan} ${loaders} v
 compiles("VK_NO_PROTOTYPES, no Vulkan header" "" -DVK_NO_PROTOTYPES ${vulkan} ${loaders})
 compiles("Xlib first" "" X11/Xlib.h X11/Xutil.h ${core} ${vulkan} ${loaders})
 compiles("Xlib last" "" ${core} ${vulkan} ${loaders} X11/Xlib.h)
-# After the standard library's, which do not bear them.
+# After the headers of the standard library, which do not compile with these macros.
 compiles("macros of windows.h" "" algorithm array bit cmath cstddef cstdint filesystem functional limits memory optional span string
          string_view utility variant vector vulkan/vulkan.h windows_macros.h ${core} ${vulkan} ${loaders})
 
-# Only dermis/glm.h is for those who have GLM. What Dermis' sources include is not needed by those who use it.
+# Only dermis/glm.h needs GLM. The dependencies of Dermis' sources must not be dependencies of its headers.
 say("Look at what the public headers include")
 file(GLOB_RECURSE public RELATIVE "${prefix}/${includeFolder}" "${prefix}/${includeFolder}/dermis/*.h")
 list(REMOVE_ITEM public dermis/glm.h)

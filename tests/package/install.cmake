@@ -1,4 +1,4 @@
-# cmake --install: the files that must be there, no other, and none that knows where it was built or first installed.
+# cmake --install: all expected files, no others, and none that contains the path of the build or of the first installation.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(staging "${testFolder}/staging")
@@ -34,7 +34,7 @@ endif()
 list(TRANSFORM headers PREPEND ${includeFolder}/)
 file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
      "${sourceFolder}/shaders/*.comp")
-# The build makes the one from the other.
+# The build makes dermis_skin.glsl from skin_include.glsl.
 list(TRANSFORM shaders REPLACE "^skin_include.glsl$" "dermis_skin.glsl")
 list(TRANSFORM shaders PREPEND ${dataFolder}/dermis/shaders/)
 list(APPEND expected ${headers} ${shaders})

@@ -1,11 +1,11 @@
-# The table of options in docs/building.md is what cmake/ says: each option, with its default.
+# The table of options in docs/building.md must match cmake/: each option, with its default.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 file(GLOB scripts "${sourceFolder}/cmake/*.cmake")
 set(expected)
 foreach(script IN LISTS scripts)
   file(READ "${script}" text)
-  string(REPLACE ";" "," text "${text}")  # what would part a list
+  string(REPLACE ";" "," text "${text}")  # a semicolon would split the list
   string(REGEX MATCHALL "\n *option\\(DERMIS_[^\"]*\"[^\"]*\"[ \n]+[^)]*\\)" options "${text}")
   foreach(option IN LISTS options)
     string(REGEX MATCH "(DERMIS_[A-Z_]+).*\"[ \n]+([^)]*)\\)$" ignored "${option}")

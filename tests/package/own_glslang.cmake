@@ -1,6 +1,6 @@
-# A subproject of an engine that has glslang, SPIRV-Tools, GLM and Vulkan-Headers of its own, and defines only some of the names
-# that their packages do: it configures. With BUILDS a program is built and run, too; its kernels are compiled by a tool that is built
-# apart, with the system's glslang.
+# A subproject of an engine with its own glslang, SPIRV-Tools, GLM and Vulkan-Headers, which define only some of the names of their
+# packages: it must configure. With BUILDS, a program is also built and run; its kernels are compiled by a tool that is built
+# separately, with the system's glslang.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 foreach(compiler IN ITEMS ON OFF)

@@ -1,8 +1,8 @@
-# What the scripts of this folder share.
+# Functions for the scripts of this folder.
 cmake_minimum_required(VERSION 3.25)
 include("${SETTINGS}")
 
-# say(TEXT): progress, on standard output.
+# say(TEXT): prints progress on standard output.
 function(say text)
   execute_process(COMMAND ${CMAKE_COMMAND} -E echo "${text}")
 endfunction()
@@ -12,7 +12,8 @@ function(wrong text)
   message(FATAL_ERROR "${text}")
 endfunction()
 
-# run(OUTPUT what COMMAND...): runs a command that must succeed; OUTPUT gets all that it printed.
+# run(OUTPUT what COMMAND...): runs a command that must succeed; OUTPUT gets everything that it
+# printed.
 function(run output what)
   say("${what}")
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE printed ERROR_VARIABLE printed)
@@ -22,8 +23,8 @@ function(run output what)
   set(${output} "${printed}" PARENT_SCOPE)
 endfunction()
 
-# build_consumer(SOURCE ARGUMENTS...): configures, with nothing left from before, and builds a project with COMPILER, in
-# BUILD, which it sets. SOURCE is a path, or the name of a folder in consumers/. A warning of CMake is an error. CONFIGURED gets what CMake printed.
+# build_consumer(SOURCE ARGUMENTS...): configures (from scratch) and builds a project with COMPILER. SOURCE is a path, or the name
+# of a folder in consumers/. A warning of CMake is an error. Sets BUILD to the build folder, and CONFIGURED to the output of CMake.
 function(build_consumer source)
   cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${scriptFolder}/consumers")
   set(build "${testFolder}/${NAME}")
@@ -42,7 +43,7 @@ function(build_consumer source)
   set(BUILD "${build}" PARENT_SCOPE)
 endfunction()
 
-# list_compiler_symbols(OUTPUT PROGRAM): what glslang and SPIRV-Tools have in a program.
+# list_compiler_symbols(OUTPUT PROGRAM): lists the symbols of glslang and SPIRV-Tools in a program.
 function(list_compiler_symbols output program)
   run(symbols "List the symbols of ${program}" "${nm}" -C "${program}")
   if(NOT symbols MATCHES " main")
@@ -52,8 +53,8 @@ function(list_compiler_symbols output program)
   set(${output} "${found}" PARENT_SCOPE)
 endfunction()
 
-# build_with_pkg_config(PREFIX PROGRAM FLAGS...): compiles the program of consumers/vulkan with what pkg-config says of the package in
-# PREFIX, and nothing else. FLAGS come first.
+# build_with_pkg_config(PREFIX PROGRAM FLAGS...): compiles the program of consumers/vulkan with only the flags that pkg-config
+# prints for the package in PREFIX. FLAGS come first.
 function(build_with_pkg_config prefix program)
   set(ENV{PKG_CONFIG_PATH} "${prefix}/${libFolder}/pkgconfig")
   run(flags "Ask pkg-config in ${prefix}" "${pkgConfig}" --cflags --libs dermis)

@@ -1,5 +1,5 @@
-# A program that is compiled with what pkg-config says, from the installed package; and that pkg-config names all that each library
-# is linked with.
+# Compiles a program with the flags that pkg-config prints for the installed package. The flags must name everything that each
+# library links.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 build_with_pkg_config("${prefix}" "${testFolder}/${NAME}.program")
@@ -10,7 +10,7 @@ foreach(name IN ITEMS core cpu verify vulkan gltf)
   say("${flags}")
   separate_arguments(flags UNIX_COMMAND "${flags}")
   separate_arguments(own UNIX_COMMAND "${consumerFlags}")
-  # Whole, so that a symbol that nothing defines is an error.
+  # The whole archive, so that an undefined symbol is an error.
   run(ignored "Link the whole of it" "${ownCompiler}" -std=c++20 ${own} "${scriptFolder}/consumers/pkg_config/main.cpp"
       -o "${testFolder}/${NAME}.whole" -Wl,--whole-archive ${flags} -Wl,--no-whole-archive)
   run(ignored "Run it" "${testFolder}/${NAME}.whole")

@@ -1,4 +1,4 @@
-# A plugin that links Dermis whole exports none of it: the engine, or another plugin, may have another version.
+# A plugin that links all of Dermis must export none of it, because the engine or another plugin may have another version.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(plugin "${testFolder}/${NAME}.so")
@@ -15,7 +15,7 @@ set(found FALSE)
 foreach(line IN LISTS lines)
   if(line MATCHES "dermisPluginMain")
     set(found TRUE)
-  # Templates of the standard library, and what Highway's headers leave, are exported by whoever uses them.
+  # Every library exports the templates of the standard library that it uses, and some symbols of Highway's headers.
   elseif(NOT line MATCHES " [VWu] (std::|typeinfo|vtable for std|void std::|guard variable for std|hwy::|__gnu_cxx::|operator|bool std|[a-z ]+ std::)" OR line MATCHES "dermis")
     string(APPEND exported "\n  ${line}")
   endif()

@@ -1,10 +1,11 @@
 #!/bin/sh
-# Prints how large Dermis' libraries and a program are, as the table in docs/building.md.
+# Prints the sizes of Dermis' libraries and of a program, as in the table in docs/building.md.
 #
 #   tests/package/sizes.sh KERNELS FOLDER
 #
-# KERNELS is the folder of dermis_kernels.cpp: BUILD/shaders/dermis_kernels. FOLDER gets the builds. $CXX is the compiler, else c++.
-# Lean: without DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES. All is built with CMake's Release flags and stripped.
+# KERNELS is the folder of dermis_kernels.cpp: BUILD/shaders/dermis_kernels. FOLDER receives the builds. $CXX is the compiler; the
+# default is c++. "Lean" means without DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES. Everything is built with CMake's Release
+# flags and stripped.
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
 kernels=$(cd "$1" && pwd)

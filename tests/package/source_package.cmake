@@ -1,5 +1,5 @@
-# The source package, where neither glslang nor SPIRV-Tools is to be found: built as shared libraries, installed, moved, and used by
-# CMake and by pkg-config. Its kernels are those of this build.
+# The source package on a system without glslang and SPIRV-Tools: built as shared libraries, installed, moved, and used by CMake and
+# by pkg-config. Its kernels must be those of this build.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(work "${testFolder}/${NAME}")
@@ -37,7 +37,7 @@ foreach(component IN ITEMS core vulkan)
   if(NOT symbols MATCHES "dermis::")
     wrong("libdermis_${component}.so exports nothing:\n${symbols}")
   endif()
-  # Samples of what is inside.
+  # Examples of internal symbols, which must not be exported.
   string(REGEX MATCH "[^\n]*(dermis::(PlanBuilder|Groups|SlotMap|SceneBooks|abi|kernels|vulkan::(DispatchTable|Buffer)))[^\n]*" inside "${symbols}")
   if(inside)
     wrong("libdermis_${component}.so exports what is inside: ${inside}")
@@ -51,7 +51,7 @@ endif()
 set(staticPrefix "${prefix}")
 set(prefix "${work}/prefix")
 set(staticFlags "${consumerFlags}")
-set(consumerFlags "")  # nothing of this build is linked
+set(consumerFlags "")  # nothing from this build is linked
 set(COMPILER "${ownCompiler}")
 set(testFolder "${work}")
 set(NAME ways)

@@ -1,5 +1,5 @@
-# An engine that has Dermis as a subproject: the folders that a build needs are copied below an engine's source, so that what
-# is written there is seen. The kernels are this build's; at night, with the other compiler, the engine's build compiles them.
+# An engine with Dermis as a subproject: the folders that a build needs are copied into an engine's source, so that files written
+# there are found. The kernels are those of this build; in nightly tests, with the other compiler, the engine's build compiles them.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(engine "${testFolder}/${NAME}.source")
@@ -11,7 +11,7 @@ file(COPY "${sourceFolder}/CMakeLists.txt" "${sourceFolder}/cmake" "${sourceFold
      DESTINATION "${engine}/third_party/dermis")
 file(GLOB_RECURSE before "${engine}/*")
 
-# Nothing of this build is linked. These flags are the engine's; Dermis must find NaN in spite of them.
+# Nothing from this build is linked. The flags are the engine's; Dermis must detect NaN in spite of them.
 set(consumerFlags "-ffast-math -fno-signed-zeros")
 set(kernels)
 if(COMPILER STREQUAL ownCompiler)

@@ -1,5 +1,5 @@
-# dermis::core, dermis::verify and dermis::vulkan link no Vulkan loader, throw nothing, keep nothing global that can be written to, and leave
-# no function of GLM behind whose meaning depends on the engine's settings of GLM.
+# dermis::core, dermis::verify and dermis::vulkan must not link a Vulkan loader, throw exceptions, have writable global data, or
+# contain functions of GLM whose behavior depends on the engine's settings of GLM.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 foreach(component IN ITEMS core verify vulkan)
@@ -12,8 +12,8 @@ foreach(component IN ITEMS core verify vulkan)
     wrong("${nm} lists only ${count} symbols:\n${symbols}")
   endif()
 
-  # Constants are in .rodata, or in .data.rel.ro where the loader fills in addresses and then write-protects them. There is
-  # nothing in .data, .bss or thread-local storage, not even a guard variable.
+  # Constants are in .rodata, or in .data.rel.ro if the loader fills in addresses and then write-protects them. Nothing is in .data,
+  # .bss or thread-local storage, not even a guard variable.
   set(problems)
   foreach(line IN LISTS lines)
     if(line MATCHES "[|] *(\\.data|\\.bss|\\.tdata|\\.tbss|\\*COM\\*|\\.init_array|\\.ctors)[^|]*$"

@@ -1,4 +1,4 @@
-# An engine that uses dermis::vulkan, and has no loader linked.
+# An engine that uses dermis::vulkan, and links no loader.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 build_consumer(vulkan -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE)

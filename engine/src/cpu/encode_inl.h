@@ -1,4 +1,4 @@
-// Attributes as they are stored: the formats of VertexFormat, by the rules of shaders/encode.glsl.
+// Encodes attributes in the formats of VertexFormat, by the rules of shaders/encode.glsl.
 
 // clang-format off
 #if defined(DERMIS_CPU_ENCODE_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -23,7 +23,7 @@ namespace dermis::cpu::HWY_NAMESPACE {
 template <class D>
 using Words = hn::Vec<hn::RebindToUnsigned<D>>;
 
-/// An attribute of as many vertices as there are lanes: up to four words each.
+/// An encoded attribute of one vertex per lane, up to four words each.
 template <class D>
 struct Encoded {
   Words<D> words[4];
@@ -50,7 +50,7 @@ HWY_INLINE Words<D> halfBits(D d, Vec<D> value) {
   return hn::Or(sign, hn::IfThenElse(hn::Gt(magnitude, set(0x477fefff)), special, finite));
 }
 
-/// From -1 to 1; NaN is 0.
+/// Clamps to [-1, 1]; NaN becomes 0.
 template <class D>
 HWY_INLINE Vec<D> clampUnit(D d, Vec<D> value) {
   const Vec<D> one = hn::Set(d, 1.0f), minusOne = hn::Set(d, -1.0f);
@@ -79,7 +79,7 @@ HWY_INLINE void octahedral(D d, const Vec3<D>& v, Vec<D>& x, Vec<D>& y) {
                      hn::IfThenElse(hn::Lt(upperY, zero), hn::Neg(foldedY), foldedY));
 }
 
-/// 1 to `largest`, negated for a left hand.
+/// Maps [-1, 1] to 1 … `largest`, negated for a left-handed frame.
 template <class D>
 HWY_INLINE Words<D> signedByHand(D d, Vec<D> value, Vec<D> hand, float largest) {
   const hn::RebindToSigned<D> di;
@@ -131,7 +131,7 @@ HWY_INLINE Encoded<D> encodeComponents(D d, VertexFormat format, const Vec4<D>& 
   }
 }
 
-/// Positions are relative to their box by now, if the format is.
+/// If the format is relative to a box, `v` already is.
 template <class D>
 HWY_INLINE Encoded<D> encodePosition(D d, VertexFormat format, const Vec3<D>& v) {
   return encodeComponents(d, format, Vec4<D>{v.x, v.y, v.z, hn::Set(d, 1.0f)});
@@ -190,7 +190,7 @@ HWY_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
   }
 }
 
-/// Copies an attribute of some vertices: quicker if they are `most`.
+/// Copies an attribute of vertices `first` to `end`; faster if there are exactly `most`.
 template <std::size_t most = 0>
 HWY_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
                           std::size_t fromStride, std::uint32_t bytes, std::size_t first,
@@ -208,8 +208,8 @@ HWY_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* 
   });
 }
 
-/// Lanes of an attribute, `stride` bytes apart. `first` and `end` are lanes; `to` is where lane 0
-/// would go.
+/// Stores lanes `first` to `end` of an attribute, `stride` bytes apart. `to` is the address of lane
+/// 0, even if lane 0 is not stored.
 template <class D>
 HWY_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, std::byte* to,
                            std::size_t stride, std::size_t first, std::size_t end) {
@@ -236,13 +236,13 @@ HWY_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, st
   }
 }
 
-// -- Positions and normals in float32, side by side: what most engines ask for.
+// -- Positions and normals in float32, side by side: the layout that most engines use.
 
 inline constexpr std::size_t vertexFloats = 6;
 inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
 
-/// Four vertices of each block: positions and normals, component by component, to where each block
-/// begins.
+/// Stores four vertices of each block of the vectors, positions and normals side by side, at that
+/// block's address in `to`.
 HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
   for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
 }
@@ -300,7 +300,7 @@ inline bool areSideBySide(const TaskInstance& instance) {
          reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
 }
 
-/// As many vertices as there are lanes.
+/// Stores one vertex per lane.
 HWY_INLINE void storeWhole(Four d, const Vec3<Four>& p, const Vec3<Four>& n, float* to) {
   storeVertices(d, p, n, &to);
 }

@@ -1,5 +1,5 @@
-// Every method, format and extra, one instance at a time. What most instances need has a quicker
-// way (plain_inl.h), by the same operations in the same order.
+// The general path: every method, format and option, one instance at a time. plain_inl.h has a
+// faster path for the common case, with the same operations in the same order.
 
 // clang-format off
 #if defined(DERMIS_CPU_GENERAL_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -28,7 +28,7 @@ template <class D>
 struct Vertex {
   Vec3<D> position;
   Vec3<D> normal, tangent;            ///< of unit length, or zero
-  Vec3<D> givenNormal, givenTangent;  ///< as the mesh has them: what scales starts from these
+  Vec3<D> givenNormal, givenTangent;  ///< as stored in the mesh; scale/shear parts apply to these
   Vec<D> hand;
 };
 
@@ -38,7 +38,7 @@ HWY_INLINE Vec3<D> loadVector(D d, const Lanes* lanes, std::size_t first) {
           hn::Load(d, lanes[2].v + first)};
 }
 
-/// v turned by q, 2 / |q|² being `factor`: v + factor r × (r × v + w v).
+/// Rotates v by q, where `factor` is 2 / |q|²: v + factor r × (r × v + w v).
 template <class D>
 HWY_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>& v) {
   const Vec3<D> axis{q.x, q.y, q.z};
@@ -46,7 +46,7 @@ HWY_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>&
   return add3(v, scale3(cross3(axis, inner), factor));
 }
 
-/// A point turned and moved: p + factor (r × (r × p + w p + d) + w d − dw r).
+/// Rotates and translates a point: p + factor (r × (r × p + w p + d) + w d − dw r).
 template <class D>
 HWY_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> factor,
                              const Vec3<D>& p) {
@@ -75,15 +75,15 @@ HWY_INLINE Vec3<D> throughMatrix(const Matrix<D>& m, const Vec3<D>& p) {
           hn::Add(dot3(m.r2.x, m.r2.y, m.r2.z, p.x, p.y, p.z), m.r2.w)};
 }
 
-/// A 3×3 matrix by its rows, scaled so that no product of two of them leaves the range of a float,
-/// and the sign of its determinant: what directions are transformed by.
+/// The 3×3 matrix that transforms directions, by its rows, and the sign of its determinant. It is
+/// scaled so that no product of two of its entries leaves the range of a float.
 template <class D>
 struct DirectionMap {
   Vec3<D> r0, r1, r2;
   Vec<D> side;
 };
 
-/// `isModerate`: nothing is so large or small that it must be scaled.
+/// `isModerate`: no entry is so large or small that the matrix must be scaled.
 template <class D>
 HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r1,
                                         const Vec3<D>& r2, bool isModerate) {
@@ -95,7 +95,8 @@ HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r
   map.side = sideOf(d, dot3(map.r0, cross3(map.r1, map.r2)));
   return map;
 }
-/// By the cofactors; a mirror turns normals over once.
+/// Multiplies by the cofactor matrix and the sign of the determinant, so that a mirror gives the
+/// direction of the inverse transpose.
 template <class D>
 HWY_INLINE Vec3<D> mapNormal(const DirectionMap<D>& map, const Vec3<D>& n) {
   const Vec3<D> turned{dot3(cross3(map.r1, map.r2), n), dot3(cross3(map.r2, map.r0), n),
@@ -117,7 +118,7 @@ HWY_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal,
   return unitOr(d, mapNormal(directionMap(d, m, isModerate), normal), normal);
 }
 
-/// Which of a vertex' directions are stored; the others are not computed.
+/// Selects the directions of a vertex that are stored; the others are not computed.
 template <bool withTangents>
 struct Wanted {
   static constexpr bool tangents = withTangents;
@@ -126,7 +127,8 @@ struct Wanted {
   bool any() const { return normals || tangents; }
 };
 
-/// Directions of `v` through a map, `normal` and `tangent` being what they are at first.
+/// Transforms `normal` and `tangent` by a map and stores them in `v`. A direction that becomes zero
+/// keeps its value in `v`.
 template <class D, class Wanted>
 HWY_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& normal,
                               const Vec3<D>& tangent, Wanted wanted, Vertex<D>& v) {
@@ -137,7 +139,7 @@ HWY_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& no
   }
 }
 
-/// A vertex through a blended matrix.
+/// Transforms a vertex by a blended matrix.
 template <class D, class Wanted>
 HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, Wanted wanted,
                                    bool isModerate) {
@@ -167,7 +169,7 @@ HWY_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
 
 // -- Sums over influences.
 
-/// The slots of a block's vertices, from one of its lanes on.
+/// The influence slots of a block's vertices, starting at one of its lanes.
 struct Slots {
   const std::uint16_t* joints;
   const std::uint16_t* pairs;
@@ -175,7 +177,7 @@ struct Slots {
   std::uint32_t influences;
 };
 
-/// Calls `sum` with the number of influences: as a constant, or 0 if it is too large to be one.
+/// Calls `sum` with the number of influences: a compile-time constant up to 4, or 0 for more.
 template <class Sum>
 HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
   switch (influences) {
@@ -192,8 +194,8 @@ HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
   }
 }
 
-/// Σ w e of one vertex, of as many floats of an entry as there are lanes. An entry has `units`
-/// times 8 floats. `influences` is 0 where `slots` say how many.
+/// Σ w e of one vertex, over as many floats of each entry as there are lanes. An entry has 8
+/// `units` floats. If `influences` is 0, `count` is the number of influences.
 template <int influences, class D>
 HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
                             const std::uint16_t* HWY_RESTRICT numbers,
@@ -206,7 +208,7 @@ HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t 
 }
 
 #if HWY_MAX_BYTES >= 32
-/// Eight rows of eight floats: the columns of their halves.
+/// Transposes the lower and the upper halves of eight rows of eight floats.
 HWY_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec4<Eight>& low, Vec4<Eight>& high) {
   low = {hn::ConcatLowerLower(d, rows[4], rows[0]), hn::ConcatLowerLower(d, rows[5], rows[1]),
          hn::ConcatLowerLower(d, rows[6], rows[2]), hn::ConcatLowerLower(d, rows[7], rows[3])};
@@ -216,7 +218,7 @@ HWY_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec4<Eight>& low, V
   transpose4(d, high.x, high.y, high.z, high.w);
 }
 
-/// Σ w e of eight vertices. An entry has 4 K floats that count.
+/// Σ w e of eight vertices, over the first 4 K floats of each entry.
 template <std::size_t K>
 HWY_NOINLINE HWY_ATTR void sumEntries(Eight d, const float* entries, std::size_t units,
                                       const std::uint16_t* numbers, const Slots& slots,
@@ -262,7 +264,7 @@ HWY_NOINLINE HWY_ATTR void sumEntries(Four d, const float* entries, std::size_t 
 }
 #endif
 
-/// The pivot's entry of each lane.
+/// Gathers the entry of each vertex's pivot, one per lane.
 template <std::size_t K, class D>
 HWY_INLINE void pivotEntries(D d, const float* entries, const Slots& slots, Vec4<D>* found) {
   constexpr std::size_t lanes = hn::MaxLanes(d);
@@ -272,21 +274,21 @@ HWY_INLINE void pivotEntries(D d, const float* entries, const Slots& slots, Vec4
   for (std::size_t k = 0; k < K; ++k) found[k] = loadRows(d, all + k * 4, 4 * K);
 }
 
-// -- Palettes: what the vertices of a section read of one instance's pose.
+// -- Palettes: one instance's pose in the form that the vertices of a section read.
 
 struct Palette {
   const float* pairs = nullptr;        ///< dual quaternions, 8 floats each
   const float* scaleShears = nullptr;  ///< of joints, 8 floats each
-  const float* scalePairs = nullptr;   ///< the joint's part less the pivot's
+  const float* scalePairs = nullptr;   ///< of pairs: the joint's part minus the pivot's
   const float* rows = nullptr;         ///< of joints, 16 floats each
   bool scales = false;
-  bool isModerate = false;  ///< `areModerate`, of linear blending
+  bool isModerate = false;  ///< result of `areModerate`, for linear blending
 };
 
 inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
   const std::size_t lines = (count + std::size(CacheLine().v) - 1) / std::size(CacheLine().v);
   if (memory.size() < lines) {
-    memory.reserve(lines);  // not twice as much
+    memory.reserve(lines);  // exact size, no geometric growth
     memory.resize(lines);
   }
   return memory.data()->v;
@@ -296,7 +298,7 @@ inline bool needsRows(Method method) {
   return method == Method::linear || method == Method::blended || needsCentersOfRotation(method);
 }
 
-/// R S | t of a joint that was taken apart.
+/// Writes R S | t of a decomposed joint.
 inline void writeRows(const float* q, const float* part, const JointMatrix& matrix, float* to) {
   const float x = q[0], y = q[1], z = q[2], w = q[3];
   const float r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
@@ -342,7 +344,7 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
       std::memcpy(rows + joint * 16, &matrixOf(joint), sizeof(JointMatrix));
     return palette;
   }
-  // Joints are converted as many at a time as there are lanes.
+  // Joints are converted in whole vectors, so the last one may write beyond the last joint.
   float* const converted = floatsOf(scratch.dualQuaternions, (joints.size() + 8) * 8);
   float* const parts = floatsOf(scratch.scaleShears, (joints.size() + 8) * 8);
   palette.scales = convertJoints({joints, pose, {converted}, {parts}}) && mayScale;
@@ -366,11 +368,11 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
 
 // -- Methods.
 
-/// What some methods read of a vertex besides.
+/// Additional inputs per vertex that some methods read.
 template <class D>
 struct MethodInputs {
   Vec3<D> center;
-  Vec<D> share;  ///< of dual quaternions, or the strength of bulge control
+  Vec<D> share;  ///< weight of the dual quaternion result, or bulge control strength
 };
 
 template <class D>
@@ -390,7 +392,8 @@ HWY_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) 
   return {rows[0], rows[1], rows[2]};
 }
 
-/// Between a vertex that went straight and one that was turned. A mirror shows in the latter's.
+/// Interpolates between a linearly blended vertex and a rotated one. Handedness comes from the
+/// latter.
 template <class D, class Wanted>
 HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
                                  Vec<D> share, Wanted wanted) {
@@ -419,7 +422,7 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
   const Vec4<D>&real = blend[0], &dual = blend[1];
   const Vec<D> factor = turningFactor(d, real);
 
-  // First phase: scaled and sheared in bind space.
+  // First phase: scale and shear in bind space.
   Vertex<D> scaled = bind;
   Vec3<D> center = inputs.center;
   const bool isAboutCenter = method == Method::centerOfRotation;
@@ -434,7 +437,7 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
   const Vec3<D> point = isAboutCenter ? sub3(bind.position, center) : bind.position;
   const Vec3<D> scaledPoint = scales ? throughPart(part, point) : point;
 
-  // Second phase: turned and moved.
+  // Second phase: rotate and translate.
   Vertex<D> turned = scaled;
   if (wanted.normals) turned.normal = turnDirection(real, factor, scaled.normal);
   if constexpr (Wanted::tangents) turned.tangent = turnDirection(real, factor, scaled.tangent);
@@ -460,7 +463,7 @@ HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const
 
 // -- Instances.
 
-/// What is found out about the vertices of one instance, lane by lane.
+/// Bounds (per lane) and number of clamped vertices of one instance.
 struct Findings {
   HWY_ALIGN float least[3][blockVertices];
   HWY_ALIGN float greatest[3][blockVertices];
@@ -472,7 +475,7 @@ struct Findings {
   }
 };
 
-/// Lanes `first` to `end`.
+/// Mask of lanes `first` to `end`.
 template <class D>
 HWY_INLINE hn::Mask<D> lanesFrom(D d, std::size_t first, std::size_t end) {
   return hn::AndNot(hn::FirstN(d, first), hn::FirstN(d, end));
@@ -482,7 +485,7 @@ template <class D>
 HWY_INLINE void addPositions(D d, const Vec3<D>& position, hn::Mask<D> counts, Findings& findings) {
   const Vec<D> all[3] = {position.x, position.y, position.z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    // NaN is in no box: it is neither less nor greater.
+    // NaN leaves the bounds unchanged: both comparisons are false.
     const Vec<D> value = all[axis];
     const Vec<D> least = hn::Load(d, findings.least[axis]);
     const Vec<D> greatest = hn::Load(d, findings.greatest[axis]);
@@ -493,19 +496,19 @@ HWY_INLINE void addPositions(D d, const Vec3<D>& position, hn::Mask<D> counts, F
   }
 }
 
-/// Vertices of a run, of one instance.
+/// A range of vertices of one run, for one instance.
 struct GeneralTask {
   const Task& task;
   const Run& run;
   const TaskInstance& instance;
   const Palette& palette;
-  const Palette* previous;  ///< Motion::reskinned
+  const Palette* previous;  ///< only for Motion::reskinned
   std::uint32_t firstVertex, vertexEnd;
   std::array<std::uint32_t, 3> sizes;  ///< bytes of positions, normals, tangents
   bool areSideBySide = false;          ///< positions and normals, in float32
 };
 
-/// One block's vertices in bind pose, displaced.
+/// One block's vertices in bind pose, after morphing.
 struct BlockVertices {
   Lanes positions[3], normals[3], tangents[4];
 };
@@ -546,7 +549,7 @@ HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, 
   return v;
 }
 
-/// Relative to the box of the instance, where the format is.
+/// Maps a position from the instance's box to [-1, 1].
 template <class D>
 HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& position) {
   const auto along = [&](Vec<D> v, std::size_t axis) HWY_ATTR {
@@ -556,7 +559,7 @@ HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& 
   return {along(position.x, 0), along(position.y, 1), along(position.z, 2)};
 }
 
-/// Lanes `first` to `end` of those from `lane` of a block on.
+/// Skins lanes `first` to `end` of the vector that starts at lane `lane` of a block.
 template <bool scales, bool tangents, class D>
 HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
                           std::size_t first, std::size_t end, const BlockVertices* morphed,
@@ -589,7 +592,7 @@ HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std
     if (!isSnormPosition(format)) return encodePosition(d, format, position);
     const Vec3<D> relative = relativeTo(d, task.instance, position);
     if (mayCount) {
-      // A vertex of the engine's own box may stand a rounding outside.
+      // A vertex on a face of the engine's box may lie outside by a rounding error.
       const auto isBeyond = [&](Vec<D> component) HWY_ATTR {
         return hn::Gt(hn::Abs(component), hn::Set(d, 1.00001f));
       };

@@ -1,12 +1,12 @@
-// The SIMD code of all instruction sets, and which of them is used.
+// The SIMD code of all instruction sets, and the choice among them.
 
-// Refinements of AVX-512 (the lowest eight bits) and SSSE3 would change nothing, and vectors of SVE
-// have no size.
+// Disables refinements of AVX-512 (the lowest eight bits) and SSSE3, which would change nothing,
+// and SVE, whose vectors have no fixed size.
 #ifndef HWY_DISABLED_TARGETS
 #define HWY_DISABLED_TARGETS (0xff | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
-// What Highway says is broken with GCC before 12.3 (bug 106322) is not used here; tests compare its
-// bits.
+// Highway considers this target broken with GCC before 12.3 (bug 106322). Dermis does not use the
+// affected operations; tests compare the resulting bits.
 #ifndef HWY_BROKEN_EMU128
 #define HWY_BROKEN_EMU128 0
 #endif
@@ -16,7 +16,7 @@
 #include "strict_floating_point.h"
 
 #include "hwy/foreach_target.h"
-// After foreach_target.h.
+// Must come after foreach_target.h.
 #include "hwy/highway.h"
 
 #include <bit>
@@ -34,7 +34,7 @@ struct SectionTask {
   Scratch* scratch;
   const Section& section;
   std::size_t firstRun, runEnd;
-  std::uint32_t firstVertex, vertexEnd;  ///< in these runs
+  std::uint32_t firstVertex, vertexEnd;  ///< within these runs
 };
 
 /// The vertices of a run that a job skins.
@@ -107,7 +107,7 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
   write(findings, instance);
 }
 
-// -- The plain way.
+// -- The fast path (plain_inl.h).
 
 inline bool isPlainTask(const Task& task) {
   return (task.method == Method::dualQuaternion || task.method == Method::linear) &&
@@ -119,7 +119,7 @@ inline bool isPlainInstance(const TaskInstance& instance) {
   return instance.morphs.empty() && instance.result == nullptr && areSideBySide(instance);
 }
 
-/// How many instances there are room for at a time.
+/// Maximum number of instances skinned at a time.
 #if HWY_MAX_BYTES >= 64
 inline constexpr std::size_t mostInstances = 4;
 #elif HWY_MAX_BYTES >= 32
@@ -128,20 +128,20 @@ inline constexpr std::size_t mostInstances = 2;
 inline constexpr std::size_t mostInstances = 1;
 #endif
 
-/// Instances that are skinned together, and what their poses became.
+/// Instances that are skinned together, and their converted poses.
 struct PlainGroup {
   std::size_t count = 0;
   float* outputs[mostInstances] = {};
   std::span<const JointMatrix> poses[mostInstances];
-  /// Of each joint the real parts of all instances, and the dual parts; and likewise its
+  /// For each joint, the real parts of all instances; the dual parts follow. The same for its
   /// scale/shear parts.
   DualQuaternionArray<float> joints{nullptr, mostInstances * 4};
   DualQuaternionArray<float> parts = joints;
-  float* palettes = nullptr;  ///< of those that are skinned next
+  float* palettes = nullptr;  ///< of the instances that are skinned next
 
   /// Gets memory for the joints and the palettes of `mostInstances` instances.
   void assign(Scratch& scratch, std::size_t jointCount, std::size_t paletteFloats) {
-    // Joints are converted as many at a time as there are lanes.
+    // Joints are converted in whole vectors, so the last one may write beyond the last joint.
     joints.dual = parts.dual = (jointCount + blockVertices) * joints.stride;
     joints.first = floatsOf(scratch.dualQuaternions, joints.dual * 2);
     parts.first = floatsOf(scratch.scaleShears, joints.dual * 2);
@@ -160,7 +160,8 @@ inline DualQuaternionArray<const T> readOnly(const DualQuaternionArray<T>& array
   return {array.first, array.stride, array.dual};
 }
 
-/// Skins parts of blocks beside the output, as it skins whole ones, and copies them there.
+/// Skins a partial block: skins the whole block to a temporary buffer and copies the part to the
+/// output.
 template <class Skin>
 HWY_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t first,
                          std::uint32_t end, std::size_t instances, float* const* outputs,
@@ -176,8 +177,8 @@ HWY_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t 
   }
 }
 
-/// Calls `skin` for each run, with the blocks of it that the job has, and with where the vertices
-/// of its first block go.
+/// Calls `skin` for the blocks of each run that lie in the job. `skinPart` handles blocks that lie
+/// in the job only partly.
 template <class Skin>
 HWY_INLINE void forRuns(const SectionTask& part, std::size_t instances, float* const* outputs,
                         const Skin& skin) {
@@ -201,7 +202,7 @@ HWY_INLINE void forRuns(const SectionTask& part, std::size_t instances, float* c
   }
 }
 
-/// By dual quaternions: as many instances as D has blocks.
+/// Skins by dual quaternions; as many instances as D has blocks.
 template <class D>
 inline HWY_ATTR void turnGroup(D d, const SectionTask& part, const PlainGroup& group,
                                std::size_t first) {
@@ -232,7 +233,7 @@ inline HWY_ATTR void turnOne(const SectionTask& part, const PlainGroup& group, s
 }
 #endif
 
-/// By matrices.
+/// Skins by matrices.
 template <class D>
 inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& group,
                                std::size_t first) {
@@ -256,7 +257,7 @@ inline HWY_ATTR void moveGroup(D d, const SectionTask& part, const PlainGroup& g
           });
 }
 
-/// By dual quaternions, with two-phase scale.
+/// Skins by dual quaternions, with two-phase scale.
 template <class D>
 inline HWY_ATTR void turnScaledGroup(D d, const SectionTask& part, const PlainGroup& group,
                                      std::size_t first) {
@@ -293,7 +294,7 @@ inline HWY_ATTR void skinBlocks(D d, PlainKind kind, const SectionTask& part,
   turnGroup(d, part, group, first);
 }
 
-/// All of them, and then there are none.
+/// Skins all instances of the group, then empties it.
 inline HWY_ATTR void skinGroup(PlainKind kind, const SectionTask& part, PlainGroup& group) {
   std::size_t first = 0;
 #if HWY_MAX_BYTES >= 64
@@ -327,7 +328,8 @@ inline void copyJoints(std::size_t count, const DualQuaternionArray<float>& from
   }
 }
 
-/// Instances that are plain. Those by matrices that are very large or small go the general way.
+/// Skins all instances. Those that are not plain, and those whose matrices for linear blending are
+/// very large or small, take the general path.
 inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   const Task& task = part.task;
   const MeshData& mesh = *task.mesh;
@@ -404,14 +406,15 @@ namespace {
 
 HWY_EXPORT(skinTask);
 
-/// A build for one instruction set has a table of one, and needs that.
+/// A build for one instruction set has a dispatch table with one entry, which must be called
+/// directly.
 constexpr bool isForOne = std::size(HWY_DISPATCH_TABLE(skinTask)) == 1;
 
 std::int64_t usable() {
   return isForOne ? HWY_TARGETS : hwy::SupportedTargets() & HWY_TARGETS;
 }
 
-/// Of our own: Highway's is that of the whole process, which the engine may use too.
+/// Dermis has its own: Highway's is shared by the whole process, and the engine may use it too.
 hwy::ChosenTarget& chosenTarget() {
   static hwy::ChosenTarget chosen;
   static const bool isReady = (chosen.Update(usable()), true);

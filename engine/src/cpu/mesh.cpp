@@ -16,11 +16,11 @@ namespace dermis::cpu {
 namespace {
 
 constexpr std::uint32_t mostInfluences = 1000;
-/// A section's dual quaternions stay in the cache of first level, for four instances at a time.
+/// Limits a section so that its dual quaternions stay in the cache for four instances at a time.
 constexpr std::size_t sectionPairs = 1024;
 static_assert(blockVertices * mostInfluences < 65536 / indexScale);
 
-/// Reads a packed mesh, whose contents were checked when it was made.
+/// Reads a packed mesh. Its contents were checked when it was made.
 class Reader {
  public:
   explicit Reader(const PackedMesh& packed)
@@ -69,7 +69,7 @@ std::vector<Lanes> lanesOf(const Reader& reader, std::uint32_t section, std::uin
   return lanes;
 }
 
-/// A number for each vertex, or the same for all.
+/// One number per vertex, or `all` for every vertex if there is no such section.
 std::vector<Lanes> sharesOf(const Reader& reader, std::uint32_t section, float all) {
   if (section != 0) return lanesOf(reader, section, 1, 1);
   Lanes lanes;
@@ -77,7 +77,7 @@ std::vector<Lanes> sharesOf(const Reader& reader, std::uint32_t section, float a
   return std::vector<Lanes>((reader.header.vertexCount + blockVertices - 1) / blockVertices, lanes);
 }
 
-/// As `unitOr` of the kernels, to the bit: vertices that are displaced are made unit there.
+/// Gives the same bits as `unitOr` of the kernels, which normalizes vertices after morphing.
 std::array<float, 3> unitOrZero(float x, float y, float z) {
   const float largest = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
   const std::uint32_t exponent = std::bit_cast<std::uint32_t>(largest) >> 23;
@@ -91,7 +91,7 @@ std::array<float, 3> unitOrZero(float x, float y, float z) {
   return {x * inverse, y * inverse, z * inverse};
 }
 
-/// Directions, and the handedness behind them where there are four components.
+/// Normalizes directions. A fourth component, the handedness, becomes 1 or -1.
 void makeUnit(std::vector<Lanes>& lanes, std::size_t components) {
   for (std::size_t block = 0; block < lanes.size(); block += components) {
     for (std::uint32_t lane = 0; lane < blockVertices; ++lane) {
@@ -106,7 +106,7 @@ void makeUnit(std::vector<Lanes>& lanes, std::size_t components) {
   }
 }
 
-/// Lists the joints and pairs of sections, and the slots of vertices.
+/// Builds the lists of joints and pairs of sections, and the slots of vertices.
 class Slots {
  public:
   explicit Slots(MeshData& data) : data_(data) {}
@@ -145,11 +145,11 @@ class Slots {
   }
 
  private:
-  /// So that poses are mostly read from one end to the other.
+  /// Sorts joints so that poses are read mostly in memory order.
   void sortJoints() {
     std::vector<std::uint16_t> numbers(joints_.size());
     std::uint16_t next = 0;
-    for (const auto& [joint, number] : joints_) {  // rising
+    for (const auto& [joint, number] : joints_) {  // in ascending order
       data_.joints[std::size_t{firstJoint_} + next] = joint;
       numbers[number] = next++;
     }

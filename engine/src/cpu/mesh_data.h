@@ -1,5 +1,5 @@
-// What a cpu::Mesh consists of. Vertices stand in blocks of eight, attribute by attribute,
-// component by component; the last block is filled up with vertices of no influences.
+// The data of a cpu::Mesh. Vertices are stored in blocks of eight: attribute by attribute,
+// component by component. The last block is padded with vertices without influences.
 #pragma once
 
 #include <array>
@@ -21,32 +21,32 @@ struct alignas(32) Lanes {
   float v[blockVertices] = {};
 };
 
-/// Stands for a joint that leaves everything where it is: the only one of vertices without
-/// influences.
+/// Denotes an identity joint, the only joint of vertices without influences.
 inline constexpr std::uint32_t stillJoint = 0xffffffff;
 
-/// The joints of influences are numbers into the lists of a section, times this, so that processors
-/// find an entry by one address.
+/// Influences store indices into the lists of a section, multiplied by this, so that an entry can
+/// be addressed without further arithmetic.
 inline constexpr std::uint32_t indexScale = 8;
 
-/// A pivot and a joint of some of its vertices, as numbers into `Section`'s joints. Each pose gives
-/// a dual quaternion for each pair, in the pivot's hemisphere: vertices then add without looking.
+/// A pivot and a joint that influences vertices of that pivot, as indices into `Section`'s joints.
+/// Each pose gives a dual quaternion for each pair, in the pivot's hemisphere, so that vertices add
+/// them without comparing signs.
 struct Pair {
   std::uint16_t pivot = 0;
   std::uint16_t joint = 0;
 };
 
-/// Blocks, one behind the other, that share lists of joints and pairs.
+/// Consecutive blocks that share lists of joints and pairs.
 struct Section {
-  std::uint32_t firstJoint = 0, jointEnd = 0;  ///< of `MeshData::joints`
-  std::uint32_t firstPair = 0, pairEnd = 0;    ///< of `MeshData::pairs`
+  std::uint32_t firstJoint = 0, jointEnd = 0;  ///< in `MeshData::joints`
+  std::uint32_t firstPair = 0, pairEnd = 0;    ///< in `MeshData::pairs`
 
   std::uint32_t jointCount() const { return jointEnd - firstJoint; }
   std::uint32_t pairCount() const { return pairEnd - firstPair; }
 };
 
-/// Blocks, one behind the other, of one section, in which each vertex has `influences` slots. Those
-/// that it does not need have weight 0 and its pivot. Slots stand vertex by vertex.
+/// Consecutive blocks of one section in which each vertex has `influences` slots. Unused slots have
+/// weight 0 and refer to the vertex's pivot. Slots are stored vertex by vertex.
 struct Run {
   std::uint32_t section = 0;
   std::uint32_t firstBlock = 0, blockEnd = 0;
@@ -60,27 +60,28 @@ struct Run {
 
 struct MeshData {
   MeshInfo info;
-  std::vector<Lanes> positions;     ///< 3 a block
-  std::vector<Lanes> normals;       ///< 3 a block, of unit length; empty if there are none
-  std::vector<Lanes> givenNormals;  ///< as the mesh has them
-  std::vector<Lanes> tangents;      ///< 4 a block: unit length, and 1 or -1
+  std::vector<Lanes> positions;     ///< 3 per block
+  std::vector<Lanes> normals;       ///< 3 per block, of unit length; empty if there are none
+  std::vector<Lanes> givenNormals;  ///< as stored in the mesh
+  std::vector<Lanes> tangents;      ///< 4 per block: a unit vector, and 1 or -1
   std::vector<Lanes> givenTangents;
-  std::vector<Lanes> centers;                ///< of rotation, 3 a block
-  std::vector<Lanes> dualQuaternionWeights;  ///< 1 a block
-  std::vector<Lanes> bulgeStrengths;         ///< 1 a block
+  std::vector<Lanes> centers;                ///< of rotation, 3 per block
+  std::vector<Lanes> dualQuaternionWeights;  ///< 1 per block
+  std::vector<Lanes> bulgeStrengths;         ///< 1 per block
   std::vector<float> weights;                ///< of each slot
   std::vector<std::uint16_t> jointNumbers;   ///< of each slot, times `indexScale`
   std::vector<std::uint16_t> pairNumbers;    ///< likewise
-  std::vector<std::uint32_t> joints;         ///< of sections: joints of the pose
-  std::vector<Pair> pairs;                   ///< of sections
+  std::vector<std::uint32_t> joints;         ///< lists of all sections: joints of the pose
+  std::vector<Pair> pairs;                   ///< lists of all sections
   std::vector<Section> sections;
-  std::vector<Run> runs;              ///< in the order of blocks
-  std::vector<std::uint32_t> packed;  ///< with morph targets: the packed mesh
+  std::vector<Run> runs;              ///< in ascending order of blocks
+  std::vector<std::uint32_t> packed;  ///< only with morph targets: the packed mesh
 
   std::uint32_t runOf(std::uint32_t block) const;
-  /// Those that count, the pivot first.
+  /// Influences with a weight other than 0, the pivot first.
   std::vector<abi::InfluenceRecord> influencesOf(std::uint32_t vertex) const;
-  /// Some of the vertices, displaced, and without directions: they come out where they do here.
+  /// Copies some of the vertices, morphed and without directions. They are skinned to the same
+  /// positions as here.
   MeshData select(std::span<const std::uint32_t> vertices,
                   std::span<const MorphWeight> morphs) const;
 };

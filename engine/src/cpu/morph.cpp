@@ -19,7 +19,7 @@ void morphBlock(const MeshData& mesh, std::uint32_t block, std::span<const Morph
     const auto target = abi::load<abi::MorphRecord>(
         words, header.morphs + std::size_t{morph.target} * abi::MORPH_WORDS);
     const std::uint32_t number = first / abi::MORPH_BLOCK_VERTICES - target.firstBlock;
-    if (number >= target.blockCount) continue;  // one before the first wraps around
+    if (number >= target.blockCount) continue;  // a block before the first one wraps around
     const auto record = abi::load<abi::MorphBlockRecord>(
         words, target.blocks + std::size_t{number} * abi::MORPH_BLOCK_WORDS);
     const std::uint64_t mask = record.maskLow | std::uint64_t{record.maskHigh} << 32;

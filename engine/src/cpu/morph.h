@@ -1,4 +1,4 @@
-// Morph targets: what the active ones add to vertices in bind pose.
+// Adds the displacements of active morph targets to vertices in bind pose.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace dermis::cpu {
 
-/// Adds to a block what the active targets displace. `lanes` are its positions, normals and
-/// tangents, three components each; null if they are not wanted.
+/// Adds the displacements of the active targets to a block. `positions`, `normals` and `tangents`
+/// have three components each; null if not wanted.
 void morphBlock(const MeshData& mesh, std::uint32_t block, std::span<const MorphWeight> morphs,
                 Lanes* positions, Lanes* normals, Lanes* tangents);
 

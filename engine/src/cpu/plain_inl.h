@@ -1,7 +1,7 @@
-// What most instances need, as fast as it can be: positions and normals in float32, side by side,
-// by dual quaternions or matrices. Several instances at a time: weights and numbers of joints
-// are read once for all of them, and each has its own 128 bits of a vector, so that nothing crosses
-// from one to another before it is stored.
+// The fast path for the common case: positions and normals in float32, side by side, skinned by
+// dual quaternions or matrices. Several instances are skinned at a time: weights and joint indices
+// are read once for all of them, and each instance has its own 128 bits of a vector, so that data
+// is exchanged between instances only when results are stored.
 
 // clang-format off
 #if defined(DERMIS_CPU_PLAIN_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -22,10 +22,10 @@ struct PlainTask {
   const MeshData& mesh;
   const Run& run;
   std::uint32_t firstBlock, blockEnd;
-  std::uint32_t outputBlock;  ///< the one that stands at the beginning of the output
+  std::uint32_t outputBlock;  ///< the block at the start of the output
 };
 
-/// The three components of four vertices, in each block.
+/// Loads the three components of four vertices into each block of a vector.
 struct InEveryBlock {
   std::size_t first;
 
@@ -35,7 +35,7 @@ struct InEveryBlock {
             hn::LoadDup128(d, lanes[2].v + first)};
   }
 };
-/// Of eight vertices.
+/// Loads the three components of eight vertices, one per lane.
 struct InAllLanes {
   template <class D>
   HWY_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
@@ -43,7 +43,7 @@ struct InAllLanes {
   }
 };
 
-/// What is read of a block late stays out of registers until then.
+/// Loads positions and normals as late as possible, to save registers.
 template <class D, class Place>
 HWY_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual, const Lanes* positions,
                              const Lanes* normals, const Place& place, float* const* to) {
@@ -52,8 +52,8 @@ HWY_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual, cons
   storeVertices(d, position, turnDirection(real, factor, place.load(d, normals)), to);
 }
 
-/// As many instances as D has blocks. `pairs`: of each pair the real parts of all of them; the dual
-/// parts stand `dual` floats behind.
+/// Skins as many instances as D has blocks. `pairs`: for each pair, the real parts of all
+/// instances; the dual parts follow `dual` floats later.
 template <int influences, class D>
 HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
                               std::size_t dual, float* const* outputs) {
@@ -96,17 +96,17 @@ HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTR
   }
 }
 
-/// What the vertices of instances that scale read. Entries of all instances stand side by side,
-/// their second halves in arrays behind.
+/// The palette of instances that scale or shear. Entries of all instances are stored side by side;
+/// their second halves follow in separate arrays.
 struct ScaledPalette {
   const float* pairs;       ///< dual quaternions of pairs
-  const float* scalePairs;  ///< scale/shear parts of pairs: the joint's less the pivot's
-  const float* parts;       ///< of joints
-  std::size_t dual;         ///< from a half of a pair to the other one
-  std::size_t second;       ///< the same, of a joint
+  const float* scalePairs;  ///< scale/shear parts of pairs: the joint's minus the pivot's
+  const float* parts;       ///< scale/shear parts of joints
+  std::size_t dual;         ///< floats from the first half of a pair to the second
+  std::size_t second;       ///< floats from the first half of a joint to the second
 };
 
-/// As `turnInstances`, with two-phase scale.
+/// Like `turnInstances`, with two-phase scale.
 template <int influences, class D>
 HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPalette& palette,
                                     float* const* outputs) {
@@ -119,7 +119,7 @@ HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPale
   float* to[blocks];
   for (std::size_t i = 0; i < blocks; ++i)
     to[i] = outputs[i] + std::size_t{task.firstBlock - task.outputBlock} * blockFloats;
-  /// Both halves of an entry, blended, of four vertices.
+  /// Blends both halves of an entry for four vertices.
   const auto blend = [&](const float* HWY_RESTRICT entries, Vec<D> sums[8]) HWY_ATTR {
     for (std::size_t vertex = 0; vertex < 4; ++vertex) {
       const std::uint16_t* const own = number + vertex * count;
@@ -173,8 +173,8 @@ HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPale
   }
 }
 
-/// The same by blended matrices. `rows`: of a joint, the first rows of all instances; the other
-/// rows stand `rowFloats` and twice as many floats behind.
+/// Like `turnInstances`, by blended matrices. `rows`: for each joint, the first rows of all
+/// instances; the second and third rows follow `rowFloats` and 2 `rowFloats` floats later.
 template <int influences, class D>
 HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTRICT rows,
                               std::size_t rowFloats, float* const* outputs) {
@@ -223,7 +223,7 @@ HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTR
 }
 
 #if HWY_MAX_BYTES >= 32
-/// One instance: a vector holds a dual quaternion, and then a component of eight vertices.
+/// Skins one instance: a vector first holds a dual quaternion, then a component of eight vertices.
 template <int influences>
 HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RESTRICT pairs,
                              float* output) {

@@ -9,8 +9,8 @@
 namespace dermis::cpu {
 namespace {
 
-// Double precision needs no residual with compensated sums, as the palette kernel does
-// (shaders/polar.glsl), and there is no driver that could take its operations for others.
+// In double precision, no residual with compensated sums is needed, unlike in the palette kernel
+// (shaders/polar.glsl), and no driver can replace operations.
 using Vector = std::array<double, 4>;
 using Matrix = std::array<std::array<double, 4>, 4>;
 
@@ -58,7 +58,7 @@ Vector byJacobi(const double c[3][3]) {
   Matrix m = hornMatrix(c);
   Matrix vectors{};
   for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
-  // It converges quadratically: five or six sweeps, and few matrices take more.
+  // Converges quadratically: five or six sweeps suffice for nearly all matrices.
   for (int sweep = 0; sweep < 12; ++sweep) {
     double outside = 0, inside = 0;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -100,16 +100,17 @@ double determinantOf(const Matrix3& m, const Matrix3& cofactors) {
   return m[0][0] * cofactors[0][0] + m[0][1] * cofactors[0][1] + m[0][2] * cofactors[0][2];
 }
 
-/// Newton's method for the orthogonal factor (Higham 1986, "Computing the polar decomposition"):
-/// X ← (X + X⁻ᵀ) / 2, from about C / det(C)^⅓ on. It converges quadratically, to a rotation if
-/// det(C) > 0. Returns whether it did within a few steps, as it does where C is far from flat.
+/// Newton's method for the orthogonal factor (Higham 1986, "Computing the polar decomposition"): X
+/// ← (X + X⁻ᵀ) / 2, starting at about C / det(C)^⅓. It converges quadratically, to a rotation if
+/// det(C) > 0. Returns whether it converged within a few steps, as it does unless C is nearly
+/// singular.
 bool nearestRotation(const double c[3][3], Matrix3& x) {
   for (std::size_t i = 0; i < 3; ++i) x[i] = {c[i][0], c[i][1], c[i][2]};
   Matrix3 cofactors = cofactorsOf(x);
   const double determinant = determinantOf(x, cofactors);
-  // The largest entry is 1. What is flatter is left to Jacobi's method.
+  // The largest entry is 1. Flatter matrices are left to Jacobi's method.
   if (!(determinant > 1e-4)) return false;
-  // By a power of two: libraries round cube roots in different ways.
+  // Scales by a power of two, because libraries round cube roots differently.
   int exponent = 0;
   static_cast<void>(std::frexp(determinant, &exponent));
   const double scale = std::ldexp(1.0, -exponent / 3);
@@ -133,7 +134,7 @@ bool nearestRotation(const double c[3][3], Matrix3& x) {
   return false;
 }
 
-/// Of a rotation, by its largest component (Shepperd 1978).
+/// The quaternion of a rotation matrix, from its largest component (Shepperd 1978).
 Vector quaternionOf(const Matrix3& r) {
   const Vector squares{1 + r[0][0] - r[1][1] - r[2][2], 1 - r[0][0] + r[1][1] - r[2][2],
                        1 - r[0][0] - r[1][1] + r[2][2], 1 + r[0][0] + r[1][1] + r[2][2]};
@@ -166,9 +167,9 @@ void polarParts(const float rows[3][4], float rotation[4], ScaleShear& scaleShea
     scaleShear = {{0, 0, 0}, {0, 0, 0}};
     return;
   }
-  // The determinant, and how large it would be if no product in it cancelled. One that rounding of
-  // the matrix may have made negative (24 roundings of 2^-24) counts as 0: a flat matrix has one of
-  // either sign.
+  // The determinant, and its size if no product in it cancelled. A determinant that may be negative
+  // only because the matrix was rounded (24 roundings of 2^-24) counts as 0: that of a flat matrix
+  // may have either sign.
   double determinant = 0, magnitude = 0;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;

@@ -1,5 +1,5 @@
-// Joints that scale or shear, taken apart. Few joints do, so this is no SIMD code: its bits are the
-// same on every machine.
+// Decomposes joints that scale or shear. Few joints do, so this is scalar code; it gives the same
+// bits on every machine.
 #pragma once
 
 namespace dermis::cpu {
@@ -10,9 +10,9 @@ struct ScaleShear {
   float mixed[3] = {0, 0, 0};  ///< xy xz yz
 };
 
-/// The nearest rotation to the 3×3 part C of a joint matrix, as a unit quaternion x y z w, and the
-/// rest. With a negative determinant R is the rotation of −C and the sign goes into S. `rows` are
-/// finite.
+/// The rotation nearest to the 3×3 part C of a joint matrix, as a unit quaternion x y z w, and the
+/// scale/shear part. With a negative determinant R is the rotation of −C and S has the sign. `rows`
+/// must be finite.
 void polarParts(const float rows[3][4], float rotation[4], ScaleShear& scaleShear);
 
 }  // namespace dermis::cpu

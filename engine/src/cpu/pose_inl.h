@@ -1,5 +1,5 @@
-// Poses to what vertices read: unit dual quaternions of joints and of pairs, scale/shear parts, and
-// matrices. The formulas are those of the palette kernel (shaders/palette.comp).
+// Converts poses to what vertices read: unit dual quaternions of joints and of pairs, scale/shear
+// parts, and matrices. The formulas are those of the palette kernel (shaders/palette.comp).
 
 // clang-format off
 #if defined(DERMIS_CPU_POSE_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -24,10 +24,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
 
-/// Joint matrices of as many joints as there are lanes.
+/// One joint matrix per lane.
 template <class D>
 struct Joints {
-  Vec3<D> r0, r1, r2;  ///< the 3×3 parts by their rows
+  Vec3<D> r0, r1, r2;  ///< rows of the 3×3 parts
   Vec3<D> translation;
 };
 
@@ -36,7 +36,7 @@ struct DualQuaternions {
   Vec4<D> real, dual;
 };
 
-/// det > 0, and no row of CᵀC − 1 sums, by absolute values, to more than 8e-6.
+/// det > 0, and the absolute values of each row of CᵀC − 1 sum to at most 8e-6.
 template <class D>
 HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
   const Vec3<D> c0{j.r0.x, j.r1.x, j.r2.x};
@@ -54,8 +54,8 @@ HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
   return hn::And(hn::Gt(dot3(j.r0, cross3(j.r1, j.r2)), hn::Zero(d)), near);
 }
 
-/// The unit quaternion of a matrix that is all but a rotation: the first guess by the largest of
-/// the four squared components (Shepperd 1978), and a step of the power method.
+/// The unit quaternion of a matrix that is nearly a rotation: a first guess from the largest of the
+/// four squared components (Shepperd 1978), then one step of the power method.
 template <class D>
 HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
   const Vec<D> one = hn::Set(d, 1.0f);
@@ -98,9 +98,9 @@ HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
   return {vector.x, vector.y, vector.z, hn::Mul(hn::Set(d, -0.5f), dot3(t, axis))};
 }
 
-/// Dual quaternions of joints or pairs: the real parts `stride` floats from one to the next, the
-/// dual parts `dual` floats behind them. Scale/shear parts stand like that, too: the diagonal and
-/// an entry, and the two other entries.
+/// Dual quaternions of joints or pairs. Real parts are `stride` floats apart; each dual part is
+/// `dual` floats after its real part. Scale/shear parts have the same layout: first the diagonal
+/// and one mixed entry, then the two other entries.
 template <class T>
 struct DualQuaternionArray {
   T* first;
@@ -108,15 +108,16 @@ struct DualQuaternionArray {
   std::size_t dual = 4;
 };
 
-/// The joints of a section, and where what is made of them goes.
+/// The joints of a section, and the destination of their converted poses.
 struct PoseTask {
   std::span<const std::uint32_t> joints;
   std::span<const JointMatrix> pose;
   DualQuaternionArray<float> dualQuaternions;
-  DualQuaternionArray<float> scaleShears;  ///< two times four floats a joint, in the same way
+  DualQuaternionArray<float> scaleShears;  ///< same layout, two times four floats per joint
 };
 
-/// The matrices of joints `first` and on, 12 floats each: where they stand, or copied.
+/// The matrices of `count` joints from `first` on, 12 floats each: in place if they are contiguous,
+/// otherwise in `copies`.
 HWY_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, std::size_t count,
                                    float* copies) {
   const std::uint32_t begin = task.joints[first];
@@ -134,7 +135,7 @@ HWY_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, std:
   return copies;
 }
 
-/// A joint that is not rigid: its rotation, and the rest.
+/// Decomposes a joint that is not rigid into its rotation and its scale/shear part.
 inline void convertOther(const float* matrix, float rotation[4], ScaleShear& part) {
   float rows[3][4];
   std::memcpy(rows, matrix, sizeof(rows));
@@ -149,10 +150,10 @@ inline void convertOther(const float* matrix, float rotation[4], ScaleShear& par
   }
 }
 
-/// Whether normals may go by the cofactors of blended matrices as they are: no entry is larger than
-/// 2^40, and no joint shrinks all to less than 2^-10. A determinant, the product of three, is then
-/// at most 2^120, and at most 2^-30 of what it would be if each matrix were scaled to entries of
-/// about 1, as the kernels do.
+/// Whether normals can use the cofactors of blended matrices without scaling: no entry is larger
+/// than 2^40, and the largest entry of each joint is at least 2^-10. A determinant, a sum of
+/// products of three entries, is then at most about 2^120 and at most 2^30 times smaller than if
+/// each matrix were scaled to entries of about 1, as the kernels do.
 inline bool areModerate(std::span<const std::uint32_t> joints, std::span<const JointMatrix> pose) {
   constexpr float most = 0x1p40f, least = 0x1p-10f;
   bool are = true;
@@ -168,7 +169,7 @@ inline bool areModerate(std::span<const std::uint32_t> joints, std::span<const J
   return are;
 }
 
-/// Returns whether a joint scales or shears.
+/// Converts all joints. Returns whether any of them scales or shears.
 inline HWY_ATTR bool convertJoints(const PoseTask& task) {
   const Wide d;
   constexpr std::size_t lanes = hn::MaxLanes(d);
@@ -213,8 +214,8 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
   return scales;
 }
 
-/// A dual quaternion for each pair, in the hemisphere of its pivot; of as many instances as D has
-/// blocks, which stand one behind the other.
+/// Writes a dual quaternion for each pair, in the hemisphere of its pivot, for as many instances as
+/// D has blocks. The values of these instances are adjacent.
 template <class D>
 HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
                              const DualQuaternionArray<const float>& joints,
@@ -237,7 +238,7 @@ HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
   }
 }
 
-/// The joint's scale/shear part less the pivot's, of each pair.
+/// Writes the joint's scale/shear part minus the pivot's, for each pair.
 template <class D>
 HWY_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
                                const DualQuaternionArray<const float>& parts,

@@ -23,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Four = hn::FixedTag<float, 4>;
 #if HWY_MAX_BYTES >= 32
 using Eight = hn::FixedTag<float, 8>;
-/// Vertices at a time where no more than one instance is looked at.
+/// Vertices processed at a time when one instance is skinned.
 using Wide = Eight;
 #else
 using Wide = Four;
@@ -44,7 +44,7 @@ struct Vec4 {
   Vec<D> x, y, z, w;
 };
 
-// One rounding an operation on every target: nothing here is fused, or an estimate.
+// Each operation rounds once on every target: no fused operations and no estimates.
 
 template <class V>
 HWY_INLINE V dot3(V ax, V ay, V az, V bx, V by, V bz) {
@@ -82,8 +82,8 @@ HWY_INLINE Vec<D> largest3(const Vec3<D>& a) {
   return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
 }
 
-/// The power of two that brings a normal number to between a half and 4, and a subnormal one to at
-/// least 2^-23, so that its square neither overflows nor vanishes.
+/// The power of two that scales a normal number to between a half and 4, and a subnormal one to at
+/// least 2^-23, so that its square neither overflows nor underflows to 0.
 template <class D>
 HWY_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
   const hn::RebindToUnsigned<D> du;
@@ -92,7 +92,7 @@ HWY_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
   return hn::BitCast(d, hn::ShiftLeft<23>(scaled));
 }
 
-/// `v` with length 1, at any scale, or `fallback` where it vanished.
+/// `v` normalized, whatever its magnitude, or `fallback` if its length is 0.
 template <class D>
 HWY_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
   const Vec3<D> scaled = scale3(v, powerScale(d, largest3(v)));
@@ -101,13 +101,13 @@ HWY_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
   return choose3(hn::Eq(square, hn::Zero(d)), fallback, scale3(scaled, inverse));
 }
 
-/// 1 or -1: that sign of `value`, in which -0 counts as 0.
+/// The sign of `value` as 1 or -1; the sign of -0 is 1.
 template <class D>
 HWY_INLINE Vec<D> sideOf(D d, Vec<D> value) {
   return hn::IfThenElse(hn::Lt(value, hn::Zero(d)), hn::Set(d, -1.0f), hn::Set(d, 1.0f));
 }
 
-/// In each block, the rows of a 4×4 matrix become its columns.
+/// Transposes the 4×4 matrix in each block.
 template <class D>
 HWY_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
   const hn::Repartition<double, D> dd;
@@ -121,7 +121,7 @@ HWY_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
   e = hn::BitCast(d, hn::InterleaveUpper(dd, highAb, highCe));
 }
 
-/// Four floats of each lane, `stride` floats apart, as four vectors. Any alignment.
+/// Loads four floats for each lane, `stride` floats apart, as four vectors. Any alignment.
 HWY_INLINE Vec4<Four> loadRows(Four d, const float* from, std::size_t stride) {
   Vec4<Four> rows{hn::LoadU(d, from), hn::LoadU(d, from + stride), hn::LoadU(d, from + 2 * stride),
                   hn::LoadU(d, from + 3 * stride)};

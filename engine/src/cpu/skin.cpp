@@ -1,4 +1,4 @@
-// The checks of a job, and what does not depend on instruction sets.
+// Checks of a job, and code that does not depend on instruction sets.
 
 #include "dermis/cpu/skin.h"
 
@@ -17,18 +17,18 @@ Error wrong(const std::string& what) {
   return {ErrorCode::invalidArgument, what};
 }
 
-/// What `checkJob` knows of a job in buffers: one that is alone, and has all it wants.
+/// Runs `checkJob` on the equivalent job in buffers: the only one, in buffers as large as it needs.
 Result<void> checkLayout(const Job& job) {
   const MeshInfo& info = job.mesh->info();
   dermis::Job checked;
   checked.mesh = info;
   checked.method = job.method;
   checked.place(job.places);
-  // They count from the engine's addresses.
+  // Offsets are relative to the engine's addresses.
   for (OutputAttribute* attribute :
        {&checked.positions, &checked.normals, &checked.tangents, &checked.previousPositions})
     attribute->offset = 0;
-  if (checked.motion == Motion::reskinned) checked.motion = Motion::kept;  // checked by instances
+  if (checked.motion == Motion::reskinned) checked.motion = Motion::kept;  // checked per instance
   checked.box = {{-1, -1, -1}, {1, 1, 1}};
   const PoseDescription pose{info.requiredJoints, 0, true};
   Batch batch;

@@ -1,5 +1,6 @@
-// A Scene whose commands become jobs. The tables of its plan say which vertices of which instances
-// are skinned, from which poses; palettes are only names of poses here.
+// Runs a Scene on the CPU by converting its commands to jobs. The tables of its plan say which
+// vertices of which instances are skinned from which poses. Here a palette is only a reference to a
+// pose.
 
 #include "dermis/cpu/skinning_system.h"
 
@@ -31,14 +32,14 @@ void skin(const PlannedJob& job) {
 namespace {
 
 constexpr std::uint32_t noResult = 0xffffffff;
-/// Skinned at a time by the widest vectors.
+/// Instances that the widest vectors skin at a time.
 constexpr std::uint64_t instancesTogether = 4;
 
-/// As large as offsets in the tables allow.
-/// The largest size of an object, a multiple of 64. Sizes of buffers are below it, so that they fit
-/// `std::size_t` on 32-bit systems, too.
+/// The largest size of an object, a multiple of 64. Buffers are smaller, so that their sizes fit
+/// `std::size_t` on 32-bit systems too.
 constexpr std::uint64_t largestSize = std::numeric_limits<std::ptrdiff_t>::max() / 64 * 64;
 
+/// As large as offsets in the tables allow.
 DeviceLimits limitsOfMemory() {
   DeviceLimits limits;
   limits.maxStorageBufferRange = std::min<std::uint64_t>(0xfffffffc, largestSize);
@@ -54,11 +55,11 @@ Error wrong(const std::string& what) {
   return {ErrorCode::invalidArgument, what};
 }
 
-/// The joint matrices that a palette is made of.
+/// The pose that a palette refers to.
 struct PaletteSource {
   std::span<const JointMatrix> pose;
   bool mayScale = true;
-  std::uint64_t end = 0;  ///< the unit behind the palette
+  std::uint64_t end = 0;  ///< one past the last unit of the palette
 };
 
 }  // namespace
@@ -83,39 +84,39 @@ struct SkinningSystem::State {
   const PaletteSource& paletteAt(std::uint32_t unit) const;
 
   Scene scene;
-  std::unique_ptr<State*> self;  ///< what the scene's growth callback is given
+  std::unique_ptr<State*> self;  ///< context of the scene's growth callback
   Plan plan;
   std::span<const std::uint32_t> tables;  ///< of the plan
   std::uint64_t frame = 0;
-  bool isPlanned = false;  ///< the frame has its jobs
+  bool isPlanned = false;  ///< the jobs of the frame were made
 
   struct OwnMesh {
     MeshHandle handle;
     Mesh mesh;
   };
-  /// By the word at which the scene would place it.
+  /// Keyed by the word at which the scene would place the mesh.
   std::unordered_map<std::uint32_t, OwnMesh> meshes;
   std::vector<std::vector<JointMatrix>> poseBuffers;
   std::vector<CacheLine> ownOutput;
   std::span<std::byte> output;
-  std::map<std::uint32_t, PaletteSource> palettes;  ///< by their first unit; they do not overlap
+  std::map<std::uint32_t, PaletteSource> palettes;  ///< keyed by first unit; they do not overlap
   mutable std::map<std::uint32_t, PaletteSource>::const_iterator lastPalette;
 
   std::vector<TaskInstance> instances;
-  std::vector<std::uint32_t> resultOf;  ///< of each: the number of its result, or `noResult`
-  /// What a task finds out about an instance. Others may find out about its other vertices.
+  std::vector<std::uint32_t> resultOf;  ///< of each instance: index of its result, or `noResult`
+  /// A task's result for an instance. Other tasks may skin other vertices of the same instance.
   struct Part {
     std::uint32_t result;
     InstanceResult found;
   };
   std::vector<Part> parts;
-  std::vector<InstanceResult> results;  ///< by their numbers
+  std::vector<InstanceResult> results;  ///< by index
   std::vector<std::byte> readBack;
   struct Extent {
     std::size_t first, count;
   };
   std::vector<PlannedTask> tasks;
-  std::vector<Extent> extents;  ///< of each task, among the instances
+  std::vector<Extent> extents;  ///< of each task: its range of `instances`
   std::vector<PlannedJob> jobs;
 };
 
@@ -233,7 +234,7 @@ void SkinningSystem::beginFrame() {
   State& state = *state_;
   const bool hasResults = std::exchange(state.isPlanned, false);
   ++state.frame;
-  // Numbers that rise one by one cannot be wrong.
+  // Consecutive frame numbers are always valid.
   static_cast<void>(state.scene.beginFrame(state.frame, state.frame - 1).ok());
   if (hasResults) state.readBackResults();
   state.jobs.clear();
@@ -312,7 +313,7 @@ Result<void> SkinningSystem::abandonFrame() {
   return {};
 }
 
-/// A palette that is written ends those that it overwrites.
+/// Writing a palette removes the palettes that it overlaps.
 void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
   const auto push = abi::load<abi::PalettePush>(dispatch.constants, 0);
   for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
@@ -330,7 +331,7 @@ void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
     if (first != palettes.begin() && std::prev(first)->second.end > record.place) --first;
     auto end = first;
     while (end != palettes.end() && end->first < source.end) ++end;
-    // Mostly it is the same again: the memory is kept.
+    // Usually the same palette is written again; its map entry is reused.
     if (first != end && first->first == record.place) {
       first->second = source;
       ++first;
@@ -342,7 +343,7 @@ void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
   }
 }
 
-/// Instances mostly come in the order of their poses.
+/// Instances are mostly in the order of their poses, so the next palette is tried first.
 const PaletteSource& SkinningSystem::State::paletteAt(std::uint32_t unit) const {
   if (lastPalette != palettes.end() && lastPalette->first != unit) ++lastPalette;
   if (lastPalette == palettes.end() || lastPalette->first != unit)
@@ -407,7 +408,7 @@ void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
           record.positions, record.normals, record.tangents, record.previousPositions};
       for (std::size_t stream = 0; stream < streamCount; ++stream) {
         if (attributes[stream]->format == VertexFormat::none) continue;
-        // Records say where the group's first vertex stands.
+        // Records have the place of the group's first vertex.
         instance.outputs[stream] = output.data() + dispatch.windows[stream].offset +
                                    offsets[stream] -
                                    std::size_t{group.firstVertex} * attributes[stream]->stride;
@@ -418,7 +419,7 @@ void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
   }
 }
 
-/// Instances from `first` on, as tasks of some of them or of some of their vertices.
+/// Adds instances from `first` on, as tasks for some of them or for some of their vertices.
 void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
                                          std::uint64_t verticesPerJob) {
   const std::size_t count = instances.size() - first;
@@ -443,7 +444,7 @@ void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
         static_cast<std::uint32_t>(std::min<std::uint64_t>(begin + step, task.vertexEnd));
     const bool isAgain = begin != task.firstVertex && findOut;
     for (std::size_t instance = 0; isAgain && instance < count; ++instance) {
-      // Ranges may be done at the same time, so each has its own results.
+      // Ranges may run at the same time, so each has its own results.
       instances.push_back(TaskInstance(instances[first + instance]));
       resultOf.push_back(std::uint32_t{resultOf[first + instance]});
     }
@@ -459,7 +460,7 @@ void SkinningSystem::State::addTask(const Task& task, std::size_t first, std::si
   extents.push_back({first, count});
 }
 
-/// When nothing moves any more.
+/// Called after all tasks were added, when the vectors no longer reallocate.
 void SkinningSystem::State::finishTasks() {
   parts.clear();
   for (const std::uint32_t result : resultOf) {
@@ -479,7 +480,7 @@ void SkinningSystem::State::finishTasks() {
   }
 }
 
-/// As the GPU's commands do.
+/// Reads back results as the GPU's commands do.
 void SkinningSystem::State::readBackResults() {
   for (const Part& part : parts) {
     if (results.size() <= part.result) results.resize(part.result + 1);
@@ -497,7 +498,7 @@ void SkinningSystem::State::readBackResults() {
     std::memcpy(readBack.data() + copy->toOffset,
                 reinterpret_cast<const std::byte*>(results.data()) + copy->fromOffset, size);
   }
-  static_cast<void>(scene.readBack(frame - 1, readBack).ok());  // it was committed last
+  static_cast<void>(scene.readBack(frame - 1, readBack).ok());  // the frame that was committed last
 }
 
 // -- Results.

@@ -1,4 +1,4 @@
-// What the SIMD code gets: jobs that were checked, and memory to work in.
+// Input of the SIMD code: checked jobs, and scratch memory.
 #pragma once
 
 #include <array>
@@ -17,26 +17,27 @@ struct alignas(64) CacheLine {
   float v[16];
 };
 
-/// Memory of one thread, as large as the largest section that it has skinned needs.
+/// Scratch memory of one thread, sized for the largest section that it has skinned.
 struct Scratch {
   std::vector<CacheLine> dualQuaternions;  ///< of joints: real and dual part
   std::vector<CacheLine> scaleShears;      ///< of joints: diagonal and mixed entries, and two zeros
   std::vector<CacheLine> rows;             ///< of joints: 3×4, and four zeros
   std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
-  std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part less the pivot's
+  std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
 };
 
-/// As `Instance`.
+/// Counterpart of `Instance`.
 struct TaskInstance {
   std::span<const JointMatrix> pose;
-  /// Where each attribute of the mesh's first vertex stands, by `Stream`.
+  /// Address of each attribute of the mesh's first vertex, indexed by `Stream`.
   std::array<std::byte*, streamCount> outputs{};
   bool mayScale = true, restartsMotion = false, settles = false;
-  std::span<const MorphWeight> morphs;  ///< rising by target
+  std::span<const MorphWeight> morphs;  ///< in ascending order of targets
   std::span<const JointMatrix> previousPose;
   std::span<const MorphWeight> previousMorphs;
   InstanceResult* result = nullptr;
-  float boxCenter[3] = {}, boxInverse[3] = {};  ///< of snorm16 positions; 1 / half its size
+  float boxCenter[3] = {}, boxInverse[3] = {};  ///< for snorm16 positions; `boxInverse` is 1 / half
+                                                ///< the size
 
   std::byte* output(Stream stream) const { return outputs[static_cast<std::size_t>(stream)]; }
 };
@@ -49,15 +50,16 @@ struct Task {
   std::span<const TaskInstance> instances;
 };
 
-/// Fails with `invalidArgument` for a method for comparison. The message begins with `subject`.
+/// Fails with `invalidArgument` for a method that is only for comparison. The message begins with
+/// `subject`.
 Result<void> checkMethod(Method method, const char* subject);
 
-/// With memory that the thread keeps.
+/// Skins with scratch memory of the thread.
 void skinTask(const Task& task);
 
-/// `scratch`: four, of an instance, of its previous pose, of several at a time, and of several that
-/// scale.
-/// By the best instructions that the processor has, or those that `setTarget` chose.
+/// Uses the best instruction set of the processor, or the one that `setTarget` chose. `scratch`
+/// points to four objects: for one instance, its previous pose, several instances at a time, and
+/// several instances that scale.
 void dispatchTask(const Task& task, Scratch* scratch);
 
 }  // namespace dermis::cpu

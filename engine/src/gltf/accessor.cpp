@@ -61,8 +61,8 @@ const char* typeName(int type) {
   }
 }
 
-// The columns of a matrix start at multiples of 4 bytes (glTF 2.0, 3.6.2.4). Only matrices of bytes
-// and shorts feel it, and Dermis reads none of those: their ranges are checked nevertheless.
+// The columns of a matrix start at multiples of 4 bytes (glTF 2.0, 3.6.2.4). This matters only for
+// matrices of bytes and shorts. Dermis reads none of those, but checks their ranges.
 std::uint64_t elementSize(const tinygltf::Accessor& accessor) {
   const std::uint64_t component = sizeOfComponent(accessor.componentType);
   const auto matrix = [&](std::uint64_t side) { return side * ((side * component + 3) / 4 * 4); };
@@ -158,10 +158,10 @@ void Source::checkView(std::size_t index) const {
   const tinygltf::BufferView& view = content().bufferViews[index];
   const auto buffer = static_cast<std::size_t>(view.buffer);
   if (buffer >= buffers_.size()) failInvalid("bufferView ", index, ": it cannot be used");
-  // The structural check has bounded every number here by 2^53, so that no sum overflows.
+  // The structural check has limited every number here to 2^53, so that no sum overflows.
   const std::uint64_t size = buffers_[buffer].byteLength;
   if (view.byteOffset + view.byteLength <= size) return;
-  // Others cut it off, too. What an accessor needs of it must be there.
+  // Other programs cut the view off, too. The bytes that an accessor needs must exist.
   notes_.broken(NoteKind::viewLength, "bufferView ", index, ": bytes ", view.byteOffset, " to ",
                 view.byteOffset + view.byteLength, " are outside buffer ", view.buffer, " of ",
                 size, " bytes");
@@ -214,7 +214,7 @@ void Source::checkAccessors() {
   }
 }
 
-// Buffers that nothing skinned uses may be nowhere.
+// Buffers that nothing skinned uses may be missing.
 bool Source::hasBytes(const tinygltf::Accessor& accessor) const {
   const auto there = [&](int view) {
     if (view < 0) return true;
@@ -258,7 +258,7 @@ void Source::checkSparse(std::size_t index) const {
   for (const auto& [view, size] :
        {std::pair(indices.bufferView, indexSize), std::pair(values.bufferView, valueSize)}) {
     if (strideOf(view) == 0) continue;
-    // Some programs use a stride, some do not: it must not matter.
+    // Programs disagree whether to use the stride, so it must make no difference.
     const std::string sentence =
         join(where, ": bufferView ", view, " has a byteStride, which sparse data may not have");
     if (strideOf(view) != size) failInvalid(sentence);
@@ -358,7 +358,7 @@ bool Source::hasNoData(int accessor) const {
   return found.bufferView < 0 && !found.sparse.isSparse;
 }
 
-// Primitives may share accessors, and shared data is decoded, and spent, once for each.
+// Primitives may share accessors. Shared data is decoded, and spent, once per use.
 void Source::spendOnAccessor(int index) {
   refuseFaulty(index);
   spend(std::uint64_t{count(index)} * components(index), sizeof(float),
@@ -380,7 +380,7 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
                   ", and the accessor has ", accessor.count, " elements");
     }
     if (i > 0 && elements[i] <= elements[i - 1]) {
-      // Each is written in its turn: of two for one element, the last counts.
+      // Values are written in order: of two for the same element, the last one wins.
       notes_.broken(NoteKind::sparse, "accessor ", index, ": sparse index ", i, " is ", elements[i],
                     " after ", elements[i - 1], ": they must ascend");
     }
@@ -388,8 +388,8 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
   return elements;
 }
 
-// Calls `visit` with the number of each component and its address; sparse values come later, with
-// the numbers of those that they replace. What is all zeros is not visited.
+// Calls `visit` with the index and the address of each component, then again for those that sparse
+// values replace. Components of an accessor without a bufferView are zero and not visited.
 template <typename Visit>
 void Source::forEachComponent(int index, Visit visit) {
   const tinygltf::Accessor& accessor = content().accessors[static_cast<std::size_t>(index)];
@@ -413,7 +413,7 @@ void Source::forEachComponent(int index, Visit visit) {
   }
 }
 
-// `read` makes a Value of the address of a component.
+// `read` converts the component at an address to a Value.
 template <typename Value, typename Read>
 std::vector<Value> Source::decode(int index, Read read) {
   spendOnAccessor(index);

@@ -14,7 +14,7 @@ namespace {
 constexpr Format float32{TINYGLTF_COMPONENT_TYPE_FLOAT, false};
 constexpr Format timeFormats[] = {float32};
 constexpr Format vectorFormats[] = {float32};
-// Not allowed, but there is no other way to read them.
+// Not allowed, but with only one meaning.
 constexpr Format clearVectors[] = {
     {TINYGLTF_COMPONENT_TYPE_BYTE, true},   {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, true},
     {TINYGLTF_COMPONENT_TYPE_SHORT, true},  {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, true},
@@ -40,12 +40,12 @@ Interpolation interpolationOf(const std::string& name) {
   return Interpolation::linear;
 }
 
-// What the channels of all clips have in common to say.
+// Counts over the channels of all clips, for notes.
 struct Tally {
   std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
 };
 
-// 0 if a channel has no effect: there are no weights to move.
+// Returns 0 if a channel has no effect because there are no weights to animate.
 std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
   switch (channel.path) {
     case ChannelPath::translation:
@@ -70,8 +70,8 @@ std::uint32_t componentsOf(const Source& source, const Channel& channel, const s
   return count;
 }
 
-// Equal times are a jump, negative ones lie before the beginning. What times that fall mean,
-// programs do not agree about.
+// Equal times are a jump, and negative times are before the beginning. Programs disagree about the
+// meaning of descending times.
 void checkTimes(const std::vector<float>& times, int accessor, const std::string& where,
                 Notes& notes) {
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -130,7 +130,7 @@ std::vector<float> readValues(Source& source, int accessor, const Channel& chann
   return values;
 }
 
-// Integers cannot hit unit length exactly: the tolerance is what their rounding explains.
+// Integers cannot represent unit length exactly: the tolerance is their rounding error.
 double unitLengthTolerance(const Source& source, int accessor) {
   switch (source.content().accessors[static_cast<std::size_t>(accessor)].componentType) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
@@ -158,7 +158,7 @@ std::size_t normalizeRotations(Channel& channel, double tolerance) {
   return count;
 }
 
-// The channel, or nothing if it is left out.
+// Returns nothing if the channel is left out.
 std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
                                    const tinygltf::AnimationChannel& from, const std::string& where,
                                    Tally& tally) {
@@ -184,7 +184,7 @@ std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& an
   if (channel.interpolation == Interpolation::cubicSpline && channel.times.size() < 2) {
     source.notes().broken(NoteKind::keys, where, ": a CUBICSPLINE needs at least two keys");
   }
-  // An accessor of no elements has been noted.
+  // There is already a note about an accessor without elements.
   if (channel.times.empty()) return std::nullopt;
   channel.values = readValues(source, sampler.output, channel, where);
   if (channel.path == ChannelPath::rotation) {
@@ -200,8 +200,8 @@ double column(const std::array<double, 16>& matrix, std::size_t index, std::size
   return matrix[4 * index + row];
 }
 
-// The rotation of an orthonormal matrix (columns divided by `scale`), by the largest of the four
-// components: Shepperd, "Quaternion from rotation matrix", 1978.
+// The rotation of an orthonormal matrix (the columns divided by `scale`), from the largest of the
+// four components: Shepperd, "Quaternion from rotation matrix", 1978.
 std::array<double, 4> rotationOf(const std::array<double, 16>& matrix,
                                  const std::array<double, 3>& scale) {
   double m[3][3];
@@ -226,8 +226,8 @@ std::array<double, 4> rotationOf(const std::array<double, 16>& matrix,
   return q;
 }
 
-// Takes a node's matrix apart, for a channel to replace a part of it: the specification forbids
-// such a node, three.js does this. The sign of a mirrored matrix goes into the x scale, as there.
+// Decomposes a node's matrix, so that a channel can replace a part of it. The specification forbids
+// such a node, but three.js accepts it. As there, a mirrored matrix gets a negative x scale.
 void decompose(Node& node) {
   const std::array<double, 16> matrix = *node.matrix;
   node.matrix.reset();
@@ -258,7 +258,8 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
               Tally& tally) {
   Clip clip;
   clip.name = animation.name;
-  // By node and path. An enumeration is never hidden, so a map of it would be exported.
+  // Keyed by node and path. The key has no enumeration: a map of one would be exported, because
+  // enumerations are never hidden.
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> samplers;
   for (std::size_t i = 0; i < animation.channels.size(); ++i) {
     const std::string where = join("animation ", index, " channel ", i);

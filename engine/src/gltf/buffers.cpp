@@ -17,7 +17,7 @@ std::uint8_t base64Digit(char character) {
   if (character >= 'A' && character <= 'Z') return static_cast<std::uint8_t>(character - 'A');
   if (character >= 'a' && character <= 'z') return static_cast<std::uint8_t>(character - 'a' + 26);
   if (character >= '0' && character <= '9') return static_cast<std::uint8_t>(character - '0' + 52);
-  // The URL-safe alphabet of RFC 4648 too.
+  // Also accepts the URL-safe alphabet of RFC 4648.
   if (character == '+' || character == '-') return 62;
   if (character == '/' || character == '_') return 63;
   return notADigit;
@@ -44,7 +44,7 @@ std::vector<std::byte> decodeBase64(std::string_view text, const std::string& wh
   return bytes;
 }
 
-// A buffer may be shorter than it says: what an accessor needs of it must be there.
+// A buffer may be shorter than its byteLength. The bytes that an accessor needs must exist.
 std::uint64_t lengthOf(const BufferDescription& description, std::uint64_t there,
                        const std::string& where, Notes& notes) {
   if (there >= description.byteLength) return description.byteLength;
@@ -53,7 +53,7 @@ std::uint64_t lengthOf(const BufferDescription& description, std::uint64_t there
   return there;
 }
 
-// Buffers in side files: each file is read once, as far as the longest buffer in it goes.
+// Buffers in side files. Each file is read once, as far as its longest buffer needs.
 class SideBuffers {
  public:
   explicit SideBuffers(SideFiles& files) : files_(files) {}
@@ -72,7 +72,7 @@ class SideBuffers {
 
  private:
   SideFiles& files_;
-  std::map<std::size_t, FileToRead> found_;  // by buffer
+  std::map<std::size_t, FileToRead> found_;  // keyed by buffer
   std::map<std::filesystem::path, std::uint64_t> needed_;
 };
 
@@ -101,7 +101,7 @@ std::vector<Buffer> loadBuffers(const Document& document,
                                 SideFiles& files, MemoryBudget& budget, Notes& notes) {
   const std::vector<BufferDescription>& descriptions = document.buffers;
   std::vector<bool> isLost(descriptions.size());
-  // One that nothing skinned uses may fail.
+  // A buffer that nothing skinned uses may fail.
   const auto attempt = [&](std::size_t i, auto function) {
     if (document.usage.buffers[i]) return function();
     if (!notes.tolerate(NoteKind::unused, "; nothing skinned uses it", function)) isLost[i] = true;
@@ -130,7 +130,7 @@ std::vector<Buffer> loadBuffers(const Document& document,
       if (buffer.storage != nullptr) {
         buffer.bytes = *buffer.storage;
       } else if (i == 0 && binaryChunk) {
-        buffer.bytes = *binaryChunk;  // Only the first buffer may be that.
+        buffer.bytes = *binaryChunk;  // Only the first buffer may be the binary chunk.
       } else {
         return;
       }

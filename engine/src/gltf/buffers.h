@@ -1,5 +1,4 @@
-// The bytes of the buffers that a file names: in its binary chunk, in data URIs, in files beside
-// it.
+// The bytes of a file's buffers: from its binary chunk, from data URIs, and from side files.
 #pragma once
 
 #include <cstddef>
@@ -18,14 +17,14 @@ namespace dermis::gltf {
 /// One buffer. `bytes` points into `storage` or into the file itself.
 struct Buffer {
   std::uint64_t byteLength = 0;
-  /// `byteLength` bytes, or none: a buffer that no accessor reads may have no data.
+  /// `byteLength` bytes, or empty: a buffer that no accessor reads may have no data.
   std::span<const std::byte> bytes;
   Bytes storage;  ///< shared by the buffers of one side file; null in the binary chunk
 };
 
-/// Fetches them all. Throws `Failure`: `ioError` if a file cannot be read or lies outside the
-/// folder, `limitExceeded`. One that nothing skinned uses may fail, and one may be shorter than it
-/// says, with a note.
+/// Loads all buffers. Throws `Failure`: `ioError` if a file cannot be read or lies outside the
+/// folder, or `limitExceeded`. A buffer that nothing skinned uses may fail, and a buffer may be
+/// shorter than its byteLength; each gives a note.
 std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
                                 SideFiles& files, MemoryBudget& budget, Notes& notes);

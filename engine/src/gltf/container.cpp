@@ -31,7 +31,7 @@ bool isGlb(std::span<const std::byte> bytes) {
   return bytes.size() >= 4 && readWord(bytes, 0) == magicNumber;
 }
 
-// Returns how many of the file's bytes, of which there are `size`, belong to the container.
+// Returns how many of the file's `size` bytes belong to the container.
 std::uint32_t checkHeader(std::span<const std::byte> bytes, std::uint64_t size) {
   if (bytes.size() < headerSize) {
     failInvalid("the GLB header is truncated: ", bytes.size(), " bytes instead of ", headerSize);
@@ -65,7 +65,7 @@ void takeChunk(std::size_t chunk, std::uint32_t type, std::span<const std::byte>
   } else if (chunk == 0) {
     notes.broken(NoteKind::container, "the first GLB chunk is not JSON");
   }
-  // Chunks of other types belong to extensions and are passed over, as the specification asks.
+  // Chunks of other types belong to extensions and are skipped, as the specification requires.
 }
 
 }  // namespace

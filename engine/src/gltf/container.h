@@ -17,15 +17,16 @@ struct Container {
   std::optional<std::span<const std::byte>> binaryChunk;  ///< Of a GLB file that has one.
 };
 
-/// So many bytes of a file show whether it can be one.
+/// Number of bytes at the start of a file that show whether it can be one.
 inline constexpr std::size_t containerStart = 12;
 
-/// Throws `Failure` if a file of `size` bytes that begins with these cannot be read whatever
-/// follows: the header of a GLB file disagrees with its size, or a text is no JSON object.
+/// Checks the first bytes of a file of `size` bytes. Throws `Failure` if the file cannot be read
+/// whatever follows: the header of a GLB file disagrees with its size, or a text is not a JSON
+/// object.
 void checkStart(std::span<const std::byte> start, std::uint64_t size);
 
-/// Takes the file apart: GLB where it begins with the magic, otherwise all of it is JSON. Throws
-/// `Failure` if a GLB header or chunk needs more bytes than there are.
+/// Splits the file: it is GLB if it begins with the magic number, otherwise all of it is JSON.
+/// Throws `Failure` if a GLB header or chunk needs more bytes than there are.
 Container openContainer(std::span<const std::byte> bytes, Notes& notes);
 
 }  // namespace dermis::gltf

@@ -16,16 +16,17 @@ namespace {
 
 using nlohmann::json;
 
-// What a parsed text takes, at most: for each array or object, with what holds it; for each element
-// or member, in a vector that grows or a tree; and for characters, of strings or of numbers written
-// out. Parsed twice, by tinygltf again, but never at the same time.
+// Upper bounds of the memory of a parsed text: for each array or object, including its place in its
+// parent; for each element or member, in a growing vector or a tree; and for each character of a
+// string or number. tinygltf parses the text again, but the two results never exist at the same
+// time.
 constexpr std::uint64_t bytesPerBracket = 96;
 constexpr std::uint64_t bytesPerComma = 48;
 constexpr std::uint64_t bytesPerMember = 112;
 constexpr std::uint64_t bytesPerCharacter = 4;
 
-// Looks at brackets, commas and colons alone, outside strings: whether they match is the parser's
-// business. Spends what the parsed text will take.
+// Counts brackets, commas and colons outside strings; the parser checks whether they match. Spends
+// the memory that the parsed text will take.
 void checkNesting(std::string_view text, MemoryBudget& budget) {
   std::uint64_t bytes = bytesPerCharacter * text.size();
   std::uint32_t depth = 0;
@@ -63,7 +64,7 @@ json parseJson(std::string_view text) {
   }
 }
 
-// The parser takes a zero byte for the end of the text.
+// The parser treats a zero byte as the end of the text.
 std::string_view trimText(std::string_view text, Notes& notes) {
   constexpr std::string_view byteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(byteOrderMark)) {
@@ -97,7 +98,7 @@ void checkVersion(json& root, Notes& notes) {
   const auto version = asset->find("version");
   if (version == asset->end()) failInvalid("asset: it has no version");
   const std::string text = versionOf(*version, notes);
-  // tinygltf wants a text.
+  // tinygltf expects a string.
   *version = text;
   if (text.substr(0, 2) != "2.") {
     fail(ErrorCode::unsupportedFeature,
@@ -112,8 +113,8 @@ void checkVersion(json& root, Notes& notes) {
   }
 }
 
-// Extensions that change how a surface looks, not where it is: a file that requires them can be
-// skinned without.
+// Extensions that change the appearance of a surface, not its position: a file that requires them
+// can be skinned without them.
 bool concernsOnlyAppearance(std::string_view extension) {
   constexpr std::array<std::string_view, 8> prefixes = {
       "KHR_materials_", "KHR_texture_", "EXT_texture_",   "MSFT_texture_",
@@ -173,7 +174,7 @@ std::vector<BufferDescription> takeBuffers(json& root) {
   return buffers;
 }
 
-// Nothing of these is read, so nobody has to parse them. The recursion is bounded by
+// Nothing in these is read, so they need not be parsed. The recursion is limited by
 // `deepestNesting`.
 void eraseExtensions(json& value) {
   if (value.is_object()) {
@@ -237,7 +238,7 @@ Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes
 
   Document document;
   document.quantized = usesQuantization(root, notes);
-  // What is checked has lost its textures.
+  // Before the check, which removes textures.
   if (appearance != nullptr) *appearance = findAppearance(root, budget);
   document.usage = checkReferences(root, budget, notes);
   document.buffers = takeBuffers(root);

@@ -12,12 +12,12 @@
 
 namespace dermis::gltf {
 
-/// Nesting beyond this is refused: parsers recurse, and a stack has an end. Real files stay
-/// below 20.
+/// Maximum nesting of JSON. Parsers recurse, so deeper nesting could overflow the stack. Real files
+/// stay below 20.
 inline constexpr std::uint32_t deepestNesting = 256;
 
 /// tinygltf refuses indices without a bufferView, which the specification allows (zeros, or a
-/// sparse accessor): so it gets them under this name, as an attribute.
+/// sparse accessor). Therefore indices are passed to it as an attribute of this name.
 inline constexpr const char* indicesAttribute = "_DERMIS_INDICES";
 
 /// What the file says about one buffer.
@@ -26,15 +26,15 @@ struct BufferDescription {
   std::optional<std::string> uri;
 };
 
-/// What of a file is read for the sake of what is skinned or animated: by index, whether.
+/// Which objects are read for skinning or animation, by index.
 struct Usage {
-  std::vector<bool> meshes;  ///< of nodes that have a skin
-  std::vector<bool> skins;   ///< of nodes that have a mesh
+  std::vector<bool> meshes;  ///< of nodes with a skin
+  std::vector<bool> skins;   ///< of nodes with a mesh
   std::vector<bool> accessors, views, buffers;
   std::vector<std::uint32_t> strides;  ///< byteStride by bufferView; 0: none
 };
 
-/// A file's structure: every index in it is in range, every property that is read has its type.
+/// A file's structure. Every index in it is in range, and every property that is read has its type.
 struct Document {
   tinygltf::Model content;  ///< Without buffers, images, textures, cameras, extensions and extras.
   std::vector<BufferDescription> buffers;
@@ -45,14 +45,14 @@ struct Document {
 struct Appearance;
 class Notes;
 
-/// Parses and checks. Spends the memory of the result before it is allocated. Fills in `appearance`
-/// unless it is null. Throws `Failure`.
+/// Parses and checks the text. Spends the memory of the result before it is allocated. Fills in
+/// `appearance` unless it is null. Throws `Failure`.
 Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes,
                        Appearance* appearance = nullptr);
 
-/// Checks every index and every type in `root`, as `parseDocument` needs it; whole numbers written
-/// with a fraction of zero become integers. What is broken but clear is mended in place. Spends
-/// what the things that it lists will take. Throws `Failure`.
+/// Checks every index and every type in `root`, as `parseDocument` needs it. Whole numbers written
+/// with a fraction of zero become integers. Faults with only one possible meaning are repaired in
+/// place. Spends the memory that the listed objects will take. Throws `Failure`.
 Usage checkReferences(nlohmann::json& root, MemoryBudget& budget, Notes& notes);
 
 }  // namespace dermis::gltf

@@ -21,7 +21,7 @@ void fail(ErrorCode code, std::string message) {
 
 void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
            std::string_view where) {
-  // No object is larger, and sizes in `std::size_t` do not wrap below it: that is for 32-bit
+  // No object is larger, and sizes below this do not wrap in `std::size_t`. This matters on 32-bit
   // systems.
   constexpr std::uint64_t largestSize = std::numeric_limits<std::ptrdiff_t>::max();
   if (count <= largestSize / std::max<std::uint64_t>(bytesEach, 1) &&

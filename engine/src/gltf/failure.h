@@ -1,5 +1,5 @@
-// How this module reports trouble to itself: a `Failure` is thrown, and `loadFromMemory` turns it
-// into a `Result`. None leaves the module.
+// How this module reports errors internally: a `Failure` is thrown, and `loadFromMemory` turns it
+// into a `Result`. No exception leaves the module.
 #pragma once
 
 #include <concepts>
@@ -27,7 +27,7 @@ std::string textOf(Integer number) {
   return std::to_string(number);
 }
 
-/// The parts one after another, numbers in decimal.
+/// Concatenates the parts; numbers are written in decimal.
 template <typename... Parts>
 std::string join(const Parts&... parts) {
   std::string text;
@@ -42,13 +42,13 @@ inline std::string counted(std::size_t count, std::string_view what) {
 
 [[noreturn]] void fail(ErrorCode code, std::string message);
 
-/// Fails with `invalidData` and the sentence made of the parts.
+/// Fails with `invalidData` and the sentence that the parts form.
 template <typename... Parts>
 [[noreturn]] void failInvalid(const Parts&... parts) {
   fail(ErrorCode::invalidData, join(parts...));
 }
 
-/// Spends, or fails with `limitExceeded`. `where` names the allocation in the message.
+/// Spends memory, or fails with `limitExceeded`. `where` names the allocation in the message.
 void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
            std::string_view where);
 

@@ -25,19 +25,20 @@ std::uint8_t hexadecimalDigit(char character) {
   return notADigit;
 }
 
-// RFC 3986: a scheme is a letter and then letters, digits, '+', '-' or '.', up to a colon.
+// RFC 3986: a scheme is a letter followed by letters, digits, '+', '-' or '.', up to a colon.
 bool hasScheme(std::string_view uri) {
   const std::size_t colon = uri.find(':');
   return colon != std::string_view::npos && uri.find('/') > colon;
 }
 
-// The path of a side file below the folder as its URI spells it, or a failure.
+// The path of a side file relative to the folder, as its URI spells it. Throws `Failure` if it may
+// leave the folder.
 std::filesystem::path relativePath(std::string_view uri, const std::string& where) {
   if (hasScheme(uri)) {
     fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a relative file name"));
   }
   const std::string text = decodePercent(uri, where);
-  // There a colon names a drive, or another stream of a file.
+  // On Windows, a colon names a drive or another stream of a file.
   constexpr bool isWindows = std::filesystem::path::preferred_separator != '/';
   const bool hostile = text.empty() || text.find('\0') != std::string::npos ||
                        text.find('\\') != std::string::npos || hasScheme(text) ||
@@ -61,14 +62,14 @@ std::string inFull(const std::filesystem::path& path) {
   return join("'", oneLine(utf8(path)), "'");
 }
 
-/// With all links followed.
+/// Resolves all links.
 std::filesystem::path realPath(const std::filesystem::path& path, std::error_code& error) {
 #ifdef _WIN32
-  // Not std::filesystem::canonical: that of GCC does not know the links of Windows.
+  // Not std::filesystem::canonical: GCC's does not resolve links on Windows.
   const HANDLE file =
       CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
                   OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, nullptr);
-  std::wstring name(32768, L'\0');  // the longest that Windows has
+  std::wstring name(32768, L'\0');  // the maximum length on Windows
   DWORD length = 0;
   if (file != INVALID_HANDLE_VALUE) {
     length = GetFinalPathNameByHandleW(file, name.data(), static_cast<DWORD>(name.size()),
@@ -94,7 +95,7 @@ std::ifstream open(const FileToRead& file, const std::string& where) {
   fail(ErrorCode::ioError, join(where, ": ", inFull(file.path), " cannot be opened", reason));
 }
 
-// As many bytes as there are, at most `count`.
+// Reads at most `count` bytes, fewer if the file ends.
 std::vector<std::byte> readBytes(std::ifstream& stream, std::uint64_t count,
                                  const std::filesystem::path& path, const std::string& where) {
   std::vector<std::byte> bytes(static_cast<std::size_t>(count));
@@ -153,7 +154,8 @@ FileToRead SideFiles::find(std::string_view uri, const std::string& where) const
   if (folder_.empty())
     fail(ErrorCode::ioError, join(where, ": ", name, " cannot be read without a folder"));
   const FileToRead named = findFile(folder_ / relative, where + ": ");
-  // Links are followed here, once, and what is opened has none: it must still be in the folder.
+  // Links are resolved here, once, so that the opened path has none. It must still be in the
+  // folder.
   std::error_code error;
   const std::filesystem::path folder = realPath(folder_, error);
   const std::filesystem::path real = error ? std::filesystem::path() : realPath(named.path, error);

@@ -1,4 +1,4 @@
-// The files that a model consists of: opened only in its folder, read once, as far as needed.
+// The files of a model: opened only in its folder, and read once, only as far as needed.
 #pragma once
 
 #include <cstddef>
@@ -14,55 +14,55 @@
 
 namespace dermis::gltf {
 
-/// No file may be larger: a GLB cannot be, and no buffer has a reason to.
+/// Maximum size of a file: a GLB file cannot be larger, and no buffer needs to be.
 inline constexpr std::uint64_t largestFile = 0xffffffff;
 
 using Bytes = std::shared_ptr<const std::vector<std::byte>>;
 
-/// A regular file and its size. What else stands there is not opened: a pipe might never end.
+/// A regular file and its size. Other kinds of files are not opened: a pipe might never end.
 struct FileToRead {
   std::filesystem::path path;
   std::uint64_t size = 0;
 };
 
-/// A path for messages: `string` is in the code page of the machine with some standard libraries on
-/// Windows, and throws where that lacks a character.
+/// A path for messages. `string` uses the code page of the machine with some standard libraries on
+/// Windows, and throws if that lacks a character.
 std::string utf8(const std::filesystem::path& path);
 
-/// Throws `Failure` with `ioError`: there is no such file, it is a folder, it may not be looked at.
+/// Throws `Failure` with `ioError` if there is no such file, it is a folder, or access is denied.
 /// `where` is the prefix of messages, with a colon, or empty.
 FileToRead findFile(const std::filesystem::path& path, const std::string& where = {});
 
-/// The file that a model is in, whole. Throws `Failure`: with `ioError`, and with `invalidData` or
-/// `limitExceeded` if its size or its first bytes show that it cannot be one, before the rest is
-/// read.
+/// Reads the whole file of a model. Throws `Failure`: with `ioError`, or with `invalidData` or
+/// `limitExceeded` if its size or its first bytes show, before the rest is read, that it cannot be
+/// a model.
 std::vector<std::byte> readModelFile(const FileToRead& file);
 
-/// The files beside a model that it names by relative URIs.
+/// The side files that a model names by relative URIs.
 class SideFiles {
  public:
-  /// `folder` empty: there are none. What is read is counted in the budget, which must outlive this
-  /// object.
+  /// If `folder` is empty, there are no side files. Bytes that are read are counted in the budget,
+  /// which must outlive this object.
   SideFiles(std::filesystem::path folder, MemoryBudget& budget);
 
-  /// Where a URI leads, links followed, or a failure with `ioError`: it leads out of the folder, or
-  /// to nothing that can be read.
+  /// Resolves a URI to a file, following links. Throws `Failure` with `ioError` if the file is
+  /// outside the folder or cannot be read.
   FileToRead find(std::string_view uri, const std::string& where) const;
 
-  /// The first `needed` bytes of a file that was found, or all of it if there are fewer; perhaps
-  /// more, if more of it was needed before.
+  /// Returns the first `needed` bytes of a found file, or all of them if there are fewer. May
+  /// return more if more were needed before.
   Bytes read(const FileToRead& file, std::uint64_t needed, const std::string& where);
 
-  /// What was read.
+  /// The files that were read.
   std::vector<std::filesystem::path> paths() const;
 
  private:
-  std::filesystem::path folder_;  ///< as it was given
+  std::filesystem::path folder_;  ///< as given to the constructor
   MemoryBudget& budget_;
   std::map<std::filesystem::path, Bytes> read_;
 };
 
-/// `%20` to a space and so on. Throws `Failure` if a '%' is not followed by two hexadecimal
+/// Decodes `%20` to a space and so on. Throws `Failure` if a '%' is not followed by two hexadecimal
 /// digits.
 std::string decodePercent(std::string_view text, const std::string& where);
 

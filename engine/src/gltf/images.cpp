@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A member of an object, or null if there is no such member or no object.
+/// A member of an object, or null if there is no such member or `value` is not an object.
 const json& member(const json& value, const char* name) {
   static const json nothing;
   if (!value.is_object()) return nothing;
@@ -64,7 +64,7 @@ TextureUse textureOf(const json& root, const json& material) {
   return use;
 }
 
-/// Reads each image when it is first asked for.
+/// Reads each image when it is first requested.
 class ImageReader {
  public:
   ImageReader(const Appearance& appearance, const Source& source, SideFiles& files, Model& model)
@@ -73,7 +73,7 @@ class ImageReader {
     same_.resize(model.images.size());
   }
 
-  /// The first image that equals this one; `none` where it cannot be had.
+  /// The first image that equals this one, or `none` if it cannot be read.
   std::uint32_t find(std::uint32_t index) {
     if (index >= same_.size()) return none;
     if (!same_[index]) same_[index] = read(index);
@@ -101,7 +101,7 @@ class ImageReader {
     return place->second;
   }
 
-  /// The first image of the same uri or bufferView, which may be this one.
+  /// The first image with the same uri or bufferView, which may be this one.
   std::uint32_t firstNamed(const ImageDescription& description, std::uint32_t index) {
     if (description.bufferView)
       return byView_.emplace(*description.bufferView, index).first->second;
@@ -129,7 +129,7 @@ class ImageReader {
   const Source& source_;
   SideFiles& files_;
   Model& model_;
-  std::vector<std::optional<std::uint32_t>> same_;  // what `find` has returned
+  std::vector<std::optional<std::uint32_t>> same_;  // results of `find`
   std::map<std::uint64_t, std::uint32_t> byView_;
   std::map<std::string_view, std::uint32_t> byUri_, byContent_;
 };

@@ -1,5 +1,5 @@
-// Which images a file's materials show, and their encoded bytes. Whatever is wrong with them costs
-// a picture and no more: a file that can be skinned can be skinned.
+// Which images a file's materials show, and their encoded bytes. A fault in an image only loses
+// that image: the file can still be skinned.
 #pragma once
 
 #include <cstdint>
@@ -20,18 +20,19 @@ struct ImageDescription {
   std::optional<std::uint64_t> bufferView;
 };
 
-/// What a file says of images and textures. Nothing in it is checked against the rest of the file.
+/// The images and textures of a file, not checked against the rest of the file.
 struct Appearance {
   std::vector<ImageDescription> images;
-  std::vector<TextureUse> baseColorTextures;  ///< by material
+  std::vector<TextureUse> baseColorTextures;  ///< indexed by material
 };
 
-/// Takes out of the JSON what it understands; leaves the rest as it is. Spends what that takes.
-/// Throws `Failure` with `limitExceeded`.
+/// Extracts what it understands from the JSON and ignores the rest. Spends the memory that this
+/// takes. Throws `Failure` with `limitExceeded`.
 Appearance findAppearance(const nlohmann::json& root, MemoryBudget& budget);
 
-/// images, and the textures of the materials: those images that one shows, equal ones once. Side
-/// files are read by the rules of buffers. What cannot be had is said in a note.
+/// Fills in `images` and the textures of the materials. Only images that a material shows are read,
+/// equal ones once. Side files are read by the same rules as those of buffers. An image that cannot
+/// be read gives a note.
 void readImages(const Appearance& appearance, const Source& source, SideFiles& files, Model& model);
 
 }  // namespace dermis::gltf

@@ -10,7 +10,7 @@
 namespace dermis::gltf {
 namespace {
 
-// Where the parts of a key lie in `Channel::values`.
+// The place of each part of a key in `Channel::values`.
 enum class Part : std::size_t { inTangent, value, outTangent };
 
 const float* keyPart(const Channel& channel, std::size_t key, Part part) {
@@ -19,8 +19,8 @@ const float* keyPart(const Channel& channel, std::size_t key, Part part) {
   return &channel.values[(3 * key + static_cast<std::size_t>(part)) * width];
 }
 
-// glTF 2.0, appendix C.4: along the shorter arc. Where the two are so close that the angle is lost
-// in rounding, linear.
+// glTF 2.0, appendix C.4: interpolates along the shorter arc. Linear if the two are so close that
+// the angle is lost in rounding.
 void slerp(const float* from, const float* to, double fraction, std::span<double> value) {
   double cosine = 0;
   for (std::size_t i = 0; i < 4; ++i) cosine += double{from[i]} * double{to[i]};
@@ -39,7 +39,7 @@ void slerp(const float* from, const float* to, double fraction, std::span<double
   }
 }
 
-// glTF 2.0, appendix C.5: a Hermite spline whose tangents are scaled by the distance of the keys.
+// glTF 2.0, appendix C.5: a Hermite spline whose tangents are scaled by the time between the keys.
 void cubicSpline(const Channel& channel, std::size_t key, double distance, double t,
                  std::span<double> value) {
   const float* from = keyPart(channel, key, Part::value);
@@ -74,7 +74,7 @@ void between(const Channel& channel, std::size_t key, double time, std::span<dou
 }  // namespace
 
 void interpolate(const Channel& channel, double time, std::span<double> value) {
-  // The last key that is not after the time; the first key where all are.
+  // The last key that is not after the time, or the first key if all are.
   const auto after = std::upper_bound(channel.times.begin(), channel.times.end(), time,
                                       [](double at, float key) { return !(at >= double{key}); });
   const auto next = static_cast<std::size_t>(after - channel.times.begin());

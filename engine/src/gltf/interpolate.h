@@ -1,4 +1,4 @@
-// One channel at one time.
+// Interpolates one channel at one time.
 #pragma once
 
 #include <span>
@@ -7,9 +7,9 @@
 
 namespace dermis::gltf {
 
-/// The channel's value at a time in seconds, clamped to its keys, into `value`:
-/// `channel.components` doubles. Rotations come out with unit length. A time that is not a number
-/// counts as one before the first key.
+/// Writes the channel's value at a time in seconds, clamped to its keys, to `value`:
+/// `channel.components` doubles. Rotations have unit length. A time that is NaN counts as before
+/// the first key.
 void interpolate(const Channel& channel, double time, std::span<double> value);
 
 }  // namespace dermis::gltf

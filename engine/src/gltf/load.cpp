@@ -43,7 +43,7 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   return model;
 }
 
-// The one place where exceptions end: `Failure`s, and whatever the libraries underneath throw.
+// The only place that catches all exceptions: `Failure`s, and whatever the libraries throw.
 template <typename Function>
 Result<Model> guarded(Function function) {
   try {
@@ -68,7 +68,7 @@ Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesy
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
   return guarded([&] {
     const FileToRead file = findFile(path);
-    // A name without a folder stands in the current one; an empty folder would mean that there is
+    // A name without a folder is in the current folder; an empty folder would mean that there is
     // none.
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     try {

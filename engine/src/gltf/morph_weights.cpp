@@ -18,7 +18,7 @@ const Channel* findWeights(const Model& model, std::uint32_t node, std::uint32_t
   return found == channels.end() || placeOf(*found) != wanted ? nullptr : &*found;
 }
 
-// A spline may leave the range of its keys, and with it that of a float.
+// A spline may leave the range of its keys, and so the range of a float.
 float toFloat(double value) {
   constexpr double largest = std::numeric_limits<float>::max();
   return static_cast<float>(std::clamp(value, -largest, largest));

@@ -8,11 +8,11 @@
 namespace dermis::gltf {
 namespace {
 
-// Decimal numbers in a JSON text are not exact; only what is farther from unit length than this is
-// worth a note.
+// Decimal numbers in a JSON text are not exact. Only a length that differs from 1 by more than this
+// gets a note.
 constexpr double unitLengthTolerance = 1e-5;
 
-// The fourth row is not used, here as in other programs.
+// Like other programs, Dermis does not use the fourth row.
 void checkMatrix(const std::array<double, 16>& matrix, std::size_t index, Notes& notes) {
   constexpr double tolerance = 1e-5;
   const bool affine = std::abs(matrix[3]) <= tolerance && std::abs(matrix[7]) <= tolerance &&
@@ -47,8 +47,8 @@ void readParents(const tinygltf::Model& content, Model& model) {
   }
 }
 
-// Roots first, then their children, and so on. What is left over hangs in a cycle, for no node has
-// two parents.
+// Roots first, then their children, and so on. The nodes that remain are in a cycle, because no
+// node has two parents.
 void orderNodes(const tinygltf::Model& content, Model& model) {
   model.nodeOrder.reserve(model.nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {

@@ -1,5 +1,5 @@
-// What a `Model` says about its file: rules that are broken though the meaning is clear, and what
-// is left out. Counted by kind, so that a file cannot make a note a byte.
+// Notes of a `Model` about its file: broken rules whose intent is clear, and what is left out.
+// Notes are counted by kind, so that a file cannot produce a note per byte.
 #pragma once
 
 #include <array>
@@ -13,38 +13,38 @@
 namespace dermis::gltf {
 
 enum class NoteKind : std::uint8_t {
-  // Broken rules. What Dermis does about each stands in the sentence, unless it is to read on.
+  // Broken rules. The sentence says what Dermis does about each, unless it simply reads on.
   container,        ///< GLB lengths, padding and the order of chunks
   text,             ///< a byte order mark, zero bytes after the JSON
   version,          ///< asset.version 2 in another notation
   extensions,       ///< lists of extensions that do not fit together
-  nullProperty,     ///< taken for an absent one
+  nullProperty,     ///< treated as absent
   emptyArray,       ///< likewise
-  name,             ///< not a text
-  reference,        ///< to what is not there, where nothing is read of it
-  unused,           ///< faults of what nothing skinned or animated uses
-  material,         ///< a value of the wrong kind: the default is taken
-  bufferLength,     ///< more than there are
+  name,             ///< not a string
+  reference,        ///< to an object that does not exist, if nothing reads it
+  unused,           ///< faults in objects that nothing skinned or animated uses
+  material,         ///< a value of the wrong type: the default is used
+  bufferLength,     ///< more than there are bytes
   viewLength,       ///< 0, or beyond the buffer
-  stride,           ///< of a number or in a place that is not allowed
+  stride,           ///< not an allowed number, or in a place where none is allowed
   alignment,        ///< of components or attributes
   accessor,         ///< byteOffset without bufferView, normalized floats, count 0
-  sparse,           ///< count 0, indices that do not rise
-  format,           ///< of an accessor: not allowed there, but of one meaning only
-  attribute,        ///< left out: a fault of one that does not concern skinning
+  sparse,           ///< count 0, or indices that do not ascend
+  format,           ///< of an accessor: not allowed there, but with only one meaning
+  attribute,        ///< left out because of a fault; not one that skinning needs
   influenceSet,     ///< JOINTS_n without WEIGHTS_n after complete sets
   targetCount,      ///< primitives of a mesh with different numbers of morph targets
   weightCount,      ///< too many or too few default weights
   withoutMesh,      ///< skin or weights on a node without a mesh
-  duplicate,        ///< the same entry of a list twice
+  duplicate,        ///< the same entry twice in a list
   matrix,           ///< with other transforms, or with a fourth row
   sceneNode,        ///< listed by a scene though it is not a root
   skeleton,         ///< joints without a common root
   keys,             ///< times that are negative or equal, splines of one key
-  channel,          ///< without effect, or there twice
-  animatedMatrix,   ///< taken apart
-  restOfTriangles,  ///< indices that make no triangle
-  // What is no fault of the file, or not of this one.
+  channel,          ///< without effect, or a duplicate
+  animatedMatrix,   ///< decomposed
+  restOfTriangles,  ///< indices that do not form a triangle
+  // Not a fault of the file, or of this file.
   noPositions,
   noTimes,
   image,
@@ -57,24 +57,23 @@ class Notes {
 
   bool strict() const { return strict_; }
 
-  /// Counts a broken rule under the sentence made of the parts, which names the place. Throws
-  /// `Failure` with that sentence if strict.
+  /// Counts a broken rule. The parts form the sentence about it, which names the place. If strict,
+  /// throws `Failure` with that sentence instead.
   template <typename... Parts>
   void broken(NoteKind kind, const Parts&... parts) {
     if (strict_) failInvalid(parts...);
     remark(kind, parts...);
   }
 
-  /// Counts what is not an error, even where strict.
+  /// Counts something that is not an error, even if strict.
   template <typename... Parts>
   void remark(NoteKind kind, const Parts&... parts) {
     Tally& tally = tallies_[static_cast<std::size_t>(kind)];
     if (++tally.count == 1) tally.first = join(parts...);
   }
 
-  /// Calls the function. A `Failure` of it is counted as a broken rule, or thrown on where strict
-  /// and where it says `limitExceeded`.
-  /// Returns whether there was none.
+  /// Calls the function. If it throws a `Failure`, counts that as a broken rule, or rethrows it if
+  /// strict or if it is `limitExceeded`. Returns whether there was no `Failure`.
   template <typename Function>
   bool tolerate(NoteKind kind, const char* consequence, Function function) {
     try {
@@ -87,7 +86,7 @@ class Notes {
     }
   }
 
-  /// Adds a sentence for each kind: the first that was counted, and how many more there were.
+  /// Adds a sentence for each kind: the first that was counted, and how many others there were.
   void appendTo(std::vector<std::string>& sentences) const {
     for (const Tally& tally : tallies_) {
       if (tally.count == 0) continue;

@@ -12,7 +12,7 @@
 namespace dermis::gltf {
 namespace {
 
-// What each attribute may be stored as: glTF 2.0, 3.7.2.1, and the longer lists of
+// The formats that each attribute may have: glTF 2.0, 3.7.2.1, and the longer lists of
 // KHR_mesh_quantization.
 constexpr Format float32{TINYGLTF_COMPONENT_TYPE_FLOAT, false};
 constexpr Format int8{TINYGLTF_COMPONENT_TYPE_BYTE, false};
@@ -38,7 +38,7 @@ constexpr Format quantizedTexcoords[] = {float32, int8,    snorm8, uint8,  unorm
                                          int16,   snorm16, uint16, unorm16};
 constexpr Format quantizedTargets[] = {float32, int8, snorm8, int16, snorm16};
 
-// What may not stand there and yet has one meaning only. A joint is an integer whatever stores it;
+// Formats that are not allowed but have only one meaning. A joint is an integer in any format, and
 // weights are from 0 to 1.
 constexpr Format clearJoints[] = {unorm8, unorm16, uint32, int8, int16, float32};
 constexpr Format clearWeights[] = {uint8, uint16, snorm8, snorm16};
@@ -47,7 +47,7 @@ constexpr Format clearIndices[] = {unorm8, unorm16};
 // The number in "JOINTS_3" if the name begins with the prefix "JOINTS_".
 struct SetName {
   bool matches = false;
-  std::uint32_t number = none;  // none: not a number as the specification writes it
+  std::uint32_t number = none;  // none if not written as the specification requires
 };
 
 SetName setName(std::string_view name, std::string_view prefix) {
@@ -64,7 +64,7 @@ int findAttribute(const std::map<std::string, int>& attributes, const std::strin
   return found == attributes.end() ? -1 : found->second;
 }
 
-// How many sets of an attribute there are; they must be numbered from 0 without a gap.
+// Number of sets of an attribute. They must be numbered from 0 without a gap.
 std::uint32_t countSets(const std::map<std::string, int>& attributes, std::string_view prefix,
                         const std::string& where) {
   std::uint32_t count = 0;
@@ -94,10 +94,10 @@ class PrimitiveCheck {
     if (!primitive_.targets.empty() && hasNoAttribute()) {
       failInvalid(where_, ": it has morph targets, but no attribute that they could displace");
     }
-    // It is left out.
+    // Such a primitive is left out.
     if (!primitive_.attributes.contains("POSITION")) return;
     checkInfluences();
-    // A copy, because some may be left out.
+    // Iterates over a copy, because attributes may be left out.
     for (const auto& attribute : std::map(primitive_.attributes)) {
       const std::string& name = attribute.first;
       const int accessor = attribute.second;
@@ -120,7 +120,7 @@ class PrimitiveCheck {
     return primitive_.attributes.size() == primitive_.attributes.count(indicesAttribute);
   }
 
-  // Everything but positions, directions, triangles and what moves them.
+  // Everything except positions, directions, triangles and what moves them.
   static bool concernsOnlyAppearance(std::string_view name) {
     return name != indicesAttribute && name != "POSITION" && name != "NORMAL" &&
            name != "TANGENT" && !name.starts_with("JOINTS_") && !name.starts_with("WEIGHTS_");
@@ -129,7 +129,7 @@ class PrimitiveCheck {
   void checkInfluences() {
     std::uint32_t joints = countSets(primitive_.attributes, "JOINTS_", where_);
     const std::uint32_t weights = countSets(primitive_.attributes, "WEIGHTS_", where_);
-    // Joints without weights move nothing; but a vertex needs some that do.
+    // Joints without weights move nothing, but a vertex needs some weights.
     for (; joints > weights; --joints) {
       const std::string sentence =
           join(where_, ": JOINTS_", joints - 1, " has no WEIGHTS_", joints - 1);
@@ -180,13 +180,13 @@ class PrimitiveCheck {
     source_.noteAttributeAlignment(accessor, place);
   }
 
-  // The name of an attribute, which an application may have made up, for a message.
+  // The name of an attribute in messages. An application may have chosen it.
   static std::string placeName(const std::string& name) {
     if (name == indicesAttribute) return "indices";
     return name.starts_with("_") || name.size() > 20 ? inQuotes(name) : name;
   }
 
-  // There are as many of all attributes as there are positions.
+  // All attributes must have as many elements as there are positions.
   void checkCount(int accessor, const std::string& place) const {
     const std::uint32_t vertices = source_.count(primitive_.attributes.at("POSITION"));
     if (source_.count(accessor) == vertices) return;
@@ -194,7 +194,7 @@ class PrimitiveCheck {
                 " elements, but POSITION has ", vertices);
   }
 
-  // A file may use the formats of KHR_mesh_quantization without saying so.
+  // Formats of KHR_mesh_quantization are tolerated in a file that does not declare it.
   void requireQuantized(int accessor, int type, std::span<const Format> plain,
                         std::span<const Format> quantized, const std::string& place) const {
     if (source_.quantized()) return source_.require(accessor, type, quantized, place);
@@ -207,8 +207,8 @@ class PrimitiveCheck {
   std::string where_;
 };
 
-// Unsigned bytes and shorts are joints whether or not they are called normalized. The rest is made
-// shorts of.
+// Unsigned bytes and shorts are joints whether or not they are marked as normalized. Other formats
+// are converted to shorts.
 void readJoints(Source& source, int accessor, const std::string& where, Influences& set) {
   const int type = source.format(accessor).componentType;
   if (type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
@@ -218,7 +218,7 @@ void readJoints(Source& source, int accessor, const std::string& where, Influenc
     set.joints = source.stored(accessor);
     return;
   }
-  // Exact up to 2^24, and more than 2^16 is refused.
+  // Exact up to 2^24; joints above 2^16 are refused.
   const std::vector<float> values = source.floats(accessor);
   source.spend(values.size(), sizeof(std::uint16_t), where);
   set.jointType = ComponentType::uint16;
@@ -233,7 +233,7 @@ void readJoints(Source& source, int accessor, const std::string& where, Influenc
   }
 }
 
-// Unsigned bytes and shorts are weights from 0 to 1 whether or not they are called normalized.
+// Unsigned bytes and shorts are weights from 0 to 1 whether or not they are marked as normalized.
 void readWeights(Source& source, int accessor, const std::string& where, Influences& set) {
   switch (source.format(accessor).componentType) {
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
@@ -279,7 +279,7 @@ std::vector<float> readOptional(Source& source, int accessor) {
   return accessor < 0 ? std::vector<float>() : source.floats(accessor);
 }
 
-// Sets from 0 up to the first that is missing.
+// Reads sets from 0 up to the first missing one.
 std::vector<std::vector<float>> readTexcoords(Source& source,
                                               const std::map<std::string, int>& attributes) {
   std::vector<std::vector<float>> sets;
@@ -315,8 +315,8 @@ std::vector<std::uint32_t> readIndices(Source& source, int accessor, std::uint32
   return indices;
 }
 
-// glTF 2.0, 3.7.2.1: triangle i of a strip is i, i + 1 + i % 2, i + 2 − i % 2; of a fan i + 1, i +
-// 2, 0.
+// glTF 2.0, 3.7.2.1: triangle i of a strip is (i, i + 1 + i % 2, i + 2 − i % 2); triangle i of a
+// fan is (i + 1, i + 2, 0).
 std::vector<std::uint32_t> unroll(const std::vector<std::uint32_t>& indices, int mode) {
   std::vector<std::uint32_t> triangles;
   if (indices.size() < 3) return triangles;
@@ -335,7 +335,7 @@ std::vector<std::uint32_t> unroll(const std::vector<std::uint32_t>& indices, int
 std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primitive& from,
                                          std::uint32_t vertexCount, const std::string& where) {
   const int accessor = findAttribute(from.attributes, indicesAttribute);
-  // Points and lines: their indices are looked at, but make no triangle.
+  // The indices of points and lines are checked, but form no triangles.
   std::vector<std::uint32_t> indices = readIndices(source, accessor, vertexCount, where);
   switch (from.mode) {
     case TINYGLTF_MODE_TRIANGLES:
@@ -356,7 +356,7 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
 
 std::string primitiveName(const tinygltf::Mesh& mesh, std::size_t meshIndex,
                           std::size_t primitive) {
-  // Messages cut names at 80 characters, and must not cut off the number.
+  // Messages cut names off at 80 characters; the number must stay.
   const std::string name =
       mesh.name.empty() ? join("number ", meshIndex) : shortName(mesh.name, 56);
   return mesh.primitives.size() == 1 ? name : join(name, " primitive ", primitive);

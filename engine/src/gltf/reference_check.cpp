@@ -1,10 +1,10 @@
-// Everything that can be wrong with a file's JSON without looking at a buffer: missing or mistyped
-// properties, and indices of things that do not exist. tinygltf takes most of these for defaults,
-// or wraps them to another number.
+// Finds everything that can be wrong with a file's JSON without reading a buffer: missing or
+// mistyped properties, and indices of objects that do not exist. tinygltf replaces most of these by
+// defaults, or wraps the numbers.
 //
-// What is wrong and yet of one meaning is mended with a note. What is wrong with something that
-// nothing skinned or animated uses is noted, and a placeholder stands in its place: so the check
-// goes from what uses to what is used.
+// A fault with only one possible meaning is repaired, with a note. A fault in an object that
+// nothing skinned or animated uses gives a note, and a placeholder replaces the object. Therefore
+// users are checked before what they use.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,11 +30,11 @@ namespace {
 
 using nlohmann::json;
 
-// Beyond this a JSON number need not be the integer that was written.
+// Above this, a JSON number may differ from the integer that was written.
 constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
 
-// "{}," is three bytes in a file, and hundreds in the structs that are made of it, tinygltf's and
-// Dermis' own, in vectors that grow.
+// "{}," takes three bytes in a file, but hundreds in the structs made from it (tinygltf's and
+// Dermis'), which are in growing vectors.
 struct Section {
   const char* name;
   std::uint64_t bytesEach;
@@ -51,7 +51,7 @@ constexpr std::array sections{Section{"buffers", sizeof(BufferDescription) + siz
                               Section{"cameras", 0}};
 constexpr std::uint64_t bytesPerPrimitive = sizeof(tinygltf::Primitive) + sizeof(Primitive);
 constexpr std::uint64_t bytesPerTarget = sizeof(std::map<std::string, int>) + sizeof(MorphTarget);
-constexpr std::uint64_t bytesPerAttribute = 128;  // in a map, with its name
+constexpr std::uint64_t bytesPerAttribute = 128;  // in a map, including its name
 constexpr std::uint64_t bytesPerSampler = 2 * sizeof(tinygltf::AnimationSampler);
 constexpr std::uint64_t bytesPerChannel = sizeof(tinygltf::AnimationChannel) + sizeof(Channel);
 
@@ -96,7 +96,7 @@ class ReferenceCheck {
               [&](json& accessor, const std::string& where, std::size_t i) {
                 checkAccessor(accessor, where, usage_.accessors[i]);
               });
-    // The replaced view names a buffer that does not exist, so that reading it is an error.
+    // The placeholder names a buffer that does not exist, so that reading it is an error.
     checkUsed(
         "bufferViews", usage_.views,
         {{"buffer", std::numeric_limits<std::int32_t>::max()}, {"byteLength", 0}},
@@ -108,8 +108,8 @@ class ReferenceCheck {
   }
 
  private:
-  // Calls `check` for each item of a section. A fault of one that is not used is noted, and the
-  // placeholder takes its place.
+  // Calls `check` for each item of a section. A faulty item that is not used gives a note and is
+  // replaced by the placeholder.
   template <typename Check>
   void checkUsed(const char* section, const std::vector<bool>& used, const json& placeholder,
                  Check check) {
@@ -121,7 +121,7 @@ class ReferenceCheck {
     });
   }
 
-  // The kind of thing that a section lists: "mesh" for "meshes".
+  // The kind of object in a section: "mesh" for "meshes".
   static std::string kindOf(std::string_view section) {
     return std::string(section == "meshes" ? "mesh" : section.substr(0, section.size() - 1));
   }
@@ -152,8 +152,8 @@ class ReferenceCheck {
     }
   }
 
-  // Takes out what stands for nothing: null, and lists that may be left out but not be empty. The
-  // nesting is bounded by `deepestNesting`.
+  // Removes members without a meaning: nulls, and empty lists of kinds that may be absent but not
+  // empty. The recursion is limited by `deepestNesting`.
   void tidy(json& value, const std::string& where) {
     if (value.is_array()) {
       for (json& child : value) tidy(child, where);
@@ -214,7 +214,7 @@ class ReferenceCheck {
     return object[property];
   }
 
-  // JSON knows no integers: 3.0 is one.
+  // JSON has no integers: 3.0 counts as one.
   static std::uint64_t integer(json& value, const std::string& what) {
     if (value.is_number_float()) {
       const double number = value.get<double>();
@@ -266,7 +266,7 @@ class ReferenceCheck {
     reference(object, property, section, where);
   }
 
-  // The same for what is not read: taken out where it is wrong.
+  // The same for a reference that is not read: removed if it is wrong.
   void idleReference(json& object, const char* property, const char* section,
                      const std::string& where) const {
     const bool good = notes_.tolerate(NoteKind::reference, "; it is left out",
@@ -274,7 +274,7 @@ class ReferenceCheck {
     if (!good) object.erase(property);
   }
 
-  // A list of indices, none of them twice when this returns.
+  // Checks a list of indices and removes duplicates.
   void references(json& object, const char* property, const char* section,
                   const std::string& where) const {
     if (!object.contains(property)) return;
@@ -290,13 +290,13 @@ class ReferenceCheck {
     items.erase(std::remove_if(items.begin(), items.end(), isAgain), items.end());
   }
 
-  // Whether an attribute is one that tells where vertices and triangles are, and what moves them.
+  // Whether an attribute gives the position or direction of vertices, or what moves them.
   static bool isEssential(std::string_view name) {
     return name == "POSITION" || name == "NORMAL" || name == "TANGENT" ||
            name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
   }
 
-  // Attributes or morph targets: a name to an accessor. `used`: whether what they hold is read.
+  // Checks attributes or a morph target: names with accessors. `used`: whether they are read.
   void attributes(json& object, const std::string& where, bool used) {
     if (!object.is_object()) failInvalid(where, " is not an object");
     spend(budget_, object.size(), bytesPerAttribute, where);
@@ -315,7 +315,7 @@ class ReferenceCheck {
     }
   }
 
-  // Marks the accessor that a property names, which has been found to be there.
+  // Marks the accessor that a property names as used. The index must have been checked.
   void use(const json& object, const char* property) {
     if (object.contains(property)) usage_.accessors[object[property].get<std::size_t>()] = true;
   }
@@ -336,7 +336,7 @@ class ReferenceCheck {
     if (found != object.end()) finiteNumber(*found, property, where);
   }
 
-  // Finite in float32, which is what is made of it in the end.
+  // Numbers must be finite in float32, because they are converted to it.
   static void finiteNumber(const json& value, const char* property, const std::string& where) {
     if (!value.is_number())
       failInvalid(where, ": ", property, " contains something other than numbers");
@@ -380,7 +380,7 @@ class ReferenceCheck {
       notes_.broken(NoteKind::stride, where, ": byteStride ", stride,
                     " is not a multiple of 4 from 4 to 252");
     }
-    // tinygltf refuses those that break the rule.
+    // tinygltf refuses strides that break the rule.
     if (view.contains("byteStride")) usage_.strides[index] = static_cast<std::uint32_t>(stride);
     view.erase("byteStride");
   }
@@ -442,7 +442,7 @@ class ReferenceCheck {
     }
   }
 
-  // Keeps what Dermis reads of a material. Nothing that is wrong with it concerns skinning.
+  // Keeps the properties of a material that Dermis reads. No fault in them affects skinning.
   void checkMaterial(json& material, const std::string& where) const {
     json lean = json::object();
     const auto keep = [&](const json& from, json& to, const char* property, auto check) {
@@ -467,7 +467,7 @@ class ReferenceCheck {
       keep(from, factors, "roughnessFactor", [&] { number(from, "roughnessFactor", where); });
       lean[group] = std::move(factors);
     }
-    // Textures and extensions are none of this check's business.
+    // This check ignores textures and extensions.
     material = std::move(lean);
   }
 
@@ -507,15 +507,15 @@ class ReferenceCheck {
     return targets == primitive.end() ? 0 : targets->size();
   }
 
-  // Of the primitive that has the most.
+  // Number of targets of the primitive that has the most.
   static std::size_t targetsOf(const json& mesh) {
     std::size_t most = 0;
     for (const json& primitive : mesh["primitives"]) most = std::max(most, targetCount(primitive));
     return most;
   }
 
-  // Weights beyond the targets have no effect and are cut off. Targets beyond the weights have
-  // weight 0, as all have where there are no weights.
+  // Weights without a target have no effect and are removed. Targets without a weight have weight
+  // 0, as all do if there are no weights.
   void checkWeights(json& object, std::size_t targets, const std::string& where) const {
     if (!object.contains("weights")) return;
     numbers(object, "weights", 0, where);
@@ -532,7 +532,7 @@ class ReferenceCheck {
     std::unordered_set<std::uint64_t> seen;
     for (json& joint : joints) {
       const std::uint64_t node = inRange(joint, "nodes", where + ": an entry of joints");
-      // Each place in the list has its own inverse bind matrix.
+      // Each entry of the list has its own inverse bind matrix.
       if (!seen.insert(node).second)
         notes_.broken(NoteKind::duplicate, where, ": joints lists ", node, " twice");
     }
@@ -572,7 +572,7 @@ class ReferenceCheck {
     const json& mesh = root_["meshes"][index];
     const MorphFacts& facts = morphFacts(index, mesh);
     checkWeights(node, facts.targets, where);
-    // Whether the rest is 0 or the mesh's own, programs do not agree about.
+    // Programs disagree whether the remaining weights are 0 or the mesh's.
     if (node["weights"].size() < facts.weights) {
       failInvalid(where, ": it has ", node["weights"].size(), " weights for ", facts.targets,
                   " morph targets, but its mesh has more weights");
@@ -585,7 +585,7 @@ class ReferenceCheck {
     std::size_t weights = 0;  // up to the last that is not 0
   };
 
-  // Many nodes may name one mesh of many targets.
+  // Cached, because many nodes may name one mesh with many targets.
   const MorphFacts& morphFacts(std::size_t index, const json& mesh) {
     morphFacts_.resize(sizeOf("meshes"));
     MorphFacts& facts = morphFacts_[index];
@@ -645,7 +645,7 @@ class ReferenceCheck {
     if (!require(target, "path", where + " target").is_string()) {
       failInvalid(where, " target: path is not a string");
     }
-    // The channels of an extension may have no node. tinygltf would drop them and shift the rest.
+    // A channel of an extension may have no node. tinygltf would drop it and shift the others.
     if (!target.contains("node")) {
       target["node"] = 0;
       target["path"] = unknownPath;

@@ -5,7 +5,7 @@
 namespace dermis::gltf {
 namespace {
 
-// A node's own transform with a clip's values in it.
+// A node's local transform, with a clip's values applied.
 struct LocalTransform {
   std::array<double, 3> translation;
   std::array<double, 4> rotation;
@@ -22,7 +22,7 @@ GlobalTransform fromMatrix(const std::array<double, 16>& columns) {
   return transform;
 }
 
-// Translation × rotation × scale, the rotation of unit length.
+// Translation × rotation × scale. The rotation has unit length.
 GlobalTransform compose(const LocalTransform& local) {
   const auto [x, y, z, w] = local.rotation;
   const auto& s = local.scale;

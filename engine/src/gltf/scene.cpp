@@ -17,8 +17,8 @@ std::vector<bool> nodesBelow(const Model& model, const std::vector<std::uint32_t
   return reachable;
 }
 
-// The nodes of a scene. A node that it lists without being a root must be there through its parents
-// as well: otherwise it is not clear whether their transforms apply.
+// The nodes of a scene. If the scene lists a node that is not a root, the node's parents must be in
+// the scene too: otherwise it is not clear whether their transforms apply.
 std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::size_t scene) {
   std::vector<std::uint32_t> roots, others;
   for (const int node : source.content().scenes[scene].nodes)
@@ -33,8 +33,8 @@ std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::si
   return reachable;
 }
 
-// What the default scene holds: `scene`, or scene 0 if the file does not say (as three.js does),
-// or all nodes where it has no scenes.
+// The nodes of the default scene: of `scene`, or of scene 0 if the file does not say (as in
+// three.js), or all nodes if there are no scenes.
 std::vector<bool> findReachable(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   if (!content.scenes.empty())
@@ -79,7 +79,7 @@ void readScene(Source& source, Model& model) {
     if (!reachable[i] || node.skin == none) continue;
     readMesh(source, model, node.mesh);
     const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
-    // A few nodes and a few primitives make many pairs of them.
+    // A few nodes and a few primitives can make many pairs.
     source.spend(primitives.size(), 2 * sizeof(SkinnedPrimitive),
                  join("node ", i, " and the primitives of mesh ", node.mesh));
     for (std::uint32_t j = 0; j < primitives.size(); ++j) {

@@ -10,10 +10,10 @@ namespace {
 
 constexpr Format matrixFormat[] = {{TINYGLTF_COMPONENT_TYPE_FLOAT, false}};
 
-// Column-major, as the file has it, to our rows.
+// Converts the file's column-major matrix to rows.
 JointMatrix toJointMatrix(const float* columns, const std::string& where) {
-  // The specification wants the fourth row exact; exporters that invert in float32 leave dust in
-  // it.
+  // The specification requires an exact fourth row, but exporters that invert in float32 leave
+  // rounding errors in it.
   constexpr float tolerance = 1e-5f;
   JointMatrix matrix;
   for (int column = 0; column < 4; ++column) {
@@ -41,7 +41,7 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
     failInvalid(place, ": accessor ", accessor, " has ", source.count(accessor), " matrices for ",
                 joints, " joints");
   }
-  // An accessor of zeros: no matrix in it would pass.
+  // An accessor without data is all zeros, and no such matrix is valid.
   if (source.hasNoData(accessor)) return std::vector<JointMatrix>(joints);
   const std::vector<float> floats = source.floats(accessor);
   std::vector<JointMatrix> matrices(joints);
@@ -51,7 +51,7 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
   return matrices;
 }
 
-// The root above each node.
+// The root of each node's tree.
 std::vector<std::uint32_t> findRoots(const Model& model) {
   std::vector<std::uint32_t> roots(model.nodes.size());
   for (const std::uint32_t node : model.nodeOrder) {

@@ -1,10 +1,10 @@
-// tinygltf as Dermis uses it: a parser of JSON into structs, with no image loaders and no access to
-// files. Everything in Dermis that includes tiny_gltf.h does so through here, because the switches
-// change the classes.
+// tinygltf as Dermis uses it: it parses JSON into structs, without image loaders or access to
+// files. All of Dermis includes tiny_gltf.h through this header, because the switches change the
+// classes.
 #pragma once
 
-// An engine may have a tinygltf of its own, built with other switches: in this namespace the two
-// cannot be mixed up by the linker.
+// An engine may have its own tinygltf, built with other switches. The linker cannot confuse the
+// two, because this one is in another namespace.
 #define tinygltf dermis_tinygltf
 #define TINYGLTF_NO_STB_IMAGE
 #define TINYGLTF_NO_STB_IMAGE_WRITE

@@ -1,5 +1,5 @@
-// The one translation unit that holds tinygltf's code.
-// Without TINYGLTF_NO_FS it would include this itself; its writer needs it all the same.
+// The only translation unit with tinygltf's code. With TINYGLTF_NO_FS, tinygltf does not include
+// <fstream>, but its writer needs it.
 #include <fstream>
 
 #define TINYGLTF_IMPLEMENTATION

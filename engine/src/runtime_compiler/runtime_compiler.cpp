@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// By which a change of a file is noticed. Of a file that is not there: nothing.
+/// Detects changes of a file. The default value is that of a file that does not exist.
 struct Stamp {
   fs::file_time_type time = fs::file_time_type::min();
   std::uintmax_t size = 0;
@@ -59,12 +59,12 @@ std::vector<std::pair<std::string, std::string>> definesOf(const kernels::Recipe
   return defines;
 }
 
-/// A module that a Context has asked for.
+/// A module that a Context has requested.
 struct Module {
   const kernels::Recipe* recipe = nullptr;
-  std::vector<std::uint32_t> words;  ///< that are in use
+  std::vector<std::uint32_t> words;  ///< SPIR-V that is in use
   std::set<fs::path> files;          ///< that it was compiled from
-  bool isStale = false;              ///< A file has changed since.
+  bool isStale = false;              ///< A file has changed since the module was compiled.
 };
 
 ShaderCompilerOptions compilerOptions(const fs::path& cacheFolder, bool scalarBlockLayout) {
@@ -90,16 +90,17 @@ struct RuntimeCompiler::State {
                               std::uint64_t completedFrame);
 
   RuntimeCompilerOptions options;
-  std::mutex mutex;  ///< of all below: a thread may call `prepare` while another one reloads
+  std::mutex mutex;  ///< guards all members below: a thread may call `prepare` while another one
+                     ///< reloads
   ShaderCompiler compiler, scalarCompiler;
   std::map<std::string, Module, std::less<>> modules;
-  std::map<fs::path, Stamp> stamps;  ///< of all their files
+  std::map<fs::path, Stamp> stamps;  ///< of the files of all modules
   RuntimeCompilerStatistics statistics;
   std::vector<std::string> cacheProblems;
 };
 
-/// Where a file was written after `began` what was read may be what stood there before: the next
-/// reload takes it for changed. File systems count time in steps.
+/// If a file was written after `began`, the compiler may have read its earlier contents: the next
+/// reload treats it as changed. The margin covers the time resolution of file systems.
 void RuntimeCompiler::State::watch(const fs::path& path, fs::file_time_type began) {
   const Stamp stamp = stampOf(path);
   stamps.try_emplace(path, stamp.time < began - std::chrono::milliseconds(20) ? stamp : Stamp{});
@@ -110,7 +111,7 @@ Result<std::vector<std::uint32_t>> RuntimeCompiler::State::compile(Module& modul
   const auto began = fs::file_time_type::clock::now();
   ShaderCompiler& used = module.recipe->scalarBlockLayout ? scalarCompiler : compiler;
   Result<std::vector<std::uint32_t>> words = used.compileFile(path, definesOf(*module.recipe));
-  // Where it fails these are not all: those of before stay.
+  // After a failure the list of includes is incomplete, so the earlier files stay in it.
   if (words) module.files.clear();
   module.files.insert(path);
   module.files.insert(used.lastIncludes().begin(), used.lastIncludes().end());
@@ -143,7 +144,8 @@ Result<std::vector<std::uint32_t>> RuntimeCompiler::State::get(std::string_view 
   return words;
 }
 
-/// Marks the modules of files that have changed since the last call. Whether there are any.
+/// Marks modules as stale if a file of theirs has changed since the last call. Returns whether
+/// there are any.
 bool RuntimeCompiler::State::findStale() {
   std::set<fs::path> changed;
   for (auto& [path, stamp] : stamps) {
@@ -164,11 +166,11 @@ bool RuntimeCompiler::State::findStale() {
 Result<KernelReload> RuntimeCompiler::State::reload(const vulkan::Context& context,
                                                     std::uint64_t frame,
                                                     std::uint64_t completedFrame) {
-  // Also destroys what is no longer used.
+  // Also destroys kernels that are no longer used.
   if (Result<std::uint32_t> done = context.replaceKernels({}, frame, completedFrame); !done)
     return done.error();
   KernelReload reload;
-  // Held to the end: a `prepare` that has seen the old kernels replaced gets the new ones.
+  // Held until the end, so that a `prepare` that finds the old kernels replaced gets the new ones.
   const std::unique_lock lock(mutex, std::try_to_lock);
   if (!lock || !findStale()) return reload;
   if (Result<void> good = checkAbi(options.shaderFolder); !good) return good.error();

@@ -40,16 +40,15 @@ Precision precisionOf(VertexFormat format) {
 
 constexpr double halfRounding = 0x1p-11;
 constexpr double leastHalfRounding = 0x1p-25;
-// Up to 2.5 units in the last place of a division, and about seven other roundings.
+// Up to 2.5 units in the last place for a division, and about seven other roundings.
 constexpr double foldingRounding = 12 * floatRounding;
 
-/// How far a unit vector moves when the point that stands for it on the octahedron moves by `x` and
-/// `y`.
+/// How far a unit vector moves if its point on the octahedron moves by `x` and `y`.
 double octahedralBound(double x, double y) {
   return std::sqrt(3.0) * std::hypot(x, y, x + y);
 }
 
-/// A unit vector whose components are rounded each for itself.
+/// Bound for a unit vector whose components are rounded separately.
 double componentwiseBound(const Precision& precision) {
   if (precision.rounding == Rounding::half) {
     return halfRounding + std::sqrt(3.0) * leastHalfRounding;

@@ -26,7 +26,7 @@ Stored load(const AttributeView& view, std::size_t element, std::uint32_t compon
   return value;
 }
 
-/// The value of a binary16: (-1)^s · 2^(e - 15) · (1 + f / 1024), without the 1 where e is 0.
+/// The value of a binary16: (-1)^s · 2^(e - 15) · (1 + f / 1024). Without the 1 if e is 0.
 double valueOfHalf(std::uint16_t bits) {
   const int exponent = bits / 1024 % 32;
   const double fraction = bits % 1024 / 1024.0;
@@ -39,7 +39,7 @@ double valueOfHalf(std::uint16_t bits) {
                        : sign * (1 + fraction) * std::exp2(exponent - 15);
 }
 
-/// A weight times 65535: sums of what is stored as integers then are exact, and a tie is a tie.
+/// A weight times 65535. Sums of weights stored as integers are then exact, and so are ties.
 double readWeight(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
   switch (view.type) {
     case ComponentType::unorm8:
@@ -106,7 +106,7 @@ void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influe
       if (weight != 0) influences.push_back({readJoint(set.joints, vertex, slot), weight});
     }
   }
-  // By weight too: whatever the order of the slots, duplicates add up to the same.
+  // Also sorted by weight, so that the sum of duplicates does not depend on the order of slots.
   std::sort(influences.begin(), influences.end(), [](const Influence& a, const Influence& b) {
     return a.joint != b.joint ? a.joint < b.joint : a.stored < b.stored;
   });
@@ -135,10 +135,10 @@ bool isFloat32(const dvec3& v) {
   return true;
 }
 
-/// One attribute, and the roundings that the same sum has in float32.
+/// The value of one attribute, and the roundings of the same sum in float32.
 struct Sum {
   dvec3 value{0.0};
-  double magnitude = 0;  ///< the lengths of all that was added
+  double magnitude = 0;  ///< sum of the lengths of all summands
   std::uint32_t roundings = 0;
 
   void start(const dvec3& stored) {
@@ -156,7 +156,7 @@ struct Sum {
   double relativeRounding() const { return rounding() == 0 ? 0 : rounding() / glm::length(value); }
 };
 
-/// Where a target's attributes have this vertex, if they do.
+/// The element of a target's attributes for this vertex, if there is one.
 std::optional<std::size_t> elementOf(const MorphTargetView& target, std::size_t vertex) {
   if (target.vertices.empty()) return vertex;
   const auto found = std::lower_bound(target.vertices.begin(), target.vertices.end(), vertex);

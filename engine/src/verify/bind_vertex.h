@@ -1,5 +1,5 @@
 // A vertex in bind pose, in double precision: every type that an attribute may have, influences,
-// and morph targets added. Packing reads the same by its own means.
+// and morphing. This code is independent of packing, which reads the same data.
 #pragma once
 
 #include <cstddef>
@@ -15,24 +15,24 @@
 
 namespace dermis::reference {
 
-/// The number that a component stands for: `unorm` and `snorm` types divided by their largest.
+/// The value of a component: `unorm` and `snorm` types are divided by their largest value.
 double readComponent(const AttributeView& view, std::size_t element, std::uint32_t component);
 
 /// The first three components.
 glm::dvec3 readVector(const AttributeView& view, std::size_t element);
 
-/// A vertex' position: what is stored, times the mesh's scale, plus its offset.
+/// A vertex' position: the stored value times the mesh's scale, plus its offset.
 glm::dvec3 readPosition(const MeshView& mesh, std::size_t vertex);
 
 struct Influence {
   std::uint32_t joint;
-  double stored;      ///< the weight as stored, times 65535, duplicates added up: what the pivot is
-                      ///< chosen by
+  double stored;      ///< the weight as stored, times 65535, with duplicates added; the pivot is
+                      ///< chosen by it
   double weight = 0;  ///< normalized
 };
 
-/// All sets together, one entry a joint, in the order of joints; the weights sum to 1. Empty: no
-/// weight. `influences` is overwritten.
+/// Reads the influences of all sets, one entry per joint, in ascending order of joints. The weights
+/// sum to 1. Empty if no influence has a weight. `influences` is overwritten.
 void readInfluences(const MeshView& mesh, std::size_t vertex, std::vector<Influence>& influences);
 
 struct ActiveMorph {
@@ -40,19 +40,19 @@ struct ActiveMorph {
   double weight;  ///< not 0
 };
 
-/// The targets that have a weight, in the order of the mesh. Fails with `invalidArgument` for a
-/// target that the mesh lacks or that stands twice, and for a weight that is not finite.
+/// The targets with a weight other than 0, in the order of the mesh. Fails with `invalidArgument`
+/// for a target that the mesh lacks or that is listed twice, and for a weight that is not finite.
 Result<std::vector<ActiveMorph>> activeMorphs(const MeshView& mesh,
                                               std::span<const MorphWeight> weights);
 
-/// A vertex before it is skinned; zeros for what the mesh lacks. Directions are of any length.
+/// A vertex before it is skinned. Attributes that the mesh lacks are zero. Directions may have any
+/// length.
 struct BindVertex {
   glm::dvec3 position, normal, tangent;
   double handedness = 1;  ///< 1 or -1
 };
 
-/// What is stored for a vertex, plus Σ w_i d_i of the active targets. Fills the conditioning's
-/// roundings.
+/// The stored vertex plus Σ w_i d_i of the active targets. Fills in the conditioning's roundings.
 BindVertex bindVertex(const MeshView& mesh, std::size_t vertex, std::span<const ActiveMorph> morphs,
                       Conditioning& conditioning);
 

@@ -14,9 +14,11 @@ using reference::Double4;
 using reference::SkinnedMesh;
 using reference::VertexBounds;
 
-/// As inexact as Vulkan allows: 4 u by `inversesqrt`, 10 u by a division, and their own roundings.
+/// As inaccurate as Vulkan permits: 4 u for `inversesqrt`, 10 u for a division, and their own
+/// roundings.
 constexpr double unitTolerance = 1.5e-6;
-/// What binary16 rounds to infinity: half a step above its largest finite number, 65504.
+/// The least value that binary16 rounds to infinity: half a step above its largest finite number,
+/// 65504.
 constexpr double halfOverflow = 65520;
 
 bool isHalf(VertexFormat format) {
@@ -58,13 +60,13 @@ bool isFinite(const Double3& a) {
   return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]);
 }
 
-/// error ÷ bound, where a bound of 0 allows no error.
+/// error ÷ bound; a bound of 0 allows no error.
 double share(double error, double bound) {
   if (error == 0) return 0;
   return bound > 0 ? error / bound : HUGE_VAL;
 }
 
-/// What stands in the buffer for one vertex, against what should.
+/// Compares the position in the buffer with the expected one.
 struct PositionCheck {
   double error = 0;
   double share = 0;
@@ -72,8 +74,8 @@ struct PositionCheck {
   bool clamped = false;
 };
 
-/// Infinite components that float16 had to make are taken out: they are right. `bound` is that of
-/// the float32 position.
+/// Clears infinite components that are correct because float16 overflows. `bound` is that of the
+/// float32 position.
 bool dropOverflow(Double3& actual, Double3& expected, double bound) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (std::isfinite(actual[axis])) continue;
@@ -85,8 +87,8 @@ bool dropOverflow(Double3& actual, Double3& expected, double bound) {
   return true;
 }
 
-/// Whether float16 may be unable to hold a position of which only its size is known. No answer is
-/// much further away than `scale`: blending divides by |b_q|, rarely less than a half.
+/// Whether float16 may overflow at a position of which only the size is known. No result is much
+/// further away than `scale`: blending divides by |b_q|, which is rarely less than a half.
 bool mayOverflow(VertexFormat format, const VertexBounds& bounds) {
   return isHalf(format) && 8 * bounds.scale >= halfOverflow;
 }
@@ -99,7 +101,7 @@ PositionCheck checkPosition(Double3 expected, const SkinnedView& view, std::size
   if (isHalf(format)) check.finite = dropOverflow(actual, expected, bound);
   check.finite &= isFinite(actual);
   if (!check.finite) return check;
-  Double3 reach{};  // how large the float32 components can be
+  Double3 reach{};  // maximum size of the float32 components
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (isSnormPosition(format)) {
       const double inside = std::clamp(expected[axis], static_cast<double>(view.box.min[axis]),
@@ -114,7 +116,7 @@ PositionCheck checkPosition(Double3 expected, const SkinnedView& view, std::size
   return check;
 }
 
-/// A unit direction, or a zero one. `bound` is negative if only its length is known.
+/// Error ÷ bound of a unit or zero direction. `bound` is negative if only the length is known.
 double directionShare(Double3 expected, const Double3& actual, VertexFormat format, double bound,
                       double formatBound, bool mayBeZero) {
   if (!isFinite(expected) || !std::isfinite(bound)) return HUGE_VAL;
@@ -193,7 +195,7 @@ struct Checker {
     const bool arbitrary = bounds.onlyFinite;
     const double bound = bounds.position;
     if (!isFinite(expected.positions[vertex]) || !(arbitrary || std::isfinite(bound))) {
-      fail(vertex);  // of the reference
+      fail(vertex);  // the reference is at fault
       return;
     }
     const PositionCheck position = checkPosition(expected.positions[vertex], actual, vertex, bound);
@@ -219,7 +221,7 @@ struct Checker {
   }
 };
 
-/// What is wrong with an attribute that is to be compared, or nothing.
+/// Describes what is wrong with an attribute to compare; empty if nothing is.
 std::string complaint(const char* name, const SkinnedAttribute& attribute,
                       bool (*allows)(VertexFormat), std::size_t count) {
   if (attribute.data == nullptr || !allows(attribute.format)) {

@@ -9,23 +9,24 @@
 namespace dermis::reference {
 namespace {
 
-/// What a GPU may flush to 0: 64 results below the least normal number, 2^-126, for a vertex.
+/// Effect of denormals that a GPU flushes to 0: 64 results per vertex below 2^-126, the least
+/// normal number.
 constexpr double flushed = 0x1p-120;
 
-/// A: by how much dividing by |b| makes errors larger where it is less than a quarter.
+/// A: the factor by which dividing by |b| increases errors if |b| is less than a quarter.
 double amplification(Method method, const Conditioning& conditioning) {
   return method == Method::linear ? 1 : std::max(1.0, 0.25 / conditioning.blendLength);
 }
 
-/// How well a direction is conditioned where it passes through a 3×3.
+/// How well a direction is conditioned that is transformed by a 3×3.
 struct Direction {
   double alignment;
   double bindRounding;     ///< in units of u
-  double length;           ///< of what is normalized in the end
-  double shortcutsInside;  ///< how many times M's own error counts: M is used so often
+  double length;           ///< of the vector that is normalized at the end
+  double shortcutsInside;  ///< how many times M is used, and so how many times its error counts
 };
 
-/// A direction that passes through a 3×3, or is turned by a blended rotation, or both.
+/// Bound for a direction that is transformed by a 3×3, or by a blended rotation, or both.
 double directionBound(Method method, const Conditioning& conditioning, const Direction& direction) {
   constexpr double leastAlignment = 1e-3;
   constexpr double mostOfAlignment = 0.05;
@@ -73,11 +74,11 @@ VertexBounds boundsOf(Method method, const Conditioning& conditioning) {
   bounds.normal = normalBound(method, conditioning);
   bounds.tangent = tangentBound(method, conditioning);
   bounds.scale = conditioning.scale;
-  // Linear blending knows neither signs nor rotations.
+  // Linear blending has no quaternion signs and no rotations.
   bounds.onlyFinite =
       method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate);
   bounds.undefined = conditioning.undefined;
-  // If the bind pose all but cancels, rounding decides whether anything is left.
+  // If the bind pose nearly cancels, rounding decides whether anything is left.
   bounds.normalMayVanish = floatRounding * conditioning.normalRounding >= 1;
   bounds.tangentMayVanish = floatRounding * conditioning.tangentRounding >= 1;
   bounds.eitherHandedness = conditioning.handednessAmbiguous;

@@ -38,7 +38,7 @@ glm::dvec3 anyPerpendicular(const glm::dvec3& v) {
   return glm::normalize(glm::cross(v, axis));
 }
 
-/// How large the determinant would be if no product in it cancelled.
+/// The size of the determinant if no product in it cancelled.
 double uncancelledDeterminant(const glm::dmat3& m) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
@@ -67,7 +67,7 @@ SingularValues singularValues(const glm::dmat3& matrix) {
     result.values[i] = lengths[order[static_cast<std::size_t>(i)]];
     result.right[i] = right[order[static_cast<std::size_t>(i)]];
   }
-  // Left vectors that the matrix does not determine are completed to an orthonormal set.
+  // Left vectors that the matrix does not determine complete the orthonormal set.
   const double tiny = 1e-300;
   if (result.values[0] > tiny) {
     result.left[0] = work[order[0]] / result.values[0];
@@ -86,18 +86,18 @@ PolarParts polarParts(const glm::dmat3& matrix) {
   parts.largest = svd.values[0];
   parts.distanceFromRotation = std::max(std::abs(svd.values[0] - 1), std::abs(svd.values[2] - 1));
   parts.degenerate = svd.values[1] <= 1e-5 * svd.values[0] || svd.values[0] == 0;
-  // A GPU may take entries below 2^-126 for 0.
+  // A GPU may flush entries below 2^-126 to 0.
   parts.degenerate |= svd.values[1] + svd.values[2] < 0x1p-100;
 
-  // A determinant within 16 roundings of 0 counts as 0; a kernel, whose own determinant is rounded
-  // as well, draws the line somewhere between that and twice as much.
+  // A determinant within 16 roundings of 0 counts as 0. A kernel's determinant has rounding errors
+  // too, so its limit is between this value and twice as much.
   const double determinant = glm::determinant(matrix);
   const double rounding = 16 * 0x1p-24 * uncancelledDeterminant(matrix);
   const bool mirrored = determinant < -rounding;
   parts.degenerate |= mirrored && determinant >= -2 * rounding;
 
   glm::dmat3 left = mirrored ? -svd.left : svd.left;
-  // Where the matrix is singular the last axis may point either way: take the one that makes a
+  // If the matrix is singular, the last axis may have either sign. Choose the one that makes a
   // rotation.
   if (glm::determinant(left) * glm::determinant(svd.right) < 0) left[2] = -left[2];
   parts.rotation = left * glm::transpose(svd.right);
@@ -110,7 +110,7 @@ namespace {
 using glm::dmat3;
 using glm::dvec4;
 
-/// The unit quaternion of a rotation matrix, by the largest of its four squared components
+/// The unit quaternion of a rotation matrix, from the largest of its four squared components
 /// (Shepperd 1978).
 dvec4 quaternionOf(const dmat3& r) {
   // r[column][row]
@@ -166,8 +166,9 @@ Joint takeApart(const JointMatrix& matrix) {
     deviation = std::max(deviation,
                          std::abs(gram[0][row]) + std::abs(gram[1][row]) + std::abs(gram[2][row]));
   }
-  // The kernels compare float sums with 8e-6. An entry of CᵀC is a sum of three products, off by at
-  // most 3 u, and a row has three of them: joints up to 9 u beyond may go either way.
+  // The kernels compare float sums with 8e-6. An entry of CᵀC is a sum of three products, with an
+  // error of at most 3 u, and a row has three entries. Joints up to 9 u above the limit may count
+  // as rigid or not.
   joint.rigidForKernels = glm::determinant(joint.linear) > 0 && deviation <= 8e-6 + 9 * 0x1p-24;
   joint.distanceFromRotation = parts.distanceFromRotation;
   return joint;

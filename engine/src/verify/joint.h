@@ -1,4 +1,4 @@
-// A joint matrix taken apart, in double precision: singular values, the polar decomposition, the
+// Decomposes a joint matrix in double precision: singular values, the polar decomposition, the
 // rigid part.
 #pragma once
 
@@ -12,11 +12,11 @@ namespace dermis::reference {
 
 struct SingularValues {
   glm::dmat3 left;    ///< orthonormal columns
-  glm::dvec3 values;  ///< falling, not negative
+  glm::dvec3 values;  ///< in descending order, not negative
   glm::dmat3 right;   ///< orthonormal columns; matrix = left · diag(values) · rightᵀ
 };
 
-/// One-sided Jacobi: small singular values come out as exact as large ones. The matrix must be
+/// One-sided Jacobi: small singular values are as accurate as large ones. The matrix must be
 /// finite.
 SingularValues singularValues(const glm::dmat3& matrix);
 
@@ -25,15 +25,15 @@ struct PolarParts {
   glm::dmat3 scaleShear;  ///< symmetric; matrix = rotation · scaleShear
   double largest = 0;     ///< the largest singular value
   double distanceFromRotation =
-      0;  ///< the largest |singular value - 1|: how far it moves a point at distance 1
+      0;  ///< largest |singular value - 1|: how far it moves a point at distance 1
   bool degenerate =
-      false;  ///< rank ≤ 1, or so near to a singular mirror that its sense is a matter of
-              ///< rounding, or σ₂ + σ₃ < 2^-100, where that a GPU may flush denormals to 0 turns it
+      false;  ///< rank ≤ 1; or so close to a singular mirror that rounding decides the sign; or σ₂
+              ///< + σ₃ < 2^-100, so that flushing denormals to 0 on a GPU would turn it
 };
 
-/// With a negative determinant the rotation is that of −matrix, and the sign goes into the scale
-/// part. A matrix whose determinant is 0 but for rounding in float32 is flat, not mirrored: the
-/// rotation of its two axes, det +1.
+/// If the determinant is negative, the rotation is that of −matrix, and the scale part has the
+/// sign. A matrix whose determinant is 0 except for rounding in float32 counts as flat, not
+/// mirrored: the rotation of its two axes, det +1.
 PolarParts polarParts(const glm::dmat3& matrix);
 
 struct Joint {
@@ -41,14 +41,14 @@ struct Joint {
   glm::dvec3 translation;
   Rigid rigid;  ///< the rotation of the polar decomposition, and the translation
   glm::dmat3 scaleShear;
-  double largest = 1;  ///< singular value
+  double largest = 1;  ///< largest singular value
   bool finite = true;
   bool degenerate = false;
   bool rigidForKernels = false;
   double distanceFromRotation = 0;
 };
 
-/// A matrix that is not finite gives NaNs.
+/// Decomposes a joint. A matrix that is not finite gives NaNs.
 Joint takeApart(const JointMatrix& matrix);
 
 }  // namespace dermis::reference

@@ -18,11 +18,12 @@ using glm::dvec3;
 using glm::dvec4;
 
 dmat3 adjugateTranspose(const dmat3& m) {
-  // The cofactor matrix: its columns are the cross products of the other two.
+  // The cofactor matrix: each column is the cross product of the other two.
   return dmat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
 }
 
-/// A normal by the inverse transpose of m, but for its length; finite also where m is singular.
+/// Transforms a normal by the inverse transpose of m, without normalizing. Finite even if m is
+/// singular.
 dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
                       Conditioning& conditioning) {
   const auto& [m, determinant, largest, stretch] = matrix;
@@ -31,13 +32,13 @@ dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
   if (inputLength == 0) return result;  // stays zero, exactly
   conditioning.normalAlignment =
       largest > 0 ? glm::length(result) / (largest * stretch * inputLength) : 0;
-  // Where the determinant is a matter of rounding, so is the side that the normal points to.
+  // If rounding decides the sign of the determinant, it also decides the sign of the normal.
   if (matrix.isFlat()) conditioning.normalAlignment = 0;
-  if (glm::length(result) == 0) return normal;  // of rank 1 or 0: any direction will do
+  if (glm::length(result) == 0) return normal;  // rank 1 or 0: any direction is valid
   return determinant < 0 ? -result : result;
 }
 
-/// A tangent by the map of positions, but for its length.
+/// Transforms a tangent by the same matrix as positions, without normalizing.
 dvec3 transformTangent(const BlendedMatrix& matrix, const dvec3& tangent,
                        Conditioning& conditioning) {
   const dvec3 result = matrix.m * tangent;
@@ -48,7 +49,7 @@ dvec3 transformTangent(const BlendedMatrix& matrix, const dvec3& tangent,
   return glm::length(result) == 0 ? tangent : result;
 }
 
-/// A mirror turns a tangent frame's handedness over.
+/// A mirror inverts a tangent frame's handedness.
 double transformHandedness(const BlendedMatrix& matrix, double handedness,
                            Conditioning& conditioning) {
   conditioning.handednessAmbiguous = matrix.isFlat();
@@ -85,7 +86,7 @@ namespace {
 
 constexpr int mostSteps = 20;
 
-/// The square of a screw's size; the dual part is measured by how far the joints reach.
+/// The squared size of a screw. Its dual part is measured relative to the reach of the joints.
 double squareOf(const Rigid& screw, double reach) {
   const double dual = glm::dot(screw.dual, screw.dual);
   return glm::dot(screw.real, screw.real) + (reach > 0 ? dual / (reach * reach) : 0);
@@ -107,7 +108,7 @@ Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditionin
       Rigid joint = vertex.joints[influence.joint].rigid;
       if (glm::dot(joint.real, pivot) < 0) joint = -joint;
       const Rigid difference = normalize(conjugate(b) * joint);
-      // Near a full turn the axis, and with it the step, is a matter of rounding.
+      // Near a full turn, rounding decides the axis, and with it the step.
       conditioning.signAmbiguous |= difference.real.w < -0.9;
       mean = mean + log(difference) * influence.weight;
     }
@@ -117,19 +118,19 @@ Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditionin
     before = size;
     if (size <= 1e-15) break;
   }
-  // Errors of one step live on in the next, by the factor by which steps shrink.
+  // The error of one step remains in the next, reduced by the factor by which steps shrink.
   conditioning.turning = 1 / (1 - std::min(slowest, 1 - 1.0 / mostSteps));
   conditioning.leverage = (conditioning.turning - 1) * conditioning.scale;
   return b;
 }
 
-/// A rigid transform's matrix logarithm is that of its dual quaternion in another dress, and so is
-/// the exponential: sums of them are sums of these.
+/// The matrix logarithm of a rigid transform is the logarithm of its dual quaternion in another
+/// representation. The same holds for the exponential, and so for sums of logarithms.
 Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning) {
   Rigid mean{glm::dvec4(0.0), glm::dvec4(0.0)};
   for (const Influence& influence : vertex.influences) {
     Rigid joint = vertex.joints[influence.joint].rigid;
-    // At half a turn the logarithm jumps to the opposite one.
+    // At half a turn the logarithm jumps to its opposite.
     conditioning.signAmbiguous |= vertex.influences.size() > 1 && std::abs(joint.real.w) < 1e-5;
     if (joint.real.w < 0) joint = -joint;
     mean = mean + log(normalize(joint)) * influence.weight;
@@ -141,9 +142,9 @@ Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning) {
 
 namespace {
 
-/// In directions in which the rotations differ by less, the center stays where it is: 0.
+/// In directions in which rotations differ by less, the center stays at 0.
 constexpr double leastSingularValue = 1e-3;
-/// What packing drops.
+/// Packing drops smaller weights.
 constexpr double leastWeight = 0x1p-49;
 
 }  // namespace
@@ -172,7 +173,7 @@ dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
       apart = std::max(apart, glm::length(shift));
     }
   }
-  // Pairs count as many times as there are joints what differences from the mean would give.
+  // Sums over pairs are those over differences from the mean, times the number of joints.
   const auto count = static_cast<double>(joints.size());
   const SingularValues parts = singularValues(square);
   dvec3 center(0.0);
@@ -184,7 +185,7 @@ dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
     least = std::min(least, singularValue);
     center += parts.right[i] * (glm::dot(parts.right[i], right) / parts.values[i]);
   }
-  // Rotations are known to a rounding; where they all but agree, that moves the center far.
+  // Rotations have rounding errors; if they are nearly equal, these errors move the center far.
   conditioning.leverage = glm::length(center) + (std::isfinite(least) ? apart / least : 0);
   return center;
 }
@@ -220,7 +221,7 @@ BindVertex skinIterative(const VertexToSkin& vertex, Conditioning& conditioning)
 }
 
 BindVertex skinLogMatrix(const VertexToSkin& vertex, Conditioning& conditioning) {
-  const bool signs = conditioning.signAmbiguous;  // no pivot here
+  const bool signs = conditioning.signAmbiguous;  // log-matrix has no pivot
   const RigidBlend blend = blendRigid(vertex, conditioning);
   conditioning.signAmbiguous = signs;
   conditioning.blendLength = 1;
@@ -228,7 +229,7 @@ BindVertex skinLogMatrix(const VertexToSkin& vertex, Conditioning& conditioning)
   return moveRigidly(vertex, blend.scaleShear, rigid.real, translationOf(rigid), conditioning);
 }
 
-/// Σ w (R S p + t), or without S.
+/// Σ w (R S p + t), or without S if not `withScale`.
 dvec3 linearPoint(const VertexToSkin& vertex, const dvec3& point, bool withScale) {
   dvec3 sum(0.0);
   for (const Influence& influence : vertex.influences) {
@@ -262,7 +263,7 @@ BindVertex skinBlended(const VertexToSkin& vertex, Conditioning& conditioning) {
   const double share = vertex.inputs.dualQuaternionWeight;
   const dvec3 normal = (1 - share) * linear.normal + share * turned.normal;
   const dvec3 tangent = (1 - share) * linear.tangent + share * turned.tangent;
-  // A sum of unit vectors that all but cancel is the less certain.
+  // The more two unit vectors cancel, the less accurate is the direction of their sum.
   const auto lengthOf = [](const dvec3& sum, const dvec3& part) {
     return part == dvec3(0.0) ? 1 : glm::length(sum);
   };
@@ -277,7 +278,7 @@ BindVertex skinBlended(const VertexToSkin& vertex, Conditioning& conditioning) {
           unitOrZero(tangent), turned.handedness};
 }
 
-/// A center that is far away counts as the vertex' own position does.
+/// The distance of the center has the same effect as that of the vertex' position.
 void conditionCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
   const double distance = 2 * glm::length(vertex.inputs.center);
   conditioning.leverage = conditioning.stretch * distance;
@@ -294,7 +295,8 @@ BindVertex skinCenterOfRotation(const VertexToSkin& vertex, Conditioning& condit
   return moveRigidly(vertex, blend.scaleShear, blend.rigid.real, translation, conditioning);
 }
 
-/// What linear blending and dual quaternions make of the center differs; that much of it is added.
+/// Linear blending and dual quaternions transform the center differently; a part of the difference
+/// is added.
 BindVertex skinBulgeControlled(const VertexToSkin& vertex, Conditioning& conditioning) {
   const dvec3& center = vertex.inputs.center;
   const RigidBlend blend = blendRigid(vertex, conditioning);
@@ -309,7 +311,7 @@ BindVertex skinBulgeControlled(const VertexToSkin& vertex, Conditioning& conditi
 }  // namespace
 
 const Influence& pivotOf(std::span<const Influence> influences) {
-  // In the order of joints: the first of the strongest has the lowest.
+  // In ascending order of joints: the first of the strongest has the lowest joint.
   return *std::max_element(
       influences.begin(), influences.end(),
       [](const Influence& a, const Influence& b) { return a.stored < b.stored; });
@@ -330,7 +332,7 @@ RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning) {
     kernelsScale |= !joint.rigidForKernels;
   }
   const double norm = std::sqrt(glm::dot(blend.rigid.real, blend.rigid.real));
-  // No summand points away from the pivot: dot(real, pivot) ≥ its weight. NaN is let through.
+  // No summand points away from the pivot: dot(real, pivot) ≥ its weight. NaN is accepted.
   assert(!(norm < strongest.weight * (1 - 1e-9)));
   conditioning.blendLength = norm;
   blend.rigid = blend.rigid * (1 / norm);

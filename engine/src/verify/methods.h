@@ -1,6 +1,6 @@
-// The blending rules, in double precision. Each takes the joints of a palette, the influences of
-// one vertex in the order of their joints, at least one, and the vertex in bind pose; normals and
-// tangents come out of unit length or zero. What depends on the method is written into the
+// The blending methods, in double precision. Each takes the joints of a palette, the influences of
+// one vertex (at least one, in ascending order of joints), and the vertex in bind pose. Normals and
+// tangents of the result have unit length or are zero. Each method fills in its part of the
 // conditioning.
 #pragma once
 
@@ -17,7 +17,7 @@
 
 namespace dermis::reference {
 
-/// What some methods want to know of a vertex besides.
+/// Additional inputs per vertex that some methods read.
 struct MethodInputs {
   glm::dvec3 center{0.0};
   double dualQuaternionWeight = 0;
@@ -33,19 +33,19 @@ struct VertexToSkin {
 
 BindVertex skinVertex(const VertexToSkin& vertex, Method method, Conditioning& conditioning);
 
-/// The strongest influence, the lowest joint on a tie.
+/// The strongest influence. On a tie, the one with the lowest joint.
 const Influence& pivotOf(std::span<const Influence> influences);
 
-/// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1) with the pivot of
-/// greatest weight, the real part of unit length; and the scale/shear parts blended linearly.
+/// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1), where the pivot
+/// has the greatest weight and the real part unit length; and the scale/shear parts blended
+/// linearly.
 struct RigidBlend {
   Rigid rigid;
   glm::dmat3 scaleShear{0.0};
 };
 RigidBlend blendRigid(const VertexToSkin& vertex, Conditioning& conditioning);
 
-/// In two phases: scaled in bind space, then moved by a rotation about the origin and a
-/// translation.
+/// Skins in two phases: scales in bind space, then rotates about the origin and translates.
 BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
                        const glm::dvec4& rotation, const glm::dvec3& translation,
                        Conditioning& conditioning);
@@ -54,26 +54,27 @@ BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
 Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditioning);
 /// exp(Σ w log C), C the rigid parts.
 Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
-/// Kavan and Žára 2005: the point that the rigid parts come nearest to agreeing on.
+/// Kavan and Žára 2005: the point on whose destination the rigid parts agree best.
 glm::dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning);
 
-/// The 3×3 that directions go through, and what their sense depends on.
+/// The 3×3 that transforms directions, and what its sign depends on.
 struct BlendedMatrix {
   /// `largestOfJoints` is their largest singular value.
   BlendedMatrix(const glm::dmat3& matrix, double largestOfJoints);
 
-  /// Whether the sign of the determinant is a matter of rounding.
+  /// Whether rounding decides the sign of the determinant.
   bool isFlat() const;
 
   glm::dmat3 m;
   double determinant;
   double largest;  ///< its largest singular value
-  double stretch;  ///< that of the joints: what the blended entries were rounded by
+  double stretch;  ///< largest singular value of the joints; the blended entries were rounded
+                   ///< relative to it
 };
 
-/// A vertex through a blended matrix, but for its position: the normal by the inverse transpose,
-/// finite also where the matrix is singular, the tangent by the matrix, both of unit length or
-/// zero, the handedness by the sign of the determinant. Fills the conditioning's alignments.
+/// Transforms everything but the position by a blended matrix: the normal by the inverse transpose
+/// (finite even if the matrix is singular), the tangent by the matrix, both with unit length or
+/// zero, and the handedness by the sign of the determinant. Fills in the conditioning's alignments.
 BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,
                                Conditioning& conditioning);
 

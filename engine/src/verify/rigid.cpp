@@ -71,12 +71,12 @@ glm::dmat3 matrixOf(const dvec4& rotation) {
 Rigid log(const Rigid& a) {
   const dvec3 r(a.real), d(a.dual);
   const double sine = glm::length(r);
-  // No turn, or a full one, whose axis is lost: −a is the same translation then.
+  // No turn or a full turn, which has no axis: −a is the same transform, a translation.
   if (sine == 0) return {dvec4(0.0), dvec4(a.real.w < 0 ? -d : d, 0)};
   const double angle = std::atan2(sine, a.real.w);
   const double factor = angle / sine;
-  // (1 − angle cot angle) / sine², by its series where the difference would cancel: with
-  // s = sine², 1/3 + 2/15 s + 8/105 s² + …, each coefficient (2k + 2) / (2k + 5) of the one before.
+  // (1 − angle cot angle) / sine². The series avoids cancellation at small angles: with s = sine²,
+  // 1/3 + 2/15 s + 8/105 s² + …, each coefficient is (2k + 2) / (2k + 5) times the one before.
   double slope = (1 - factor * a.real.w) / (sine * sine);
   if (angle < 0.3) {
     double term = 1.0 / 3;
@@ -94,7 +94,8 @@ Rigid exp(const Rigid& screw) {
   const double square = glm::dot(r, r), angle = std::sqrt(square);
   double sinc = 0, slope = 0;  // sin a / a, and (cos a − sin a / a) / a²
   if (angle < 0.3) {
-    // Σ (−1)^k a^2k / (2k + 1)!, and its derivative over a: Σ (−1)^(k+1) (2k + 2) a^2k / (2k + 3)!.
+    // Σ (−1)^k a^2k / (2k + 1)!, and its derivative divided by a: Σ (−1)^(k+1) (2k + 2) a^2k / (2k
+    // + 3)!.
     double term = 1;
     for (int k = 0; k < 8; ++k) {
       sinc += term;

@@ -1,5 +1,5 @@
-// Rigid transforms as dual quaternions, for the reference. Not those of dual_quat.h: templates on
-// GLM's quaternions would bring their layout, which an engine may change by a macro, into the
+// Rigid transforms as dual quaternions, for the reference. It does not use dual_quat.h: templates
+// on GLM's quaternions would bring their layout, which an engine may change by a macro, into the
 // library.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace dermis::reference {
 
-/// real + ε dual, x y z w. Also a logarithm, which has no scalars.
+/// real + ε dual, each x y z w. Also represents a logarithm, which has no scalar parts.
 struct Rigid {
   glm::dvec4 real{0, 0, 0, 1};
   glm::dvec4 dual{0, 0, 0, 0};
@@ -20,23 +20,23 @@ Rigid operator*(const Rigid& a, double factor);
 Rigid operator+(const Rigid& a, const Rigid& b);
 Rigid operator-(const Rigid& a);
 
-/// d = ½ (0, t) q, of a unit quaternion.
+/// d = ½ (0, t) q, for a unit quaternion q.
 Rigid rigidOf(const glm::dvec4& rotation, const glm::dvec3& translation);
-/// The inverse of a unit one.
+/// The inverse of a unit dual quaternion.
 Rigid conjugate(const Rigid& a);
-/// A real part of unit length, and a dual part orthogonal to it.
+/// Makes the real part unit length, and the dual part orthogonal to it.
 Rigid normalize(const Rigid& a);
 
 /// 2 vec(d q*) / |q|².
 glm::dvec3 translationOf(const Rigid& a);
-/// By a unit quaternion.
+/// Rotates by a unit quaternion.
 glm::dvec3 rotate(const glm::dvec4& rotation, const glm::dvec3& v);
-/// By one with a real part of unit length.
+/// Transforms by a dual quaternion whose real part has unit length.
 glm::dvec3 transformPoint(const Rigid& a, const glm::dvec3& point);
 glm::dmat3 matrixOf(const glm::dvec4& rotation);
 
-/// Half the angle about, and half the way along, the screw axis; of a truly unit one. Kavan et al.
-/// 2008, appendix.
+/// Half the angle about the screw axis, and half the distance along it. The dual quaternion must
+/// have unit length. Kavan et al. 2008, appendix.
 Rigid log(const Rigid& a);
 /// The inverse of `log`.
 Rigid exp(const Rigid& screw);

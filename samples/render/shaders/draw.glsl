@@ -1,11 +1,11 @@
-// What each draw is pushed: samples/render/draw_block.h has the same in C++.
+// Push constants of each draw. samples/render/blocks.h declares the same in C++.
 #ifndef DERMIS_RENDER_DRAW_GLSL
 #define DERMIS_RENDER_DRAW_GLSL
 
 layout(push_constant) uniform Draw {
   vec4 rows[3];     // model to world, row-major
   vec4 baseColor;
-  vec4 surface;     // metallic, roughness, alpha cutoff, 1 where colors come from a value a vertex
+  vec4 surface;     // metallic, roughness, alpha cutoff, 1 if colors come from a value per vertex
   int shadowIndex;  // -1: the key light, otherwise a sky light
 } draw;
 

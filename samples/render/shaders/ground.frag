@@ -5,7 +5,7 @@ layout(location = 0) in vec3 worldPosition;
 
 layout(location = 0) out vec4 displayed;
 
-// The ground is the background with the shadows that fall on it: so it has no edge and no horizon.
+// The ground is the background plus shadows, so it has no edge and no horizon.
 void main() {
   vec3 background = backgroundAt(gl_FragCoord.xy);
   const vec3 up = vec3(0.0, 1.0, 0.0);

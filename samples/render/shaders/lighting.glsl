@@ -1,6 +1,6 @@
-// How much of the light arrives: a key light with a penumbra that grows with the distance of what
-// throws it, and a sky of many weak lights, each with a shadow map of its own. Their sum is ambient
-// light that knows what is near: dark under the chin, between the legs, where a foot meets the ground.
+// The visible part of the light. The key light has a penumbra that grows with the distance of the occluder. The sky consists of
+// many weak lights, each with its own shadow map. Together they give ambient light with occlusion by nearby surfaces: dark under
+// the chin, between the legs, and where a foot meets the ground.
 #ifndef DERMIS_RENDER_LIGHTING_GLSL
 #define DERMIS_RENDER_LIGHTING_GLSL
 
@@ -14,15 +14,15 @@ layout(constant_id = 0) const int blockerTaps = 20;
 layout(constant_id = 1) const int penumbraTaps = 32;
 layout(constant_id = 2) const int skyTaps = 4;
 
-// Of two taps on a disc of radius 1 none is near the other (Vogel 1979, "A better way to construct
-// the sunflower head").
+// Sample positions on a disc of radius 1, well separated from each other (Vogel 1979, "A better way
+// to construct the sunflower head").
 vec2 discTap(int index, int count) {
   float angle = float(index) * 2.39996323;
   return sqrt((float(index) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
 }
 
-// Away from the surface by a texel's width, the more the light grazes it: so that a surface does not
-// shade itself if the map is too coarse for its slope.
+// Moves a position away from the surface by about the width of a texel, more at grazing light, so
+// that a coarse shadow map does not make a sloped surface shadow itself.
 vec3 offsetFromSurface(vec3 position, vec3 normal, float cosine, float texel) {
   float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
   return position + normal * texel * (0.6 + 1.4 * sine);
@@ -55,7 +55,7 @@ float keyVisibility(vec3 position, vec3 normal) {
   return visible / float(penumbraTaps);
 }
 
-// `radius`: of the filter, as a part of the map.
+// `radius` is that of the filter, as a fraction of the map.
 float skyVisibility(int light, vec3 position, vec3 normal, float cosine, float radius) {
   vec3 place =
       (view.skyMatrices[light] * vec4(offsetFromSurface(position, normal, cosine, view.shadow.z), 1.0)).xyz;
@@ -68,7 +68,7 @@ float skyVisibility(int light, vec3 position, vec3 normal, float cosine, float r
   return visible / float(skyTaps);
 }
 
-// What arrives of the sky's light at a surface: x as it is, y were there nothing in the way.
+// Sky light that reaches a surface: x with occlusion, y without.
 vec2 skyLight(vec3 position, vec3 normal, float radius) {
   vec2 light = vec2(0.0);
   for (int i = 0; i < int(view.sky.x); ++i) {
@@ -80,7 +80,7 @@ vec2 skyLight(vec3 position, vec3 normal, float radius) {
   return light;
 }
 
-// As displayed, linear: lighter at the horizon, darker above and below.
+// The background as displayed, in linear values: lighter at the horizon, darker above and below.
 vec3 backgroundAt(vec2 pixel) {
   vec2 place = (pixel - view.viewport.xy) / view.viewport.zw;
   vec2 fromCenter = place - vec2(0.5, 0.62);
@@ -88,9 +88,8 @@ vec3 backgroundAt(vec2 pixel) {
   return mix(view.horizonColor.rgb, view.zenithColor.rgb, far);
 }
 
-// Bayer 1973, "An optimum method for two-level rendition of continuous-tone pictures": half a step of
-// 8 bits up or down, so that gradients have no rings; in linear light, which the target stores as
-// sRGB.
+// Ordered dithering (Bayer 1973, "An optimum method for two-level rendition of continuous-tone pictures") by up to half a step of 8
+// bits, so that gradients have no bands. In linear values; the target stores sRGB.
 vec3 dithered(vec3 color, vec2 pixel) {
   uvec2 place = uvec2(pixel) & 1u;
   float amount = (float((place.x ^ place.y) << 1 | place.y) + 0.5) / 4.0 - 0.5;

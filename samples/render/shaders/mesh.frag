@@ -17,7 +17,7 @@ layout(constant_id = 4) const bool isFlat = false;  // there are no normals
 layout(constant_id = 5) const int alphaMode = 0;    // opaque, mask, blend
 
 vec3 surfaceNormal() {
-  // As the glTF specification demands of a mesh without normals.
+  // As the glTF specification requires for a mesh without normals.
   if (isFlat) {
     vec3 normal = normalize(cross(dFdx(worldPosition), dFdy(worldPosition)));
     vec3 towardsEye = view.eye.w == 0.0 ? view.eye.xyz : view.eye.xyz - worldPosition;
@@ -28,7 +28,7 @@ vec3 surfaceNormal() {
   return gl_FrontFacing ? normal : -normal;
 }
 
-// From what is nothing to what is much: slate, teal, yellow, red.
+// From low to high values: slate, teal, yellow, red.
 vec3 heat(float value) {
   const vec3 stops[5] = vec3[](vec3(0.10, 0.13, 0.22), vec3(0.05, 0.32, 0.42), vec3(0.25, 0.60, 0.30),
                                vec3(0.90, 0.65, 0.10), vec3(0.75, 0.05, 0.03));
@@ -69,13 +69,14 @@ void main() {
   vec3 normal = surfaceNormal();
   vec3 towardsEye = normalize(view.eye.w == 0.0 ? view.eye.xyz : view.eye.xyz - worldPosition);
   float metallic = draw.surface.x;
-  // Lights are directions: on a mirror they would be points, and a metal would be black between them.
+  // Lights are directions: on a mirror they would be points, and a metal would be black between them. So roughness has a minimum.
   float roughness = clamp(draw.surface.y, 0.35, 1.0);
   vec3 diffuse = base.rgb * (1.0 - 0.5 * metallic);
   vec3 reflectance = mix(vec3(0.04), base.rgb, metallic);
 
-  // At an edge the middle of a pixel may be beyond the triangle, where in a crease it is below the
-  // next one: half of what a pixel sees of the surface farther out it is in the light again.
+  // At an edge, the center of a pixel may lie outside the triangle. In a crease, this point is
+  // below the adjacent triangle, and would be in its shadow. Half a pixel farther out it is lit
+  // again.
   float seen = max(length(dFdx(worldPosition)), length(dFdy(worldPosition)));
   vec3 litPosition = worldPosition + normal * min(0.5 * seen, view.shadow.z);
 

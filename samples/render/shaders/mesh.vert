@@ -3,10 +3,10 @@
 #include "draw.glsl"
 #include "view.glsl"
 
-// What Dermis skinned, as it stands in its output buffer.
+// Skinned attributes, as stored in the output buffer of Dermis.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
-// What skinning leaves as it is.
+// Attributes that skinning does not change.
 layout(location = 2) in vec2 texcoord;
 layout(location = 3) in vec4 color;
 layout(location = 4) in float value;

@@ -1,7 +1,7 @@
 #ifndef DERMIS_RENDER_TONE_GLSL
 #define DERMIS_RENDER_TONE_GLSL
 
-// Khronos 2024, "PBR Neutral": base colors stay what they are, only highlights are compressed.
+// Khronos 2024, "PBR Neutral": base colors are unchanged, only highlights are compressed.
 vec3 toneMapped(vec3 color) {
   const float start = 0.8 - 0.04;
   const float desaturation = 0.15;

@@ -1,4 +1,4 @@
-// What one view of a picture is drawn with: samples/render/view_block.h has the same in C++.
+// Uniform data of one view of a picture. samples/render/blocks.h declares the same in C++.
 #ifndef DERMIS_RENDER_VIEW_GLSL
 #define DERMIS_RENDER_VIEW_GLSL
 
@@ -9,19 +9,20 @@ layout(std140, set = 0, binding = 0) uniform View {
   mat4 keyMatrix;                   // world to the key light's shadow map: clip coordinates
   mat4 skyMatrices[maxSkyLights];
   vec4 skyDirections[maxSkyLights]; // towards the light; w: its share of the sky's light
-  vec4 eye;                         // perspective: where it is, w 1; orthographic: towards it, w 0
+  vec4 eye;                         // perspective: position, w 1; orthographic: direction towards
+                                    // the eye, w 0
   vec4 keyDirection;                // towards the light; w: tangent of its angular radius
-  vec4 keyColor;                    // what a white surface that faces it reflects
-  vec4 skyColor;                    // what a white surface reflects under all of the sky
-  vec4 bounceColor;                 // … and above the ground
-  vec4 rimDirection;                // towards the light at the back; w: its strength
+  vec4 keyColor;                    // reflected by a white surface that faces the light
+  vec4 skyColor;                    // reflected by a white surface under the whole sky
+  vec4 bounceColor;                 // reflected by a white surface above the ground
+  vec4 rimDirection;                // towards the rim light; w: its strength
   vec4 shadow;                      // key: texel, depth range; sky: texel (lengths in the world); w: 1 / map size
   vec4 sky;                         // x: number of lights, y: 1 / map size; z: widest penumbra of the key light, w: of the sky, as a part of its map
-  vec4 horizonColor;                // of the background, as displayed, linear
+  vec4 horizonColor;                // of the background, as displayed, in linear values
   vec4 zenithColor;
   vec4 ground;                      // center; w: radius at which it has faded into the background
   vec4 viewport;                    // origin and size in pixels
-  vec4 haze;                        // x: distance at which it begins, y: 1 / distance to the full, z: most
+  vec4 haze;                        // x: distance at which it begins, y: 1 / distance to the maximum, z: maximum
 } view;
 
 #endif

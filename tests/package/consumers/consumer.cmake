@@ -1,4 +1,5 @@
-# What the consumers share: an engine's strict flags, for the headers of Dermis too.
+# Functions for all consumers. Compiles with an engine's strict flags, also for the headers of
+# Dermis.
 
 # consumer_flags(TARGET)
 function(consumer_flags target)
@@ -7,8 +8,8 @@ function(consumer_flags target)
   set_target_properties(${target} PROPERTIES NO_SYSTEM_FROM_IMPORTED ON)
 endfunction()
 
-# consumer_headers(TARGET LIBRARY HEADERS...): compiles each header in a source of its own, which includes it twice; names
-# count from the include folder.
+# consumer_headers(TARGET LIBRARY HEADERS...): compiles each header in its own source file, which includes it twice. Names are
+# relative to the include folder.
 function(consumer_headers target library)
   set(sources)
   foreach(header IN LISTS ARGN)
