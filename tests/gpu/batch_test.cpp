@@ -107,7 +107,7 @@ TEST_F(BatchTest, TuningAndDescriptorsChangeNoBit) {
   for (const bool pushDescriptors : {true, false}) {
     useDevice(pushDescriptors);
     for (const Tuning tuning :
-         {Tuning{8, 1}, Tuning{16, 2}, Tuning{32, 5, 1000}, Tuning{64, 16}, Tuning{128, 4}}) {
+         {Tuning{8, 1}, Tuning{16, 2}, Tuning{32, 5, 1000}, Tuning{8, 32, 0, 16}, Tuning{128, 4}}) {
       samples::RunOptions options;
       options.tuning = tuning;
       const samples::BatchResult other = run(crowd.requests, options);

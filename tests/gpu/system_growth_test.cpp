@@ -162,7 +162,7 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   expectRefused(system.addMesh(mesh), "a packed mesh takes");
   const PoseHandle pose = must(system.addPose(8));
   must(system.addPose(12));
-  expectRefused(system.addPose(1), "the CPU writes hold 20, of which 20 are in use");
+  expectRefused(system.addPose(1), "the CPU writes hold 20 joints, of which 20 are in use");
   must(system.addPose(20, {.writer = PoseWriter::gpu}));
   expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}),
                 "the GPU writes hold 20 joints, of which 20 are in use; their maximum is 20");

@@ -301,7 +301,7 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
       {"instanceCapacity",
        [](SkinningSystemDescription& d) { d.instanceCapacity = Capacity::fixed(0); }},
       {"buffers", [&](SkinningSystemDescription& d) { d.buffers.create = create; }},
-      {"tuning",
+      {"Tuning::workgroupSize",
        [](SkinningSystemDescription& d) {
          d.tuning = Tuning{33, 4};
        }},

@@ -46,7 +46,7 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
       {dermisProgram, "verify", bar, "--threads", "1", "--json", json, "--junit", junit},
       "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
   EXPECT_EQ(result.status, 1) << result.errors;
-  const std::string what = "1 vertices are outside their bound, the first is 0;";
+  const std::string what = "1 vertices are outside their bound; the first is 0.";
   const std::string bits =
       "the result does not have the same bits as that of 64 invocations, 4 instances each";
 
