@@ -543,7 +543,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
     if (!isForComparison(method)) continue;
     bad = good;
     bad.method = method;
-    expectRefused(bad, std::string(methodName(method)) + " is for comparison");
+    expectRefused(bad, std::string(methodName(method)) + " is a method for comparison");
   }
   bad = good;
   bad.firstVertex = 204;

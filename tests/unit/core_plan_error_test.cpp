@@ -96,7 +96,7 @@ TEST_F(PlanErrors, BrokenPromises) {
   limits.promises = {2, false, false};
   expectGood();
   limits.promises.maxInfluences = 1;
-  expectInvalid({"job 0", "2 influences", "maxInfluences must be 1"});
+  expectInvalid({"job 0", "2 influences", "Promises::maxInfluences is 1"});
   limits.promises = {0, true, false};
   expectInvalid({"job 0", "morph targets", "noMorphTargets"});
   limits.promises = {0, false, true};
@@ -557,7 +557,7 @@ TEST_F(PlanErrors, Tunings) {
   }
   for (const std::uint32_t size : {0u, 1u, 4u, 9u, 65u, 96u, 256u, 0x80000000u}) {
     tuning.workgroupSize = size;
-    expectInvalid({"tuning", "workgroup"});
+    expectInvalid({"Tuning::workgroupSize"});
   }
   tuning = {};
   for (const std::uint32_t instances : {1u, 5u, 32u}) {
@@ -566,7 +566,7 @@ TEST_F(PlanErrors, Tunings) {
   }
   for (const std::uint32_t instances : {0u, 33u, 256u, 257u}) {
     tuning.instancesPerInvocation = instances;
-    expectInvalid({"tuning", "instances"});
+    expectInvalid({"Tuning::instancesPerInvocation"});
   }
   tuning = {};
   for (const std::uint32_t vertices : {1u, 2u, 16u}) {
@@ -575,7 +575,7 @@ TEST_F(PlanErrors, Tunings) {
   }
   for (const std::uint32_t vertices : {0u, 3u, 32u, 0x80000000u}) {
     tuning.verticesPerInvocation = vertices;
-    expectInvalid({"tuning", "vertices"});
+    expectInvalid({"Tuning::verticesPerInvocation"});
   }
 }
 

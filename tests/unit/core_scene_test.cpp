@@ -406,7 +406,7 @@ TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   expectRefused(bad, ErrorCode::limitExceeded, "framesInFlight");
   bad = smallScene();
   bad.tuning.workgroupSize = 3;
-  expectRefused(bad, ErrorCode::invalidArgument, "tuning");
+  expectRefused(bad, ErrorCode::invalidArgument, "Tuning::workgroupSize");
   bad = smallScene();
   bad.limits.maxWorkgroupCountX = 0;
   expectRefused(bad, ErrorCode::invalidArgument, "limits");

@@ -440,12 +440,12 @@ void addNodes(std::vector<Violation>& table) {
              f.json["scenes"][0]["nodes"] = {0, 1, 1};
            }},
           {"scene_lists_a_child", noted, Three::loads,
-           "scene 0: node 2 is not a root, but a child of node 1",
+           "scene 0: node 2 is not a root but a child of node 1",
            [](File& f) {
              f.json["scenes"][0]["nodes"] = {0, 1, 2};
            }},
           {"scene_lists_a_child_alone", refused, Three::misreads,
-           "scene 0: node 2 is not a root, but a child of node 1",
+           "scene 0: node 2 is not a root but a child of node 1",
            [](File& f) {
              f.json["scenes"][0]["nodes"] = {0, 2};
            }},

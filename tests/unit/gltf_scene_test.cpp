@@ -191,10 +191,10 @@ TEST(GltfScene, RefusesBadScenes) {
   file.json["scenes"][0]["nodes"] = {0, 7};
   expectInvalid(file, "scene 0: an entry of nodes is 7, and the file has 3 nodes");
   file.json["scenes"][0]["nodes"] = {0, 2};
-  expectInvalid(file, "scene 0: node 2 is not a root, but a child of node 1");
+  expectInvalid(file, "scene 0: node 2 is not a root but a child of node 1");
   // It is there anyway.
   file.json["scenes"][0]["nodes"] = {2, 0, 1};
-  EXPECT_EQ(expectNoted(file, "scene 0: node 2 is not a root, but a child of node 1")
+  EXPECT_EQ(expectNoted(file, "scene 0: node 2 is not a root but a child of node 1")
                 .skinnedPrimitives.size(),
             1u);
 }

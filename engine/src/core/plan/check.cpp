@@ -330,7 +330,7 @@ Result<void> checkTuning(const Tuning& tuning) {
                    std::to_string(tuning.instancesPerInvocation));
   }
   if (!std::has_single_bit(tuning.verticesPerInvocation) || tuning.verticesPerInvocation > 16) {
-    return invalid("tuning: an invocation skins a power of two of vertices from 1 to 16, not " +
+    return invalid("Tuning::verticesPerInvocation must be a power of two from 1 to 16, not " +
                    std::to_string(tuning.verticesPerInvocation));
   }
   return {};
