@@ -96,6 +96,8 @@ TEST_F(RoundingTest, HalvesBecomeInfiniteFromHalfAStepAboveTheLargest) {
 
 // Of the size of a box with a side of 2 · 32767, a step of snorm16 is 1: halves are ties.
 TEST_F(RoundingTest, TiesOfSnormGoToTheEvenOne) {
+  if (context().limits().maxStorageBuffersPerStage < storageBuffersWanted)
+    GTEST_SKIP() << "the device has too few storage buffers for snorm16 positions";
   constexpr float half = 32767;
   std::vector<float> values;
   std::vector<int> expected;

@@ -90,7 +90,11 @@ TEST_F(StagedTest, EveryRecordHasTheSameBits) {
                    std::string(formatName(layout.tangents)));
       const Result<samples::BatchResult> a = run(*staged, crowd, layout, {64, 4});
       const Result<samples::BatchResult> b = run(*plain, crowd, layout, {64, 4});
-      ASSERT_TRUE(a.ok() && b.ok());
+      // Kernels with fewer buffers only store words.
+      if (plain->limits().maxStorageBuffersPerStage < storageBuffersWanted &&
+          layout.positions == float16x3)
+        continue;
+      ASSERT_TRUE(a.ok() && b.ok()) << (a ? b : a).error().message;
       expectSame(*a, *b);
       if (method == Method::linear) break;
     }
