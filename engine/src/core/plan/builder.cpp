@@ -499,12 +499,10 @@ void PlanBuilder::writeInstances() {
 
 namespace {
 
-using RecordWords = std::array<std::uint32_t, abi::INSTANCE_WORDS>;
-
 /// Whether each word increases by the same amount from record to record.
 bool areEvenlySpaced(std::span<const std::uint32_t> records) {
   if (records.size() < 2 * abi::INSTANCE_WORDS) return false;
-  RecordWords expected, step;
+  std::array<std::uint32_t, abi::INSTANCE_WORDS> expected, step;
   for (std::size_t word = 0; word < expected.size(); ++word) {
     expected[word] = records[expected.size() + word];
     step[word] = records[expected.size() + word] - records[word];
