@@ -22,7 +22,7 @@ struct Mesh {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
   std::vector<Vec3> colours;         // linear red, green, blue, 0 to 1
-  std::vector<std::size_t> regions;  // that each vertex belongs to; empty if nobody asked
+  std::vector<std::size_t> regions;  // the region of each vertex; empty if not requested
   std::vector<Influences> influences;
   std::vector<std::uint32_t> indices;  // triangles, counter-clockwise seen from outside
 };

@@ -10,7 +10,7 @@ namespace dermis::samples::render {
 
 inline constexpr std::uint32_t maxSkyLights = 32;
 
-/// std140: only matrices and vectors of four components, so that there is no padding.
+/// Layout std140. All members are matrices or vectors of four components, which need no padding.
 struct ViewBlock {
   glm::mat4 viewProjection{1.0f};
   glm::mat4 keyMatrix{1.0f};

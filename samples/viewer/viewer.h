@@ -18,10 +18,10 @@ class Viewer {
  public:
   Viewer(const Options& options, Presenter& presenter);
 
-  /// Runs until the user quits, or until the requested number of frames has been shown. The latter
-  /// runs end at the first error, because nobody is there to read it. Returns the exit status: not
-  /// `done` if the program could not do what the command line requests. Fails with `vulkanError` if
-  /// the device does.
+  /// Runs until the user quits, or until the requested number of frames has been shown. With a
+  /// number of frames, the run is unattended and ends at the first error. Returns the exit status:
+  /// not `done` if the program could not do what the command line requests. Fails with
+  /// `vulkanError` if a Vulkan call fails.
   Result<samples::ExitStatus> run();
 
  private:

@@ -68,8 +68,8 @@ Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesy
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
   return guarded([&] {
     const FileToRead file = findFile(path);
-    // A name without a folder is in the current folder; an empty folder would mean that there is
-    // none.
+    // A path without a folder is relative to the current folder. An empty folder would mean that
+    // the file has no folder.
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
     try {
       return readModel(readModelFile(file), folder, options);

@@ -14,8 +14,7 @@ namespace dermis {
 namespace {
 
 // glslang counts its users itself, but not under a lock in every version. The lock and the count
-// are constant-initialized and hold nothing, so that there is nothing to destroy when the program
-// ends.
+// are constant-initialized and own no memory, so no destructor runs when the program ends.
 class GlslangUse {
  public:
   GlslangUse() {
