@@ -264,10 +264,10 @@ struct ResultRecord {
   uint minX;
   uint minY;
   uint minZ;
-  uint clampedVertices;
   uint maxX;
   uint maxY;
   uint maxZ;
+  uint clampedVertices;
   uint reserved;
 };
 

@@ -56,11 +56,17 @@ uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
 #endif
 
 #ifdef WIDE
-layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records24 { u64vec3 records24[]; };
+layout(set = 0, binding = BINDING_POSITIONS, scalar) buffer Records24 { u64vec3 records24[]; };
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 
 // `index` counts records. It is incremented from instance to instance, because lavapipe divides slowly.
 uint recordPlace(uint byte) { return byte / max(RECORD, 1u); }
+
+// Loads the float32x3 position at the beginning of a 24-byte record.
+uvec4 loadRecordPosition(uint index) {
+  uvec2 high = unpackUint2x32(records24[index].y);
+  return uvec4(unpackUint2x32(records24[index].x), high.x, 0u);
+}
 
 // Stores RECORD bytes at once. This takes less time with drivers that store lane by lane.
 void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {

@@ -193,9 +193,17 @@ struct Work {
 };
 
 #ifdef HAS_MOTION
+// The position that this frame's will overwrite.
+uvec4 keptPosition(Instance instance) {
+#ifdef WIDE
+  if (RECORD == 24u && POSITION_FORMAT == FORMAT_FLOAT32X3) return loadRecordPosition(instance.recordPlace);
+#endif
+  return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+}
+
 uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
   if ((instance.record.joints & INSTANCE_RESTARTS) != 0u) return current;
-  if (MOTION == MOTION_KEPT) return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  if (MOTION == MOTION_KEPT) return keptPosition(instance);
   ExtensionRecord extension = loadExtension(instance.record.extension);
   Vertex before = work.bind;
   if (MORPHS) {
@@ -211,7 +219,7 @@ uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
 void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef HAS_MOTION
   if (MOTION != MOTION_NONE && (instance.record.joints & INSTANCE_SETTLES) != 0u) {
-    uvec4 words = loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+    uvec4 words = keptPosition(instance);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     return;
   }

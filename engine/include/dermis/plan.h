@@ -175,8 +175,8 @@ struct Job {
 /// `uintBitsToFloat((n & 0x80000000u) != 0u ? n & 0x7fffffffu : ~n)`.
 struct InstanceResult {
   std::uint32_t orderedMin[3] = {0xffffffffu, 0xffffffffu, 0xffffffffu};
-  std::uint32_t clampedVertices = 0;  ///< number of vertices outside `Job::box`
   std::uint32_t orderedMax[3] = {0, 0, 0};
+  std::uint32_t clampedVertices = 0;  ///< number of vertices outside `Job::box`
   std::uint32_t reserved = 0;
 
   /// The exact box of the skinned float32 positions, before conversion to their format. NaNs are
