@@ -132,7 +132,7 @@ void skinEverywhere(const FileBuilder& file, const std::string& ending,
   }
 }
 
-// ---- joint index outside the palette, NaN or infinite position/weight, negative weight, counts
+// ---- joint index outside the pose, NaN or infinite position/weight, negative weight, counts
 // ---- that disagree, empty mesh, strides too small
 
 /// Ten vertices on a line; vertex v hangs on joint v % 3 by 0.75 and on the next by 0.25.
@@ -206,7 +206,7 @@ void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::s
   EXPECT_TRUE(validate(repaired->view(), LineMesh::jointCount).packable());
   ASSERT_TRUE(pack(repaired->view(), LineMesh::jointCount).ok());
 
-  // Each joint lifts by its number: what is left of the weights is normalised.
+  // Each joint lifts by its number: what is left of the weights is normalized.
   std::vector<JointMatrix> pose(LineMesh::jointCount);
   for (std::size_t joint = 0; joint < pose.size(); ++joint)
     pose[joint].m[2][3] = 4 * static_cast<float>(joint);
@@ -300,7 +300,7 @@ TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndR
       joint.add<std::uint8_t>({0, 9, 0, 0, 1, 9, 0, 0, 0, 1, 0, 0}, "VEC4", unsignedByteType);
   joint.attributes()["WEIGHTS_0"] =
       joint.addFloats({1, 0, 0, 0, 0.5f, 0.5f, 0, 0, 0.25f, 0.75f, 0, 0}, "VEC4");
-  expectWarning(joint, "mesh 'Fox', vertex 1: joint 9 is outside the palette of 2");
+  expectWarning(joint, "mesh 'Fox', vertex 1: joint 9 is outside the pose of 2 joints");
   FileBuilder position = fox();
   position.attributes()["POSITION"] =
       position.addFloats({0, 0, 0, 1, 0, 0, nan, 2, infinity}, "VEC3");
@@ -326,7 +326,7 @@ TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndR
 
 // ---- weights that do not sum to 1
 
-TEST_F(BadInput, WeightsThatDoNotSumToOneAreNormalisedOverAllSetsAndCounted) {
+TEST_F(BadInput, WeightsThatDoNotSumToOneAreNormalizedOverAllSetsAndCounted) {
   FileBuilder file = fox(), expected = fox();
   const std::vector<std::uint8_t> swapped{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
   file.attributes()["JOINTS_1"] = file.add(swapped, "VEC4", unsignedByteType);
@@ -369,7 +369,7 @@ FileBuilder rotating(const std::vector<float>& times, const std::vector<float>& 
   return file;
 }
 
-TEST_F(BadInput, RotationKeysThatAreNotOfUnitLengthAreNormalisedAndCounted) {
+TEST_F(BadInput, RotationKeysThatAreNotOfUnitLengthAreNormalizedAndCounted) {
   const FileBuilder file = rotating({0, 1}, {0, 0, 0, 7, 0, 0, 3, 3}, "LINEAR");
   const float half = std::sqrt(0.5f);
   const FileBuilder unit = rotating({0, 1}, {0, 0, 0, 1, 0, 0, half, half}, "LINEAR");

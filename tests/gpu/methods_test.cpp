@@ -180,7 +180,7 @@ TEST_P(MethodTest, Truth14_AnInfluenceOfWeightZeroHasNoEffectInAnyBit) {
     for (std::size_t slot = 0; slot < mesh.joints.size(); ++slot) {
       if (mesh.joints[slot] == 7) mesh.weights[slot] = without.weights[slot] = 0;
       if (mesh.weights[slot] == 0) without.joints[slot] = 0;
-      // Without weight a joint outside the palette is none either.
+      // Without weight a joint outside the pose is none either.
       if (mesh.weights[slot] == 0 && slot % 3 == 0) mesh.joints[slot] = 0xffffffffu;
     }
     const std::vector<JointMatrix> pose = randomPose(6, 8, rigidity);
@@ -238,7 +238,7 @@ TEST_P(MethodTest, Truth08_RigidJointsGiveARigidResult) {
   // Linear blending shrinks: there that is looked for.
   const bool shrinks = GetParam() == Method::linear || GetParam() == Method::blended;
   int shrunk = 0;
-  // Four vertices a body, of the same weights and the same centre of rotation.
+  // Four vertices a body, of the same weights and the same center of rotation.
   OwnedMesh mesh = randomMesh(9, 1000, 30, 4);
   for (std::size_t vertex = 0; vertex < 1000; ++vertex) {
     const std::size_t body = vertex / 4 * 4;
@@ -291,7 +291,7 @@ Turned turnedOf(const samples::SkinnedVertices& skinned) {
   return {angle < -1e-3 ? angle + 360 : angle, std::hypot(x, y)};
 }
 
-/// (1, 0, 0) between joints 0, 1, …; its centre of rotation on the axis; of `blended` the dual
+/// (1, 0, 0) between joints 0, 1, …; its center of rotation on the axis; of `blended` the dual
 /// quaternions.
 OwnedMesh pointOf(std::vector<float> weights) {
   OwnedMesh mesh;

@@ -193,7 +193,7 @@ TEST_F(InputTest, Truth14_ASlotOfWeightZeroHasNoEffectInAnyBit) {
   }
 }
 
-TEST_F(InputTest, Truth05_UnnormalisedWeightsAreNormalised) {
+TEST_F(InputTest, Truth05_UnnormalizedWeightsAreNormalized) {
   OwnedMesh scaled = plain;
   for (float& weight : scaled.weights) weight *= 1024;
   expectAsPlain(scaled.view(), 0);
@@ -226,7 +226,7 @@ TEST_F(InputTest, RefusesWhatPackRefuses) {
   OwnedMesh mesh = plain;
   mesh.joints[17 * 4] = 12;
   mesh.weights[17 * 4] = 1;
-  refused(mesh, "vertex 17: joint 12 is outside the palette of 12");
+  refused(mesh, "vertex 17: joint 12 is outside the pose of 12 joints");
   mesh = plain;
   mesh.weights[3 * 4 + 1] = -1;
   refused(mesh, "vertex 3");

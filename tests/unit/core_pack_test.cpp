@@ -441,7 +441,7 @@ TEST(Pack, RefusesWhatValidateRefuses) {
   OwnedMesh mesh = slottedMesh(1, 65, 2, 10);
   mesh.joints[64 * 2] = 31;
   mesh.weights[64 * 2] = 1;
-  refused(mesh, 24, "mesh 'slotted', vertex 64: joint 31 is outside the palette of 24");
+  refused(mesh, 24, "mesh 'slotted', vertex 64: joint 31 is outside the pose of 24 joints");
   mesh.weights[64 * 2] = nan;
   refused(mesh, 24, "mesh 'slotted', vertex 64: the weight of joint 31 is not finite");
   mesh.weights[64 * 2] = -1;

@@ -440,11 +440,11 @@ TEST_F(ValidateTest, JointsOutsideThePose) {
   EXPECT_TRUE(validate(view, jointCount).findings.empty());
   mesh.joints[7 * 4 + 1] = 31;
   EXPECT_EQ(onlyFinding(MeshProblem::jointOutOfRange, 1, 7),
-            "mesh 'Fox', vertex 7: joint 31 is outside the palette of 24");
+            "mesh 'Fox', vertex 7: joint 31 is outside the pose of 24 joints");
   mesh.joints[6 * 4] = jointCount;
   mesh.joints[9 * 4] = 0xffffffffu;
   EXPECT_EQ(onlyFinding(MeshProblem::jointOutOfRange, 3, 6),
-            "mesh 'Fox', vertex 6: joint 24 is outside the palette of 24");
+            "mesh 'Fox', vertex 6: joint 24 is outside the pose of 24 joints");
 }
 
 TEST_F(ValidateTest, Truth14_JointsOfSlotsWithoutWeightMayBeAnything) {
@@ -553,7 +553,7 @@ TEST_F(ValidateTest, DuplicateJoints) {
             "mesh 'Fox', vertex 2: joint 2 has weight twice");
 }
 
-TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbours) {
+TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbors) {
   const std::uint32_t joints[] = {9, 4, 9, 1};
   const float weights[] = {0.25f, 0.25f, 0.25f, 0.25f};
   for (std::size_t slot = 0; slot < 4; ++slot) {

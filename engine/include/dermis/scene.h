@@ -166,7 +166,7 @@ struct InstanceChange {
 /// Sets both `InstanceChange::visible` and `InstanceChange::updateInterval` of an instance.
 struct InstanceVisibility {
   InstanceHandle instance = {};
-  bool isVisible = true;
+  bool visible = true;
   std::uint32_t updateInterval = 1;
 };
 

@@ -43,7 +43,7 @@ struct MeshFinding {
   std::uint64_t count = 0;        ///< number of vertices, morph displacements or views that have it
   std::uint32_t firstVertex = 0;  ///< the first such vertex
   /// A sentence about the first place, for example "mesh 'Fox', vertex 17: joint 31 is outside the
-  /// palette of 24".
+  /// pose of 24 joints".
   std::string message;
 };
 

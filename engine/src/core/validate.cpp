@@ -306,8 +306,8 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
       }
       if (joint >= jointCount) {
         findings.addVertex(MeshProblem::jointOutOfRange, vertex, [&] {
-          return "joint " + std::to_string(joint) + " is outside the palette of " +
-                 std::to_string(jointCount);
+          return "joint " + std::to_string(joint) + " is outside the pose of " +
+                 std::to_string(jointCount) + " joints";
         });
         good = false;
         continue;

@@ -236,7 +236,7 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   if (jointCount == 0 || jointCount > maxPoseJoints) {
     return Error{ErrorCode::invalidArgument,
-                 "mesh " + inQuotes(mesh.name) + ": a palette has 1 to " +
+                 "mesh " + inQuotes(mesh.name) + ": a pose has 1 to " +
                      std::to_string(maxPoseJoints) + " joints, not " + std::to_string(jointCount)};
   }
   if (const Result<void> accepted = validate(mesh, jointCount).accepted(); !accepted)

@@ -440,14 +440,14 @@ Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> insta
     }
     InstanceState& state = states[handle.index];
     state.updateInterval = wanted.updateInterval;
-    if (state.isVisible == wanted.isVisible) continue;
-    if (wanted.isVisible && (state.isStale || state.isMoving)) {
+    if (state.isVisible == wanted.visible) continue;
+    if (wanted.visible && (state.isStale || state.isMoving)) {
       show(state, handle);
       continue;
     }
     // `show` and `hide` without calls: no list gets longer.
-    state.isVisible = wanted.isVisible;
-    if (!wanted.isVisible) {
+    state.isVisible = wanted.visible;
+    if (!wanted.visible) {
       if (state.visibleFrom != record + 1) state.hiddenAfter = record;
     } else if (state.hiddenAfter != record) {
       state.visibleFrom = record + 1;
