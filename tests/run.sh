@@ -2,7 +2,7 @@
 # Builds Dermis with all warnings as errors and runs its tests. Installs missing packages first.
 #
 #   tests/run.sh [PRESET]          ci (the default), dev, release, asan or tsan: builds all, runs all tests
-#   tests/run.sh sanitized         Dermis and the samples with address and undefined-behaviour sanitizers: tests of what works on the
+#   tests/run.sh sanitized         Dermis and the samples with address and undefined-behavior sanitizers: tests of what works on the
 #                                  CPU, and a small suite on a device
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #

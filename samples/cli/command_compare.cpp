@@ -14,11 +14,11 @@
 #include "comparison_subject.h"
 #include "dermis/text.h"
 #include "driver_version.h"
-#include "file_name.h"
 #include "open_device.h"
-#include "output_file.h"
-#include "picture_writer.h"
-#include "progress.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
+#include "program/progress.h"
+#include "render/picture_writer.h"
 
 namespace dermis::cli {
 namespace {

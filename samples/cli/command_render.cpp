@@ -13,11 +13,11 @@
 #include "commands.h"
 #include "crowd.h"
 #include "drawn_scene.h"
-#include "file_name.h"
 #include "method_options.h"
-#include "picture_writer.h"
-#include "progress.h"
+#include "program/file_name.h"
+#include "program/progress.h"
 #include "render/pass_counter.h"
+#include "render/picture_writer.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

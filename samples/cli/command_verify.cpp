@@ -14,7 +14,7 @@
 
 #include "commands.h"
 #include "open_device.h"
-#include "progress.h"
+#include "program/progress.h"
 #include "verification_report.h"
 
 namespace dermis::cli {

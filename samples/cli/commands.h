@@ -9,8 +9,8 @@
 #include <string>
 
 #include "dermis/gltf.h"
-#include "file_name.h"
 #include "program/exit_status.h"
+#include "program/file_name.h"
 
 namespace dermis::cli {
 

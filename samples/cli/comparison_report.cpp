@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "output_file.h"
+#include "program/output_file.h"
 #include "program/plain_text.h"
 
 namespace dermis::cli {

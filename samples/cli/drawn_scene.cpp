@@ -8,10 +8,10 @@
 #include <set>
 #include <utility>
 
-#include "appearance/winding.h"
 #include "barrier.h"
 #include "bind_pose.h"
 #include "dermis/vulkan/scope.h"
+#include "render/winding.h"
 
 namespace dermis::cli {
 namespace {

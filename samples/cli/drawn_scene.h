@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "appearance/appearances.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "open_device.h"
+#include "render/appearances.h"
 #include "render/renderer.h"
 #include "skinned_scene.h"
 

@@ -9,7 +9,7 @@
 #include "dermis/centers_of_rotation.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
-#include "progress.h"
+#include "program/progress.h"
 #include "solve_centers.h"
 
 namespace dermis::cli {

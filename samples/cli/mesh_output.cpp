@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "file_name.h"
 #include "mesh_formats.h"
-#include "output_file.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 
 namespace dermis::cli {
 

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "output_file.h"
 #include "picture_sheet.h"
+#include "program/output_file.h"
 #include "program/plain_text.h"
 
 namespace dermis::cli {

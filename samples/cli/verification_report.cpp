@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "output_file.h"
+#include "program/output_file.h"
 #include "program/plain_text.h"
 
 namespace dermis::cli {

@@ -3,12 +3,9 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
 #include <vector>
 
-#include "dermis/result.h"
-#include "dermis/vulkan/bindings.h"
-#include "device.h"
+#include "buffer_memory.h"
 
 namespace dermis::samples {
 
@@ -17,20 +14,13 @@ class DeviceBuffer {
   /// `size` may be 0: an empty range.
   static Result<DeviceBuffer> create(Device& device, std::uint64_t size, VkBufferUsageFlags usage);
   DeviceBuffer() = default;
-  ~DeviceBuffer();
-  DeviceBuffer(DeviceBuffer&& other) noexcept { *this = std::move(other); }
-  DeviceBuffer& operator=(DeviceBuffer&& other) noexcept;
 
-  /// The whole buffer; a null buffer if it is empty.
-  vulkan::BufferRange range() const { return {buffer_, 0, size_}; }
+  vulkan::BufferRange range() const { return buffer_.range(); }
   /// Waits for the kernels that were submitted before, and returns what they wrote.
   Result<std::vector<std::byte>> read() const;
 
  private:
-  Device* device_ = nullptr;
-  VkBuffer buffer_ = VK_NULL_HANDLE;
-  VkDeviceMemory memory_ = VK_NULL_HANDLE;
-  std::uint64_t size_ = 0;
+  BufferMemory buffer_;
 };
 
 }  // namespace dermis::samples

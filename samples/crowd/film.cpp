@@ -8,12 +8,12 @@
 
 #include <glm/trigonometric.hpp>
 
-#include "appearance/winding.h"
 #include "barrier.h"
 #include "coarse_triangles.h"
 #include "dermis/vulkan/scope.h"
 #include "frames.h"
 #include "program/exit_status.h"
+#include "render/winding.h"
 
 using namespace dermis;
 

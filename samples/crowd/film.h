@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "appearance/appearances.h"
 #include "crowd.h"
 #include "crowd_report.h"
 #include "open_device.h"
-#include "picture_writer.h"
-#include "progress.h"
+#include "program/progress.h"
+#include "render/appearances.h"
 #include "render/pass_counter.h"
+#include "render/picture_writer.h"
 #include "render/renderer.h"
 #include "statistics_panel.h"
 #include "stroll.h"

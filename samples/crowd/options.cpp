@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "file_name.h"
-#include "picture_writer.h"
+#include "program/file_name.h"
 #include "program/program.h"
+#include "render/picture_writer.h"
 
 using namespace dermis;
 

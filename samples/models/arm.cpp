@@ -17,7 +17,7 @@ constexpr int bendIntervals = 24;
 constexpr double elbowZone = 0.060;  // half the length over which the weights go over
 constexpr double wristZone = 0.035;
 
-const Vec3 skinColour(0.610, 0.340, 0.230);
+const Vec3 skinColor(0.610, 0.340, 0.230);
 
 // Along x, palm towards the viewer on +z, bending upwards.
 const Frame armFrame{{0.0, 0.0, 0.0}, {0.0, 0.0, -1.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}};
@@ -33,7 +33,7 @@ Mesh makeMesh() {
   Shape shape;
   for (const Piece& piece : armPieces(armFrame)) shape.add(piece.solid, piece.blend);
   const Field field = [&shape](const Vec3& point) { return shape.distance(point); };
-  QuadMesh quads = polygonise(field, gridOver({-0.08, -0.08, -0.08}, {0.78, 0.16, 0.08}, cellSize));
+  QuadMesh quads = polygonize(field, gridOver({-0.08, -0.08, -0.08}, {0.78, 0.16, 0.08}, cellSize));
   relax(quads, field, relaxSteps);
 
   Mesh mesh;
@@ -41,7 +41,7 @@ Mesh makeMesh() {
   mesh.positions = quads.positions;
   mesh.normals = smoothNormals(mesh.positions, mesh.indices);
   for (const Vec3& position : mesh.positions) {
-    mesh.colours.push_back(skinColour);
+    mesh.colors.push_back(skinColor);
     mesh.influences.push_back(influencesAt(position));
   }
   return mesh;
@@ -53,10 +53,10 @@ Model armModel() {
   Model model;
   model.name = "arm";
   model.roughness = 0.6;
-  const Vec3 shoulder = armCentre(armFrame, 0.0);
-  const Vec3 elbow = armCentre(armFrame, elbowAlong);
-  const Vec3 wrist = armCentre(armFrame, wristAlong);
-  const Vec3 knuckles = armCentre(armFrame, knuckleAlong);
+  const Vec3 shoulder = armCenter(armFrame, 0.0);
+  const Vec3 elbow = armCenter(armFrame, elbowAlong);
+  const Vec3 wrist = armCenter(armFrame, wristAlong);
+  const Vec3 knuckles = armCenter(armFrame, knuckleAlong);
   model.skeleton.add("upperArm", noParent, shoulder, elbow - shoulder);
   model.skeleton.add("forearm", 0, elbow, wrist - elbow);
   model.skeleton.add("hand", 1, wrist, knuckles - wrist);

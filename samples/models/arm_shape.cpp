@@ -70,7 +70,7 @@ Vec3 thumbTip(const Frame& frame) {
   return frame.toModel(thumbEnd);
 }
 
-Vec3 armCentre(const Frame& frame, double along) {
+Vec3 armCenter(const Frame& frame, double along) {
   const Section section = sectionAt(armSections(), along);
   return frame.toModel({section.centreSide, along, section.centreFront});
 }

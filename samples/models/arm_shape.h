@@ -27,6 +27,6 @@ Vec3 thumbBase(const Frame& frame);
 Vec3 thumbTip(const Frame& frame);
 
 // The middle of the arm's cross-section at a place along it.
-Vec3 armCentre(const Frame& frame, double along);
+Vec3 armCenter(const Frame& frame, double along);
 
 }  // namespace dermis::models

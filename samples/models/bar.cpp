@@ -28,14 +28,14 @@ WeightRow weightsAt(double x) {
 }
 
 // Stripes along the bar let the eye follow the twist.
-Vec3 colourOf(std::uint32_t side) {
+Vec3 colorOf(std::uint32_t side) {
   return side / 6 % 2 == 0 ? darkStripe : lightStripe;
 }
 
-void addVertex(Mesh& mesh, const Vec3& position, const Vec3& normal, const Vec3& colour) {
+void addVertex(Mesh& mesh, const Vec3& position, const Vec3& normal, const Vec3& color) {
   mesh.positions.push_back(position);
   mesh.normals.push_back(normal);
-  mesh.colours.push_back(colour);
+  mesh.colors.push_back(color);
   mesh.influences.push_back(quantise(weightsAt(position.x)));
 }
 
@@ -53,7 +53,7 @@ void addTube(Mesh& mesh) {
     const double x = length * static_cast<double>(ring) / static_cast<double>(ringCount - 1);
     for (std::uint32_t side = 0; side < sideCount; ++side) {
       const Vec3 direction = directionOf(side);
-      addVertex(mesh, Vec3(x, 0.0, 0.0) + direction * radius, direction, colourOf(side));
+      addVertex(mesh, Vec3(x, 0.0, 0.0) + direction * radius, direction, colorOf(side));
     }
   }
   for (std::uint32_t ring = 0; ring + 1 < ringCount; ++ring) {
@@ -69,18 +69,18 @@ void addTube(Mesh& mesh) {
 // A cap has vertices of its own, because its normal differs from the tube's.
 void addCap(Mesh& mesh, double x, double outward) {
   const Vec3 normal(outward, 0.0, 0.0);
-  const auto centre = static_cast<std::uint32_t>(mesh.positions.size());
+  const auto center = static_cast<std::uint32_t>(mesh.positions.size());
   addVertex(mesh, {x, 0.0, 0.0}, normal, darkStripe);
   for (std::uint32_t side = 0; side < sideCount; ++side) {
     addVertex(mesh, Vec3(x, 0.0, 0.0) + directionOf(side) * radius, normal, darkStripe);
   }
   for (std::uint32_t side = 0; side < sideCount; ++side) {
-    const std::uint32_t first = centre + 1 + side;
-    const std::uint32_t second = centre + 1 + (side + 1) % sideCount;
+    const std::uint32_t first = center + 1 + side;
+    const std::uint32_t second = center + 1 + (side + 1) % sideCount;
     if (outward > 0.0) {
-      addTriangle(mesh, centre, first, second);
+      addTriangle(mesh, center, first, second);
     } else {
-      addTriangle(mesh, centre, second, first);
+      addTriangle(mesh, center, second, first);
     }
   }
 }

@@ -26,11 +26,11 @@ double crossing(const Vec3& from, const Vec3& to, const RegionAt& regionAt) {
   return 0.5 * (low + high);
 }
 
-using Neighbours = std::vector<std::vector<std::uint32_t>>;
+using Neighbors = std::vector<std::vector<std::uint32_t>>;
 
 // Of every edge across a border the nearer end moves onto it; a vertex with several such edges
 // takes the nearest.
-std::vector<bool> moveOntoBorders(std::vector<Vec3>& positions, const Neighbours& neighbours,
+std::vector<bool> moveOntoBorders(std::vector<Vec3>& positions, const Neighbors& neighbors,
                                   const RegionAt& regionAt) {
   std::vector<std::size_t> regions;
   regions.reserve(positions.size());
@@ -39,10 +39,10 @@ std::vector<bool> moveOntoBorders(std::vector<Vec3>& positions, const Neighbours
   std::vector<bool> isOnBorder(positions.size(), false);
   for (std::size_t vertex = 0; vertex < positions.size(); ++vertex) {
     double nearest = std::numeric_limits<double>::max();
-    for (const std::uint32_t neighbour : neighbours[vertex]) {
-      if (regions[vertex] == regions[neighbour]) continue;
-      const Vec3 edge = positions[neighbour] - positions[vertex];
-      const double fraction = crossing(positions[vertex], positions[neighbour], regionAt);
+    for (const std::uint32_t neighbor : neighbors[vertex]) {
+      if (regions[vertex] == regions[neighbor]) continue;
+      const Vec3 edge = positions[neighbor] - positions[vertex];
+      const double fraction = crossing(positions[vertex], positions[neighbor], regionAt);
       const double distance = fraction * fraction * glm::dot(edge, edge);
       if (fraction > 0.5 || distance >= nearest) continue;
       nearest = distance;
@@ -58,17 +58,17 @@ std::vector<bool> moveOntoBorders(std::vector<Vec3>& positions, const Neighbours
 
 void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t>& indices,
                    const RegionAt& regionAt, const Field& field) {
-  const Neighbours neighbours = neighboursOf(positions.size(), indices);
-  const std::vector<bool> isOnBorder = moveOntoBorders(positions, neighbours, regionAt);
+  const Neighbors neighbors = neighborsOf(positions.size(), indices);
+  const std::vector<bool> isOnBorder = moveOntoBorders(positions, neighbors, regionAt);
   for (int step = 0; step < smoothingSteps; ++step) {
     std::vector<Vec3> next = positions;
     for (std::size_t vertex = 0; vertex < positions.size(); ++vertex) {
-      const auto& around = neighbours[vertex];
+      const auto& around = neighbors[vertex];
       const bool isNearBorder = std::any_of(around.begin(), around.end(),
                                             [&](std::uint32_t each) { return isOnBorder[each]; });
       if (isOnBorder[vertex] || !isNearBorder) continue;
       Vec3 sum(0.0);
-      for (const std::uint32_t neighbour : around) sum += positions[neighbour];
+      for (const std::uint32_t neighbor : around) sum += positions[neighbor];
       const Vec3 offset = sum / static_cast<double>(around.size()) - positions[vertex];
       const Vec3 normal = unit(gradient(field, positions[vertex], normalStep));
       next[vertex] += perpendicular(offset, normal) * 0.5;
@@ -78,14 +78,14 @@ void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t
   project(positions, field);
 }
 
-void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colours) {
-  const std::size_t noRegion = colours.size();
+void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colors) {
+  const std::size_t noRegion = colors.size();
   const std::size_t vertexCount = mesh.positions.size();
   std::vector<std::size_t>& regions = mesh.regions;
   regions.assign(vertexCount, noRegion);
   // copies[vertex * regions + region]: the vertex that stands for this one in that region.
-  std::vector<std::uint32_t> copies(vertexCount * colours.size(), 0);
-  mesh.colours.assign(vertexCount, Vec3(0.0));
+  std::vector<std::uint32_t> copies(vertexCount * colors.size(), 0);
+  mesh.colors.assign(vertexCount, Vec3(0.0));
   for (std::size_t first = 0; first < mesh.indices.size(); first += 3) {
     const Vec3 middle =
         (mesh.positions[mesh.indices[first]] + mesh.positions[mesh.indices[first + 1]] +
@@ -96,16 +96,16 @@ void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colour
       const std::uint32_t vertex = mesh.indices[corner];
       if (regions[vertex] == noRegion) {
         regions[vertex] = region;
-        mesh.colours[vertex] = colours[region];
+        mesh.colors[vertex] = colors[region];
       }
       if (regions[vertex] == region) continue;
-      std::uint32_t& copy = copies[vertex * colours.size() + region];
+      std::uint32_t& copy = copies[vertex * colors.size() + region];
       if (copy == 0) {
         copy = static_cast<std::uint32_t>(mesh.positions.size());
         mesh.positions.push_back(Vec3(mesh.positions[vertex]));
         mesh.normals.push_back(Vec3(mesh.normals[vertex]));
         mesh.influences.push_back(Influences(mesh.influences[vertex]));
-        mesh.colours.push_back(colours[region]);
+        mesh.colors.push_back(colors[region]);
         regions.push_back(region);
       }
       mesh.indices[corner] = copy;

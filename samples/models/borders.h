@@ -1,4 +1,4 @@
-// Sharp borders between colours on a mesh whose vertices know nothing of them.
+// Sharp borders between colors on a mesh whose vertices know nothing of them.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 
 namespace dermis::models {
 
-// The region that a point of the surface belongs to, as an index into a list of colours.
+// The region that a point of the surface belongs to, as an index into a list of colors.
 using RegionAt = std::function<std::size_t(const Vec3&)>;
 
 // Moves vertices along edges onto the borders of regions, and evens out the others about them. The
@@ -17,8 +17,8 @@ using RegionAt = std::function<std::size_t(const Vec3&)>;
 void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t>& indices,
                    const RegionAt& regionAt, const Field& field);
 
-// Gives each triangle the colour of its region, and its vertices the region. A vertex between
-// regions is doubled, as it needs two colours.
-void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colours);
+// Gives each triangle the color of its region, and its vertices the region. A vertex between
+// regions is doubled, as it needs two colors.
+void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colors);
 
 }  // namespace dermis::models

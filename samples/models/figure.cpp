@@ -14,7 +14,7 @@ Model figureModel() {
   model.mesh.normals = surface.normals;
   model.mesh.indices = surface.indices;
   model.mesh.influences = figureWeights(shape, model.mesh);
-  paint(model.mesh, figureRegions(shape), figureColours());
+  paint(model.mesh, figureRegions(shape), figureColors());
   model.parts = figureParts();
   model.clips = {walkClip(), idleClip(), waveClip()};
   return model;

@@ -88,10 +88,10 @@ Skeleton figureSkeleton();
 // ---- What lies on the surface
 // ---------------------------------------------------------------------------------------
 std::vector<Influences> figureWeights(const FigureShape& shape, const Mesh& mesh);
-// Clothes, skin and hair: where each is, and its colour. The shape must outlive the function that
+// Clothes, skin and hair: where each is, and its color. The shape must outlive the function that
 // is returned.
 RegionAt figureRegions(const FigureShape& shape);
-const std::vector<Vec3>& figureColours();
+const std::vector<Vec3>& figureColors();
 // Body, hair, shirt, trousers, shoes: as characters come, each with a material of its own.
 std::vector<Part> figureParts();
 

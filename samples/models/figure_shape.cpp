@@ -99,25 +99,25 @@ void addLeftFoot(Shape& shape) {
 // So the grid lies in a space where hands, feet and head are larger, and what it finds is shrunk
 // back.
 struct Lens {
-  Vec3 centre;
+  Vec3 center;
   double radius;
-  double strength;  // at the centre, lengths are shrunk by 1 − strength
+  double strength;  // at the center, lengths are shrunk by 1 − strength
 };
 
 Vec3 throughLenses(Vec3 point, const std::vector<Lens>& lenses) {
   for (const Lens& lens : lenses) {
-    const Vec3 offset = point - lens.centre;
+    const Vec3 offset = point - lens.center;
     const double ratio = glm::dot(offset, offset) / (lens.radius * lens.radius);
     if (ratio >= 1.0) continue;
     const double rest = 1.0 - ratio;
     const double fade = rest * rest * rest;
-    point = lens.centre + offset * (1.0 - lens.strength * fade);
+    point = lens.center + offset * (1.0 - lens.strength * fade);
   }
   return point;
 }
 
 std::vector<Lens> lenses() {
-  const Vec3 hand = armCentre(leftArmFrame(), 0.645);
+  const Vec3 hand = armCenter(leftArmFrame(), 0.645);
   const Vec3 foot = leftFootFrame().toModel({0.0, 0.05, 0.03});
   std::vector<Lens> list = {{{0.0, 1.612, 0.050}, 0.290, 0.62}};
   for (const double side : {1.0, -1.0}) {
@@ -171,7 +171,7 @@ FigureSurface figureSurface(const FigureShape& shape) {
     return shape.whole.distance(throughLenses(point, list));
   };
   QuadMesh quads =
-      polygonise(seen, gridOver({-0.855, -0.06, -0.27}, {0.855, 1.86, 0.27}, cellSize));
+      polygonize(seen, gridOver({-0.855, -0.06, -0.27}, {0.855, 1.86, 0.27}, cellSize));
   relax(quads, seen, relaxSteps);
 
   const Field field = [&](const Vec3& point) { return shape.whole.distance(point); };

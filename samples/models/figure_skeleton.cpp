@@ -37,9 +37,9 @@ std::vector<Placed> middleBones() {
 std::vector<Placed> leftArmBones() {
   const Frame arm = leftArmFrame();
   const Vec3 clavicle(0.022, 1.425, 0.020);
-  const Vec3 elbow = armCentre(arm, elbowAlong);
-  const Vec3 wrist = armCentre(arm, wristAlong);
-  const Vec3 knuckles = armCentre(arm, knuckleAlong);
+  const Vec3 elbow = armCenter(arm, elbowAlong);
+  const Vec3 wrist = armCenter(arm, wristAlong);
+  const Vec3 knuckles = armCenter(arm, knuckleAlong);
   const Vec3 tips = arm.toModel({-0.018, 0.72, 0.05});
   return {{"Clavicle", index(Bone::upperChest), clavicle, shoulderPoint},
           {"UpperArm", index(Bone::leftClavicle), shoulderPoint, elbow},

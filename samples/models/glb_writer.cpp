@@ -48,17 +48,17 @@ int putPositions(Buffer& buffer, const std::vector<Vec3>& positions) {
   return accessor;
 }
 
-int putColours(Buffer& buffer, const std::vector<Vec3>& colours) {
+int putColors(Buffer& buffer, const std::vector<Vec3>& colors) {
   buffer.begin();
-  for (const Vec3& colour : colours) {
+  for (const Vec3& color : colors) {
     for (int axis = 0; axis < 3; ++axis) {
-      const double level = std::clamp(colour[axis], 0.0, 1.0) * 255.0 + 0.5;
+      const double level = std::clamp(color[axis], 0.0, 1.0) * 255.0 + 0.5;
       buffer.put(static_cast<std::uint32_t>(level), 1);
     }
     buffer.put(255, 1);
   }
   const int accessor =
-      buffer.end(GlbComponent::unsignedByte, "VEC4", colours.size(), GlbTarget::vertices);
+      buffer.end(GlbComponent::unsignedByte, "VEC4", colors.size(), GlbTarget::vertices);
   buffer.accessor(accessor)["normalized"] = true;
   return accessor;
 }
@@ -67,7 +67,7 @@ Json putPrimitive(Buffer& buffer, const Mesh& mesh, std::size_t material) {
   Json attributes;
   attributes["POSITION"] = putPositions(buffer, mesh.positions);
   attributes["NORMAL"] = putVectors(buffer, mesh.normals, GlbTarget::vertices);
-  if (!mesh.colours.empty()) attributes["COLOR_0"] = putColours(buffer, mesh.colours);
+  if (!mesh.colors.empty()) attributes["COLOR_0"] = putColors(buffer, mesh.colors);
 
   buffer.begin();
   for (const Influences& influences : mesh.influences) {
@@ -127,7 +127,7 @@ int putInverseBindMatrices(Buffer& buffer, const Skeleton& skeleton) {
   return buffer.end(GlbComponent::float32, "MAT4", skeleton.joints.size(), GlbTarget::none);
 }
 
-// Quaternions q and −q turn alike; neighbours in time are kept in one half so that interpolation
+// Quaternions q and −q turn alike; neighbors in time are kept in one half so that interpolation
 // goes the short way.
 std::vector<Quat> rotationsOf(const Skeleton& skeleton, const Clip& clip, std::size_t joint) {
   std::vector<Quat> rotations;

@@ -15,7 +15,7 @@ Values valuesOf(const Section& section) {
   return {section.centreSide, section.centreFront, section.halfWidth, section.front, section.back};
 }
 
-// The slope at an inner section is that between its neighbours; the curve is level at both ends.
+// The slope at an inner section is that between its neighbors; the curve is level at both ends.
 double slopeAt(const std::vector<Section>& sections, std::size_t index, std::size_t value) {
   if (index == 0 || index + 1 == sections.size()) return 0.0;
   const Section& before = sections[index - 1];

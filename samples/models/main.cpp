@@ -1,9 +1,9 @@
 // dermis-models OUTDIR: writes bar.glb, arm.glb and figure.glb into an existing folder.
 #include <string>
 
-#include "file_name.h"
 #include "models.h"
-#include "output_file.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 #include "program/program.h"
 
 namespace {

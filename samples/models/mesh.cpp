@@ -16,7 +16,7 @@ Mesh partOf(const Mesh& mesh, const Part& part) {
     places[vertex] = static_cast<std::uint32_t>(result.positions.size());
     result.positions.push_back(mesh.positions[vertex]);
     result.normals.push_back(mesh.normals[vertex]);
-    result.colours.push_back(mesh.colours[vertex]);
+    result.colors.push_back(mesh.colors[vertex]);
     result.influences.push_back(mesh.influences[vertex]);
     result.regions.push_back(region);
   }
@@ -28,22 +28,22 @@ Mesh partOf(const Mesh& mesh, const Part& part) {
   return result;
 }
 
-std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,
-                                                     const std::vector<std::uint32_t>& indices) {
-  std::vector<std::vector<std::uint32_t>> neighbours(vertexCount);
+std::vector<std::vector<std::uint32_t>> neighborsOf(std::size_t vertexCount,
+                                                    const std::vector<std::uint32_t>& indices) {
+  std::vector<std::vector<std::uint32_t>> neighbors(vertexCount);
   for (std::size_t corner = 0; corner < indices.size(); corner += 3) {
     for (std::size_t side = 0; side < 3; ++side) {
       const std::uint32_t from = indices[corner + side];
       const std::uint32_t to = indices[corner + (side + 1) % 3];
-      neighbours[from].push_back(to);
-      neighbours[to].push_back(from);
+      neighbors[from].push_back(to);
+      neighbors[to].push_back(from);
     }
   }
-  for (auto& list : neighbours) {
+  for (auto& list : neighbors) {
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
   }
-  return neighbours;
+  return neighbors;
 }
 
 std::vector<Vec3> smoothNormals(const std::vector<Vec3>& positions,

@@ -21,7 +21,7 @@ struct Influences {
 struct Mesh {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
-  std::vector<Vec3> colours;         // linear red, green, blue, 0 to 1
+  std::vector<Vec3> colors;          // linear red, green, blue, 0 to 1
   std::vector<std::size_t> regions;  // the region of each vertex; empty if not requested
   std::vector<Influences> influences;
   std::vector<std::uint32_t> indices;  // triangles, counter-clockwise seen from outside
@@ -37,9 +37,9 @@ struct Part {
 // corners in two regions, and every vertex of the part is used.
 Mesh partOf(const Mesh& mesh, const Part& part);
 
-// For each vertex, its neighbours along triangle edges, in ascending order.
-std::vector<std::vector<std::uint32_t>> neighboursOf(std::size_t vertexCount,
-                                                     const std::vector<std::uint32_t>& indices);
+// For each vertex, its neighbors along triangle edges, in ascending order.
+std::vector<std::vector<std::uint32_t>> neighborsOf(std::size_t vertexCount,
+                                                    const std::vector<std::uint32_t>& indices);
 
 // Unit normals of the vertices: the mean of the triangles about each, weighted by area.
 std::vector<Vec3> smoothNormals(const std::vector<Vec3>& positions,

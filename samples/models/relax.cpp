@@ -21,15 +21,15 @@ Vec3 projected(const Vec3& point, const Field& field) {
   return point - slope * std::clamp(amount, -longest, longest);
 }
 
-std::vector<std::vector<std::uint32_t>> quadNeighbours(const QuadMesh& mesh) {
-  std::vector<std::vector<std::uint32_t>> neighbours(mesh.positions.size());
+std::vector<std::vector<std::uint32_t>> quadNeighbors(const QuadMesh& mesh) {
+  std::vector<std::vector<std::uint32_t>> neighbors(mesh.positions.size());
   for (const Quad& quad : mesh.quads) {
     // Each inner edge is met once in each direction, so one direction is enough.
     for (std::size_t side = 0; side < 4; ++side) {
-      neighbours[quad[side]].push_back(quad[(side + 1) % 4]);
+      neighbors[quad[side]].push_back(quad[(side + 1) % 4]);
     }
   }
-  return neighbours;
+  return neighbors;
 }
 
 // The triangle of a corner of a quad and the two after it: 1 if all sides are equal, 0 if it
@@ -50,14 +50,14 @@ void project(std::vector<Vec3>& positions, const Field& field) {
 }
 
 void relax(QuadMesh& mesh, const Field& field, int steps) {
-  const auto neighbours = quadNeighbours(mesh);
+  const auto neighbors = quadNeighbors(mesh);
   for (int step = 0; step < steps; ++step) {
     std::vector<Vec3> next = mesh.positions;
     for (std::size_t vertex = 0; vertex < next.size(); ++vertex) {
       Vec3 sum(0.0);
-      for (const std::uint32_t neighbour : neighbours[vertex]) sum += mesh.positions[neighbour];
+      for (const std::uint32_t neighbor : neighbors[vertex]) sum += mesh.positions[neighbor];
       const Vec3& here = mesh.positions[vertex];
-      const Vec3 middle = sum / static_cast<double>(neighbours[vertex].size());
+      const Vec3 middle = sum / static_cast<double>(neighbors[vertex].size());
       const Vec3 normal = unit(gradient(field, here, differenceStep));
       next[vertex] = projected(here + perpendicular(middle - here, normal) * pull, field);
     }

@@ -1,12 +1,12 @@
-// Evens out a polygonised surface without leaving it.
+// Evens out a polygonized surface without leaving it.
 #pragma once
 
 #include "mesh.h"
-#include "polygonise.h"
+#include "polygonize.h"
 
 namespace dermis::models {
 
-// Moves each vertex towards the middle of its neighbours along the surface and back onto it,
+// Moves each vertex towards the middle of its neighbors along the surface and back onto it,
 // `steps` times.
 void relax(QuadMesh& mesh, const Field& field, int steps);
 

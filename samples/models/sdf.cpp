@@ -22,27 +22,27 @@ double sign(double value) {
 
 }  // namespace
 
-Solid sphere(const Vec3& centre, double radius) {
+Solid sphere(const Vec3& center, double radius) {
   return {[=](const Vec3& point) {
-            const Vec3 local = point - centre;
+            const Vec3 local = point - center;
             return std::sqrt(glm::dot(local, local)) - radius;
           },
-          {centre, radius}};
+          {center, radius}};
 }
 
-Solid ellipsoid(const Vec3& centre, const Vec3& radii) {
-  return {[=](const Vec3& point) { return ellipsoidDistance(point - centre, radii); },
-          {centre, std::max({radii.x, radii.y, radii.z})}};
+Solid ellipsoid(const Vec3& center, const Vec3& radii) {
+  return {[=](const Vec3& point) { return ellipsoidDistance(point - center, radii); },
+          {center, std::max({radii.x, radii.y, radii.z})}};
 }
 
-Solid ellipsoid(const Vec3& centre, const Vec3& radii, const Vec3& x, const Vec3& y,
+Solid ellipsoid(const Vec3& center, const Vec3& radii, const Vec3& x, const Vec3& y,
                 const Vec3& z) {
   return {[=](const Vec3& point) {
-            const Vec3 local = point - centre;
+            const Vec3 local = point - center;
             return ellipsoidDistance({glm::dot(local, x), glm::dot(local, y), glm::dot(local, z)},
                                      radii);
           },
-          {centre, std::max({radii.x, radii.y, radii.z})}};
+          {center, std::max({radii.x, radii.y, radii.z})}};
 }
 
 Solid roundCone(const Vec3& from, const Vec3& to, double fromRadius, double toRadius) {
@@ -69,11 +69,11 @@ Solid roundCone(const Vec3& from, const Vec3& to, double fromRadius, double toRa
 
 Solid mirrored(const Solid& solid) {
   const Field field = solid.field;
-  const Vec3& centre = solid.bound.centre;
+  const Vec3& center = solid.bound.center;
   return {[field](const Vec3& point) {
             return field({-point.x, point.y, point.z});
           },
-          {{-centre.x, centre.y, centre.z}, solid.bound.radius}};
+          {{-center.x, center.y, center.z}, solid.bound.radius}};
 }
 
 double smoothMinimum(double a, double b, double blend) {
@@ -102,7 +102,7 @@ void Shape::carve(const Solid& solid, double blend) {
 double Shape::distance(const Vec3& point) const {
   double distance = 1e3;
   for (const Part& part : parts_) {
-    const Vec3 local = point - part.solid.bound.centre;
+    const Vec3 local = point - part.solid.bound.center;
     const double atLeast = std::sqrt(glm::dot(local, local)) - part.solid.bound.radius;
     if (part.isCarved) {
       if (-atLeast <= distance - part.blend) continue;

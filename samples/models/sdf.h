@@ -15,7 +15,7 @@ using Field = std::function<double(const Vec3&)>;
 
 // A sphere that holds all of a field's inside.
 struct Bound {
-  Vec3 centre;
+  Vec3 center;
   double radius;
 };
 
@@ -24,10 +24,10 @@ struct Solid {
   Bound bound;
 };
 
-Solid sphere(const Vec3& centre, double radius);
-Solid ellipsoid(const Vec3& centre, const Vec3& radii);
+Solid sphere(const Vec3& center, double radius);
+Solid ellipsoid(const Vec3& center, const Vec3& radii);
 // An ellipsoid whose own axes are the unit vectors x, y, z, at right angles to one another.
-Solid ellipsoid(const Vec3& centre, const Vec3& radii, const Vec3& x, const Vec3& y, const Vec3& z);
+Solid ellipsoid(const Vec3& center, const Vec3& radii, const Vec3& x, const Vec3& y, const Vec3& z);
 // Two spheres and the cone that touches both.
 Solid roundCone(const Vec3& from, const Vec3& to, double fromRadius, double toRadius);
 // `solid` mirrored at x = 0.

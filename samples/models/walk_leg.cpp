@@ -20,7 +20,7 @@ struct Key {
   double value;
 };
 
-// Cubic Hermite curve through keys, with the slope between neighbours; keys lie on both sides of
+// Cubic Hermite curve through keys, with the slope between neighbors; keys lie on both sides of
 // the phase.
 double curve(const std::vector<Key>& keys, double phase) {
   std::size_t index = 1;
@@ -82,7 +82,7 @@ Vec3 stanceAnkle(double phase) {
   return flat + pitched(ballForward, up + bulge, 0.0) - pitched(ballForward, up, pitch);
 }
 
-// The path through the air joins the path on the ground with its speed, because neighbours on the
+// The path through the air joins the path on the ground with its speed, because neighbors on the
 // ground are keys too.
 Vec3 swingAnkle(double phase) {
   static const std::vector<std::array<double, 3>> inAir = {

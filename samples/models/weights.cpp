@@ -37,30 +37,30 @@ Influences quantise(const WeightRow& weights) {
 
 std::vector<Influences> diffuseWeights(const Mesh& mesh, const Diffusion& diffusion) {
   const std::size_t jointCount = diffusion.jointCount;
-  const auto neighbours = neighboursOf(mesh.positions.size(), mesh.indices);
+  const auto neighbors = neighborsOf(mesh.positions.size(), mesh.indices);
   std::vector<double> current(mesh.positions.size() * jointCount, 0.0);
-  for (std::size_t vertex = 0; vertex < neighbours.size(); ++vertex) {
+  for (std::size_t vertex = 0; vertex < neighbors.size(); ++vertex) {
     current[vertex * jointCount + diffusion.nearestJoint[vertex]] = 1.0;
   }
   std::vector<double> next(current.size());
   for (int step = 0; step < diffusion.steps; ++step) {
-    for (std::size_t vertex = 0; vertex < neighbours.size(); ++vertex) {
+    for (std::size_t vertex = 0; vertex < neighbors.size(); ++vertex) {
       double* row = &next[vertex * jointCount];
       const double share = 0.5 * diffusion.spread[vertex];
-      const double part = share / static_cast<double>(neighbours[vertex].size());
+      const double part = share / static_cast<double>(neighbors[vertex].size());
       for (std::size_t joint = 0; joint < jointCount; ++joint) {
         row[joint] = current[vertex * jointCount + joint] * (1.0 - share);
       }
-      for (const std::uint32_t neighbour : neighbours[vertex]) {
-        const double* from = &current[neighbour * jointCount];
+      for (const std::uint32_t neighbor : neighbors[vertex]) {
+        const double* from = &current[neighbor * jointCount];
         for (std::size_t joint = 0; joint < jointCount; ++joint) row[joint] += from[joint] * part;
       }
     }
     current.swap(next);
   }
   std::vector<Influences> influences;
-  influences.reserve(neighbours.size());
-  for (std::size_t vertex = 0; vertex < neighbours.size(); ++vertex) {
+  influences.reserve(neighbors.size());
+  for (std::size_t vertex = 0; vertex < neighbors.size(); ++vertex) {
     WeightRow row(jointCount);
     for (std::size_t joint = 0; joint < jointCount; ++joint) {
       const double weight = current[vertex * jointCount + joint];

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "file_name.h"
+#include "program/file_name.h"
 #include "program/program.h"
 
 namespace dermis::viewer {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "output_file.h"
+#include "program/output_file.h"
 
 namespace dermis::viewer {
 

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "file_name.h"
 #include "interface.h"
 #include "joint_overlay.h"
 #include "keys.h"
 #include "program/exit_status.h"
+#include "program/file_name.h"
 #include "screenshot.h"
 
 namespace dermis::viewer {

@@ -1,6 +1,6 @@
 // How fast the CPU path is, beside a plain loop and, where it was built with
 // -DDERMIS_BENCH_OZZ=FOLDER, ozz-animation's SkinningJob (linear blending, by SIMD; it leaves
-// normals unnormalised, and gets its palettes ready). All take turns in one process; the best round
+// normals unnormalized, and gets its palettes ready). All take turns in one process; the best round
 // counts.
 //
 //   dermis_cpu_benchmark [VERTICES|MODEL [INSTANCES [ROUNDS]]]    10,000 vertices, 200 instances,

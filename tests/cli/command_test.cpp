@@ -220,11 +220,12 @@ TEST(CommandTest, APoseThatIsNotFiniteIsNotVerified) {
   REQUIRE_DEVICE();
   // Each scale fits into float32, their product does not.
   const std::string path = writeModel("infinite.gltf", "a", "[1e30,1,1]", "[1e30,1,1]");
-  EXPECT_EQ(dermis({"verify", path}).status, 1);
+  EXPECT_EQ(dermis({"verify", path, "--quick"}).status, 1);
   const CommandResult skinned = dermis({"skin", path, "-o", outFile("infinite.ply")});
   EXPECT_EQ(skinned.status, 0);
   EXPECT_NE(skinned.errors.find("not finite"), std::string::npos) << skinned.errors;
-  const CommandResult good = dermis({"verify", writeModel("finite.gltf", "a", "[1,2,-0.001]")});
+  const CommandResult good =
+      dermis({"verify", writeModel("finite.gltf", "a", "[1,2,-0.001]"), "--quick"});
   EXPECT_EQ(good.status, 0) << good.output;
   EXPECT_EQ(good.output.find("only asked"), std::string::npos) << good.output;
 }
@@ -505,8 +506,8 @@ TEST(CommandTest, NoModelSpoilsTheReportOfAnother) {
   const std::string huge = writeModel("huge.gltf", "a", "[1e37,1,1]");
   const std::string larger = writeModel("larger.gltf", "a", "[1e38,1e38,1e38]");
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
-  const CommandResult result = dermis(
-      {"verify", outFile("none.glb"), far, huge, larger, bar, "--json", json, "--junit", junit});
+  const CommandResult result = dermis({"verify", outFile("none.glb"), far, huge, larger, bar,
+                                       "--quick", "--json", json, "--junit", junit});
   EXPECT_EQ(result.status, 3) << result.output << result.errors;
   for (const std::string& refused : {far, larger}) {
     EXPECT_EQ(countOf(result.errors, "dermis: error: " + refused + ": node 0 'a', mesh"), 1u)

@@ -151,7 +151,7 @@ TEST_F(StrollTest, WhoIsFarAwayIsUpdatedLessOften) {
   }
 }
 
-TEST_F(StrollTest, FiguresWearColoursOfTheirOwn) {
+TEST_F(StrollTest, FiguresWearColorsOfTheirOwn) {
   const Wardrobe wardrobe(*character_);
   for (std::uint32_t part = 0; part < character_->parts().size(); ++part) {
     std::set<std::array<float, 3>> tints;

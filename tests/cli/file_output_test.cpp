@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "dermis_command.h"
-#include "file_name.h"
 #include "gltf_builder.h"
-#include "output_file.h"
 #include "ply.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 #include "test_paths.h"
 
 namespace dermis::test {

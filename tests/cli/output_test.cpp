@@ -160,7 +160,7 @@ TEST(OutputTest, KeepsWhatSkinningLeavesAsItIs) {
   EXPECT_EQ(pose.obj.objects.at(0).name, "Body");
 }
 
-// A validator refuses colours and factors outside 0 to 1, normals that are not of unit length, and
+// A validator refuses colors and factors outside 0 to 1, normals that are not of unit length, and
 // whatever is not finite.
 TEST(OutputTest, MendsInAGlbWhatGltfForbids) {
   constexpr float infinity = std::numeric_limits<float>::infinity();

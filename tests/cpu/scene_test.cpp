@@ -193,7 +193,7 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
   expectRefused(cpu::SkinningSystem::create(tiny), "output");
 }
 
-// What a neighbour finds out later does not take it away either.
+// What a neighbor finds out later does not take it away either.
 // On a 32-bit system these bytes would be counted modulo 2^32.
 TEST(CpuSceneCreationTest, MoreOutputThanAnObjectCanHoldIsRefused) {
   cpu::SkinningSystemDescription description;

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string>
 
-#include "file_name.h"
-#include "output_file.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 
 namespace dermis::test {
 namespace {

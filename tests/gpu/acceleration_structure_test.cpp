@@ -58,15 +58,15 @@ double length(const reference::Double3& v) {
   return std::hypot(v[0], v[1], v[2]);
 }
 
-/// At the centre of the triangle, from a distance of 1.
+/// At the center of the triangle, from a distance of 1.
 Ray rayAt(const Triangle& triangle) {
   const reference::Double3 normal =
       cross(difference(triangle[1], triangle[0]), difference(triangle[2], triangle[0]));
   Ray ray;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double centre = (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3;
+    const double center = (triangle[0][axis] + triangle[1][axis] + triangle[2][axis]) / 3;
     const double unit = normal[axis] / length(normal);
-    ray.origin[axis] = static_cast<float>(centre + unit);
+    ray.origin[axis] = static_cast<float>(center + unit);
     ray.direction[axis] = static_cast<float>(-unit);
   }
   return ray;

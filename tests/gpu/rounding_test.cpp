@@ -25,8 +25,8 @@ float valueOf(std::uint32_t half) {
   return (half & 0x8000) != 0 ? -magnitude : magnitude;
 }
 
-/// Both neighbours of a float, and itself.
-void addWithNeighbours(std::vector<float>& values, float value) {
+/// Both neighbors of a float, and itself.
+void addWithNeighbors(std::vector<float>& values, float value) {
   values.push_back(value);
   values.push_back(std::nextafter(value, -std::numeric_limits<float>::infinity()));
   values.push_back(std::nextafter(value, std::numeric_limits<float>::infinity()));
@@ -63,7 +63,7 @@ class RoundingTest : public DeviceTest {
   }
 };
 
-// Between each two neighbouring numbers, normal and subnormal, of either sign: the tie, and the
+// Between each two neighboring numbers, normal and subnormal, of either sign: the tie, and the
 // floats on both sides of it, which are no ties.
 TEST_F(RoundingTest, TiesOfHalvesGoToTheEvenOne) {
   std::vector<float> values;
@@ -71,7 +71,7 @@ TEST_F(RoundingTest, TiesOfHalvesGoToTheEvenOne) {
     const float low = valueOf(half), high = valueOf(half + 1);
     const float tie = low + (high - low) / 2;
     ASSERT_EQ(double{tie} - double{low}, double{high} - double{tie});
-    addWithNeighbours(values, half % 2 == 0 ? tie : -tie);
+    addWithNeighbors(values, half % 2 == 0 ? tie : -tie);
   }
   const std::vector<std::uint16_t> stored = store(values, VertexFormat::float16x4, {});
   ASSERT_GE(stored.size(), values.size());
@@ -87,8 +87,8 @@ TEST_F(RoundingTest, TiesOfHalvesGoToTheEvenOne) {
 
 TEST_F(RoundingTest, HalvesBecomeInfiniteFromHalfAStepAboveTheLargest) {
   std::vector<float> values;
-  addWithNeighbours(values, 65520);
-  addWithNeighbours(values, -65520);
+  addWithNeighbors(values, 65520);
+  addWithNeighbors(values, -65520);
   const std::vector<std::uint16_t> stored = store(values, VertexFormat::float16x4, {});
   const std::vector<std::uint16_t> expected{0x7c00, 0x7bff, 0x7c00, 0xfc00, 0xfc00, 0xfbff};
   EXPECT_EQ(stored, expected);

@@ -7,17 +7,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <mutex>
 #include <string>
 
 #include "device_profiles.h"
+#include "next_layer.h"
 
 namespace dermis::test {
 namespace {
 
 struct Layer {
-  std::mutex mutex;
-  std::map<VkInstance, PFN_vkGetInstanceProcAddr> instances;
+  NextLayer next;
   PFN_vkGetPhysicalDeviceProperties properties = nullptr;
   PFN_vkGetPhysicalDeviceProperties2 properties2 = nullptr;
 };
@@ -60,21 +59,12 @@ VKAPI_ATTR void VKAPI_CALL getProperties2(VkPhysicalDevice device,
 VKAPI_ATTR VkResult VKAPI_CALL createInstance(const VkInstanceCreateInfo* info,
                                               const VkAllocationCallbacks* callbacks,
                                               VkInstance* instance) {
-  auto* link = static_cast<VkLayerInstanceCreateInfo*>(const_cast<void*>(info->pNext));
-  while (link->sType != VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO ||
-         link->function != VK_LAYER_LINK_INFO)
-    link = static_cast<VkLayerInstanceCreateInfo*>(const_cast<void*>(link->pNext));
-  const PFN_vkGetInstanceProcAddr next = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-  link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-  const auto create = reinterpret_cast<PFN_vkCreateInstance>(next(nullptr, "vkCreateInstance"));
-  const VkResult result = create(info, callbacks, instance);
+  const VkResult result = layer().next.createInstance(info, callbacks, instance);
   if (result != VK_SUCCESS) return result;
-  const std::lock_guard lock(layer().mutex);
-  layer().instances[*instance] = next;
   layer().properties = reinterpret_cast<PFN_vkGetPhysicalDeviceProperties>(
-      next(*instance, "vkGetPhysicalDeviceProperties"));
+      layer().next.function(*instance, "vkGetPhysicalDeviceProperties"));
   layer().properties2 = reinterpret_cast<PFN_vkGetPhysicalDeviceProperties2>(
-      next(*instance, "vkGetPhysicalDeviceProperties2"));
+      layer().next.function(*instance, "vkGetPhysicalDeviceProperties2"));
   return result;
 }
 
@@ -87,12 +77,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL getInstanceProcAddr(VkInstance instance
       {"vkGetPhysicalDeviceProperties2", reinterpret_cast<PFN_vkVoidFunction>(getProperties2)},
       {"vkGetPhysicalDeviceProperties2KHR", reinterpret_cast<PFN_vkVoidFunction>(getProperties2)}};
   if (const auto found = own.find(name); found != own.end()) return found->second;
-  PFN_vkGetInstanceProcAddr next = nullptr;
-  {
-    const std::lock_guard lock(layer().mutex);
-    next = layer().instances[instance];
-  }
-  return next != nullptr ? next(instance, name) : nullptr;
+  return layer().next.function(instance, name);
 }
 
 }  // namespace

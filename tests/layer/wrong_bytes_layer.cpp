@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "next_layer.h"
 #include "wrong_bytes.h"
 
 namespace dermis::test {
@@ -51,7 +52,7 @@ struct Plant {
 
 struct Layer {
   std::mutex mutex;
-  std::map<VkInstance, PFN_vkGetInstanceProcAddr> instances;
+  NextLayer next;
   VkInstance newest = VK_NULL_HANDLE;
   std::map<VkDevice, DeviceFunctions> devices;
   std::map<VkBuffer, Buffer> buffers;
@@ -180,28 +181,12 @@ VKAPI_ATTR VkResult VKAPI_CALL queueWaitIdle(VkQueue queue) {
   return result;
 }
 
-/// The link of the chain that the loader made for this layer, which is taken off it.
-template <typename Info, typename CreateInfo>
-auto* takeLink(const CreateInfo* createInfo, VkStructureType type) {
-  auto* info = static_cast<Info*>(const_cast<void*>(createInfo->pNext));
-  while (info->sType != type || info->function != VK_LAYER_LINK_INFO)
-    info = static_cast<Info*>(const_cast<void*>(info->pNext));
-  auto* link = info->u.pLayerInfo;
-  info->u.pLayerInfo = link->pNext;
-  return link;
-}
-
 VKAPI_ATTR VkResult VKAPI_CALL createInstance(const VkInstanceCreateInfo* info,
                                               const VkAllocationCallbacks* callbacks,
                                               VkInstance* instance) {
-  const PFN_vkGetInstanceProcAddr next =
-      takeLink<VkLayerInstanceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO)
-          ->pfnNextGetInstanceProcAddr;
-  const auto create = reinterpret_cast<PFN_vkCreateInstance>(next(nullptr, "vkCreateInstance"));
-  const VkResult result = create(info, callbacks, instance);
+  const VkResult result = layer().next.createInstance(info, callbacks, instance);
   if (result != VK_SUCCESS) return result;
   const std::lock_guard lock(layer().mutex);
-  layer().instances[*instance] = next;
   layer().newest = *instance;
   return result;
 }
@@ -274,12 +259,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL getInstanceProcAddr(VkInstance instance
       {"vkCreateInstance", reinterpret_cast<PFN_vkVoidFunction>(createInstance)},
       {"vkCreateDevice", reinterpret_cast<PFN_vkVoidFunction>(createDevice)}};
   if (const auto found = own.find(name); found != own.end()) return found->second;
-  PFN_vkGetInstanceProcAddr next = nullptr;
-  {
-    const std::lock_guard lock(layer().mutex);
-    next = layer().instances[instance];
-  }
-  return next != nullptr ? next(instance, name) : nullptr;
+  return layer().next.function(instance, name);
 }
 
 }  // namespace

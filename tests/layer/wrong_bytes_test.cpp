@@ -220,7 +220,7 @@ TEST_F(WrongBytesTest, AWrongPreviousPositionIsFound) {
              "1 previous positions are outside their bound; the first is vertex 5");
 }
 
-TEST_F(WrongBytesTest, ATouchedNeighbourIsFound) {
+TEST_F(WrongBytesTest, ATouchedNeighborIsFound) {
   // Behind the last attribute of vertex 3 there are four bytes that are nobody's.
   const auto behind = [](std::uint32_t byte) { return 12u + byte; };
   for (const std::uint64_t frame : {before, now, settled}) {

@@ -235,7 +235,7 @@ struct FeatureChain {
     vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     features2.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     pointers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VARIABLE_POINTERS_FEATURES;
-    // Neighbours of the members that are meant.
+    // Neighbors of the members that are meant.
     halves.uniformAndStorageBuffer16BitAccess = vulkan11.uniformAndStorageBuffer16BitAccess =
         VK_TRUE;
     halves.storagePushConstant16 = vulkan11.storagePushConstant16 = VK_TRUE;

@@ -3,7 +3,7 @@
 #
 #   tests/run.sh nightly [PART...]      without PART: all, in this order
 #
-#   asan         everything that has a device, under the address and undefined-behaviour sanitizers
+#   asan         everything that has a device, under the address and undefined-behavior sanitizers
 #   asan-rest    all other tests under them
 #   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages

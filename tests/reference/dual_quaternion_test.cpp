@@ -222,7 +222,7 @@ TEST(ReferenceDualQuaternion, WeightsOfOneJointThatAddUpToATieAreATie) {
 }
 
 // "On the weights as stored": a difference that dividing by the sum rounds away still counts.
-TEST(ReferenceDualQuaternion, ThePivotIsChosenBeforeNormalising) {
+TEST(ReferenceDualQuaternion, ThePivotIsChosenBeforeNormalizing) {
   const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
   RigRandom random(5);
   const float tiny = std::ldexp(1.0f, -53);
@@ -270,7 +270,7 @@ TEST(ReferenceDualQuaternion, ConditioningIsWhatItsCommentSays) {
   for (const Method method : allMethods) {
     const reference::AnalyzedMesh result = skinned(mesh, pose, method);
     EXPECT_NEAR(result.conditioning[0].scale, 5 + 3 * 2, 1e-12);
-    // A centre of rotation counts twice.
+    // A center of rotation counts twice.
     const glm::dvec3 center(mesh.centersOfRotation[0], mesh.centersOfRotation[1],
                             mesh.centersOfRotation[2]);
     const double besides = needsCentersOfRotation(method) ? 2 * glm::length(center) : 0;

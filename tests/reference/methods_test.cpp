@@ -50,7 +50,7 @@ OwnedMesh meshWithShares(RigRandom& random, std::uint32_t vertices, std::uint32_
   return mesh;
 }
 
-/// A vertex with its joints taken apart by hand, normalised weights, and what two phases have in
+/// A vertex with its joints taken apart by hand, normalized weights, and what two phases have in
 /// common.
 struct ByHand {
   struct Influence {
@@ -495,7 +495,7 @@ TEST(ReferenceMethods, SphericalBlendOfACommonAxisIsFinite) {
   }
 }
 
-// No centre is better than another: it stays where it is, at 0.
+// No center is better than another: it stays where it is, at 0.
 TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
   RigRandom random(18);
   for (int trial = 0; trial < 100; ++trial) {
@@ -511,7 +511,7 @@ TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
   }
 }
 
-// Rotations that differ by less than 1e-3: the centre must not fly off.
+// Rotations that differ by less than 1e-3: the center must not fly off.
 TEST(ReferenceMethods, SphericalBlendOfNearlyEqualRotationsStaysNear) {
   RigRandom random(19);
   for (const double angle : {1e-7, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2}) {
@@ -633,17 +633,17 @@ TEST(ReferenceMethods, BulgeControlLeadsFromDualQuaternionsToCentersOfRotation) 
     for (std::size_t vertex = 0; vertex < 100; ++vertex)
       mesh.bulgeStrengths[vertex] = std::array{0.0f, 0.25f, 0.5f, 1.0f}[vertex % 4];
     const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
-                                  centred = skinned(mesh, pose, Method::centerOfRotation),
+                                  centered = skinned(mesh, pose, Method::centerOfRotation),
                                   result = skinned(mesh, pose, Method::bulgeControlled);
     for (std::size_t vertex = 0; vertex < 400; ++vertex) {
       const auto strength = static_cast<double>(mesh.bulgeStrengths[vertex]);
       expectNear(toVector(result.positions[vertex]),
                  (1 - strength) * toVector(dual.positions[vertex]) +
-                     strength * toVector(centred.positions[vertex]),
+                     strength * toVector(centered.positions[vertex]),
                  1e-13);
       // All three turn alike.
       EXPECT_EQ(result.normals[vertex], dual.normals[vertex]);
-      EXPECT_EQ(result.normals[vertex], centred.normals[vertex]);
+      EXPECT_EQ(result.normals[vertex], centered.normals[vertex]);
     }
   }
 }
@@ -668,7 +668,7 @@ TEST(ReferenceMethods, BulgeControlTakesTheMeshsStrengthWhereTheVerticesHaveNone
   const std::vector<JointMatrix> pose = randomJoints(random, Joints::rigid, 8);
   OwnedMesh mesh = scatteredMesh(random, 50, 8, 3);
   const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion),
-                                centred = skinned(mesh, pose, Method::centerOfRotation);
+                                centered = skinned(mesh, pose, Method::centerOfRotation);
   for (const float strength : {0.0f, 0.125f, 1.0f}) {
     MeshView view = mesh.view();
     if (strength != 1) view.bulgeStrength = strength;  // all of it unless it says otherwise
@@ -678,7 +678,7 @@ TEST(ReferenceMethods, BulgeControlTakesTheMeshsStrengthWhereTheVerticesHaveNone
     for (std::size_t vertex = 0; vertex < 50; ++vertex) {
       expectNear(toVector(result->positions[vertex]),
                  (1 - static_cast<double>(strength)) * toVector(dual.positions[vertex]) +
-                     static_cast<double>(strength) * toVector(centred.positions[vertex]),
+                     static_cast<double>(strength) * toVector(centered.positions[vertex]),
                  1e-14);
     }
   }
@@ -736,7 +736,7 @@ TEST(ReferenceMethods, WhatIsScaledIsThenMovedRigidly) {
       };
       scale(scaled.positions);
       for (const Method method : twoPhaseMethods) {
-        // Those take the centre by the joints themselves, scale and all.
+        // Those take the center by the joints themselves, scale and all.
         if (needsCentersOfRotation(method)) continue;
         const reference::AnalyzedMesh result = skinned(mesh, pose, method);
         if (result.conditioning[0].signAmbiguous) continue;

@@ -114,7 +114,7 @@ inline void append(std::vector<float>& values, const glm::dvec3& vector) {
   for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(vector[i]));
 }
 
-/// Its centre of rotation is a point by the way: half way to (0.2, −0.4, 0.6).
+/// Its center of rotation is a point by the way: half way to (0.2, −0.4, 0.6).
 inline void addVertex(OwnedMesh& mesh, const glm::dvec3& position,
                       std::initializer_list<RigInfluence> influences) {
   append(mesh.positions, position);

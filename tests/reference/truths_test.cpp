@@ -80,9 +80,9 @@ TEST(ReferenceTruths, Truth01_DlbTurnsUpTo8149ThousandthsOfADegreeOtherThanTheSc
 
 TEST(ReferenceTruths, Truth02_TheTranslationAlongTheScrewDiffersBy1501HundredthsOfAPercent) {
   OwnedMesh mesh = betweenTwo({0, 0, 0}, 10000);
-  const glm::dvec3 centre(0.3, -0.4, 0);
+  const glm::dvec3 center(0.3, -0.4, 0);
   const glm::dmat3 turn = rotationAbout({0, 0, 1}, 179.9999 * pi / 180);
-  const std::array pose{JointMatrix{}, jointOf(turn, centre - turn * centre + glm::dvec3(0, 0, 1))};
+  const std::array pose{JointMatrix{}, jointOf(turn, center - turn * center + glm::dvec3(0, 0, 1))};
   const reference::AnalyzedMesh exact = skinned(mesh, pose, Method::dualQuaternionIterative);
   for (std::size_t step = 0; step <= 10000; ++step)
     ASSERT_NEAR(exact.positions[step][2], static_cast<double>(step) * 1e-4, 1e-6);
@@ -97,12 +97,12 @@ TEST(ReferenceTruths, Truth02_TheTranslationAlongTheScrewDiffersBy1501Hundredths
 TEST(ReferenceTruths, Truth03_BothStayOnTheScrewAxis) {
   RigRandom random(3);
   for (int trial = 0; trial < 2000; ++trial) {
-    const glm::dvec3 axis = random.direction(), centre = random.vector(1);
+    const glm::dvec3 axis = random.direction(), center = random.vector(1);
     const glm::dquat turn = turnAbout(axis, random.between(0.2, pi - 0.05));
-    const DualQuatd screw = rigidOf(turn, centre - turn * centre + random.between(-2, 2) * axis);
+    const DualQuatd screw = rigidOf(turn, center - turn * center + random.between(-2, 2) * axis);
     const double t = random.between(0.1, 0.9);
     ExactRig rig(std::array{DualQuatd{}, screw}, std::array{1 - t, t});
-    const glm::dvec3 onAxis = centre + random.between(-1, 1) * axis;
+    const glm::dvec3 onAxis = center + random.between(-1, 1) * axis;
     for (const Method method :
          {Method::dualQuaternion, Method::dualQuaternionIterative, Method::logMatrix}) {
       const glm::dvec3 way = rig.move(onAxis, method) - onAxis;
@@ -180,7 +180,7 @@ TEST(ReferenceTruths, Truth04_WhoIsInvariantUnderWhat) {
       const glm::dvec3 here = rig.move(p, method, inputs);
       if (rig.conditioning.signAmbiguous) continue;
       const double l = deviation(movedBy(g, joints, one), p, inputs, transformPoint(g, here));
-      // C g at p is C at g p: the bind pose, centre and all, moved by g.
+      // C g at p is C at g p: the bind pose, center and all, moved by g.
       const glm::dvec3 there = rig.move(transformPoint(g, p), method, moved);
       const double r = deviation(movedBy(one, joints, g), p, inputs, there);
       const double f =
@@ -242,7 +242,7 @@ TEST(ReferenceTruths, Truth04_ThroughPoses) {
   }
 }
 
-// ---- 5: the library normalises weights, for every method (input_test.cpp has it by the bit)
+// ---- 5: the library normalizes weights, for every method (input_test.cpp has it by the bit)
 
 TEST(ReferenceTruths, Truth05_DlbItselfDoesNotChangeLinearBlendingItselfDoes) {
   RigRandom random(6);
@@ -336,9 +336,9 @@ struct FourJoints {
       joints.push_back(base * rigidOf(turnAbout(turns[i] / angle, angle), translations[i]));
       sum += weights[i];
     }
-    std::array<double, 4> normalised = weights;
-    for (double& weight : normalised) weight /= sum;
-    return {joints, normalised};
+    std::array<double, 4> normalized = weights;
+    for (double& weight : normalized) weight /= sum;
+    return {joints, normalized};
   }
 };
 
@@ -412,7 +412,7 @@ TEST(ReferenceTruths, Truth08_RigidJointsGiveARigidResult) {
     inputs.bulgeStrength = random.between(0, 1);
     for (const Method method : rigidMethods) {
       const glm::dmat3 r = rig.motion(method, inputs).rotation;
-      // Differences of points that lie as far away as the centre was thrown.
+      // Differences of points that lie as far away as the center was thrown.
       const double allowed = 1e-14 * (1 + rig.conditioning.leverage);
       const glm::dmat3 gram = glm::transpose(r) * r;
       for (int i = 0; i < 9; ++i)
@@ -572,7 +572,7 @@ TEST(ReferenceTruths, APointThatBothJointsKeepIsKept) {
 /// The volume of a bent tube whose centres of rotation lie on its axis. Sections turn by φ(w) as
 /// with dual quaternions, their centres go where linear blending takes them; so that by the
 /// determinant of that map, in which what is odd across a section cancels, the ratio is the
-/// integral over w of d(centre)/dz · Q e_z. By symmetry that is ∫ (3 − 4 w) cos φ(w).
+/// integral over w of d(center)/dz · Q e_z. By symmetry that is ∫ (3 − 4 w) cos φ(w).
 double bentVolume(double angle) {
   const int steps = 100000;
   double sum = 0;
@@ -593,7 +593,7 @@ TEST(ReferenceTruths, Truth11_BendAboutCentersOfRotationOnTheAxis) {
     EXPECT_GT(volume, 1 - sine * sine / 3);
     EXPECT_LT(volume, 1);
     expectVolume(bend, Method::centerOfRotation, volume, 3);
-    // In between by its strength, for the map's determinant is linear in where the centre goes.
+    // In between by its strength, for the map's determinant is linear in where the center goes.
     for (const float strength : {0.0f, 0.25f, 0.5f, 1.0f}) {
       expectVolume(bend, Method::bulgeControlled, 1 - static_cast<double>(strength) * (1 - volume),
                    3, strength);

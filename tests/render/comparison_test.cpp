@@ -58,7 +58,7 @@ std::array<double, 3> meanColor(const render::Picture& picture, const render::Pi
   return sums;
 }
 
-/// Degrees around the axis of greys.
+/// Degrees around the axis of grays.
 double hueOf(const std::array<double, 3>& color) {
   return std::atan2(std::numbers::sqrt3 * (color[1] - color[2]),
                     2 * color[0] - color[1] - color[2]) *
@@ -228,7 +228,7 @@ TEST_F(ComparisonTest, TheHeatMapOfDualQuaternionsIsColdEverywhere) {
   EXPECT_GT(warm[0], 200u) << "linear blending is far away at the elbow";
 }
 
-TEST_F(ComparisonTest, TheScaleHasTheColoursOfTheSurface) {
+TEST_F(ComparisonTest, TheScaleHasTheColorsOfTheSurface) {
   cli::ComparedFigures figures = figuresOf(strips_[0], twoMethods);
   ASSERT_TRUE(figures.makeHeatMaps(1));
   std::vector<render::Draw> draws;

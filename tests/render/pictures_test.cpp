@@ -94,7 +94,7 @@ TEST_P(PicturesTest, AHoleOfThreeByThreeIsSeen) {
           }
           least = std::min(least, largest);
         }
-        if (least < 25) continue;  // it is nearly of that colour
+        if (least < 25) continue;  // it is nearly of that color
         ++holes;
         EXPECT_FALSE(passes(picture)) << left << ", " << top;
       }

@@ -122,7 +122,7 @@ std::size_t pivotOf(std::span<const T> weights) {
   return pivot;
 }
 
-/// Dual-quaternion linear blending (DLB) before normalising: Σ s_j w_j q_j, s_j = −1 where q_j lies
+/// Dual-quaternion linear blending (DLB) before normalizing: Σ s_j w_j q_j, s_j = −1 where q_j lies
 /// in the other hemisphere than the pivot (a dot product of 0 counts as the same). Weights of 0 are
 /// skipped. With weights that sum to 1 the length of its real part is at least the largest weight.
 template <typename T>

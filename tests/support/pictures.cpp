@@ -99,7 +99,7 @@ void compareWholes(const Picture& a, const Picture& b, PictureDifference& differ
     difference.meanColor =
         std::max(difference.meanColor, std::abs(ofA.color[channel] - ofB.color[channel]));
   }
-  // One step of 255 more, so that pictures of one colour have a quotient, too.
+  // One step of 255 more, so that pictures of one color have a quotient, too.
   difference.contrast = std::abs((ofA.deviation + 1) / (ofB.deviation + 1) - 1);
 }
 
@@ -185,7 +185,7 @@ void expectAsReference(const std::string& name, const Picture& picture,
   const PictureDifference difference = comparePictures(picture, *reference);
   EXPECT_TRUE(isWithin(tolerance, difference))
       << "similarity " << difference.similarity << ", in the worst window "
-      << difference.worstSimilarity << "; colours differ by " << difference.worstColor
+      << difference.worstSimilarity << "; colors differ by " << difference.worstColor
       << " in a window, " << difference.meanColor << " altogether, " << difference.worstPatch
       << " in 3 x 3 pixels; contrast by " << difference.contrast;
 }

@@ -1,5 +1,5 @@
 // Pictures compared as an eye does it: what two drivers round differently does not count, what is
-// in another place or of another colour does.
+// in another place or of another color does.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ struct PictureDifference {
   /// (Wang et al. 2004, "Image quality assessment").
   double similarity = 0;
   double worstSimilarity = 0;  ///< of a window
-  /// The largest difference of the mean colours of two such windows, 0 to 255.
+  /// The largest difference of the mean colors of two such windows, 0 to 255.
   double worstColor = 255;
   /// That of the whole pictures: all a little brighter is seen by no window.
   double meanColor = 255;

@@ -78,22 +78,22 @@ glm::dvec3 rotated(const glm::dvec3& n, double angle, const glm::dvec3& v) {
          (1 - std::cos(angle)) * glm::dot(n, v) * n;
 }
 
-/// A turn about the axis through `centre` and a shift along it.
+/// A turn about the axis through `center` and a shift along it.
 struct Screw {
   glm::dvec3 axis{0, 0, 1};
-  glm::dvec3 centre{0, 0, 0};
+  glm::dvec3 center{0, 0, 0};
   double angle = 0;
   double shift = 0;
 
   glm::dvec3 apply(const glm::dvec3& p) const {
-    return centre + rotated(axis, angle, p - centre) + shift * axis;
+    return center + rotated(axis, angle, p - center) + shift * axis;
   }
   glm::dvec3 translation() const { return apply({0, 0, 0}); }
   DualQuatd dualQuat() const { return rigidOf(turn(axis, angle), translation()); }
   /// Half the angle and half the shift on the axis as a Plücker line: ½ (θ n + ε (s n + θ c × n)).
   DualQuatd logarithm() const {
     const glm::dvec3 r = 0.5 * angle * axis;
-    const glm::dvec3 d = 0.5 * (shift * axis + angle * glm::cross(centre, axis));
+    const glm::dvec3 d = 0.5 * (shift * axis + angle * glm::cross(center, axis));
     return {glm::dquat(0, r.x, r.y, r.z), glm::dquat(0, d.x, d.y, d.z)};
   }
 };
@@ -435,7 +435,7 @@ TEST(DualQuat, Truth03_BothHaveTheSameScrewAxis) {
     const glm::dvec3 moment = (d - glm::dot(axis, d) * axis) / glm::length(r);
     const double side = glm::dot(axis, screw.axis) < 0 ? -1 : 1;
     EXPECT_LE(glm::length(side * axis - screw.axis), 1e-12);
-    EXPECT_LE(glm::length(side * moment - glm::cross(screw.centre, screw.axis)), 1e-12);
+    EXPECT_LE(glm::length(side * moment - glm::cross(screw.center, screw.axis)), 1e-12);
   }
 }
 

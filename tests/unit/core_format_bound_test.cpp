@@ -181,12 +181,12 @@ TEST(FormatBounds, HalvesOfPositionsOfAnySizeAreInsideAndSomeAreNear) {
   }
 }
 
-/// In float, as a kernel may: relative to the centre, or by a factor and a summand.
+/// In float, as a kernel may: relative to the center, or by a factor and a summand.
 float boxed(float position, float low, float high, bool byFactor) {
-  const float centre = (low + high) / 2, half = (high - low) / 2;
+  const float center = (low + high) / 2, half = (high - low) / 2;
   if (half <= 0) return 0;
-  if (!byFactor) return (position - centre) / half;
-  return position * (1 / half) + -centre / half;
+  if (!byFactor) return (position - center) / half;
+  return position * (1 / half) + -center / half;
 }
 
 // From boxes around the origin to one 10,000 units away, whose steps are finer than a float's.

@@ -70,7 +70,7 @@ TEST(Pack, Truth14_SlotsOfWeightZeroLeaveNoTrace) {
   EXPECT_TRUE(std::ranges::equal(a.bytes(), b.bytes()));
 }
 
-TEST(Pack, WeightsAreNormalised) {
+TEST(Pack, WeightsAreNormalized) {
   const std::vector<BlobInfluence> influences = packedInfluences({0, 1, 2}, {6.0f, 1.0f, 3.0f});
   ASSERT_EQ(influences.size(), 3u);
   EXPECT_NEAR(influences[0].weight, 0.6f, 6e-8f);

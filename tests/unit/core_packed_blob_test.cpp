@@ -345,7 +345,7 @@ TEST(PackedBlob, NoBytesAreNoMesh) {
 }
 
 /// Reads all that a kernel might; throws where that leaves the blob. The sum keeps it from being
-/// optimised away.
+/// optimized away.
 float readEverything(const Blob& blob, const MeshInfo& info) {
   float sum = 0;
   for (std::uint32_t vertex = 0; vertex < blob.vertexCount(); ++vertex) {

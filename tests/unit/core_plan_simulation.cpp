@@ -439,12 +439,12 @@ class Simulation {
     if (job.positions.format != VertexFormat::snorm16x3 &&
         job.positions.format != VertexFormat::snorm16x4)
       return;
-    const std::array<float, 3> centre{extension.centerX, extension.centerY, extension.centerZ};
+    const std::array<float, 3> center{extension.centerX, extension.centerY, extension.centerZ};
     const std::array<float, 3> inverse{extension.inverseX, extension.inverseY, extension.inverseZ};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = static_cast<double>(job.box.min[axis]);
       const double high = static_cast<double>(job.box.max[axis]);
-      ASSERT_EQ(centre[axis], static_cast<float>((low + high) / 2));
+      ASSERT_EQ(center[axis], static_cast<float>((low + high) / 2));
       ASSERT_EQ(inverse[axis], static_cast<float>(2 / (high - low)));
     }
   }

@@ -359,7 +359,7 @@ TEST(Plan, EachPromiseLeavesPipelinesOut) {
   }
 }
 
-// A pipeline follows from the job alone: its neighbours do not change it.
+// A pipeline follows from the job alone: its neighbors do not change it.
 TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
   const OwnedBatch batch = randomRichBatch(3, 60, false);
   const auto variantsOf = [&](std::span<const Job> jobs) {

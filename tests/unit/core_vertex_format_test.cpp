@@ -217,7 +217,7 @@ TEST(VertexFormats, OctahedralTangentsCountTheirSecondComponentFromOne) {
       expectTangent(-largest, (largest + 1) / 2, {-1, 0, 0});
       expectTangent(largest, 1, {0, 0, -1});
     }
-    // What no encoder writes is taken for its neighbour.
+    // What no encoder writes is taken for its neighbor.
     EXPECT_EQ(decoded(format, 9, 0), decoded(format, 9, 1));
     EXPECT_EQ(decoded(format, 0, -largest - 1), decoded(format, 0, -largest));
   }

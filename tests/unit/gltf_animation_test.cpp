@@ -114,7 +114,7 @@ TEST(GltfAnimation, SlerpsAlongTheShorterArc) {
   const gltf::Model model =
       loaded(animated({0, 1, 2}, turnAboutZ({10, 100, 350}), "rotation", "LINEAR"));
   EXPECT_NEAR(angleAt(model, 0.5), 55, 1e-5);
-  EXPECT_NEAR(angleAt(model, 0.25), 32.5, 1e-5) << "slerp, not a normalised lerp";
+  EXPECT_NEAR(angleAt(model, 0.25), 32.5, 1e-5) << "slerp, not a normalized lerp";
   // From 100 to 350: the quaternions point into opposite hemispheres, and the way is −110.
   EXPECT_NEAR(angleAt(model, 1.5), 45, 1e-5);
   EXPECT_NEAR(angleAt(model, 1.25), 72.5, 1e-5);

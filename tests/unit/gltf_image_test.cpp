@@ -1,4 +1,4 @@
-// Images of base colours: where they come from, and that a wrong one costs no more than itself.
+// Images of base colors: where they come from, and that a wrong one costs no more than itself.
 
 #include <gtest/gtest.h>
 

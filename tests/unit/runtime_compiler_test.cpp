@@ -59,7 +59,7 @@ std::vector<kernels::Recipe> oneForEach() {
   return chosen;
 }
 
-// Macros, scalar block layout and optimisation are those of the build. At night it is all modules:
+// Macros, scalar block layout and optimization are those of the build. At night it is all modules:
 // runtime_compiler_exhaustive_test.cpp.
 TEST(RuntimeCompilerTest, UnchangedSourcesGiveTheModulesOfTheLibrary) {
   const RuntimeCompiler compiler = compilerOf(kernelSources);

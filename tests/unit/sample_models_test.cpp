@@ -24,7 +24,7 @@ std::uint64_t fnv1a(const std::vector<std::byte>& bytes) {
   return hash;
 }
 
-// Vertices that stand in one place count as one: a border of colours doubles them.
+// Vertices that stand in one place count as one: a border of colors doubles them.
 std::vector<std::size_t> weld(const std::vector<Vec3>& positions, std::size_t& count) {
   std::map<std::array<double, 3>, std::size_t> places;
   std::vector<std::size_t> place;

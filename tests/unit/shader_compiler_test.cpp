@@ -121,8 +121,8 @@ TEST_F(ShaderCompilerTest, CompilesFilesByTheirEnding) {
   EXPECT_TRUE(compiler.compileFile(
       write("a.vert", "#version 450\nvoid main() { gl_Position = vec4(0.0); }\n")));
   EXPECT_TRUE(compiler.compileFile(write("a.frag",
-                                         "#version 450\nlayout(location = 0) out vec4 colour;\n"
-                                         "void main() { colour = vec4(1.0); }\n")));
+                                         "#version 450\nlayout(location = 0) out vec4 color;\n"
+                                         "void main() { color = vec4(1.0); }\n")));
   EXPECT_EQ(compiler.compileFile(write("a.txt", trivial)).error().code, ErrorCode::invalidArgument);
   const auto missing = compiler.compileFile(folder_ / "missing.comp");
   ASSERT_FALSE(missing);
@@ -321,7 +321,7 @@ TEST_F(ShaderCompilerTest, DebugInformationIsKeptOnDemand) {
   }
 }
 
-TEST_F(ShaderCompilerTest, OptimisingMakesItShorter) {
+TEST_F(ShaderCompilerTest, OptimizingMakesItShorter) {
   const ShaderSource shader =
       source(header + buffer +
              "float twice(float x) { float y = x; y = y + x; return y; }\n"
@@ -546,7 +546,7 @@ TEST_F(ShaderCompilerTest, ContractableArithmeticIsFound) {
   EXPECT_EQ(find("float r = float(uint(a) + 3u * uint(b));"), "");
 }
 
-TEST_F(ShaderCompilerTest, WhatTheOptimiserContractsIsFound) {
+TEST_F(ShaderCompilerTest, WhatTheOptimizerContractsIsFound) {
   const auto words = ShaderCompiler().compile(
       source(header + buffer + "void main() { o.data[0] = o.data[1] * o.data[2] + o.data[3]; }\n"));
   ASSERT_TRUE(words);

@@ -47,7 +47,7 @@ bool differ(const std::uint8_t* a, const std::uint8_t* b) {
   return false;
 }
 
-/// Pixels of a part that are of another colour in another part of the same size.
+/// Pixels of a part that are of another color in another part of the same size.
 int changes(const Picture& a, const Part& part, const Picture& b, const Part& other) {
   int count = 0;
   for (std::uint32_t y = part.top; y < part.bottom; ++y) {
@@ -181,7 +181,7 @@ TEST_F(ViewerTest, PlaysAndShowsWhatKeysAskFor) {
   const Picture weights = screenshotAfter({"w"});
   EXPECT_GT(changes(first, weights, scene), 10'000) << "weights";
   EXPECT_GT(hotPixels(weights, scene), 300) << "of the hips";
-  EXPECT_GT(changes(weights, first, wholePanel), 1000) << "the scale of colours";
+  EXPECT_GT(changes(weights, first, wholePanel), 1000) << "the scale of colors";
   EXPECT_GT(changes(weights, screenshotAfter({"Tab"}), scene), 1000) << "of the next joint";
 
   const Picture error = screenshotAfter({"e"});

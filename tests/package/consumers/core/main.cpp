@@ -218,7 +218,7 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   return {};
 }
 
-/// `value` from -1 to 1 as a normalised integer.
+/// `value` from -1 to 1 as a normalized integer.
 template <typename Integer>
 Integer toSnorm(double value) {
   return static_cast<Integer>(std::lround(value * std::numeric_limits<Integer>::max()));
@@ -230,9 +230,9 @@ std::vector<SkinnedVertex> quantize(const reference::SkinnedMesh& skinned, const
   for (std::size_t i = 0; i < vertexCount; ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = box.min[axis], high = box.max[axis];
-      const double centre = (low + high) / 2, half = (high - low) / 2;
+      const double center = (low + high) / 2, half = (high - low) / 2;
       vertices[i].position[axis] =
-          toSnorm<std::int16_t>((skinned.positions[i][axis] - centre) / half);
+          toSnorm<std::int16_t>((skinned.positions[i][axis] - center) / half);
       vertices[i].normal[axis] = toSnorm<std::int8_t>(skinned.normals[i][axis]);
       vertices[i].tangent[axis] = toSnorm<std::int16_t>(skinned.tangents[i][axis]);
     }

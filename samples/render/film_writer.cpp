@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "file_name.h"
-#include "output_file.h"
 #include "picture_writer.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 
 extern char** environ;
 

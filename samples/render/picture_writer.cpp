@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "file_name.h"
-#include "output_file.h"
+#include "program/file_name.h"
+#include "program/output_file.h"
 
 namespace dermis::samples {
 namespace {

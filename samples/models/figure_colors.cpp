@@ -41,12 +41,12 @@ Region regionOfLeft(const Vec3& point, const FigureShape& shape) {
 
 }  // namespace
 
-const std::vector<Vec3>& figureColours() {
+const std::vector<Vec3>& figureColors() {
   // Linear red, green, blue, in the order of Region.
-  static const std::vector<Vec3> colours = {
+  static const std::vector<Vec3> colors = {
       {0.610, 0.340, 0.230}, {0.050, 0.028, 0.017}, {0.060, 0.215, 0.330}, {0.070, 0.066, 0.070},
       {0.185, 0.075, 0.035}, {0.560, 0.530, 0.480}, {0.085, 0.048, 0.037}};
-  return colours;
+  return colors;
 }
 
 std::vector<Part> figureParts() {

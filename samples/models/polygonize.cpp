@@ -1,4 +1,4 @@
-#include "polygonise.h"
+#include "polygonize.h"
 
 #include <algorithm>
 #include <cmath>
@@ -238,7 +238,7 @@ Grid gridOver(const Vec3& low, const Vec3& high, double cell) {
   return {(low + high - size) * 0.5, cell, cells};
 }
 
-QuadMesh polygonise(const Field& field, const Grid& grid) {
+QuadMesh polygonize(const Field& field, const Grid& grid) {
   return Net(field, grid).take();
 }
 

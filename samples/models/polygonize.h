@@ -28,6 +28,6 @@ struct QuadMesh {
 
 // A vertex in each cell that the surface crosses, a quad for each grid edge that it crosses. The
 // surface must stay inside the grid.
-QuadMesh polygonise(const Field& field, const Grid& grid);
+QuadMesh polygonize(const Field& field, const Grid& grid);
 
 }  // namespace dermis::models

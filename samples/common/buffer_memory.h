@@ -1,0 +1,43 @@
+// A Vulkan buffer with memory of its own, for the buffers that samples use.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include "dermis/result.h"
+#include "dermis/vulkan/bindings.h"
+#include "device.h"
+
+namespace dermis::samples {
+
+class BufferMemory {
+ public:
+  /// `size` may be 0: an empty range. The memory is of a type that has all flags of `required`, and
+  /// those of `preferred` if there is one.
+  static Result<BufferMemory> create(Device& device, std::uint64_t size, VkBufferUsageFlags usage,
+                                     VkMemoryPropertyFlags required,
+                                     VkMemoryPropertyFlags preferred);
+  BufferMemory() = default;
+  ~BufferMemory();
+  BufferMemory(BufferMemory&& other) noexcept { *this = std::move(other); }
+  BufferMemory& operator=(BufferMemory&& other) noexcept;
+
+  /// Only for a buffer that is not empty.
+  Device& device() const { return *device_; }
+  VkDeviceMemory memory() const { return memory_; }
+  VkBuffer handle() const { return buffer_; }
+  std::uint64_t size() const { return size_; }
+  /// The whole buffer; a null buffer if it is empty.
+  vulkan::BufferRange range() const { return {buffer_, 0, size_}; }
+
+ private:
+  Device* device_ = nullptr;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  std::uint64_t size_ = 0;
+};
+
+/// The error of a Vulkan function that failed for a buffer of `size` bytes.
+Error bufferError(const char* function, std::uint64_t size, VkResult result);
+
+}  // namespace dermis::samples
