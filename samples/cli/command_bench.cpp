@@ -72,7 +72,9 @@ ExitStatus write(const BenchOptions& options, const ThroughputTitle& title,
 ExitStatus bench(const BenchOptions& options) {
   if (options.onPaper) {
     return printByteModels() ? ExitStatus::done
-                             : reportError(ExitStatus::stopped, "SPIRV-Tools cannot read a kernel");
+                             : reportError(ExitStatus::stopped,
+                                           "SPIRV-Tools cannot read a kernel, or the command was "
+                                           "built without them");
   }
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   const std::array<samples::RequestedOutput, 2> outputs{

@@ -75,6 +75,10 @@ std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
 
 namespace dermis::cli {
 
+std::vector<std::uint32_t> specializedSpirv(const Variant&, const DeviceLimits&) {
+  return {};
+}
+
 std::optional<std::uint64_t> spirvInstructionCount(const Variant&, const DeviceLimits&) {
   return std::nullopt;
 }

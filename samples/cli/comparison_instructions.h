@@ -10,7 +10,7 @@
 namespace dermis::cli {
 
 /// A kernel with specialized constants, all functions inlined, and dead code removed. Empty if
-/// SPIRV-Tools fail.
+/// SPIRV-Tools fail, or if the command was built without them.
 std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
 
 /// The number of SPIR-V instructions of a kernel that calculate or access memory, after

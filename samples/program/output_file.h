@@ -38,7 +38,7 @@ struct OutputTarget {
 class OutputFile {
  public:
   /// Creates an empty file: next to the target or, if the target is written through, in the folder
-  /// for temporary files. Fails with `ioError`.
+  /// for temporary files. Fails with `ioError`, on Windows also if the target is a device.
   static Result<std::unique_ptr<OutputFile>> create(const std::filesystem::path& path);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

@@ -41,6 +41,17 @@ Error cannotWrite(const std::filesystem::path& path) {
   return cannotWrite(path, reason);
 }
 
+/// NUL, CON, a pipe. `std::filesystem::status` does not find them.
+bool isDevice(const std::filesystem::path& path) {
+  const HANDLE handle =
+      CreateFileW(path.c_str(), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
+                  OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+  if (handle == INVALID_HANDLE_VALUE) return false;
+  const DWORD type = GetFileType(handle);
+  CloseHandle(handle);
+  return type == FILE_TYPE_CHAR || type == FILE_TYPE_PIPE;
+}
+
 Result<OutputTarget> findTarget(const std::filesystem::path& name) {
   OutputTarget target;
   target.name = name;
@@ -48,10 +59,7 @@ Result<OutputTarget> findTarget(const std::filesystem::path& name) {
   std::error_code error;
   const std::filesystem::file_type type = std::filesystem::status(name, error).type();
   if (type == std::filesystem::file_type::directory) return cannotWrite(name, EISDIR);
-  // NUL, CON and other devices.
-  target.isThrough = type != std::filesystem::file_type::regular &&
-                     type != std::filesystem::file_type::not_found &&
-                     type != std::filesystem::file_type::none;
+  target.isThrough = isDevice(name);
   const DWORD attributes = GetFileAttributesW(name.c_str());
   if (attributes != INVALID_FILE_ATTRIBUTES && (attributes & FILE_ATTRIBUTE_READONLY) != 0)
     return cannotWrite(name, EACCES);
@@ -103,6 +111,13 @@ Result<std::unique_ptr<OutputFile>> OutputFile::createFor(const OutputTarget& ta
   if (made->file_ < 0) return cannotWrite(target.name);
   made->isThere_ = true;
   return made;
+}
+
+Result<std::unique_ptr<OutputFile>> OutputFile::create(const std::filesystem::path& path) {
+  const Result<OutputTarget> target = findTarget(path);
+  if (!target) return target.error();
+  if (target->isThrough) return cannotWrite(path, "it is a device");
+  return createFor(*target);
 }
 
 OutputFile::~OutputFile() {

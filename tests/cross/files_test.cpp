@@ -87,6 +87,8 @@ TEST_F(FilesTest, DevicesAreWrittenThrough) {
   const fs::path nowhere = isWindows ? "NUL" : "/dev/null";
   const Result<void> written = samples::writeFile(nowhere, std::string("x"));
   EXPECT_TRUE(written) << written.error().message;
+  const auto file = samples::OutputFile::create(nowhere);
+  EXPECT_EQ(file.ok(), !isWindows);
 }
 
 TEST_F(FilesTest, OneFileWithTwoNamesIsFound) {
