@@ -136,6 +136,7 @@ part_windows() {
   export WINEDEBUG=-all WINEPREFIX="$PWD/build/cross/wine"
   wine=$(PATH=/usr/lib/wine:$PATH command -v wine64 || command -v wine)
   cross windows "$wine"
+  PATH=/usr/lib/wine:$PATH wineserver -k || true # the one that began without a screen
   xvfb-run -a "$wine" "$(dermis_of windows)" devices
   xvfb-run -a "$wine" "$(dermis_of windows)" verify build/ci/samples/models/bar.glb
   # File names are in UTF-8.

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "cpu/task.h"
+#include "cpu/thread_memory.h"
 #include "plan/check.h"
 #include "strict_floating_point.h"
 
@@ -124,7 +125,7 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
 }
 
 void skinMesh(const Job& job, const MeshData& mesh) {
-  static thread_local std::vector<TaskInstance> instances;
+  std::vector<TaskInstance>& instances = threadMemory().instances;
   instances.clear();
   for (const Instance& instance : job.instances)
     instances.push_back(taskInstance(instance, job.places));
@@ -140,8 +141,7 @@ Result<void> checkMethod(Method method, const char* subject) {
 }
 
 void skinTask(const Task& task) {
-  static thread_local Scratch scratch[4];
-  dispatchTask(task, scratch);
+  dispatchTask(task, threadMemory().scratch);
 }
 
 Result<void> skin(const Job& job) {
