@@ -112,7 +112,7 @@ cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross
     -DDERMIS_HIGHWAY_SOURCES="$PWD/build/cross/highway" -DDERMIS_EMBEDDED_SHADERS="$kernels"
   cmake --build "$folder" --target cross_tests dermis_sample_models
   outcome=0
-  ctest --test-dir "$folder" --output-on-failure --no-tests=error --timeout 900 >"$folder/tests.log" 2>&1 || outcome=$?
+  ctest --test-dir "$folder" --output-on-failure --no-tests=error --timeout 900 -j "$(nproc)" >"$folder/tests.log" 2>&1 || outcome=$?
   tail -n 20 "$folder/tests.log"
   awk '/: Skipped$/ { getline reason } /^\[  SKIPPED \] .* ms\)$/ { print "Skipped: " $4 ": " reason }' \
     "$folder/Testing/Temporary/LastTest.log" | sort -u

@@ -646,7 +646,6 @@ TEST_F(PlanErrors, TablesLargerThanARange) {
 
 // An engine that forgot to fill the limits gets an error, not a division by zero.
 TEST_F(PlanErrors, LimitsThatNoDeviceHas) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto planned = [&](const DeviceLimits& bad) {
     Plan out;
     const Result<void> result = makePlan(batch.batch(), bad, {}, out);

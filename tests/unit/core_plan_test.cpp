@@ -284,7 +284,7 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
     return keys;
   };
   std::size_t wide = 0, narrow = 0;
-  for (std::uint32_t seed = 0; seed < 10; ++seed) {
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
     OwnedBatch batch = randomRichBatch(seed, 20, false);
     batch.outputSize += 96;
     for (const Job& job : batch.jobs) {
@@ -306,6 +306,8 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
         EXPECT_EQ(attributes[0].offset % record, 0u);
         for (std::size_t stream = 0; stream < streamCount; ++stream) {
           if (attributes[stream].format == VertexFormat::none) continue;
+          // What is stored with the positions needs no alignment of its own.
+          if (attributes[stream].offset - attributes[0].offset < variant.recordBytes) continue;
           EXPECT_EQ(attributes[stream].offset % variant.units[stream], 0u);
         }
         ++(variant.recordBytes > 8 || variant.units[0] > 4 ? wide : narrow);
