@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,10 +16,12 @@
 #include <vector>
 
 #include "dermis/cpu/skinning_system.h"
+#include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/scene.h"
 #include "dermis/validate.h"
 #include "dermis/vulkan/vertex_input.h"
+#include "test_paths.h"
 
 using namespace dermis;
 
@@ -117,6 +120,38 @@ TEST(DocumentedExampleTest, AMeshIsMadeOfTheEnginesArrays) {
   EXPECT_EQ(mended.maxInfluences, 1u);
   ASSERT_FALSE(logged.empty());
   EXPECT_NE(logged[0].find("'triangle', vertex 2"), std::string::npos) << logged[0];
+}
+
+// [gltf]
+struct Character {
+  PackedMesh mesh;
+  std::vector<JointMatrix> pose;
+};
+
+/// The first skinned mesh of a file, and its pose `seconds` after the beginning of a clip.
+Result<Character> loadCharacter(const std::filesystem::path& file, std::uint32_t clip,
+                                double seconds) {
+  const Result<gltf::Model> model = gltf::load(file);
+  if (!model) return model.error();
+  if (model->skinnedPrimitives.empty())
+    return Error{ErrorCode::invalidData, file.string() + " has no skinned mesh"};
+  const gltf::SkinnedPrimitive& part = model->skinnedPrimitives[0];
+  const gltf::PrimitiveView view(model->meshes[part.mesh].primitives[part.primitive]);
+  const std::size_t jointCount = model->skins[part.skin].joints.size();
+  Result<PackedMesh> mesh = pack(view.mesh(), static_cast<std::uint32_t>(jointCount));
+  if (!mesh) return mesh.error();
+  return Character{*std::move(mesh), gltf::pose(*model, part.skin, clip, seconds)};
+}
+// [/gltf]
+
+TEST(DocumentedExampleTest, ACharacterIsLoadedFromAFile) {
+  const std::filesystem::path models = test::sampleModels;
+  const Character bar = must(loadCharacter(models / "bar.glb", 0, 0.5));
+  EXPECT_GT(bar.mesh.info().vertexCount, 0u);
+  EXPECT_GE(bar.pose.size(), bar.mesh.info().requiredJoints);
+  const Result<Character> none = loadCharacter(models / "none.glb", 0, 0);
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, ErrorCode::ioError);
 }
 
 /// One thread for each job.

@@ -22,6 +22,7 @@ foreach(name IN ITEMS dermis dermis_core dermis_cpu dermis_gltf dermis_verify de
 endforeach()
 list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/cmake/dermis/dermisConfigVersion.cmake
      ${dataFolder}/doc/dermis/LICENSE ${dataFolder}/doc/dermis/README.md ${dataFolder}/doc/dermis/CHANGELOG.md
+     ${dataFolder}/doc/dermis/SECURITY.md
      ${dataFolder}/doc/dermis/engine/README.md)
 file(GLOB_RECURSE documents RELATIVE "${sourceFolder}" "${sourceFolder}/docs/*" "${sourceFolder}/samples/minimal/*"
      "${sourceFolder}/samples/allocator/*" "${sourceFolder}/samples/gpu_poses/*")

@@ -52,8 +52,10 @@ enum class Arrangement : std::uint8_t {
 /// decide which pipelines are needed (`PipelineNeeds`).
 struct VertexLayout {
   VertexFormat positions = VertexFormat::float32x3;  ///< `isPositionFormat`
-  VertexFormat normals = VertexFormat::none;         ///< `isNormalFormat`, or `none`
-  VertexFormat tangents = VertexFormat::none;        ///< `isTangentFormat`, or `none`
+  /// `isNormalFormat`, or `none`. It must be `none` if the mesh has no normals.
+  VertexFormat normals = VertexFormat::none;
+  /// `isTangentFormat`, or `none`. It must be `none` if the mesh has no tangents.
+  VertexFormat tangents = VertexFormat::none;
   /// Whether there are previous positions. Their format is that of the positions. In a scene they
   /// are the positions of the last frame that displayed the instance.
   Motion motion = Motion::none;

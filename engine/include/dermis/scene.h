@@ -399,7 +399,7 @@ class DERMIS_CORE_API Scene {
   /// frames that copied nothing, `bytes` may be empty.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
-  // -- Results, as of the last `commit`.
+  // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits.
 
   /// Where the skinned vertices of an instance are. Before the first `commit` that skins it, the
   /// size is 0. An instance that is culled on the GPU has an output from its first `commit` on,

@@ -256,7 +256,7 @@ class DERMIS_VULKAN_API SkinningSystem {
   std::span<const InstanceHandle> settledInstances() const;
   /// As `Scene::movedInstances`.
   std::span<const InstanceHandle> movedInstances() const;
-  /// As `Scene::bounds`.
+  /// As `Scene::bounds`. `beginFrame` reads back the frames that the GPU has completed.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
   /// As `Scene::instanceCapacity`.
   std::uint32_t instanceCapacity() const;
