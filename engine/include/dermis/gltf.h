@@ -119,7 +119,8 @@ struct Primitive {
   std::vector<float> tangents;                ///< 4 per vertex, or empty
   std::vector<std::vector<float>> texcoords;  ///< TEXCOORD_0, 1, …: 2 per vertex each
   std::vector<float> colors;  ///< COLOR_0: 4 per vertex, or empty; alpha is 1 if the file has none
-  /// One element for each set. If empty, the primitive stays in bind pose.
+  /// One element for each set. If empty, the primitive stays in bind pose: `pack` refuses it, and
+  /// it is drawn without skinning.
   std::vector<Influences> influences;
   /// 3 vertex indices per triangle. Strips and fans are converted. Empty for points and lines.
   std::vector<std::uint32_t> triangles;
