@@ -269,10 +269,11 @@ using GlobalTransform = std::array<std::array<double, 4>, 3>;
 /// The global transforms of all nodes at a time of a clip, in seconds. If `clip` is `none` or does
 /// not exist, it is the rest pose.
 ///
-/// The time is clamped to the keys of each channel; NaN counts as a time before the first key. At a
-/// key the result is the value of the key. Between keys it is interpolated as glTF 2.0, appendix C,
-/// defines: LINEAR rotations by slerp along the shorter arc, CUBICSPLINE with tangents scaled by
-/// the distance of the keys. Rotations are normalized after the interpolation.
+/// The time is clamped to the keys of each channel; NaN counts as a time before the first key. For
+/// a loop, pass the time modulo `Clip::duration`. At a key the result is the value of the key.
+/// Between keys it is interpolated as glTF 2.0, appendix C, defines: LINEAR rotations by slerp
+/// along the shorter arc, CUBICSPLINE with tangents scaled by the distance of the keys. Rotations
+/// are normalized after the interpolation.
 DERMIS_GLTF_API std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
                                                          double time);
 
