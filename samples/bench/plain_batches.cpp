@@ -119,7 +119,8 @@ Result<void> PlainBatches::makeBuffers(const Crowd& crowd) {
         make(output_, crowd.instanceCount() * vertices * outputStride)}) {
     if (!made) return made;
   }
-  std::memcpy(vertices_.bytes().data(), crowd.vertices.data(), vertices * sizeof(PlainVertex));
+  std::memcpy(vertices_.bytes().data(), crowd.vertices.data(),
+              crowd.vertices.size() * sizeof(PlainVertex));
   std::byte* place = matrices_.bytes().data();
   for (const std::vector<JointMatrix>& pose : crowd.poses) {
     std::memcpy(place, pose.data(), pose.size() * sizeof(JointMatrix));

@@ -148,11 +148,11 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
   const std::vector<float> all = solve(*solver);
 
   Centers centers(mesh.primitives.size());
-  auto next = all.begin();
+  const float* next = all.data();
   for (std::size_t index = 0; index < centers.size(); ++index) {
     const gltf::Primitive& primitive = mesh.primitives[index];
     if (primitive.influences.empty()) continue;
-    const auto end = next + std::ptrdiff_t{primitive.vertexCount} * 3;
+    const float* end = next + std::size_t{primitive.vertexCount} * 3;
     centers[index].assign(next, end);
     next = end;
   }
