@@ -1,4 +1,4 @@
-// A Vulkan buffer with memory of its own, for the buffers that samples use.
+// A Vulkan buffer and its memory. MappedBuffer and DeviceBuffer are built on it.
 #pragma once
 
 #include <cstdint>

@@ -306,7 +306,7 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
         EXPECT_EQ(attributes[0].offset % record, 0u);
         for (std::size_t stream = 0; stream < streamCount; ++stream) {
           if (attributes[stream].format == VertexFormat::none) continue;
-          // What is stored with the positions needs no alignment of its own.
+          // Attributes that are part of the record only need the alignment of the record.
           if (attributes[stream].offset - attributes[0].offset < variant.recordBytes) continue;
           EXPECT_EQ(attributes[stream].offset % variant.units[stream], 0u);
         }

@@ -235,9 +235,9 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
 
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   if (jointCount == 0 || jointCount > maxPoseJoints) {
-    return Error{ErrorCode::invalidArgument,
-                 "mesh " + inQuotes(mesh.name) + ": a pose has 1 to " +
-                     std::to_string(maxPoseJoints) + " joints, not " + std::to_string(jointCount)};
+    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": a pose has 1 to " +
+                                                 std::to_string(maxPoseJoints) + " joints, not " +
+                                                 std::to_string(jointCount)};
   }
   if (const Result<void> accepted = validate(mesh, jointCount).accepted(); !accepted)
     return accepted.error();
