@@ -221,8 +221,8 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
 Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const MorphWeight> morphs,
                                     FixedPart& fixed) const {
   const SkinnedPart posed = bindPose(part, morphs);
-  const std::uint64_t positions = posed.positions.size() * sizeof(float);
-  const std::uint64_t normals = posed.normals.size() * sizeof(float);
+  const std::size_t positions = posed.positions.size() * sizeof(float);
+  const std::size_t normals = posed.normals.size() * sizeof(float);
   if (fixed.vertices.handle() == VK_NULL_HANDLE) {
     Result<MappedBuffer> made = MappedBuffer::create(*device_->device, positions + normals,
                                                      VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);

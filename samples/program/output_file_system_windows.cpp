@@ -7,12 +7,11 @@
 #include <cerrno>
 #include <climits>
 #include <cstdint>
-#include <random>
 #include <system_error>
 #include <utility>
 
 #include "file_name.h"
-#include "output_file.h"
+#include "output_file_system.h"
 
 namespace dermis::samples {
 namespace {
@@ -52,6 +51,8 @@ bool isDevice(const std::filesystem::path& path) {
   return type == FILE_TYPE_CHAR || type == FILE_TYPE_PIPE;
 }
 
+}  // namespace
+
 Result<OutputTarget> findTarget(const std::filesystem::path& name) {
   OutputTarget target;
   target.name = name;
@@ -65,6 +66,8 @@ Result<OutputTarget> findTarget(const std::filesystem::path& name) {
     return cannotWrite(name, EACCES);
   return target;
 }
+
+namespace {
 
 /// Opens a file. Returns -1 if that fails; `GetLastError` then returns the reason. It may be
 /// removed while it is open: `UnfinishedFile` does so.
@@ -87,6 +90,8 @@ int writeAll(int file, std::span<const std::byte> bytes) {
   return 0;
 }
 
+}  // namespace
+
 Result<void> writeThrough(const OutputTarget& target, std::span<const std::byte> bytes) {
   const int file = openFile(target.path, OPEN_EXISTING);
   if (file < 0) return cannotWrite(target.name);
@@ -96,28 +101,14 @@ Result<void> writeThrough(const OutputTarget& target, std::span<const std::byte>
   return {};
 }
 
-std::string temporaryNameIn(const std::filesystem::path& folder) {
-  std::random_device random;
-  const std::uint64_t number = std::uint64_t{random()} << 32 | random();
-  return (folder / fmt::format(".dermis-{:016x}.part", number)).string();
-}
-
-}  // namespace
-
 Result<std::unique_ptr<OutputFile>> OutputFile::createFor(const OutputTarget& target) {
+  if (target.isThrough) return cannotWrite(target.name, "it is a device");
   std::unique_ptr<OutputFile> made(
       new OutputFile(target, temporaryNameIn(target.path.parent_path())));
   made->file_ = openFile(pathOf(made->temporary_), CREATE_NEW);
   if (made->file_ < 0) return cannotWrite(target.name);
   made->isThere_ = true;
   return made;
-}
-
-Result<std::unique_ptr<OutputFile>> OutputFile::create(const std::filesystem::path& path) {
-  const Result<OutputTarget> target = findTarget(path);
-  if (!target) return target.error();
-  if (target->isThrough) return cannotWrite(path, "it is a device");
-  return createFor(*target);
 }
 
 OutputFile::~OutputFile() {
@@ -139,20 +130,6 @@ Result<void> OutputFile::commit() {
     return cannotWrite(target_.name);
   isThere_ = false;
   return {};
-}
-
-Result<void> writeFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const Result<OutputTarget> target = findTarget(path);
-  if (!target) return target.error();
-  if (target->isThrough) return writeThrough(*target, bytes);
-  const Result<std::unique_ptr<OutputFile>> file = OutputFile::createFor(*target);
-  if (!file) return file.error();
-  if (Result<void> written = (*file)->write(bytes); !written) return written;
-  return (*file)->commit();
-}
-
-Result<void> writeFile(const std::filesystem::path& path, const std::string& text) {
-  return writeFile(path, std::as_bytes(std::span(text)));
 }
 
 }  // namespace dermis::samples
