@@ -124,12 +124,13 @@ TEST_F(ResultsTest, ConservativeBoxesHoldTheExactOnes) {
     ASSERT_TRUE(joints.ok()) << joints.error().message;
     for (std::uint32_t seed = 0; seed < 10; ++seed) {
       const std::vector<JointMatrix> pose = randomPose(seed, 12, rigidity);
+      const bool mayScale = seed % 2 == 0;
       for (const Method method : allMethods) {
-        const samples::SkinRequest request{&packed, pose, true, method};
+        const samples::SkinRequest request{&packed, pose, mayScale, method};
         const samples::BatchResult result = run(context(), {&request, 1}, withBounds());
         const std::optional<Box> exact = result.instances[0].result.box();
         ASSERT_TRUE(exact.has_value());
-        const Box box = skinnedBounds(*joints, pose, method);
+        const Box box = skinnedBounds(*joints, pose, method, mayScale);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           EXPECT_LE(box.min[axis], exact->min[axis]);
           EXPECT_GE(box.max[axis], exact->max[axis]);

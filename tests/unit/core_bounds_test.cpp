@@ -296,6 +296,51 @@ TEST(Bounds, HoldVerticesOfJointsInOppositeHemispheres) {
   }
 }
 
+/// Of the joints `rotated`, in the box of the joints `scaled` if their scale is ignored.
+void expectInsideWithoutScale(OwnedMesh& mesh, std::span<const JointMatrix> scaled,
+                              std::span<const JointMatrix> rotated, const std::string& what) {
+  const JointBounds bounds = boundsOf(mesh.view(), static_cast<std::uint32_t>(scaled.size()));
+  for (const Method method : provenMethods) {
+    const Box box = skinnedBounds(bounds, scaled, method, false);
+    const bool scales = method == Method::linear;
+    const Result<reference::SkinnedMesh> skinned =
+        reference::skin(mesh.view(), scales ? scaled : rotated, method);
+    ASSERT_TRUE(skinned.ok());
+    for (std::size_t vertex = 0; vertex < skinned->positions.size(); ++vertex) {
+      ASSERT_LE(overhang(box, skinned->positions[vertex], skinned->bounds[vertex].position), 0)
+          << what << ", " << methodName(method) << ", vertex " << vertex;
+    }
+  }
+}
+
+TEST(Bounds, HoldMeshesWhoseScaleIsIgnored) {
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    Random random(seed);
+    OwnedMesh mesh = test::randomMesh(seed, 200, 6, 1 + seed % 5);
+    std::vector<JointMatrix> scaled, rotated;
+    for (int i = 0; i < 6; ++i) {
+      const glm::dmat3 rotation = glm::mat3_cast(random.rotation());
+      const glm::dmat3 axes = glm::mat3_cast(random.rotation());
+      glm::dmat3 scale(0);
+      for (int axis = 0; axis < 3; ++axis)
+        scale[axis][axis] = random.between(0.05, seed % 2 == 0 ? 2 : 0.5);
+      if (seed % 3 == 0) scale *= -1;
+      const glm::dvec3 translation = random.vector(1);
+      scaled.push_back(jointOf(rotation * axes * scale * glm::transpose(axes), translation));
+      rotated.push_back(jointOf(rotation, translation));
+    }
+    expectInsideWithoutScale(mesh, scaled, rotated, "seed " + std::to_string(seed));
+    // The rotation of a joint of rank 1 may be any: one that moves vertices alone, if seed % 5 = 0.
+    const glm::dvec3 u = random.vector(1), v = random.vector(1);
+    const glm::dvec3 translation(rotated[2].m[0][3], rotated[2].m[1][3], rotated[2].m[2][3]);
+    scaled[2] = jointOf(glm::outerProduct(u, v), translation);
+    for (int turn = 0; turn < 8; ++turn) {
+      rotated[2] = jointOf(glm::mat3_cast(random.rotation()), translation);
+      expectInsideWithoutScale(mesh, scaled, rotated, "rank 1, seed " + std::to_string(seed));
+    }
+  }
+}
+
 double widest(const Box& box) {
   return std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]});
 }

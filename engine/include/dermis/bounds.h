@@ -99,6 +99,9 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// this pose, including rounding errors. It is in the space of the pose. In ordinary poses it is a
 /// few percent larger than necessary; docs/bounds.md has the formulas, the proof and numbers.
 ///
+/// `mayScale` is that of the pose (`PoseDescription::mayScale`). If false, the box is that of the
+/// joints without their scale, except for `linear`, which always scales.
+///
 /// There is a proof for `linear`, `dualQuaternion` and `blended`. For all other methods the box is
 /// infinite.
 ///
@@ -111,6 +114,6 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// O(joints + pairs + trios). Any thread. Needs 32 KiB of stack, and allocates only if more than
 /// 128 joints move vertices.
 DERMIS_CORE_API Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose,
-                                  Method method);
+                                  Method method, bool mayScale = true);
 
 }  // namespace dermis

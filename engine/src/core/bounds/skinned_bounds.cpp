@@ -149,6 +149,15 @@ Parts partsOf(const math::Mat3& matrix) {
   return parts;
 }
 
+/// Those of R, for poses whose scale the kernels ignore. C may round to any R as before.
+Parts partsOfRotation(const Parts& parts) {
+  Parts rotation;
+  rotation.real = parts.real;
+  rotation.largest = 1 + 1e-5;
+  rotation.ambiguous = parts.ambiguous;
+  return rotation;
+}
+
 }  // namespace
 }  // namespace dermis::bounds
 
@@ -206,23 +215,28 @@ Turn turnBetween(const Posed& first, const Posed& second) {
 /// Below this cosine rounding decides the sign.
 constexpr double ambiguousCosine = 2e-5;
 
+/// What `skinnedBounds` was asked for.
+struct Blend {
+  Method method;
+  /// Joints as the palette kernel decomposes them, which is rounded as dual quaternions are. False
+  /// for `Method::linear`.
+  bool decomposed;
+  bool mayScale;  ///< if false, decomposed joints are R instead of C
+};
+
 class PoseBounds {
  public:
-  /// `takenApart`: linear blending of joints as the palette kernel takes them apart, which is
-  /// rounded as dual quaternions are.
-  PoseBounds(const JointBounds& bounds, Method method, bool takenApart,
-             std::pmr::memory_resource* memory)
+  PoseBounds(const JointBounds& bounds, const Blend& blend, std::pmr::memory_resource* memory)
       : bounds_(bounds),
-        method_(method),
-        exactJoints_(method == Method::linear && !takenApart),
+        method_(blend.method),
+        exactJoints_(!blend.decomposed),
+        ignoresScale_(blend.decomposed && !blend.mayScale),
         joints_(memory) {}
 
   Box of(std::span<const JointMatrix> palette) {
     if (!pose(palette)) return bounds::boxOf(bounds::everything());
-    if (method_ == Method::dualQuaternion) {
-      findSplitJoints();
-      addAmbiguousJoints();
-    }
+    if (method_ == Method::dualQuaternion) findSplitJoints();
+    addAmbiguousJoints();
     addJoints();
     for (const JointBounds::Pair& pair : bounds_.pairs) {
       if (method_ == Method::linear) {
@@ -247,8 +261,12 @@ class PoseBounds {
       if (used.joint >= palette.size() || !isFinite(palette[used.joint])) return false;
       Posed& joint = joints_.emplace_back();
       joint.map = affineOf(palette[used.joint]);
-      if (method_ == Method::dualQuaternion) {
+      if (method_ == Method::dualQuaternion || ignoresScale_) {
         joint.parts = bounds::partsOf(joint.map.linear);
+        if (ignoresScale_) {
+          joint.parts = bounds::partsOfRotation(joint.parts);
+          joint.map.linear = math::rotationOf(joint.parts.real);
+        }
         anyAmbiguous_ |= joint.parts.ambiguous;
         largest_ = std::max(largest_, joint.parts.largest);
       } else {
@@ -265,9 +283,9 @@ class PoseBounds {
     return bind_.empty() || bounds::reachOf(bind_) <= 1e38;
   }
 
-  /// Finds the joints whose vertices may have influences in opposite hemispheres: by trios or,
-  /// where a vertex has too many influences for those, by angles, which see some if there are
-  /// none.
+  /// Finds the joints whose vertices may have influences in opposite hemispheres: by trios or, if a
+  /// vertex has too many influences for those, by angles. The angles may name joints that have no
+  /// such vertices.
   void findSplitJoints() {
     for (const auto& [a, b, c] : bounds_.trios) {
       splitIfTorn(joints_[a], joints_[b], joints_[c]);
@@ -312,10 +330,13 @@ class PoseBounds {
     }
     const double reach = largest_ * bounds::reachOf(bind_);
     for (const Posed& joint : joints_) {
-      if (!joint.parts.ambiguous || joint.influences == 0) continue;
-      box_.add(Range{joint.map.offset, joint.map.offset}.grownBy(joint.influences *
+      if (!joint.parts.ambiguous) continue;
+      // A vertex of this joint alone is at C p, or at R p if scale is ignored.
+      if (joint.influences == 0 && !ignoresScale_) continue;
+      const std::uint32_t influences = std::max(joint.influences, 1u);
+      box_.add(Range{joint.map.offset, joint.map.offset}.grownBy(influences *
                                                                  (reach + joint.partnerDistance)));
-      amplification_ = std::max(amplification_, 0.5 * joint.influences);
+      amplification_ = std::max(amplification_, 0.5 * influences);
     }
   }
 
@@ -340,6 +361,7 @@ class PoseBounds {
   }
 
   void addLinearPair(const JointBounds::Pair& pair) {
+    if (joints_[pair.first].parts.ambiguous || joints_[pair.second].parts.ambiguous) return;
     const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
     const Share share = shareOf(pair, 1);
     box_.add(bounds::imageOf(second + share.least * difference, pair.extent));
@@ -415,7 +437,7 @@ class PoseBounds {
 
   const JointBounds& bounds_;
   Method method_;
-  bool exactJoints_;
+  bool exactJoints_, ignoresScale_;
   std::pmr::vector<Posed> joints_;
   Range box_, bind_;
   double furthest_ = 0;  ///< the largest |t|
@@ -424,25 +446,28 @@ class PoseBounds {
   bool anyAmbiguous_ = false;
 };
 
-Box boundsBy(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method,
-             bool takenApart = false) {
+Box boundsBy(const JointBounds& bounds, std::span<const JointMatrix> palette, const Blend& blend) {
   // Room for the joints of nearly all rigs; what does not fit comes from the heap.
   alignas(Posed) std::array<std::byte, 128 * sizeof(Posed)> room;
   std::pmr::monotonic_buffer_resource memory(room.data(), room.size());
-  return PoseBounds(bounds, method, takenApart, &memory).of(palette);
+  return PoseBounds(bounds, blend, &memory).of(palette);
 }
 
 }  // namespace
 
-Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method) {
+Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method,
+                  bool mayScale) {
   switch (method) {
     case Method::linear:
+      return boundsBy(bounds, palette, {Method::linear, false, mayScale});
     case Method::dualQuaternion:
-      return boundsBy(bounds, palette, method);
+      return boundsBy(bounds, palette, {Method::dualQuaternion, true, mayScale});
     case Method::blended: {
       // Each position lies between one of linear blending and one of dual quaternions.
-      bounds::Range range = bounds::rangeOf(boundsBy(bounds, palette, Method::linear, true));
-      range.add(bounds::rangeOf(boundsBy(bounds, palette, Method::dualQuaternion)));
+      bounds::Range range =
+          bounds::rangeOf(boundsBy(bounds, palette, {Method::linear, true, mayScale}));
+      range.add(
+          bounds::rangeOf(boundsBy(bounds, palette, {Method::dualQuaternion, true, mayScale})));
       return bounds::boxOf(range);
     }
     default:
