@@ -5,3 +5,5 @@ set(CMAKE_SYSTEM_PROCESSOR i686)
 set(CMAKE_CXX_COMPILER i686-linux-gnu-g++)
 set(CMAKE_C_COMPILER i686-linux-gnu-gcc)
 set(CMAKE_EXE_LINKER_FLAGS_INIT -static)
+# This machine runs its programs itself. Without an "emulator" CMake would look for them in PATH.
+set(CMAKE_CROSSCOMPILING_EMULATOR env)

@@ -1,4 +1,8 @@
 // Accessors: formats, strides, sparse values, ranges, and how much memory they may ask for.
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
 #include "gltf_builder.h"
 
 namespace dermis::test {
@@ -190,6 +194,10 @@ TEST(GltfAccessor, ReadsSparseDataThatBreaksRules) {
             (Floats{0, 0, 0, 1, 0, 0, 0, 2, 0}));
 }
 
+/// Of a size or an offset in a file.
+constexpr std::uint64_t largestInteger = std::min(
+    (std::uint64_t{1} << 53) - 1, std::uint64_t{std::numeric_limits<std::size_t>::max() / 2});
+
 TEST(GltfAccessor, RefusesRangesOutsideTheirBytes) {
   FileBuilder file = skinnedTriangle();
   file.accessor("POSITION")["count"] = 4;
@@ -197,17 +205,33 @@ TEST(GltfAccessor, RefusesRangesOutsideTheirBytes) {
   file.accessor("POSITION")["count"] = 3;
   file.accessor("POSITION")["byteOffset"] = 4;
   expectInvalid(file, "accessor 0: bytes 4 to 40 are outside bufferView 0");
-  file.accessor("POSITION")["byteOffset"] = (std::uint64_t{1} << 53) - 4;
-  expectInvalid(file, "accessor 0: bytes 9007199254740988 to 9007199254741024");
-  file.accessor("POSITION")["count"] = 4'000'000'000u;
+  file.accessor("POSITION")["byteOffset"] = largestInteger - 3;
+  expectInvalid(file, "accessor 0: bytes " + std::to_string(largestInteger - 3) + " to " +
+                          std::to_string(largestInteger + 33));
+  file.accessor("POSITION")["count"] = 2'000'000'000u;
   expectInvalid(file, "are outside bufferView 0");
-  file.accessor("POSITION")["count"] = std::uint64_t{1} << 32;
-  expectError(file.load(), ErrorCode::limitExceeded, "accessor 0: a count of 4294967296");
+  if constexpr (sizeof(std::size_t) == 8) {
+    file.accessor("POSITION")["count"] = std::uint64_t{1} << 32;
+    expectError(file.load(), ErrorCode::limitExceeded, "accessor 0: a count of 4294967296");
+  }
 
   file = skinnedTriangle();
-  file.json["bufferViews"][1]["byteOffset"] = (std::uint64_t{1} << 53) - 1;
-  file.json["bufferViews"][1]["byteLength"] = (std::uint64_t{1} << 53) - 1;
+  file.json["bufferViews"][1]["byteOffset"] = largestInteger;
+  file.json["bufferViews"][1]["byteLength"] = largestInteger;
   expectInvalid(file, "accessor 1: bytes 0 to 12 are outside bufferView 1 of 0 bytes");
+}
+
+// 32-bit builds would cut off the upper half: offset 2^32 would be offset 0.
+TEST(GltfAccessor, RefusesIntegersThatAreTooLarge) {
+  for (const std::uint64_t number : {largestInteger + 1, std::uint64_t{1} << 63}) {
+    for (const char* property : {"byteOffset", "count"}) {
+      FileBuilder file = skinnedTriangle();
+      file.accessor("POSITION")[property] = number;
+      expectInvalid(file, "is larger than " + std::to_string(largestInteger));
+      file.accessor("POSITION")[property] = static_cast<double>(number);
+      expectInvalid(file, "is larger than " + std::to_string(largestInteger));
+    }
+  }
 }
 
 // A view that is longer than its buffer is cut off.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
@@ -30,8 +31,10 @@ namespace {
 
 using nlohmann::json;
 
-// Above this, a JSON number may differ from the integer that was written.
-constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
+// Above 2^53, a JSON number may differ from the integer that was written. tinygltf stores sizes and
+// offsets as size_t; the sum of two must fit it, in 32-bit builds too.
+constexpr std::uint64_t largestInteger = std::min(
+    (std::uint64_t{1} << 53) - 1, std::uint64_t{std::numeric_limits<std::size_t>::max() / 2});
 
 // "{}," takes three bytes in a file, but hundreds in the structs made from it (tinygltf's and
 // Dermis'), which are in growing vectors.
@@ -115,8 +118,9 @@ class ReferenceCheck {
                  Check check) {
     forEach(section, [&](json& item, const std::string& where, std::size_t i) {
       if (used[i]) return check(item, where, i);
-      const bool good = notes_.tolerate(NoteKind::unused, "; nothing skinned uses it",
-                                        [&] { check(item, where, i); });
+      const bool good =
+          notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
+                          [&] { check(item, where, i); });
       if (!good) item = placeholder;
     });
   }
@@ -218,14 +222,13 @@ class ReferenceCheck {
   static std::uint64_t integer(json& value, const std::string& what) {
     if (value.is_number_float()) {
       const double number = value.get<double>();
-      if (number >= 0 && number <= static_cast<double>(largestInteger) &&
-          std::floor(number) == number) {
-        value = static_cast<std::uint64_t>(number);
+      if (number >= 0 && std::floor(number) == number) {
+        value = static_cast<std::uint64_t>(std::min(number, 0x1p63));
       }
     }
-    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > largestInteger) {
-      failInvalid(what, " is not an integer of at least 0");
-    }
+    if (!value.is_number_unsigned()) failInvalid(what, " is not an integer of at least 0");
+    if (value.get<std::uint64_t>() > largestInteger)
+      failInvalid(what, " is larger than ", largestInteger);
     return value.get<std::uint64_t>();
   }
 
@@ -615,7 +618,8 @@ class ReferenceCheck {
       const auto check = [&] { checkSampler(samplers[i], used[i], join(where, " sampler ", i)); };
       if (used[i]) {
         check();
-      } else if (!notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", check)) {
+      } else if (!notes_.tolerate(NoteKind::unused,
+                                  "; ignored, since nothing skinned or animated uses it", check)) {
         samplers[i] = {{"input", 0}, {"output", 0}};
       }
     }
