@@ -8,7 +8,7 @@ function(dermis_shader_tool command depends)
   find_program(DERMIS_SPIRV_VAL spirv-val DOC "SPIRV-Tools' validator, run on each kernel")
   mark_as_advanced(DERMIS_SPIRV_VAL)
   if(NOT DERMIS_SPIRV_VAL)
-    message(FATAL_ERROR "Compiling kernels needs spirv-val, SPIRV-Tools and glslang (Debian: spirv-tools, glslang-dev). "
+    message(FATAL_ERROR "Compiling kernels needs spirv-val, SPIRV-Tools and glslang (Debian: spirv-tools, glslang-dev, glslang-tools). "
                         "The source package of Dermis needs none of them: its kernels are compiled")
   endif()
   get_property(isBuiltApart GLOBAL PROPERTY DERMIS_SHADER_TOOL_IS_BUILT_APART)

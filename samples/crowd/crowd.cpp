@@ -245,7 +245,7 @@ Result<VkBuffer> Crowd::writeVisibility(std::uint64_t frame) {
   samples::MappedBuffer& buffer = visibility_[frame % options_.framesInFlight];
   if (buffer.handle() == VK_NULL_HANDLE) {
     Result<samples::MappedBuffer> made = samples::MappedBuffer::create(
-        *device_, std::uint64_t{system_.onDevice()->instanceCapacity()} * 4,
+        *device_, std::uint64_t{system_.onDevice()->visibilityCount()} * 4,
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
     if (!made) return made.error();
     buffer = std::move(*made);

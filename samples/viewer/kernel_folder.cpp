@@ -27,7 +27,7 @@ class CompiledFolder : public KernelFolder {
     const Result<KernelReload> done = compiler_.reload(context, frame_, frame_ - 1);
     if (!done) return done.error();  // glslang's message, to show
     // [/reload]
-    if (done->compiled == 0) return std::optional<KernelUpdate>();
+    if (done->changed == 0) return std::optional<KernelUpdate>();
     KernelUpdate update;
     update.isOther = !done->replaced.empty();
     update.text = update.isOther ? "reloaded " + plural(done->replaced.size(), "kernel")

@@ -549,7 +549,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   }
   bad = good;
   bad.firstVertex = 204;
-  expectRefused(bad, "begin at 204 and end at 203");
+  expectRefused(bad, "firstVertex of 204 is after its last vertex");
   bad = good;
   bad.places.normals.format = static_cast<VertexFormat>(99);
   expectRefused(bad, "normals");

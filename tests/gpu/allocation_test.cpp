@@ -101,7 +101,7 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
     instances.push_back(must(system->addInstance(instance)));
   }
   const samples::MappedBuffer words = must(samples::MappedBuffer::create(
-      device, system->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+      device, system->visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::ranges::fill(words.bytes(), std::byte{1});
   const Pose pose = systemPose(1);
   const std::array<MorphWeight, 2> morphs{{{0, 0.5f}, {1, 0.25f}}};

@@ -170,11 +170,11 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   instance.bounds = true;
   must(system.addInstance(instance));
   expectRefused(system.addInstance(instance),
-                "1 instances have them already, and that is the maximum");
+                "1 instances have them already: the maximum of boundsCapacity");
   instance.bounds = false;
   must(system.addInstance(instance));
   expectRefused(system.addInstance(instance),
-                "there are 2 instances already, which is the maximum");
+                "there are 2 instances already: the maximum of instanceCapacity");
   const MeshHandle none = {};
   EXPECT_FALSE(system.removeMesh(none).ok());
 }

@@ -244,7 +244,7 @@ TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
   small.instanceCapacity = Capacity::fixed(3);
   small.boundsCapacity = Capacity::fixed(1);
   SingleInstance first(device(), small, plainLayout());
-  EXPECT_EQ(first.engine->instanceCapacity(), 3u);
+  EXPECT_EQ(first.engine->visibilityCount(), 3u);
   InstanceDescription bounded = first.description;
   bounded.bounds = true;
   const InstanceHandle second = first.engine.addInstance(bounded);

@@ -63,7 +63,7 @@ class SystemLimitsTest : public SystemTest {
     std::vector<InstanceHandle> instances;
     for (int i = 0; i < count; ++i) instances.push_back(engine.addInstance(instance));
     const samples::MappedBuffer words = must(samples::MappedBuffer::create(
-        device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+        device(), engine->visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
     std::ranges::fill(words.bytes(), std::byte{1});
     engine.submit({words.handle(), 0});
     const std::vector<std::byte> bytes = engine.readOutput();

@@ -61,7 +61,7 @@ class SystemMemoryTest : public SystemTest {
   /// Everything for which a system may want memory: culling, bounds, copies of many frames.
   void use(SystemEngine& engine) {
     const samples::MappedBuffer visibility = must(samples::MappedBuffer::create(
-        device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+        device(), engine->visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
     const PackedMesh packed = systemMesh(1, 100);
     engine.begin();
     InstanceDescription instance;

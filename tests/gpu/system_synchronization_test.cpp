@@ -72,7 +72,7 @@ class BusyScene {
     const VkBufferUsageFlags usage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     visibility_ =
-        must(samples::MappedBuffer::create(device, engine_->instanceCapacity() * 4, usage));
+        must(samples::MappedBuffer::create(device, engine_->visibilityCount() * 4, usage));
     for (samples::MappedBuffer& drawn : drawn_)
       drawn =
           must(samples::MappedBuffer::create(device, system.outputCapacity.initial, usage, true));

@@ -30,7 +30,7 @@ class SystemVisibilityTest : public SystemTest {
       instances_.push_back(engine_->addInstance(instance_));
     }
     if (!culledOnGpu) return;
-    words_ = must(samples::MappedBuffer::create(device, (*engine_)->instanceCapacity() * 4,
+    words_ = must(samples::MappedBuffer::create(device, (*engine_)->visibilityCount() * 4,
                                                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
     show(0, instanceCount);
   }
@@ -49,7 +49,7 @@ class SystemVisibilityTest : public SystemTest {
     std::ranges::fill(words_.bytes(), std::byte{0});
     for (std::uint32_t i = first; i < first + count; ++i) {
       const std::uint32_t index = must((*engine_)->visibilityIndex(instances_[i]));
-      ASSERT_LT(index, (*engine_)->instanceCapacity());
+      ASSERT_LT(index, (*engine_)->visibilityCount());
       words_.bytes()[index * 4 + i % 4] = std::byte{1};  // any bit will do
     }
   }

@@ -376,7 +376,7 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   EXPECT_EQ(failures, 0);
   // What they prepared is there: `addInstance` here is the system's own, and prepares nothing.
   const samples::MappedBuffer visibility = must(samples::MappedBuffer::create(
-      device(), engine->instanceCapacity() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+      device(), engine->visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::ranges::fill(visibility.bytes(), std::byte{1});
   engine.begin();
   instance.culledOnGpu = true;

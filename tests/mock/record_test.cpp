@@ -395,7 +395,7 @@ TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
   const std::string skin =
       " with positions as float32x3, normals as octahedral16x2, tangents as snorm8x4, previous "
       "positions, bounds, for 4 influences";
-  const std::string end = " has not been prepared";
+  const std::string end = " has no pipeline; call Context::prepare for it first";
   const std::string sentences[] = {
       "the palette kernel for dual quaternions with joints that scale" + end,
       "the clear kernel" + end, "the variant of linear" + skin + " and joints that scale" + end,
@@ -422,7 +422,7 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
   EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().message,
             "the variant of linear with positions as float32x3, morph targets, for any number of "
-            "influences and joints that scale has not been prepared");
+            "influences and joints that scale has no pipeline; call Context::prepare for it first");
 }
 
 /// A few methods and layouts, and batches of nothing else.

@@ -78,11 +78,11 @@ TEST_F(PlanErrors, NoMesh) {
 
 TEST_F(PlanErrors, MeshOffsets) {
   job().meshOffset = 8;
-  expectInvalid({"job 1", "byte 8"});
+  expectInvalid({"job 1", "meshOffset of 8 is not a multiple of 16"});
   job().meshOffset = batch.meshesSize - batch.meshes[0].bytes().size() + 16;
-  expectInvalid({"job 1"});
+  expectInvalid({"job 1", "ends after the mesh buffer"});
   job().meshOffset = ~std::uint64_t{15};
-  expectInvalid({"job 1"});
+  expectInvalid({"job 1", "ends after the mesh buffer"});
   job().meshOffset = 0;
   batch.meshesSize = batch.meshes[0].bytes().size();
   expectGood();
@@ -158,13 +158,13 @@ TEST_F(PlanErrors, PoseCounts) {
 
 TEST_F(PlanErrors, MatrixOffsets) {
   batch.poses[1].matrixOffset += 8;
-  expectInvalid({"pose 1", "8 matrices"});
+  expectInvalid({"pose 1", "matrixOffset of 392 is not a multiple of 16"});
   batch.poses[1].matrixOffset = batch.posesSize - 8 * 48;
   expectGood();
   batch.poses[1].matrixOffset += 16;
-  expectInvalid({"pose 1"});
+  expectInvalid({"pose 1", "8 matrices", "end after the poses buffer"});
   batch.poses[1].matrixOffset = ~std::uint64_t{15};
-  expectInvalid({"pose 1"});
+  expectInvalid({"pose 1", "8 matrices", "end after the poses buffer"});
 }
 
 TEST_F(PlanErrors, UnknownMethods) {

@@ -172,7 +172,7 @@ TEST(Repair, SharesAreClampedCentersThatAreNotFiniteBecomeZero) {
   mesh.centersOfRotation[4 * 3 + 0] = infinity;
   const RepairedMesh result = repaired(mesh.view(), 10);
   EXPECT_EQ(result.report().find(MeshProblem::nonFiniteCenter)->count, 2u);
-  EXPECT_NE(result.report().find(MeshProblem::shareOutOfRange), nullptr);
+  EXPECT_NE(result.report().find(MeshProblem::methodWeightOutOfRange), nullptr);
   const MeshView mended = result.view();
   const float weights[] = {0, 1, 0, 1, 0, 0.25f}, strengths[] = {0.25f, 0, 1, 0, 1, 0};
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {

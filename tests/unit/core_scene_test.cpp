@@ -394,7 +394,7 @@ TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   expectRefused(bad, ErrorCode::invalidArgument, "framesInFlight is 0");
   bad = smallScene();
   bad.outputCapacity = Capacity::fixed(0);
-  expectRefused(bad, ErrorCode::invalidArgument, "outputCapacity is 0");
+  expectRefused(bad, ErrorCode::invalidArgument, "outputCapacity has a maximum of 0");
   bad = smallScene();
   bad.limits.maxStorageBufferRange = 65536;
   bad.jointCapacity = Capacity::fixed(1000);
@@ -409,7 +409,13 @@ TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   expectRefused(bad, ErrorCode::invalidArgument, "Tuning::workgroupSize");
   bad = smallScene();
   bad.limits.maxWorkgroupCountX = 0;
-  expectRefused(bad, ErrorCode::invalidArgument, "limits");
+  expectRefused(bad, ErrorCode::invalidArgument, "maxWorkgroupCountX and Y must be at least 1");
+  bad = smallScene();
+  bad.limits.maxStorageBufferRange = 1000;
+  expectRefused(bad, ErrorCode::invalidArgument, "maxStorageBufferRange must be at least 1024");
+  bad = smallScene();
+  bad.limits.minStorageBufferOffsetAlignment = 48;
+  expectRefused(bad, ErrorCode::invalidArgument, "must be a power of two");
 }
 
 }  // namespace

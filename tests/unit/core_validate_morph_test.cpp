@@ -81,8 +81,8 @@ TEST_F(ValidateMorphs, VerticesMustRise) {
   for (const std::uint32_t second : {2u, 1u, 0u}) {
     vertices[1] = second;
     EXPECT_EQ(onlyFinding(MeshProblem::morphVertices, 1, 0),
-              "mesh 'Fox': morph target 1 displaces vertex " + std::to_string(second) +
-                  ", which is outside the mesh or not in ascending order");
+              "mesh 'Fox': morph target 1 lists vertex " + std::to_string(second) +
+                  " after vertex 2, but vertices must be in ascending order");
   }
   vertices = {9, 5, 2};
   targets[1].vertices = vertices;

@@ -330,16 +330,17 @@ TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
     };
     for (const float bad : {below, -1.0f, above, 7.0f, nan, infinity, -infinity}) {
       (*values)[4] = bad;
-      expectSentence(onlyFinding(MeshProblem::shareOutOfRange, 1, 4),
+      expectSentence(onlyFinding(MeshProblem::methodWeightOutOfRange, 1, 4),
                      "mesh 'Fox', vertex 4: the " + rest);
       (*values)[8] = bad;
-      onlyFinding(MeshProblem::shareOutOfRange, 2, 4);
+      onlyFinding(MeshProblem::methodWeightOutOfRange, 2, 4);
       std::copy(good.begin(), good.end(), values->begin());
       // The mesh's own, which counts where the vertices have none.
       *whole = bad;
       EXPECT_TRUE(validate(view, jointCount).findings.empty());
       *attribute = {};
-      expectSentence(onlyFinding(MeshProblem::shareOutOfRange, 1, 0), "mesh 'Fox': its " + rest);
+      expectSentence(onlyFinding(MeshProblem::methodWeightOutOfRange, 1, 0),
+                     "mesh 'Fox': its " + rest);
       *attribute = goodView;
       *whole = goodWhole;
     }
@@ -351,7 +352,7 @@ TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
   }
   // Vertices are counted.
   mesh.dualQuaternionWeights[3] = mesh.bulgeStrengths[3] = 2;
-  onlyFinding(MeshProblem::shareOutOfRange, 1, 3);
+  onlyFinding(MeshProblem::methodWeightOutOfRange, 1, 3);
 }
 
 TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
@@ -550,7 +551,7 @@ TEST_F(ValidateTest, DuplicateJoints) {
   mesh.joints[2 * 4 + 1] = mesh.joints[2 * 4];
   mesh.joints[5 * 4 + 1] = mesh.joints[5 * 4];
   EXPECT_EQ(onlyFinding(MeshProblem::duplicateJoint, 2, 2),
-            "mesh 'Fox', vertex 2: joint 2 has weight twice");
+            "mesh 'Fox', vertex 2: joint 2 occurs twice");
 }
 
 TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbors) {
@@ -561,7 +562,7 @@ TEST_F(ValidateTest, DuplicatesNeedNotBeNeighbors) {
     mesh.weights[8 * 4 + slot] = weights[slot];
   }
   EXPECT_EQ(onlyFinding(MeshProblem::duplicateJoint, 1, 8),
-            "mesh 'Fox', vertex 8: joint 9 has weight twice");
+            "mesh 'Fox', vertex 8: joint 9 occurs twice");
 }
 
 TEST_F(ValidateTest, DuplicatesAcrossSets) {

@@ -195,8 +195,8 @@ TEST(GltfAccessor, ReadsSparseDataThatBreaksRules) {
 }
 
 /// Of a size or an offset in a file.
-constexpr std::uint64_t largestInteger = std::min(
-    (std::uint64_t{1} << 53) - 1, std::uint64_t{std::numeric_limits<std::size_t>::max() / 2});
+constexpr std::uint64_t largestInteger =
+    std::min((std::uint64_t{1} << 53) - 1, std::uint64_t{std::numeric_limits<std::size_t>::max()});
 
 TEST(GltfAccessor, RefusesRangesOutsideTheirBytes) {
   FileBuilder file = skinnedTriangle();
@@ -224,12 +224,15 @@ TEST(GltfAccessor, RefusesRangesOutsideTheirBytes) {
 // 32-bit builds would cut off the upper half: offset 2^32 would be offset 0.
 TEST(GltfAccessor, RefusesIntegersThatAreTooLarge) {
   for (const std::uint64_t number : {largestInteger + 1, std::uint64_t{1} << 63}) {
-    for (const char* property : {"byteOffset", "count"}) {
-      FileBuilder file = skinnedTriangle();
-      file.accessor("POSITION")[property] = number;
-      expectInvalid(file, "is larger than " + std::to_string(largestInteger));
-      file.accessor("POSITION")[property] = static_cast<double>(number);
-      expectInvalid(file, "is larger than " + std::to_string(largestInteger));
+    FileBuilder file = skinnedTriangle();
+    file.accessor("POSITION")["byteOffset"] = number;
+    expectInvalid(file, "accessor 0: byteOffset is larger than");
+    file.accessor("POSITION")["byteOffset"] = static_cast<double>(number);
+    expectInvalid(file, "accessor 0: byteOffset is larger than");
+    for (const char* property : {"byteOffset", "byteLength"}) {
+      file = skinnedTriangle();
+      file.json["bufferViews"][0][property] = number;
+      expectInvalid(file, "bufferView 0: " + std::string(property) + " is larger than");
     }
   }
 }

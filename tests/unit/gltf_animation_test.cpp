@@ -132,7 +132,7 @@ TEST(GltfAnimation, NormalizesRotationKeys) {
   Floats values = turnAboutZ({0, 90});
   for (float& value : values) value *= 3;
   const gltf::Model model = loaded(animated({0, 1}, values, "rotation", "LINEAR"));
-  EXPECT_EQ(model.notes.at(0), "2 rotation keys in 1 channel not of unit length, normalized");
+  EXPECT_EQ(model.notes.at(0), "2 rotation keys in 1 channel normalized: not of unit length");
   EXPECT_NEAR(angleAt(model, 0.5), 45, 1e-5);
   EXPECT_FLOAT_EQ(model.clips[0].channels[0].values[3], 1.0f);
 }
@@ -261,7 +261,7 @@ TEST(GltfAnimation, LeavesOutChannelsThatItDoesNotKnow) {
   gltf::Model model = loaded(file);
   EXPECT_EQ(model.clips.at(0).channels.size(), 1u);
   EXPECT_EQ(xAt(model, 1), 1);
-  EXPECT_EQ(model.notes.at(0), "1 animation channel with an unknown target, left out");
+  EXPECT_EQ(model.notes.at(0), "1 animation channel left out: an unknown target");
 }
 
 // The accessor of the times has no bytes: a placeholder, of which nothing can be made.

@@ -42,7 +42,8 @@ const std::map<std::string, Decision>& decisions() {
       {"node/unresolved_skin.gltf", note("node 0: it has skin but no mesh")},
       {"node/weights_with_no_mesh.gltf", note("node 0: it has weights but no mesh")},
       {"skin/buffer_view_bytestride.gltf",
-       note("accessor 0: it is invalid, or its data is missing; nothing skinned uses it")},
+       note("accessor 0: it is invalid, or its data is missing; ignored, since nothing skinned or "
+            "animated uses it")},
       {"skin/custom_property.gltf",
        accept("a warning to the validator; properties that are not known are not read")},
       {"skin/empty_array.gltf", note("'skins' is an empty array")},

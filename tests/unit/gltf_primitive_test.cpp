@@ -207,7 +207,7 @@ TEST(GltfPrimitive, KeepsAPrimitiveWithoutJoints) {
   const gltf::PrimitiveView view(primitive);
   EXPECT_TRUE(view.mesh().influenceSets.empty());
   ASSERT_EQ(model.notes.size(), 1u);
-  EXPECT_EQ(model.notes[0], "1 primitive of a skinned node without joints, left in bind pose");
+  EXPECT_EQ(model.notes[0], "1 primitive left in bind pose: a skinned node, but no joints");
 }
 
 TEST(GltfPrimitive, LeavesOutAPrimitiveWithoutPositions) {

@@ -203,7 +203,8 @@ void addBuffers(std::vector<Violation>& table) {
              accessor(f, joints)["count"] = 4;
            }},
           {"unused_buffer_is_missing", noted, Three::loads,
-           "buffer 1: 'missing.bin' cannot be read without a folder",
+           "buffer 1: 'missing.bin' cannot be read: the model was loaded from memory, without a "
+           "folder",
            [withBuffer](File& f) {
              withBuffer(f, f.binary.size());
              f.json["buffers"].push_back({{"byteLength", 4}, {"uri", "missing.bin"}});

@@ -62,7 +62,7 @@ TEST(GltfNode, NormalizesRotations) {
       {{{"rotation", {0, 0, 2, 2}}}, {{"rotation", {0, 0, 0, 0}}}, {{"rotation", {0, 0, 0, 1}}}}));
   EXPECT_NEAR(model.nodes[0].rotation[2], std::sqrt(0.5), 1e-15);
   EXPECT_EQ(model.nodes[1].rotation, (std::array<double, 4>{0, 0, 0, 1}));
-  EXPECT_EQ(model.notes.at(0), "2 node rotations not of unit length, normalized");
+  EXPECT_EQ(model.notes.at(0), "2 node rotations normalized: not of unit length");
 }
 
 // A chain as deep as a hostile file likes: no recursion may follow it.
@@ -149,7 +149,7 @@ TEST(GltfScene, TakesTheDefaultScene) {
   gltf::Model model = loaded(file);
   EXPECT_TRUE(model.skinnedPrimitives.empty());
   EXPECT_TRUE(model.meshes.at(0).primitives.empty()) << "decoded though nothing skins it";
-  EXPECT_EQ(model.notes.at(0), "1 node with a mesh outside the default scene left out");
+  EXPECT_EQ(model.notes.at(0), "1 node left out: outside the default scene");
   file.json.erase("scene");
   EXPECT_TRUE(loaded(file).skinnedPrimitives.empty()) << "without a scene number it is scene 0";
   file.json.erase("scenes");
@@ -172,7 +172,7 @@ TEST(GltfScene, LeavesOutMeshesWithoutASkin) {
   file.json["scenes"][0]["nodes"] = {0, 1, 3, 4};
   const gltf::Model model = loaded(file);
   EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
-  EXPECT_EQ(model.notes.at(0), "2 nodes with a mesh but no skin left out");
+  EXPECT_EQ(model.notes.at(0), "2 nodes left out: a mesh but no skin");
 }
 
 TEST(GltfScene, LoadsAFileWithNothingInIt) {

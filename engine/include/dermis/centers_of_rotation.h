@@ -2,8 +2,8 @@
 // joints rotates it. They are computed once, at import, from the bind pose. Source: Le and Hodgins
 // 2016, "Real-time skeletal skinning with optimized centers of rotation".
 //
-// The similarity of two vectors of weights, i and t, is greater the more joints they share in the
-// same proportion (σ = 0.1):
+// The similarity of two weight vectors i and t is large if they share joints with the same ratio of
+// weights (σ = 0.1):
 //
 //     s(i, t) = Σ_{j≠k} w_ij w_ik w_tj w_tk exp(−(w_ij w_tk − w_ik w_tj)² / σ²)
 //
@@ -31,7 +31,8 @@ namespace dermis {
 /// 2^-49 dropped. A vertex without weight adds nothing to the weights of its triangles. A triangle
 /// without area adds nothing to a center. If a vertex has fewer than two influences, or no triangle
 /// has two of its joints, its center is its own position in bind pose; with one joint the center
-/// makes no difference. Centers are finite and lie between the centroids of the triangles.
+/// makes no difference. Every other center lies in the convex hull of the triangles' centroids.
+/// Centers are finite.
 ///
 /// Sums are computed in double precision. The result differs from the exact center only by the
 /// rounding of weights and centers to float32.
@@ -54,7 +55,8 @@ class DERMIS_CORE_API CenterOfRotationSolver {
   /// `triangles` has three vertex indices for each triangle. Pass the whole surface, as one mesh,
   /// even if it is split, for example by material: the centers depend on all of it.
   ///
-  /// Fails with `invalidMesh` if `pack` refuses the mesh, with the same message; with
+  /// `MeshView::centersOfRotation` is ignored. Fails with `invalidMesh` if `pack` refuses the rest
+  /// of the mesh, with the same message; with
   /// `invalidArgument` if `jointCount` is 0 or above `maxPoseJoints`, if the number of indices is
   /// not a multiple of 3, or if an index is outside the mesh; with `limitExceeded` above 2^32 − 1
   /// triangles. Any thread.

@@ -40,10 +40,11 @@ struct Node {
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w, of unit length
   std::array<double, 3> scale{1, 1, 1};
   /// Column-major, as in the file. If there is one, it replaces the three members above. A node
-  /// that a clip animates has none: its matrix has been decomposed into these members, with a note.
+  /// whose translation, rotation or scale a clip animates has none: its matrix has been decomposed
+  /// into these members, with a note.
   std::optional<std::array<double, 16>> matrix;
-  /// Morph weights that override those of the mesh, one for each morph target; empty if the node
-  /// has none. Missing weights are 0.
+  /// Morph weights that override those of the mesh, in the order of its morph targets; empty if the
+  /// node has none. If there are fewer than targets, the others are 0.
   std::vector<float> morphWeights;
 };
 
@@ -160,7 +161,8 @@ struct Mesh {
   /// The largest number of morph targets of a primitive, decoded or not. A primitive with fewer has
   /// the first of them.
   std::uint32_t morphTargetCount = 0;
-  std::vector<float> morphWeights;  ///< one for each morph target; missing weights are 0
+  /// In the order of the morph targets. If there are fewer than targets, the others are 0.
+  std::vector<float> morphWeights;
 };
 
 /// How values between keys are computed, as in glTF 2.0.
@@ -247,7 +249,8 @@ struct LoadOptions {
 ///   An error in a part that nothing skinned or animated uses is a note instead;
 /// - `unsupportedFeature` if the file requires an unknown extension (for example mesh compression),
 ///   or is glTF 1.0;
-/// - `limitExceeded` if it needs more memory than its size justifies (memory_budget.h).
+/// - `limitExceeded` if a file is larger than 4 GiB, or if the model needs more memory than the
+///   files' sizes justify (memory_budget.h).
 DERMIS_GLTF_API Result<Model> load(const std::filesystem::path& path,
                                    const LoadOptions& options = {});
 
@@ -284,7 +287,7 @@ DERMIS_GLTF_API std::vector<GlobalTransform> nodeGlobals(const Model& model, std
 DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
                                               std::span<const GlobalTransform> globals);
 
-/// `nodeGlobals` and `pose` in one call, for a model with one skin.
+/// `nodeGlobals` and `pose` in one call. For several skins, call `nodeGlobals` once instead.
 DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
                                               std::uint32_t clip, double time);
 

@@ -13,13 +13,14 @@ namespace dermis {
 /// Where one attribute of the skinned vertices is written. Vertex v is at `offset + v * stride` in
 /// the output buffer of that attribute. Bytes between attributes are never written.
 ///
-/// Rules:
-/// - Offset, stride and the size of the format must be multiples of 4. With
-///   `DeviceLimits::storage16Bit` they must be multiples of 2. With `DeviceLimits::storage8Bit`,
-///   too, they may be any number. If a device has fewer storage buffers than
-///   `storageBuffersWanted`, they must always be multiples of 4.
-/// - If the attributes of a job are adjacent, in the order positions, normals, tangents and with
-///   equal strides, they must be in one buffer (`OutputSizes::isOneBuffer`).
+/// Rules on the GPU. On the CPU there is none but the minimum of the stride.
+/// - Offset, stride and the size of the format must be multiples of 4. If
+///   `DeviceLimits::storage16Bit` is true, multiples of 2 are allowed. If `storage8Bit` is true,
+///   too, any number is allowed. If a device has fewer storage buffers than `storageBuffersWanted`,
+///   they must always be multiples of 4.
+/// - If normals begin where the format of the positions ends, tangents where that of the normals
+///   ends, and all strides are equal, Dermis takes the attributes for one interleaved vertex. They
+///   must then be in one buffer (`OutputSizes::isOneBuffer`).
 /// - If, in addition, positions and normals are float32x3 and the stride is a multiple of 8, the
 ///   offset of the positions must be a multiple of 8.
 struct OutputAttribute {
@@ -57,7 +58,8 @@ struct VertexLayout {
   /// `isTangentFormat`, or `none`. It must be `none` if the mesh has no tangents.
   VertexFormat tangents = VertexFormat::none;
   /// Whether there are previous positions. Their format is that of the positions. In a scene they
-  /// are the positions of the last frame that displayed the instance.
+  /// are the positions that the output had in the last committed frame in which the instance was
+  /// visible.
   Motion motion = Motion::none;
   Arrangement arrangement = Arrangement::interleaved;
   /// For interleaved layouts: bytes from one vertex to the next. It may leave room for attributes

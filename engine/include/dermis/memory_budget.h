@@ -6,9 +6,9 @@
 
 namespace dermis::gltf {
 
-/// 64 MiB, plus 64 times the bytes of the file and of all files that it names, each counted once.
-/// The program calls `spend` before each allocation. Nothing is given back, so the budget limits
-/// the time that a file takes, too.
+/// 64 MiB, plus 64 times the bytes that are read from the file and from the files that it names.
+/// `load` calls `spend` before each allocation; the caller does so for what it makes from the
+/// model. Nothing is given back, so the budget limits the time that a file takes, too.
 class MemoryBudget {
  public:
   static constexpr std::uint64_t base = std::uint64_t{64} << 20;  ///< bytes without any file

@@ -74,9 +74,10 @@ struct MorphTargetView {
   /// The vertices that the elements below belong to, strictly ascending. If empty, there is an
   /// element for each vertex of the mesh.
   std::span<const std::uint32_t> vertices;
-  /// float32, float16 or snorm16, 3 components, multiplied by `positionScale`.
+  /// float32, float16 or snorm16, 3 components (a fourth is ignored), multiplied by
+  /// `positionScale`.
   AttributeView positions;
-  AttributeView normals;   ///< float32, float16, snorm8 or snorm16, 3 components
+  AttributeView normals;   ///< float32, float16, snorm8 or snorm16, 3 components or 4
   AttributeView tangents;  ///< the same; the handedness is not displaced
   std::array<float, 3> positionScale{1, 1, 1};
 };

@@ -56,15 +56,17 @@ class DERMIS_CORE_API PackedMesh {
   std::vector<std::uint32_t> words_;
 };
 
-/// Packs a mesh for poses of at least `jointCount` joints, 1 to `maxPoseJoints`. All joint indices
-/// must be less than `jointCount`. O(vertices × influences + displacements).
+/// Packs a mesh. `jointCount` is the number of joints of its skeleton, 1 to `maxPoseJoints`: all
+/// joint indices must be less. A pose may have fewer joints, but at least
+/// `MeshInfo::requiredJoints`. O(vertices × influences + displacements).
 ///
 /// - Attributes are converted to float32.
 /// - The weights of a joint that occurs twice in a vertex are added. Zero weights are dropped.
 /// - Weights are normalized in double precision, and rounded to float32 so that they sum to exactly
 ///   1. A weight below 2^-49 is dropped.
 /// - The influences of a vertex are sorted by descending weight, and by ascending joint index if
-///   weights are equal. The first is the pivot.
+///   weights are equal. The first is the pivot: the quaternions of the others are brought into its
+///   hemisphere before they are blended (docs/methods.md).
 /// - An influence takes 8 bytes.
 /// - Of morph targets, only displaced vertices are stored.
 ///

@@ -36,8 +36,9 @@ struct Promises {
 };
 
 /// The device limits and the promises that a plan is made for. `vulkan::Context::limits` returns
-/// them; an engine without a Context fills in the values of its device. The defaults are what
-/// Vulkan guarantees.
+/// them; an engine without a Context fills in the values of its device. The defaults are the
+/// minimum that Vulkan guarantees, except `separateRanges` (how the engine binds) and
+/// `comparisonMethods` (how Dermis was built).
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes, a multiple of 4
   /// Bytes, a power of two. With `texelBuffers`, the larger of this and the alignment of uniform
@@ -46,13 +47,14 @@ struct DeviceLimits {
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
   /// Maximum storage buffers of one kernel. With fewer than `storageBuffersWanted`, all attributes
-  /// of a job must go to one buffer, close to each other, at multiples of 4 bytes, and bounds and
-  /// snorm16 positions are not available.
+  /// of a job must go to one buffer, at multiples of 4 bytes and as if `separateRanges` were false.
+  /// Bounds and snorm16 positions are then not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
-  /// Whether one dispatch may bind a different range of the output buffer for each attribute. If
-  /// false, and the output buffer is larger than a storage buffer range, all attributes of a job
-  /// must lie in one range. `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is
-  /// not enabled.
+  /// Whether one dispatch may bind a different window of the output buffer for each attribute. If
+  /// false, and the output buffer is larger than a storage buffer range, the attributes of each
+  /// vertex must lie in one `OutputWindow`. They do if they begin within 1/32 of a storage buffer
+  /// range of each other. `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is not
+  /// enabled.
   bool separateRanges = true;
   /// Whether kernels may store 2 bytes at a time
   /// (VkPhysicalDevice16BitStorageFeatures::storageBuffer16BitAccess). `OutputAttribute` says what
@@ -102,13 +104,13 @@ struct Tuning {
   /// `instancesPerInvocation`. Needs no other pipeline.
   std::uint32_t minWorkgroups = 0;
   /// Maximum vertices that one invocation skins, one after the other: a power of two from 1 to 16.
-  /// A dispatch uses the largest power of two with which vertices × mean instances of a group are
-  /// at most `instancesPerInvocation`, and which leaves at least 32 workgroups. Used only with
-  /// `DeviceLimits::texelBuffers`. Needs no other pipeline.
+  /// A dispatch uses the largest power of two v that leaves at least 32 workgroups and for which v
+  /// × m is at most `instancesPerInvocation`. m is the mean number of instances of each mesh and
+  /// layout in the dispatch. Used only with `DeviceLimits::texelBuffers`. Needs no other pipeline.
   std::uint32_t verticesPerInvocation = 1;
 };
 
-/// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the matrices buffer.
+/// A pose: `jointCount` consecutive `JointMatrix` (48 bytes each) in the poses buffer.
 struct PoseDescription {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPoseJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the poses buffer, a multiple of 16
@@ -191,8 +193,9 @@ struct OutputSizes {
   std::uint64_t normals = 0;
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
-  /// Whether all attributes share one buffer. `OutputAttribute` says when they must. `record` then
-  /// checks it if a kernel relies on it.
+  /// Whether all attributes share one buffer. `OutputAttribute` says when they must. If a kernel
+  /// relies on it, `record` checks that positions and normals are in the same buffer at the same
+  /// offset.
   bool isOneBuffer = false;
 
   /// For one buffer of `size` bytes that all attributes share.
@@ -203,10 +206,11 @@ struct OutputSizes {
 
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
-  std::span<const PoseDescription> poses;  ///< jobs name them by index; each is converted once
-  std::span<const Job> jobs;               ///< one for each instance
-  std::uint64_t meshesSize = 0;            ///< bytes of the mesh buffer
-  std::uint64_t posesSize = 0;             ///< bytes of the poses buffer
+  /// Jobs refer to them by index. Each is converted at most once for each form that methods need.
+  std::span<const PoseDescription> poses;
+  std::span<const Job> jobs;     ///< one for each instance
+  std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
+  std::uint64_t posesSize = 0;   ///< bytes of the poses buffer
   OutputSizes outputs;
 };
 
@@ -275,8 +279,8 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 
 /// All variants that a job like this one can need, with any mesh, pose and morph targets, in any
 /// batch. For `Context::prepare`, while loading. Jobs are alike if they have the same method,
-/// formats, strides, motion and bounds, and if their offsets differ by multiples of 4 bytes, by the
-/// same number for all attributes of an interleaved vertex.
+/// formats, strides, motion and bounds, and if each offset differs by a multiple of 4 bytes.
+/// Offsets of attributes of one interleaved vertex must all differ by the same number.
 ///
 /// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
 /// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
@@ -309,9 +313,11 @@ DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& n
 
 /// The buffers of a batch or a scene.
 enum class BufferRole : std::uint8_t {
-  meshes,             ///< packed meshes
-  poses,              ///< joint matrices; in a scene, those that the CPU writes
-  tables,             ///< what `writeTables` writes
+  meshes,  ///< packed meshes
+  poses,   ///< joint matrices; in a scene, those that the CPU writes
+  /// What kernels read about poses and instances. In a batch `writeTables` writes it; in a scene
+  /// the plan copies it from `upload`.
+  tables,
   palettes,           ///< what the palette kernel writes: palettes and `PoseStatus`
   results,            ///< `InstanceResult`
   positions,          ///< skinned positions; in a scene, all attributes
@@ -320,7 +326,7 @@ enum class BufferRole : std::uint8_t {
   previousPositions,  ///< positions of the previous frame
   // Only in a scene (scene.h).
   gpuPoses,    ///< joint matrices that a GPU pass of the engine writes
-  upload,      ///< what `writeTables` writes; copied to `tables`
+  upload,      ///< what `writeTables` writes in a scene
   readBack,    ///< what `Scene::readBack` reads; copied from counters and results
   visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
   history,     ///< what the visibility kernel remembers from frame to frame
@@ -332,9 +338,11 @@ inline constexpr std::size_t bufferRoleCount = 15;  ///< number of values of `Bu
 struct BufferRequirement {
   std::uint64_t size = 0;       ///< minimum, in bytes
   std::uint32_t alignment = 0;  ///< of its offset, if it is part of a larger VkBuffer; in bytes
-  std::uint32_t usage = 0;      ///< VkBufferUsageFlags
-  bool perFrame = false;        ///< rewritten every frame: one copy for each frame in flight
-  bool hostWritten = false;     ///< written by the CPU: mapped, or copied to before `record`
+  /// Minimum VkBufferUsageFlags. The engine adds its own, for example VERTEX_BUFFER for outputs, or
+  /// TRANSFER_SRC to copy results.
+  std::uint32_t usage = 0;
+  bool perFrame = false;     ///< rewritten every frame: one copy for each frame in flight
+  bool hostWritten = false;  ///< written by the CPU: mapped, or copied to before `record`
 };
 
 /// The part of an output buffer that a dispatch writes: bind min(buffer size - `offset`,
@@ -412,7 +420,8 @@ using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, Barrier
 /// instance, lies in one window.
 DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
-/// What the palette kernel reports about one pose, in the palettes buffer. The engine may read it.
+/// What the palette kernel reports about one pose, in the palettes buffer, at `Plan::statusOffset`.
+/// The engine may copy it from there.
 struct PoseStatus {
   std::uint32_t twoPhase = 0;         ///< 1 if vertices are skinned in two phases: scale, rotation
   std::uint32_t nonRigidJoints = 0;   ///< joints with scale, shear or a mirror
@@ -435,24 +444,28 @@ class DERMIS_CORE_API Plan {
 
   /// The commands, in the order in which they must be issued. For a batch: the palette and clear
   /// kernels if there is anything to convert or clear, then the skin kernels, with a barrier before
-  /// the first that needs it. The engine records the barriers before the first command and after
-  /// the last one (vulkan/scope.h).
+  /// the first that needs it. For a scene: a barrier after earlier compute, copy and indirect
+  /// accesses, copies and clears, the kernels, copies to `readBack`, and a barrier before the host
+  /// reads. In both cases the engine records the barriers between these commands and its own use of
+  /// the output (vulkan/scope.h).
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
   /// Requirements of a buffer. For a batch: the sizes of meshes, poses and outputs are those of the
   /// `Batch`, and the sizes of tables, palettes and results are what this plan needs. For a scene:
-  /// as `Scene::buffer`, but the sizes of tables and upload are what this plan needs.
+  /// as `Scene::buffer`, but tables and upload have the size that this plan needs. Visibility,
+  /// history and counters have size 0 if the plan culls no instance on the GPU.
   BufferRequirement buffer(BufferRole role) const;
   /// Byte offset of a pose's `PoseStatus` in the palettes buffer. `noStatus` if the pose is not
   /// converted, and for the plan of a scene.
   std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
   /// Byte offset in the palettes buffer of a pose's palette of dual quaternions. `noPalette` if the
-  /// pose is not converted to dual quaternions.
+  /// pose is not converted to dual quaternions, and for the plan of a scene.
   std::uint64_t paletteOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noPalette = ~std::uint64_t{0};
-  /// Byte offset of a job's `InstanceResult` in the results buffer. `noResult` if the job has none.
+  /// Byte offset of a job's `InstanceResult` in the results buffer. `noResult` if the job has none,
+  /// and for the plan of a scene.
   /// Results are in the order of their jobs, without gaps.
   std::uint64_t resultOffset(std::uint32_t job) const;
   static constexpr std::uint64_t noResult = ~std::uint64_t{0};

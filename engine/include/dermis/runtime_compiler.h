@@ -33,9 +33,9 @@ struct RuntimeCompilerOptions {
 
 /// What a reload did.
 struct KernelReload {
-  /// Number of modules with a changed source file. They were compiled again, or taken from the
+  /// Number of modules with a changed source file. Each was compiled again, or taken from the
   /// cache.
-  std::uint32_t compiled = 0;
+  std::uint32_t changed = 0;
   /// Names of the modules whose SPIR-V changed. The next `record` uses the new SPIR-V.
   std::vector<std::string> replaced;
   std::uint32_t pipelines = 0;  ///< number of pipelines that were created for these modules

@@ -53,7 +53,7 @@ struct BufferGrowth {
 };
 
 /// Creates larger buffers, in an engine with its own RHI. `addMesh`, `addPose`, `addPoses`,
-/// `addInstance` and `change` call it.
+/// `addInstance` and `change` call it. It must not throw, and must not call the Scene.
 ///
 /// Before the commands of the next plan, the engine copies the contents of the old buffer to the
 /// new one; palettes need no copy. If that frame is abandoned, the engine copies again in the next
@@ -119,19 +119,20 @@ struct InstanceDescription {
   Method method = Method::dualQuaternion;
   /// Formats and arrangement of the skinned vertices. With `Motion::kept`, the scene keeps previous
   /// positions right on the first frame, while the pose rests, between updates, and when the
-  /// instance comes back into view. The engine reports jumps with `InstanceChange::teleports`.
+  /// instance becomes visible. The engine reports jumps with `InstanceChange::teleports`.
   /// `Motion::reskinned` is not available in a scene.
   VertexLayout layout = {};
   Box box = {};  ///< for positions in snorm16: as `Job::box`
   /// Whether to compute the exact box of the skinned positions, for `Scene::bounds`.
   bool bounds = false;
-  /// The instance is skinned every N-th frame; N is at least 1. If it was due in a frame that the
-  /// engine abandoned or left out, it is skinned in the next one. Instances with the same pose and
-  /// interval are skinned in the same frames. Different poses are spread over the frames. A
-  /// teleport, another mesh and coming back into view take effect at once.
+  /// The instance is skinned every N-th frame; N is at least 1. If it was due in a frame that was
+  /// abandoned, or whose number was skipped, it is skinned in the next one. Instances with the same
+  /// pose and interval are skinned in the same frames. Different poses are spread over the frames.
+  /// A teleport, another mesh and becoming visible take effect at once.
   std::uint32_t updateInterval = 1;
-  /// Whether the GPU decides in each frame if the instance is visible: it is if its word in the
-  /// visibility buffer is not 0. If it is not visible, it is neither skinned nor settled.
+  /// Whether a word of the visibility buffer, too, decides in each frame if the instance is
+  /// visible: 0 means invisible. `InstanceChange::visible` must be true as well. An invisible
+  /// instance is neither skinned nor settled.
   ///
   /// The output of such an instance must lie in one storage buffer range. An output of at most 1/32
   /// of a range always does. If a larger one does not, because the output buffer is larger than one
@@ -290,9 +291,9 @@ class DERMIS_CORE_API Scene {
   /// Fails with `invalidArgument` if an instance uses the mesh.
   Result<void> removeMesh(MeshHandle mesh);
 
-  /// Reserves memory for a pose. The engine writes identity matrices to `posePlace`, or writes the
-  /// pose before the next `plan`. Fails with `invalidArgument` if `jointCount` is not from 1 to
-  /// `maxPoseJoints`, and as `addMesh` does.
+  /// Reserves memory for a pose. Its contents are undefined: the engine must write identity
+  /// matrices to `posePlace`, or write the pose before the next `plan`. Fails with
+  /// `invalidArgument` if `jointCount` is not from 1 to `maxPoseJoints`, and as `addMesh` does.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
   /// writes are consecutive: each begins `jointCount` matrices after the one before it. If it
@@ -320,16 +321,16 @@ class DERMIS_CORE_API Scene {
 
   // -- What changes.
 
-  /// Begins a frame. `frame` is larger than the last one. `completedFrame` is the newest frame that
-  /// the GPU has completed, or 0. Frames are numbered from 1; numbers may be skipped. Fails with
-  /// `invalidArgument` if more than `framesInFlight` frames would be in flight, or if a number is
-  /// lower than before.
+  /// Begins a frame. `completedFrame` is the newest frame that the GPU has completed, or 0. Frames
+  /// are numbered from 1; numbers may be skipped. Fails with `invalidArgument` if `frame` is not
+  /// larger than the last one, if `completedFrame` is lower than before or not lower than `frame`,
+  /// or if more than `framesInFlight` frames would be in flight.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
 
   /// Returns where the engine writes all joint matrices of the pose for this frame. The memory
   /// holds an older pose that the GPU no longer reads. All instances of the pose are skinned again.
-  /// Fails with `invalidArgument` if `beginFrame` was not called before, and for a pose that the
-  /// GPU writes.
+  /// Fails with `invalidArgument` unless it is called between `beginFrame` and `commit`, and for a
+  /// pose that the GPU writes.
   Result<PosePlace> writePose(PoseHandle pose);
   /// States that a GPU pass of the engine writes these poses before the commands of the next
   /// `plan`. All their instances are skinned again. There is one copy of such a pose: an instance
@@ -355,8 +356,8 @@ class DERMIS_CORE_API Scene {
 
   /// Whether the next `plan` skins the instance if its pose is written: it is visible, and its
   /// update interval permits it. An engine need not animate instances that are not due. Returns
-  /// false if `beginFrame` was not called. An instance that is culled on the GPU may be due and yet
-  /// not be skinned.
+  /// false unless it is called between `beginFrame` and `commit`. An instance that is culled on the
+  /// GPU may be due and yet not be skinned.
   Result<bool> isDue(InstanceHandle instance) const;
 
   /// Moves outputs from the end of the output buffer into free ranges before them. The next `plan`
@@ -399,7 +400,8 @@ class DERMIS_CORE_API Scene {
   /// frames that copied nothing, `bytes` may be empty.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
-  // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits.
+  // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits. Spans are valid
+  // until the next `commit` or `abandonFrame`.
 
   /// Where the skinned vertices of an instance are. Before the first `commit` that skins it, the
   /// size is 0. An instance that is culled on the GPU has an output from its first `commit` on,
@@ -408,8 +410,8 @@ class DERMIS_CORE_API Scene {
   /// Instances that were skinned, in no particular order, without those culled on the GPU. Empty
   /// after `abandonFrame`.
   std::span<const InstanceHandle> skinnedInstances() const;
-  /// Instances of which only previous positions were written: they came to rest, or came back into
-  /// view in the same pose.
+  /// Instances of which only previous positions were written: they came to rest, or became
+  /// visible in the same pose.
   std::span<const InstanceHandle> settledInstances() const;
   /// Instances whose output has another offset than before.
   std::span<const InstanceHandle> movedInstances() const;
@@ -423,7 +425,7 @@ class DERMIS_CORE_API Scene {
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
   /// Number of words in the visibility buffer: larger than every `visibilityIndex`. Grows when
   /// instances are added.
-  std::uint32_t instanceCapacity() const;
+  std::uint32_t visibilityCount() const;
 
   /// Counts of the last frame, of the newest frame that was read back, and of memory.
   SceneStatistics statistics() const;

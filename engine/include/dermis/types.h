@@ -8,7 +8,9 @@ namespace dermis {
 
 /// A joint matrix: joint global transform × inverse bind matrix. An affine transform as a row-major
 /// 3×4 matrix: `m[row][column]`, column 3 is the translation. It transforms a point p to m * (p,
-/// 1). 48 bytes; the GPU reads an array of these.
+/// 1): from bind space, the space of the mesh, to the space of the pose, the space of the joint
+/// global transforms. Skinned vertices are in that space. 48 bytes; the GPU reads an array of
+/// these.
 struct JointMatrix {
   float m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
 };

@@ -11,8 +11,8 @@
 
 namespace dermis {
 
-/// Kinds of problems. `pack` refuses a mesh with a problem up to `jointOutOfRange`; the other
-/// problems it fixes itself.
+/// Kinds of problems. `pack` refuses a mesh with any problem up to `jointOutOfRange`. It fixes the
+/// others.
 enum class MeshProblem : std::uint8_t {
   // The views are not valid. `repair` cannot help.
   emptyMesh,        ///< no vertices, or no positions
@@ -27,7 +27,8 @@ enum class MeshProblem : std::uint8_t {
   nonFiniteTangent,
   nonFiniteMorph,   ///< a displacement of a morph target
   nonFiniteCenter,  ///< a center of rotation
-  shareOutOfRange,  ///< a dual-quaternion weight or bulge strength that is not from 0 to 1
+  /// A dual-quaternion weight or bulge strength that is not from 0 to 1.
+  methodWeightOutOfRange,
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
   jointOutOfRange,  ///< a joint that the pose does not have, with a weight that is not 0
@@ -40,8 +41,9 @@ enum class MeshProblem : std::uint8_t {
 /// One kind of problem in one mesh.
 struct MeshFinding {
   MeshProblem problem = MeshProblem::emptyMesh;
-  std::uint64_t count = 0;        ///< number of vertices, morph displacements or views that have it
-  std::uint32_t firstVertex = 0;  ///< the first such vertex
+  std::uint64_t count = 0;  ///< number of vertices, morph displacements or views that have it
+  /// The first such vertex. 0 if the problem is one of a view or of the whole mesh.
+  std::uint32_t firstVertex = 0;
   /// A sentence about the first place, for example "mesh 'Fox', vertex 17: joint 31 is outside the
   /// pose of 24 joints".
   std::string message;
@@ -70,9 +72,9 @@ DERMIS_CORE_API bool refusedByPack(MeshProblem problem);
 DERMIS_CORE_API const char* meshProblemName(MeshProblem problem);
 
 /// Finds all problems of a mesh. O(vertices × influences + displacements). `jointCount` is the
-/// number of joints of the poses, at most `maxPoseJoints`. If there are float weights, a sum counts
-/// as 1 within 2e-7 for each weight other than 0, which is the tolerance of the official glTF
-/// validator. Integer weights must sum to exactly 1.
+/// number of joints of the skeleton; numbers above `maxPoseJoints` count as that. If there are
+/// float weights, a sum counts as 1 within 2e-7 for each weight other than 0, which is the
+/// tolerance of the official glTF validator. Integer weights must sum to exactly 1.
 DERMIS_CORE_API MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
 /// A repaired copy of a mesh. Owns its memory. Movable, not copyable.

@@ -8,7 +8,7 @@
 
 /// Changes if the interface breaks.
 #define DERMIS_VERSION_MAJOR 0
-/// Changes if the interface grows. While the major version is 0: changes if it breaks.
+/// Changes if the interface grows. While the major version is 0: also if it breaks.
 #define DERMIS_VERSION_MINOR 1
 /// Changes if only the implementation changes.
 #define DERMIS_VERSION_PATCH 0

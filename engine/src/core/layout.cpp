@@ -71,8 +71,9 @@ VertexPlaces separate(const VertexLayout& layout, std::uint32_t vertexCount, std
 Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t vertexCount,
                                    std::uint64_t offset) {
   if (layout.arrangement > Arrangement::planar)
-    return invalid("the layout's arrangement is not one of Arrangement");
-  if (layout.motion > Motion::reskinned) return invalid("the layout's motion is not one of Motion");
+    return notAValue("the layout's arrangement", layout.arrangement, "Arrangement");
+  if (layout.motion > Motion::reskinned)
+    return notAValue("the layout's motion", layout.motion, "Motion");
   if (!isPositionFormat(layout.positions)) {
     return invalid("the layout's positions cannot be in the format " +
                    std::string(formatName(layout.positions)));

@@ -129,9 +129,14 @@ bool checkMorphTarget(const MorphTargetView& target, std::size_t index, std::uin
   for (std::size_t i = 0; i < target.vertices.size(); ++i) {
     if (target.vertices[i] >= vertexCount ||
         (i > 0 && target.vertices[i] <= target.vertices[i - 1])) {
-      findings.addView(MeshProblem::morphVertices,
-                       name + " displaces vertex " + std::to_string(target.vertices[i]) +
-                           ", which is outside the mesh or not in ascending order");
+      std::string message = name + " lists vertex " + std::to_string(target.vertices[i]);
+      if (target.vertices[i] >= vertexCount) {
+        message += ", but the mesh has " + std::to_string(vertexCount) + " vertices";
+      } else {
+        message += " after vertex " + std::to_string(target.vertices[i - 1]) +
+                   ", but vertices must be in ascending order";
+      }
+      findings.addView(MeshProblem::morphVertices, message);
       return false;
     }
   }
@@ -229,14 +234,14 @@ bool isShare(float share) {
 /// `whole` is the mesh's own, which counts where the vertices have none.
 void checkShares(const AttributeView& view, float whole, const char* name, Findings& findings) {
   if (!view && !isShare(whole)) {
-    findings.addView(MeshProblem::shareOutOfRange, std::string("its ") + name + " is " +
-                                                       inWords(static_cast<double>(whole)) +
-                                                       ", not from 0 to 1");
+    findings.addView(MeshProblem::methodWeightOutOfRange, std::string("its ") + name + " is " +
+                                                              inWords(static_cast<double>(whole)) +
+                                                              ", not from 0 to 1");
   }
   for (std::uint32_t vertex = 0; view && vertex < view.count; ++vertex) {
     const float share = loadFloat(view, vertex, 0);
     if (isShare(share)) continue;
-    findings.addVertex(MeshProblem::shareOutOfRange, vertex, [&] {
+    findings.addVertex(MeshProblem::methodWeightOutOfRange, vertex, [&] {
       return std::string("the ") + name + " is " + inWords(static_cast<double>(share)) +
              ", not from 0 to 1";
     });
@@ -331,7 +336,7 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
   const auto twice = std::adjacent_find(used.begin(), used.end());
   if (twice != used.end()) {
     findings.addVertex(MeshProblem::duplicateJoint, vertex,
-                       [&] { return "joint " + std::to_string(*twice) + " has weight twice"; });
+                       [&] { return "joint " + std::to_string(*twice) + " occurs twice"; });
   }
 }
 
@@ -365,7 +370,7 @@ const char* meshProblemName(MeshProblem problem) {
       return "displacement not finite";
     case MeshProblem::nonFiniteCenter:
       return "center of rotation not finite";
-    case MeshProblem::shareOutOfRange:
+    case MeshProblem::methodWeightOutOfRange:
       return "dual-quaternion weight or bulge strength out of range";
     case MeshProblem::nonFiniteWeight:
       return "weight not finite";

@@ -450,10 +450,8 @@ Result<void> setTarget(std::string_view name) {
     if (!all.empty()) all.append(", ");
     all.append(hwy::TargetName(target));
   }
-  std::string message(1, '\'');
-  message.append(name).append(
-      "' is not an instruction set that this processor supports and Dermis was compiled for; "
-      "available: ");
+  std::string message = "the instruction set '";
+  message.append(name).append("' is not available; available here and in this build: ");
   return Error{ErrorCode::invalidArgument, message + all};
 }
 

@@ -88,8 +88,10 @@ Result<void> check(const Job& job) {
   if (Result<void> good = checkMethod(job.method, "the job: "); !good) return good;
   const std::uint32_t end = std::min(job.vertexEnd, job.mesh->info().vertexCount);
   if (job.firstVertex > end) {
-    return wrong("the job's vertices begin at " + std::to_string(job.firstVertex) + " and end at " +
-                 std::to_string(end));
+    return wrong("the job's firstVertex of " + std::to_string(job.firstVertex) +
+                 " is after its last vertex; vertexEnd is " + std::to_string(job.vertexEnd) +
+                 ", and the mesh has " + std::to_string(job.mesh->info().vertexCount) +
+                 " vertices");
   }
   if (Result<void> good = checkLayout(job); !good) return good;
   for (std::size_t index = 0; index < job.instances.size(); ++index) {

@@ -157,14 +157,15 @@ Source::Source(Document document, std::vector<Buffer> buffers, MemoryBudget& bud
 void Source::checkView(std::size_t index) const {
   const tinygltf::BufferView& view = content().bufferViews[index];
   const auto buffer = static_cast<std::size_t>(view.buffer);
-  if (buffer >= buffers_.size()) failInvalid("bufferView ", index, ": it cannot be used");
-  // The structural check has limited every number here to 2^53, so that no sum overflows.
+  if (buffer >= buffers_.size())
+    failInvalid("bufferView ", index, ": there is no buffer ", view.buffer);
+  // The structural check has limited every number here, so that no sum overflows.
   const std::uint64_t size = buffers_[buffer].byteLength;
-  if (view.byteOffset + view.byteLength <= size) return;
+  const std::uint64_t end = std::uint64_t{view.byteOffset} + view.byteLength;
+  if (end <= size) return;
   // Other programs cut the view off, too. The bytes that an accessor needs must exist.
   notes_.broken(NoteKind::viewLength, "bufferView ", index, ": bytes ", view.byteOffset, " to ",
-                view.byteOffset + view.byteLength, " are outside buffer ", view.buffer, " of ",
-                size, " bytes");
+                end, " are outside buffer ", view.buffer, " of ", size, " bytes");
 }
 
 void Source::checkViews() const {
@@ -172,7 +173,8 @@ void Source::checkViews() const {
     if (usage().views[i]) {
       checkView(i);
     } else {
-      notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", [&] { checkView(i); });
+      notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
+                      [&] { checkView(i); });
     }
   }
 }
@@ -209,7 +211,8 @@ void Source::checkAccessors() {
       continue;
     }
     const bool good =
-        notes_.tolerate(NoteKind::unused, "; nothing skinned uses it", [&] { checkAccessor(i); });
+        notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
+                        [&] { checkAccessor(i); });
     isFaulty_[i] = !good || !hasBytes(content().accessors[i]);
   }
 }
@@ -278,7 +281,8 @@ std::uint64_t Source::strideOf(const tinygltf::Accessor& accessor) const {
 const std::byte* Source::viewData(int view) const {
   const tinygltf::BufferView& range = content().bufferViews[static_cast<std::size_t>(view)];
   const auto index = static_cast<std::size_t>(range.buffer);
-  if (index >= buffers_.size()) failInvalid("bufferView ", view, ": it cannot be used");
+  if (index >= buffers_.size())
+    failInvalid("bufferView ", view, ": there is no buffer ", range.buffer);
   const Buffer& buffer = buffers_[index];
   if (buffer.bytes.empty() && buffer.byteLength != 0) {
     failInvalid("buffer ", range.buffer,

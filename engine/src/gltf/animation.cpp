@@ -296,11 +296,11 @@ void readAnimations(Source& source, Model& model) {
   if (tally.normalizedKeys > 0) {
     model.notes.push_back(join(counted(tally.normalizedKeys, "rotation key"), " in ",
                                counted(tally.channelsWithNormalizedKeys, "channel"),
-                               " not of unit length, normalized"));
+                               " normalized: not of unit length"));
   }
   if (tally.unknownPaths > 0) {
-    model.notes.push_back(join(counted(tally.unknownPaths, "animation channel"),
-                               " with an unknown target, left out"));
+    model.notes.push_back(
+        join(counted(tally.unknownPaths, "animation channel"), " left out: an unknown target"));
   }
 }
 

@@ -104,7 +104,9 @@ std::vector<Buffer> loadBuffers(const Document& document,
   // A buffer that nothing skinned uses may fail.
   const auto attempt = [&](std::size_t i, auto function) {
     if (document.usage.buffers[i]) return function();
-    if (!notes.tolerate(NoteKind::unused, "; nothing skinned uses it", function)) isLost[i] = true;
+    if (!notes.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
+                        function))
+      isLost[i] = true;
   };
   SideBuffers side(files);
   for (std::size_t i = 0; i < descriptions.size(); ++i) {

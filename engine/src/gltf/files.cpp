@@ -152,7 +152,9 @@ FileToRead SideFiles::find(std::string_view uri, const std::string& where) const
   const std::filesystem::path relative = relativePath(uri, where);
   const std::string name = inQuotes(utf8(relative));
   if (folder_.empty())
-    fail(ErrorCode::ioError, join(where, ": ", name, " cannot be read without a folder"));
+    fail(ErrorCode::ioError,
+         join(where, ": ", name,
+              " cannot be read: the model was loaded from memory, without a folder"));
   const FileToRead named = findFile(folder_ / relative, where + ": ");
   // Links are resolved here, once, so that the opened path has none. It must still be in the
   // folder.

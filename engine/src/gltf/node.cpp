@@ -99,7 +99,7 @@ void readNodes(const Source& source, Model& model) {
   orderNodes(content, model);
   if (normalized > 0) {
     model.notes.push_back(
-        join(counted(normalized, "node rotation"), " not of unit length, normalized"));
+        join(counted(normalized, "node rotation"), " normalized: not of unit length"));
   }
 }
 

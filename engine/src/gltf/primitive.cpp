@@ -376,7 +376,8 @@ void checkPrimitives(Source& source) {
       if (source.usage().meshes[i]) {
         check();
       } else {
-        source.notes().tolerate(NoteKind::unused, "; nothing skinned uses it", check);
+        source.notes().tolerate(NoteKind::unused,
+                                "; ignored, since nothing skinned or animated uses it", check);
       }
     }
   }

@@ -31,10 +31,8 @@ namespace {
 
 using nlohmann::json;
 
-// Above 2^53, a JSON number may differ from the integer that was written. tinygltf stores sizes and
-// offsets as size_t; the sum of two must fit it, in 32-bit builds too.
-constexpr std::uint64_t largestInteger = std::min(
-    (std::uint64_t{1} << 53) - 1, std::uint64_t{std::numeric_limits<std::size_t>::max() / 2});
+// Above this, a JSON number may differ from the integer that was written.
+constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
 
 // "{}," takes three bytes in a file, but hundreds in the structs made from it (tinygltf's and
 // Dermis'), which are in growing vectors.
@@ -238,6 +236,15 @@ class ReferenceCheck {
     return found == object.end() ? absent : integer(*found, join(where, ": ", property));
   }
 
+  /// Of a size or an offset: tinygltf keeps these as size_t, which has 32 bits in 32-bit builds.
+  static std::uint64_t byteCount(json& object, const char* property, const std::string& where,
+                                 std::uint64_t absent) {
+    const std::uint64_t number = integer(object, property, where, absent);
+    constexpr std::uint64_t largest = std::numeric_limits<std::size_t>::max();
+    if (number > largest) failInvalid(where, ": ", property, " is larger than ", largest);
+    return number;
+  }
+
   static std::uint64_t requireInteger(json& object, const char* property,
                                       const std::string& where) {
     require(object, property, where);
@@ -372,8 +379,9 @@ class ReferenceCheck {
 
   void checkView(json& view, const std::string& where, std::size_t index) {
     requireReference(view, "buffer", "buffers", where);
-    integer(view, "byteOffset", where, 0);
-    if (requireInteger(view, "byteLength", where) == 0)
+    byteCount(view, "byteOffset", where, 0);
+    require(view, "byteLength", where);
+    if (byteCount(view, "byteLength", where, 0) == 0)
       notes_.broken(NoteKind::viewLength, where, ": byteLength is 0");
     if (usage_.views[index]) usage_.buffers[view["buffer"].get<std::size_t>()] = true;
     const std::uint64_t stride = integer(view, "byteStride", where, 4);
@@ -390,7 +398,7 @@ class ReferenceCheck {
 
   void checkAccessor(json& accessor, const std::string& where, bool used) {
     reference(accessor, "bufferView", "bufferViews", where);
-    const std::uint64_t byteOffset = integer(accessor, "byteOffset", where, 0);
+    const std::uint64_t byteOffset = byteCount(accessor, "byteOffset", where, 0);
     if (byteOffset != 0 && !accessor.contains("bufferView")) {
       notes_.broken(NoteKind::accessor, where, ": it has a byteOffset but no bufferView");
       accessor.erase("byteOffset");

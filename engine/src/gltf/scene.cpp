@@ -88,9 +88,9 @@ void readScene(Source& source, Model& model) {
       model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
     }
   }
-  addNote(model, outside, "node", " with a mesh outside the default scene left out");
-  addNote(model, notSkinned, "node", " with a mesh but no skin left out");
-  addNote(model, inBindPose, "primitive", " of a skinned node without joints, left in bind pose");
+  addNote(model, outside, "node", " left out: outside the default scene");
+  addNote(model, notSkinned, "node", " left out: a mesh but no skin");
+  addNote(model, inBindPose, "primitive", " left in bind pose: a skinned node, but no joints");
 }
 
 }  // namespace dermis::gltf

@@ -86,7 +86,8 @@ void readSkins(Source& source, Model& model) {
     if (source.usage().skins[i]) {
       read();
     } else {
-      source.notes().tolerate(NoteKind::unused, "; nothing skinned uses it", read);
+      source.notes().tolerate(NoteKind::unused,
+                              "; ignored, since nothing skinned or animated uses it", read);
     }
     skin.name = from.name;
     const bool oneRoot = std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {

@@ -189,7 +189,7 @@ Result<KernelReload> RuntimeCompiler::State::reload(const vulkan::Context& conte
   const Result<std::uint32_t> pipelines = context.replaceKernels(replaced, frame, completedFrame);
   if (!pipelines) return pipelines.error();
 
-  reload.compiled = static_cast<std::uint32_t>(compiled.size());
+  reload.changed = static_cast<std::uint32_t>(compiled.size());
   reload.pipelines = *pipelines;
   for (const vulkan::KernelModule& module : replaced) reload.replaced.emplace_back(module.name);
   std::ranges::sort(reload.replaced);

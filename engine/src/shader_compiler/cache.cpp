@@ -67,8 +67,8 @@ std::string encodeEntry(const CacheKey& key, std::span<const std::uint32_t> word
 
 // What is wrong with an entry; null if nothing is.
 const char* findDamage(std::string_view bytes, const CacheKey& key) {
-  if (bytes.size() < headerSize || !bytes.starts_with(magic)) return "is not a cache entry";
-  if (wordAt(bytes, 4) != formatVersion) return "is of another version";
+  if (bytes.size() < headerSize || !bytes.starts_with(magic)) return "has no header";
+  if (wordAt(bytes, 4) != formatVersion) return "has another version of the cache's format";
   if (doubleWordAt(bytes, 8) != key[0] || doubleWordAt(bytes, 16) != key[1]) {
     return "belongs to another shader";
   }

@@ -224,7 +224,8 @@ struct Checker {
 /// Describes what is wrong with an attribute to compare; empty if nothing is.
 std::string complaint(const char* name, const SkinnedAttribute& attribute,
                       bool (*allows)(VertexFormat), std::size_t count) {
-  if (attribute.data == nullptr || !allows(attribute.format)) {
+  if (attribute.data == nullptr) return std::string("the skinned ") + name + " have no data";
+  if (!allows(attribute.format)) {
     return std::string("the skinned ") + name + " cannot be stored as " +
            std::string(formatName(attribute.format));
   }

@@ -29,9 +29,9 @@ Result<void> checkLayout(const OutputAttribute& positions, VkFormat format,
                    ", the size of a component of " + name);
   }
   if ((outputAddress + positions.offset) % alignment != 0) {
-    return invalid("the address of the positions (offset " + std::to_string(positions.offset) +
-                   ") is not a multiple of " + std::to_string(alignment) +
-                   ", the size of a component of " + name);
+    return invalid("the address of the positions, " + std::to_string(outputAddress) + " + offset " +
+                   std::to_string(positions.offset) + ", is not a multiple of " +
+                   std::to_string(alignment) + ", the size of a component of " + name);
   }
   return {};
 }

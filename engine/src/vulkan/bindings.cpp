@@ -18,8 +18,10 @@ Result<void> checkRange(const BufferRange& range, const char* name, const Device
   if (range.buffer == VK_NULL_HANDLE) return {};
   const std::string prefix = std::string("BatchBuffers::") + name;
   if (range.size == 0 || range.size == VK_WHOLE_SIZE || range.size % 4 != 0) {
-    return Error{ErrorCode::invalidArgument,
-                 prefix + ": its size must be a multiple of 4 bytes, and not 0 or VK_WHOLE_SIZE"};
+    return Error{
+        ErrorCode::invalidArgument,
+        prefix + ": its size must be a multiple of 4 bytes, and not 0 or VK_WHOLE_SIZE; it is " +
+            std::to_string(range.size)};
   }
   if (range.offset % limits.minStorageBufferOffsetAlignment != 0) {
     return Error{ErrorCode::invalidArgument,

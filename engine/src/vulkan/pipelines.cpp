@@ -70,9 +70,8 @@ Result<VkPipeline> Pipelines::createFromSource(const Variant& variant,
   }
   const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
   if (spirv.empty()) {
-    return Error{ErrorCode::missingFeature, "this build of Dermis has no kernel for " +
-                                                std::string(methodName(variant.method)) +
-                                                " in this layout"};
+    return Error{ErrorCode::missingFeature,
+                 "this build of Dermis has no kernel '" + kernelName(variant, limits_) + "'"};
   }
   return create(variant, layout, spirv);
 }

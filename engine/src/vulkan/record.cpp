@@ -99,7 +99,8 @@ Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
 Result<void> BindingsState::checkVariants(const Plan& plan) const {
   for (const Variant& variant : plan.variants()) {
     if (context->pipelines->find(variant) == VK_NULL_HANDLE)
-      return Error{ErrorCode::notPrepared, describe(variant) + " has not been prepared"};
+      return Error{ErrorCode::notPrepared,
+                   describe(variant) + " has no pipeline; call Context::prepare for it first"};
   }
   return {};
 }

@@ -12,13 +12,13 @@ namespace dermis::cpu {
 
 struct MeshData;
 
-/// Made once, at import, from a packed mesh. It is immutable: any number of threads may skin it at
-/// the same time. A moved-from mesh may only be assigned to or destroyed.
+/// Made once, while loading, from a packed mesh. It is immutable: any number of threads may skin it
+/// at the same time. A moved-from mesh may only be assigned to or destroyed.
 ///
-/// It owns its memory. Per vertex this is about 80 bytes with normals, 32 more with tangents, and 8
-/// for each influence. Vertices are stored in groups of eight; each takes the space of as many
-/// influences as the vertex of the group that has the most. With morph targets it keeps a copy of
-/// the packed mesh, too.
+/// It owns its memory. Per vertex this is 44 bytes with normals, 32 more with tangents, 12
+/// more with centers of rotation, and 8 for each influence. Vertices are stored in groups of eight,
+/// each with the maximum influence count of its group. With morph targets it keeps a copy of the
+/// packed mesh, too.
 class DERMIS_CPU_API Mesh {
  public:
   /// Converts a packed mesh, which may be released afterwards. O(vertices × influences). Fails with

@@ -1,7 +1,7 @@
 // Skins on the CPU, with SIMD instructions. All methods except those for comparison are available.
 // Needs no Vulkan and starts no threads: the thread that calls `skin` does the work.
 //
-//     const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // at import
+//     const cpu::Mesh mesh = *cpu::Mesh::create(*pack(view, jointCount));      // while loading
 //     cpu::Job job;
 //     job.mesh = &mesh;
 //     job.places = *placeVertices(layout, mesh.info().vertexCount);
@@ -75,7 +75,7 @@ struct Job {
   Method method = Method::dualQuaternion;  ///< any that is not `isForComparison`
   VertexPlaces places;                     ///< from `placeVertices`, or any other arrangement
   std::uint32_t firstVertex = 0;
-  std::uint32_t vertexEnd = 0xffffffff;  ///< the vertex after the last; at most the vertex count
+  std::uint32_t vertexEnd = 0xffffffff;  ///< one past the last vertex; limited to the vertex count
   std::span<const Instance> instances;
 };
 
@@ -87,8 +87,8 @@ struct Job {
 /// subnormal numbers to zero.
 ///
 /// Each thread keeps its working memory for the next job, so it stops allocating after its largest
-/// job. This is at most 1.5 MiB if no vertex has more than 128 influences, plus 150 bytes for each
-/// instance of a job.
+/// job. The working memory is at most 1.5 MiB if no vertex has more than 128 influences, plus 150
+/// bytes for each instance of the largest job.
 ///
 /// Fails with `invalidArgument` if the job breaks a rule, as `makePlan` does. It then writes
 /// nothing.

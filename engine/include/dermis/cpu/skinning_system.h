@@ -1,6 +1,7 @@
 // Skins a whole scene on the CPU: the same handles, update intervals, visibility, motion and bounds
-// as vulkan::SkinningSystem, without Vulkan. A system contains a Scene (scene.h), and owns meshes,
-// poses and output. It turns each frame into jobs, which the engine runs on its threads.
+// as vulkan::SkinningSystem, without Vulkan. A system contains a Scene (scene.h). It owns meshes,
+// poses and, unless the engine lends memory for it, the output. It turns each frame into jobs,
+// which the engine runs on its threads.
 //
 // One frame:
 //
@@ -62,7 +63,8 @@ struct SkinningSystemDescription {
 /// A scene and the memory for it.
 ///
 /// One thread at a time may call a member function. From `jobs` until its jobs are done, only
-/// `output`, `outputBytes`, `statistics` and the functions that list instances may be called. If
+/// `output`, `outputBytes`, `statistics`, `skinnedInstances`, `settledInstances` and
+/// `movedInstances` may be called. If
 /// the engine runs none of the jobs, it may call any function, and calls `abandonFrame` before the
 /// next `beginFrame`.
 class DERMIS_CPU_API SkinningSystem {

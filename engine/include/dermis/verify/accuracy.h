@@ -18,7 +18,7 @@ inline constexpr double floatRounding = 5.9604644775390625e-8;
 
 /// Maximum distance between a position in float32 and the same position stored in `format`.
 /// - float32: 0.
-/// - float16: half a unit in the last place of each component c. This is at most 2^-11 |c|, or
+/// - float16: half a unit in the last place of each component x. This is at most 2^-11 |x|, or
 ///   2^-25 below the smallest normal number.
 /// - snorm16: along each axis half a step, h / 32767 / 2, plus the rounding errors of (p − c) / h
 ///   in float32, 4 u |c| + 8 u h. c is the center of `box` and h half of its size. This holds for
@@ -47,8 +47,8 @@ struct Exemptions {
   friend bool operator==(const Exemptions&, const Exemptions&) = default;
 };
 
-/// The exemptions that the reference reports. Use it for poses from outside. A test that makes its
-/// own pose should state the numbers instead.
+/// The exemptions that the reference reports. Use it for poses that come from files. A test that
+/// makes its own pose should state the numbers instead.
 DERMIS_VERIFY_API Exemptions exemptionsOf(const reference::SkinnedMesh& expected);
 
 /// The result of a comparison. Errors are divided by the bound of their vertex, so that 1 is the

@@ -31,13 +31,13 @@ struct VertexBounds {
   /// the influences. t_j is the translation and σ_j the largest singular value of joint j, p is the
   /// position in bind pose.
   double scale = 0;
-  /// Rounding decides the answer (antipodal rotations, flat joints). The result must be finite,
-  /// nothing more.
+  /// Rounding decides the answer: rotations are antipodal, or a joint's 3×3 matrix has rank 1 or is
+  /// nearly a singular mirror. The result must be finite, nothing more.
   bool onlyFinite = false;
   bool undefined = false;         ///< a joint is not finite: there is no answer
   bool normalMayVanish = false;   ///< morph targets cancel the normal: zero is right, too
   bool tangentMayVanish = false;  ///< the same for the tangent
-  bool eitherHandedness = false;  ///< the blended matrix is flat: both handednesses are right
+  bool eitherHandedness = false;  ///< the blended matrix is singular: both handednesses are right
 };
 
 /// What `skin` returns: one element for each vertex.
@@ -57,9 +57,9 @@ struct SkinnedMesh {
 ///   quaternions; Kavan et al. 2008 for iterative blending; Alexa 2002 and Cordier and
 ///   Magnenat-Thalmann 2005 for logarithms; Kavan and Žára 2005 for spherical blending; Hejl 2004
 ///   for quaternions and translations; Le and Hodgins 2016 for centers of rotation.
-/// - All methods except `linear` apply scale and shear in two phases, by polar decomposition,
-///   without a threshold.
-/// - Normals are transformed by the adjugate transpose of the blended 3×3 matrix, tangents by the
+/// - All methods except `linear` apply scale and shear in two phases, by polar decomposition. The
+///   reference decomposes every joint; the kernels take nearly rigid joints for rigid.
+/// - Normals are transformed by the cofactor matrix of the blended 3×3 matrix, tangents by the
 ///   blended 3×3 matrix. Both are normalized. Tangents are not made orthogonal to normals. The
 ///   handedness is multiplied by the sign of the determinant.
 ///

@@ -40,10 +40,12 @@ inline constexpr VkBufferUsageFlags buildInputUsage =
 
 /// The format with which a build reads positions that are stored in format `positions`.
 ///
-/// Every device with acceleration structures can read float32x3, float32x4, float16x4 and snorm16x4
-/// (Vulkan 1.3, "Required Format Support"); it ignores the fourth component. For all other formats
-/// the function returns VK_FORMAT_UNDEFINED. An engine may ask its device whether it can read
-/// float16x3 or snorm16x3 (VK_FORMAT_FEATURE_ACCELERATION_STRUCTURE_VERTEX_BUFFER_BIT_KHR).
+/// float32x3 and float32x4 are read as VK_FORMAT_R32G32B32_SFLOAT: the stride skips the fourth
+/// component. float16x4 and snorm16x4 are read with four components, of which builds ignore the
+/// fourth. Every device with acceleration structures supports these formats (Vulkan 1.3, "Required
+/// Format Support"). For all other formats the function returns VK_FORMAT_UNDEFINED. An engine may
+/// ask its device whether it can read float16x3 or snorm16x3
+/// (VK_FORMAT_FEATURE_ACCELERATION_STRUCTURE_VERTEX_BUFFER_BIT_KHR).
 DERMIS_VULKAN_API VkFormat buildInputFormat(VertexFormat positions);
 
 /// Skinned positions as the vertices of a geometry. Sets `vertexFormat`, `vertexData`,

@@ -50,7 +50,8 @@ struct BindingsState;
 
 /// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. They
 /// must live until the GPU has completed all commands that were recorded with them. Destroy them
-/// before the Context. Any number of threads may `record` with them at the same time.
+/// before the buffers and the Context. Any number of threads may `record` with them at the same
+/// time.
 class DERMIS_VULKAN_API Bindings {
  public:
   Bindings();

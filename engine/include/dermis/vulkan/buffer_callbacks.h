@@ -40,7 +40,8 @@ struct CreatedBuffer {
 };
 
 /// Create and destroy the buffers of a SkinningSystem. They are called in the thread that calls the
-/// SkinningSystem, and may call Vulkan. With the Vulkan Memory Allocator, `create` calls
+/// SkinningSystem, and may call Vulkan. They must not throw, and must not call the SkinningSystem.
+/// With the Vulkan Memory Allocator, `create` calls
 /// vmaCreateBuffer with `info`, and `destroy` calls vmaDestroyBuffer.
 struct BufferCallbacks {
   void* user = nullptr;  ///< passed to both functions

@@ -96,11 +96,12 @@ class DERMIS_VULKAN_API Context {
   /// were measured on lavapipe; those for GPUs are guesses.
   Tuning tuning() const;
 
-  /// Builds every pipeline that instances with this method and layout can need, with any mesh, pose
-  /// and morph targets, in plans that are made with `tuning()`. For other tunings use
-  /// `everyVariant`. Once all methods and layouts are prepared, `record` never fails with
-  /// `notPrepared`. May take long: call it from a loading thread. If it fails (`invalidArgument`,
-  /// `missingFeature`, `vulkanError`), the pipelines that were built before remain.
+  /// Builds every pipeline that instances with these needs can use, in plans that are made with
+  /// `tuning()`. For other tunings use `everyVariant`. If `PipelineNeeds::mesh` and `mayScale` are
+  /// empty, these are the pipelines for any mesh, pose and morph targets. Once all needs are
+  /// prepared, `record` never fails with `notPrepared`. May take long: call it from a loading
+  /// thread. If it fails (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of
+  /// `KernelSource::get`), the pipelines that were built before remain.
   Result<void> prepare(const PipelineNeeds& needs) const;
 
   /// Builds the pipelines of these variants. Pipelines that exist are skipped. For jobs whose

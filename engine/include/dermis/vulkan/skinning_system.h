@@ -79,7 +79,7 @@ struct SkinningSystemDescription {
 /// What `SkinningSystem::record` needs to know.
 struct FrameDescription {
   /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
-  /// holds `SkinningSystem::instanceCapacity` words of 4 bytes. An instance is visible if the word
+  /// holds `SkinningSystem::visibilityCount` words of 4 bytes. An instance is visible if the word
   /// at its `visibilityIndex` is not 0. The engine's culling writes them on the GPU before
   /// `record`, with the barrier `inputScope(PreviousUse::computeWrite)` in between.
   VkBuffer visibility{};
@@ -130,8 +130,9 @@ class DERMIS_VULKAN_API SkinningSystem {
   /// Call it before `create`, to find out what a range of the engine needs. `role` is `meshes`,
   /// `poses`, `gpuPoses` or `positions` (the output). Returns usage and alignment, and the size for
   /// the initial capacity in `description`. The alignment of the output need not be a power of two.
-  /// For other roles it returns what the system will create at first. Creates nothing. Fails as
-  /// `Scene::create` does.
+  /// For other roles it returns the initial requirement; tables and upload have size 0, since their
+  /// size depends on the frame. Creates nothing. Fails as `Scene::create` does, and with
+  /// `invalidArgument` if `context` is null.
   static Result<BufferRequirement> requirement(const SkinningSystemDescription& description,
                                                BufferRole role);
 
@@ -258,8 +259,8 @@ class DERMIS_VULKAN_API SkinningSystem {
   std::span<const InstanceHandle> movedInstances() const;
   /// As `Scene::bounds`. `beginFrame` reads back the frames that the GPU has completed.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
-  /// As `Scene::instanceCapacity`.
-  std::uint32_t instanceCapacity() const;
+  /// As `Scene::visibilityCount`.
+  std::uint32_t visibilityCount() const;
   /// As `Scene::visibilityIndex`.
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
   /// As `Scene::statistics`, with times and counts of the recorded commands.

@@ -94,7 +94,10 @@ class Displacements {
     const bool all = target.vertices.empty();
     if (target.positions.count != (all ? mesh.vertexCount : target.vertices.size()) ||
         target.positions.components < 3) {
-      return invalid(mesh, ErrorCode::invalidMesh, name + ": its positions do not fit the mesh");
+      return invalid(mesh, ErrorCode::invalidMesh,
+                     name + ": it has " + std::to_string(target.positions.count) +
+                         " positions of " + std::to_string(target.positions.components) +
+                         " components, but needs 3 components for each of its vertices");
     }
     ranges_.resize(mesh.vertexCount, Range{math::Vec3(0.0), math::Vec3(0.0)});
     for (std::uint32_t element = 0; element < target.positions.count; ++element) {
@@ -104,10 +107,13 @@ class Displacements {
         whole[static_cast<int>(i)] =
             loadStored(target.positions, element, i) * static_cast<double>(target.positionScale[i]);
       }
-      if (vertex >= mesh.vertexCount || !std::isfinite(whole.x + whole.y + whole.z)) {
+      const char* fault = vertex >= mesh.vertexCount ? ": its vertex is outside the mesh"
+                          : !std::isfinite(whole.x + whole.y + whole.z)
+                              ? ": its displacement is not finite"
+                              : nullptr;
+      if (fault != nullptr) {
         return invalid(mesh, ErrorCode::invalidMesh,
-                       name + ", element " + std::to_string(element) +
-                           ": its vertex is outside the mesh, or the displacement is not finite");
+                       name + ", element " + std::to_string(element) + fault);
       }
       const math::Vec3 low = static_cast<double>(range.min) * whole;
       const math::Vec3 high = static_cast<double>(range.max) * whole;

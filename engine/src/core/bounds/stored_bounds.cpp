@@ -66,7 +66,10 @@ Result<void> checkJoints(const JointBounds& bounds) {
       return damaged("its joints are not in ascending order, or contain NaN");
     required = joint.joint + 1;
   }
-  if (required != bounds.requiredJoints) return damaged("the number of required joints is wrong");
+  if (required != bounds.requiredJoints) {
+    return damaged("requiredJoints is " + std::to_string(bounds.requiredJoints) + ", not " +
+                   std::to_string(required));
+  }
   return {};
 }
 
@@ -135,7 +138,7 @@ Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
   if (std::uint64_t{header.wordCount} * 4 != bytes.size() ||
       wordsOf(header.joints, header.pairs, header.trios) != header.wordCount) {
     return damaged("they have " + std::to_string(bytes.size()) +
-                   " bytes, but their header says otherwise");
+                   " bytes, but their header does not describe as many");
   }
   std::vector<std::uint32_t> words(header.wordCount);
   std::memcpy(words.data(), bytes.data(), bytes.size());

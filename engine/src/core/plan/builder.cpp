@@ -82,8 +82,8 @@ Result<void> Groups::place(const Job& job, const OutputStreams& streams, const P
     return Error{
         ErrorCode::limitExceeded,
         placing.subject.name() +
-            " is culled on the GPU, so its output must lie in one storage buffer range, but it "
-            "does not"};
+            " is culled on the GPU, so its output must lie in one storage buffer range of " +
+            std::to_string(limits.maxStorageBufferRange) + " bytes, but it does not"};
   }
   chooseVariant(job, streams, placing.mayScale, limits, tuning);
   GroupKey key;
@@ -230,8 +230,7 @@ Result<void> PlanBuilder::finish(const FrameWork* frame) {
     plan_->sizes.slots = 0;
   }
   if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
-    return Error{ErrorCode::limitExceeded,
-                 "the tables of the batch are larger than a storage buffer range; split the batch"};
+    return tooLargeForRange("tables", plan_->tables.size() * 4, limits_);
   }
   plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
   plan_->candidateCount = static_cast<std::uint32_t>(candidates_.size());
@@ -263,11 +262,12 @@ void setConstants(DispatchCommand& dispatch, const Push& push) {
 /// Sets the number of workgroups in the push constants too.
 template <typename Push>
 Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push) {
-  if (workgroups > std::min(std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY,
-                            maxWorkgroups)) {
-    return Error{ErrorCode::limitExceeded,
-                 "the batch needs " + std::to_string(workgroups) +
-                     " workgroups in one dispatch, more than the device allows; split the batch"};
+  const std::uint64_t maximum = std::min(
+      std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY, maxWorkgroups);
+  if (workgroups > maximum) {
+    return Error{ErrorCode::limitExceeded, "the batch needs " + std::to_string(workgroups) +
+                                               " workgroups in one dispatch; the maximum is " +
+                                               std::to_string(maximum) + "; split the batch"};
   }
   DispatchCommand& dispatch = dispatches_.emplace_back().command;
   dispatch.variant = variant;

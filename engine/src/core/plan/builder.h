@@ -166,8 +166,8 @@ struct PlanSizes {
                                 const DeviceLimits& limits) const;
 };
 
-/// Of the offset of a scene's output in its buffer. What kernels store at once counts from there:
-/// 8 bytes, or up to 32, by `DeviceLimits::scalarBlockLayout` 12 and 24 too.
+/// Alignment of the scene's output in its buffer. It is a multiple of every size that kernels store
+/// at once: 8 bytes, and with wide stores also 12, 16, 24 and 32.
 inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
   if (storesWidely(limits)) return 3 * std::max(limits.minStorageBufferOffsetAlignment, 32u);
   return std::max(limits.minStorageBufferOffsetAlignment, 16u);

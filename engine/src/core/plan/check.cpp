@@ -91,9 +91,9 @@ Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStrea
            std::to_string(job.positions.stride);
   };
   if (!batch.outputs.isOneBuffer && standsTogether(streams))
-    return invalid(name() + ": all must go to one buffer (OutputSizes::isOneBuffer)");
+    return invalid(name() + ": all attributes must go to one buffer (OutputSizes::isOneBuffer)");
   if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
-    return invalid(name() + ": they must begin at a multiple of 8, not at " +
+    return invalid(name() + ": positions must begin at a multiple of 8, not at " +
                    std::to_string(job.positions.offset));
   }
   return {};
@@ -192,7 +192,7 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
 
 Result<void> checkMotion(const Batch& batch, const Job& job, const Subject& subject) {
   if (job.motion > Motion::reskinned)
-    return invalid(subject.name() + ": its motion is not one of Motion");
+    return notAValue(subject.name() + ": its motion", job.motion, "Motion");
   if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
     return invalid(subject.name() +
                    " settles or restarts its motion, but has no previous positions");
@@ -208,6 +208,18 @@ Error invalid(std::string message) {
   return {ErrorCode::invalidArgument, std::move(message)};
 }
 
+Error notAMultiple(const std::string& what, std::uint64_t value, std::uint64_t divisor) {
+  return invalid(what + " of " + std::to_string(value) + " is not a multiple of " +
+                 std::to_string(divisor));
+}
+
+Error tooLargeForRange(const std::string& name, std::uint64_t size, const DeviceLimits& limits) {
+  return {ErrorCode::limitExceeded, "the " + name + " need " + std::to_string(size) +
+                                        " bytes, more than a storage buffer range of " +
+                                        std::to_string(limits.maxStorageBufferRange) +
+                                        " bytes; split the batch"};
+}
+
 std::string Subject::name() const {
   std::string text = kind;
   if (index != noIndex) text.append(1, ' ').append(std::to_string(index));
@@ -217,16 +229,17 @@ std::string Subject::name() const {
 Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
                       const Subject& subject, const DeviceLimits& limits) {
   if (job.mesh.vertexCount == 0) return invalid(subject.name() + " has no mesh");
-  if (job.meshOffset % packedMeshAlignment != 0 || job.meshOffset > batch.meshesSize ||
-      job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
-    return invalid(subject.name() + ": a packed mesh of " + std::to_string(job.mesh.byteSize) +
-                   " bytes cannot begin at byte " + std::to_string(job.meshOffset) +
-                   " of a mesh buffer of " + std::to_string(batch.meshesSize));
+  if (job.meshOffset % packedMeshAlignment != 0)
+    return notAMultiple(subject.name() + ": its meshOffset", job.meshOffset, packedMeshAlignment);
+  if (job.meshOffset > batch.meshesSize || job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
+    return invalid(subject.name() + ": its packed mesh of " + std::to_string(job.mesh.byteSize) +
+                   " bytes at offset " + std::to_string(job.meshOffset) +
+                   " ends after the mesh buffer of " + std::to_string(batch.meshesSize) + " bytes");
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
   if (Result<void> good = checkPoseOf(batch, job, job.pose, subject); !good) return good;
   if (job.method > allMethods.back())
-    return invalid(subject.name() + ": its method is not one of Method");
+    return notAValue(subject.name() + ": its method", job.method, "Method");
   if (isForComparison(job.method) && !limits.comparisonMethods) {
     return Error{ErrorCode::missingFeature,
                  subject.name() +
@@ -292,11 +305,13 @@ Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::siz
     return invalid(name() + " has " + std::to_string(pose.jointCount) +
                    " joints, but it may have 1 to " + std::to_string(maxPoseJoints));
   }
-  if (pose.matrixOffset % matrixAlignment != 0 || pose.matrixOffset > batch.posesSize ||
+  if (pose.matrixOffset % matrixAlignment != 0)
+    return notAMultiple(name() + ": its matrixOffset", pose.matrixOffset, matrixAlignment);
+  if (pose.matrixOffset > batch.posesSize ||
       std::uint64_t{pose.jointCount} * sizeof(JointMatrix) > batch.posesSize - pose.matrixOffset) {
-    return invalid(name() + ": " + std::to_string(pose.jointCount) +
-                   " matrices cannot begin at byte " + std::to_string(pose.matrixOffset) +
-                   " of a poses buffer of " + std::to_string(batch.posesSize));
+    return invalid(name() + ": its " + std::to_string(pose.jointCount) + " matrices at offset " +
+                   std::to_string(pose.matrixOffset) + " end after the poses buffer of " +
+                   std::to_string(batch.posesSize) + " bytes");
   }
   return checkPromisedPose(pose.mayScale, promises, {"pose", index});
 }
@@ -310,11 +325,19 @@ Result<void> checkPromises(const Promises& promises) {
 
 Result<void> checkLimits(const DeviceLimits& limits) {
   // Far below what Vulkan guarantees: this only prevents divisions by zero.
-  if (limits.maxWorkgroupCountX == 0 || limits.maxWorkgroupCountY == 0 ||
-      limits.maxStorageBufferRange < 1024 ||
-      !std::has_single_bit(limits.minStorageBufferOffsetAlignment) ||
+  if (limits.maxWorkgroupCountX == 0 || limits.maxWorkgroupCountY == 0)
+    return invalid("DeviceLimits::maxWorkgroupCountX and Y must be at least 1");
+  if (limits.maxStorageBufferRange < 1024) {
+    return invalid("DeviceLimits::maxStorageBufferRange must be at least 1024 bytes, not " +
+                   std::to_string(limits.maxStorageBufferRange));
+  }
+  if (!std::has_single_bit(limits.minStorageBufferOffsetAlignment) ||
       limits.minStorageBufferOffsetAlignment > limits.maxStorageBufferRange / 4) {
-    return invalid("the limits are lower than those of any Vulkan device");
+    return invalid(
+        "DeviceLimits::minStorageBufferOffsetAlignment must be a power of two and at most a "
+        "quarter "
+        "of maxStorageBufferRange, not " +
+        std::to_string(limits.minStorageBufferOffsetAlignment));
   }
   return checkPromises(limits.promises);
 }

@@ -13,6 +13,16 @@
 namespace dermis {
 
 Error invalid(std::string message);
+/// "WHAT of VALUE is not a multiple of DIVISOR".
+Error notAMultiple(const std::string& what, std::uint64_t value, std::uint64_t divisor);
+/// For a number that is not a value of an enum: "WHAT is 7, which is not a value of Motion".
+template <typename Enum>
+Error notAValue(const std::string& what, Enum value, const char* name) {
+  return invalid(what + " is " + std::to_string(static_cast<unsigned>(value)) +
+                 ", which is not a value of " + name);
+}
+/// For a buffer of a batch that is larger than a storage buffer range.
+Error tooLargeForRange(const std::string& name, std::uint64_t size, const DeviceLimits& limits);
 
 /// The object at fault, at the beginning of a message: "job 17", "the instance".
 struct Subject {

@@ -74,16 +74,16 @@ void PlanMaker::placePalettes(const Batch& batch) {
 }
 
 Result<void> PlanMaker::checkSizes(const Batch& batch, const DeviceLimits& limits) const {
-  const std::uint64_t most = std::max({palettesSize_, batch.posesSize, batch.meshesSize});
-  if (most <= limits.maxStorageBufferRange) return {};
-  return Error{ErrorCode::limitExceeded, "meshes, poses or palettes of " + std::to_string(most) +
-                                             " bytes are larger than a storage buffer range of " +
-                                             std::to_string(limits.maxStorageBufferRange) +
-                                             " bytes; split the batch"};
+  for (const auto& [name, size] : {std::pair{"meshes", batch.meshesSize},
+                                   {"poses", batch.posesSize},
+                                   {"palettes", palettesSize_}}) {
+    if (size > limits.maxStorageBufferRange) return tooLargeForRange(name, size, limits);
+  }
+  return {};
 }
 
-/// Checks all jobs and marks the palettes that they read. Returns the first error in a job; in
-/// `placed`, the first in a place, which counts after those in poses.
+/// Checks all jobs and marks the palettes that they read. Returns the first error in a job.
+/// `placed` receives the first error in a placement; errors in poses are reported before it.
 Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits,
                                   const Tuning& tuning, Result<void>& placed) {
   for (std::vector<std::uint32_t>& units : paletteUnits_) units.assign(batch.poses.size(), notUsed);

@@ -377,8 +377,8 @@ std::uint64_t windowOverlap(std::uint64_t range) {
   return range / 16;
 }
 
-/// Half of what windows share: runs that begin in a window end in it, and so do those of attributes
-/// that begin up to as much later.
+/// Maximum bytes of a run: half of the overlap. A run that begins in a window then ends in it, even
+/// if an attribute begins up to that many bytes after the first.
 std::uint64_t longestRun(std::uint64_t range) {
   return windowOverlap(range) / 2;
 }

@@ -94,7 +94,7 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::meshes:
       return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0), false, true};
     case BufferRole::poses:
-      // Kernels of scenes that skin read the palettes.
+      // In a scene the skin kernel reads palettes only, so poses need no texel buffer usage.
       if (isScene) return {poses, alignment, storage, false, true};
       return {poses, alignment, read | copiedTo, true, true};
     case BufferRole::gpuPoses:
@@ -139,7 +139,7 @@ Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes) {
   const std::vector<std::uint32_t>& tables = PlanData::of(plan).tables;
   if (bytes.size() < tables.size() * 4) {
     return invalid("the tables of the plan need " + std::to_string(tables.size() * 4) +
-                   " bytes, there are " + std::to_string(bytes.size()));
+                   " bytes, but only " + std::to_string(bytes.size()) + " were passed");
   }
   if (!tables.empty()) std::memcpy(bytes.data(), tables.data(), tables.size() * 4);
   return {};

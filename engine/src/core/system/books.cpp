@@ -158,9 +158,10 @@ Result<void> SceneBooks::removePose(PoseHandle handle) {
 Result<void> SceneBooks::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
   if (frame <= frame_ || completedFrame < completed_ || completedFrame >= frame) {
     return Error{ErrorCode::invalidArgument,
-                 "frame " + std::to_string(frame) + ", with " + std::to_string(completedFrame) +
-                     " complete, cannot follow frame " + std::to_string(frame_) + ", with " +
-                     std::to_string(completed_) + " complete"};
+                 "beginFrame(" + std::to_string(frame) + ", " + std::to_string(completedFrame) +
+                     "): the frame must be larger than " + std::to_string(frame_) +
+                     ", and the completed frame at least " + std::to_string(completed_) +
+                     " and less than the frame"};
   }
   if (std::ranges::all_of(
           readBacks_, [&](const ReadBack& recorded) { return recorded.frame > completedFrame; })) {

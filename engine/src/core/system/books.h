@@ -50,7 +50,7 @@ struct ScenePose {
   bool mayScale = true;
   PoseWriter writer = PoseWriter::cpu;
   std::uint32_t buffer = 0;  ///< its number
-  Range joints;              ///< in that buffer; of each slot
+  Range joints;              ///< in that buffer, of all slots together
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
   /// flight.
   std::uint32_t slot = 0;

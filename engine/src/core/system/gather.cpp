@@ -159,8 +159,8 @@ void SceneBooks::gatherMoves() {
   }
 }
 
-/// The results that the frame writes, each as far into the read-back behind the counters. What lies
-/// between two near each other is copied too.
+/// The results that the frame writes. A result has the same offset in both buffers, plus the
+/// counters in the read-back buffer. Results between two that are near each other are copied, too.
 void SceneBooks::gatherResults() {
   constexpr std::uint32_t bits = 64;
   std::vector<std::uint64_t>& marks = resultMarks_;
@@ -387,7 +387,8 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
   const auto found = std::ranges::find(readBacks_, frame, &ReadBack::frame);
   if (found == readBacks_.end() || frame == 0) {
     return invalid("frame " + std::to_string(frame) +
-                   " cannot be read back: it is not one of the last frames committed");
+                   " cannot be read back: it is not one of the last " +
+                   std::to_string(readBacks_.size()) + " frames that were committed");
   }
   std::uint64_t needed = found->hasCounters ? readBackResults : 0;
   for (const CopyCommand& copy : found->results)

@@ -74,7 +74,7 @@ Result<void> SceneBooks::takeResult(SceneInstance& instance) {
     return Error{ErrorCode::limitExceeded,
                  "the instance has bounds or snorm16 positions, but " +
                      std::to_string(resultStore_.ranges.capacity()) +
-                     " instances have them already, and that is the maximum"};
+                     " instances have them already: the maximum of boundsCapacity"};
   }
   instance.extras.result = static_cast<std::uint32_t>((*result)->offset);
   return {};
@@ -98,10 +98,10 @@ Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
     unit = static_cast<std::uint32_t>((*taken)->offset);
     return {};
   }
-  return noRoom("pose " + std::to_string(instance.poseHandle.index) + " takes " +
-                    std::to_string(size) + " units of 16 bytes in the form that " +
-                    std::string(methodName(instance.method)) + " reads",
-                unitStore_, "units of palettes");
+  return noRoom("pose " + std::to_string(instance.poseHandle.index) + " needs " +
+                    std::to_string(size) + " units of 16 bytes of palettes for " +
+                    std::string(methodName(instance.method)),
+                unitStore_, "units");
 }
 
 /// Fails with `limitExceeded` if the output has no room; the instance is then as it was.
@@ -211,7 +211,8 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   if (Result<void> good = check(instance, description.updateInterval); !good) return good.error();
   if (!makeSlot()) {
     return Error{ErrorCode::limitExceeded, "there are " + std::to_string(slotCapacity_) +
-                                               " instances already, which is the maximum"};
+                                               " instances already: the maximum of "
+                                               "instanceCapacity"};
   }
   if (Result<void> good = reserveUnits(instance); !good) return good.error();
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);

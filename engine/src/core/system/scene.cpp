@@ -14,7 +14,8 @@ namespace dermis {
 namespace {
 
 Result<void> checkDescription(const SceneDescription& description) {
-  if (description.framesInFlight == 0) return invalid("the scene's framesInFlight is 0");
+  if (description.framesInFlight == 0)
+    return invalid("the scene's framesInFlight is 0; the minimum is 1");
   if (Result<void> good = checkLimits(description.limits); !good) return good;
   const std::uint64_t range = description.limits.maxStorageBufferRange;
   constexpr std::uint64_t anySize = ~std::uint64_t{0};
@@ -34,7 +35,7 @@ Result<void> checkDescription(const SceneDescription& description) {
         {"boundsCapacity", description.boundsCapacity, range / sizeof(InstanceResult), true}}) {
     const Capacity& capacity = field.capacity;
     if (capacity.maximum == 0 && !field.mayBeNone)
-      return invalid(std::string("the scene's ") + field.name + " is 0");
+      return invalid(std::string("the scene's ") + field.name + " has a maximum of 0");
     if (capacity.maximum < capacity.initial) {
       return invalid(std::string("the scene's ") + field.name + " is " +
                      std::to_string(capacity.initial) + " initially, more than its maximum of " +
@@ -47,11 +48,12 @@ Result<void> checkDescription(const SceneDescription& description) {
             " needs a buffer larger than this device's storage buffer range of " +
             std::to_string(range) + " bytes; the maximum is " + std::to_string(field.most)};
   }
-  if (description.outputOffset % outputRangeAlignment(description.limits) != 0 ||
-      description.outputOffset > anySize / 2) {
+  const std::uint32_t alignment = outputRangeAlignment(description.limits);
+  if (description.outputOffset % alignment != 0)
+    return notAMultiple("the scene's outputOffset", description.outputOffset, alignment);
+  if (description.outputOffset > anySize / 2) {
     return invalid("the scene's outputOffset of " + std::to_string(description.outputOffset) +
-                   " is not a multiple of " +
-                   std::to_string(outputRangeAlignment(description.limits)));
+                   " is larger than the maximum, " + std::to_string(anySize / 2));
   }
   return checkTuning(description.tuning);
 }
@@ -226,7 +228,7 @@ Result<std::uint32_t> Scene::visibilityIndex(InstanceHandle instance) const {
   if (books_->instances().find(instance) == nullptr) return unknownHandle("instance", instance);
   return instance.index;
 }
-std::uint32_t Scene::instanceCapacity() const {
+std::uint32_t Scene::visibilityCount() const {
   return books_->sizes().slots;
 }
 SceneStatistics Scene::statistics() const {

@@ -77,10 +77,10 @@ class SlotMap {
   std::uint32_t size_ = 0;
 };
 
-/// `kind` is "mesh", "palette" or "instance".
+/// `kind` is "mesh", "pose" or "instance".
 template <typename Thing>
 Error unknownHandle(const char* kind, Handle<Thing> handle) {
-  if (!handle) return {ErrorCode::invalidArgument, std::string("a null ") + kind + " handle"};
+  if (!handle) return {ErrorCode::invalidArgument, std::string("the ") + kind + " handle is null"};
   return {ErrorCode::invalidArgument, "there is no " + std::string(kind) + " " +
                                           std::to_string(handle.index) + " of generation " +
                                           std::to_string(handle.generation) +

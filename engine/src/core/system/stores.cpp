@@ -92,8 +92,8 @@ Error SceneBooks::noRoom(const std::string& what, const Store& store, const char
               (ranges.capacity() < store.capacity.maximum
                    ? " (maximum " + std::to_string(store.capacity.maximum) + ")"
                    : std::string()) +
-              " only " + std::to_string(ranges.capacity() - ranges.used()) + " are free, at most " +
-              std::to_string(ranges.largestFree()) + " in one piece"};
+              " only " + std::to_string(ranges.capacity() - ranges.used()) +
+              " are free; the largest free range has " + std::to_string(ranges.largestFree())};
 }
 
 PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
@@ -106,8 +106,8 @@ PoseBuffer SceneBooks::poseBuffer(std::uint32_t number) const {
                                           description_.limits)};
 }
 
-/// Matrices one behind the other, in all slots, and their buffer: one more where none has room.
-/// Nothing if there may be no other.
+/// Takes `count` consecutive matrices for each slot, and sets `buffer`. Adds a pose buffer if none
+/// has room. Returns nothing if the maximum is reached.
 Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
                                                     std::uint32_t& buffer) {
   const std::uint64_t slots = slotsOf(writer);

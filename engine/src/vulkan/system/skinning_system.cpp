@@ -287,8 +287,8 @@ std::span<const InstanceHandle> SkinningSystem::settledInstances() const {
 std::span<const InstanceHandle> SkinningSystem::movedInstances() const {
   return state_->scene.movedInstances();
 }
-std::uint32_t SkinningSystem::instanceCapacity() const {
-  return state_->scene.instanceCapacity();
+std::uint32_t SkinningSystem::visibilityCount() const {
+  return state_->scene.visibilityCount();
 }
 Result<std::uint32_t> SkinningSystem::visibilityIndex(InstanceHandle instance) const {
   return state_->scene.visibilityIndex(instance);
