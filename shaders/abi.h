@@ -108,11 +108,12 @@ struct MeshHeader {
   uint normals;     // 4 words for each vertex: 3 floats and a 0. If the offset is 0, there are none
   uint tangents;    // the same, with the handedness as the fourth float
   uint influences;  // InfluenceRecord
-  uint centers;     // centers of rotation, as normals
+  uint centers;     // centers of rotation: 4 words for each vertex, in the layout of `normals`
   uint morphs;      // MorphRecord
   uint dualQuaternionWeights;  // a float for each vertex. If the offset is 0, all vertices have …
   float dualQuaternionWeight;  // … this value
-  uint bulgeStrengths;         // the same
+  // As dualQuaternionWeights: a float for each vertex; if 0, all have bulgeStrength.
+  uint bulgeStrengths;
   float bulgeStrength;
   uint minInfluences;  // minimum influences of a vertex
   uint reserved;
@@ -217,7 +218,7 @@ struct InstanceRecord {
   uint tangents;
   uint previousPositions;
   uint joints;           // number of joints in the palette, plus INSTANCE_* flags
-  uint previousPalette;  // with MOTION_RESKINNED: as `palette`
+  uint previousPalette;  // with MOTION_RESKINNED: as `palette`, for the previous pose
   uint extension;        // word offset of its ExtensionRecord in the tables; 0 if it has none
 };
 DERMIS_CONSTANT INSTANCE_WORDS = 8u;
@@ -246,7 +247,7 @@ struct ExtensionRecord {
   float inverseX;  // 1 / half of the size of the box
   float inverseY;
   float inverseZ;
-  uint result;  // number of its result
+  uint result;  // index of its result
   uint reserved3;
 };
 DERMIS_CONSTANT EXTENSION_WORDS = 16u;
@@ -276,8 +277,10 @@ struct ResultRecord {
 
 // One for each such instance, in the order of the instance records.
 struct CandidateRecord {
-  uint slot;     // index into the visibility and history buffers
-  uint version;  // of the vertices that it should show; different for all instances and poses
+  uint slot;  // index into the visibility and history buffers
+  // Identifies the vertices that the slot should hold. No two instances, and no two states of one
+  // instance, have the same version.
+  uint version;
 };
 DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
 
@@ -327,7 +330,7 @@ struct PalettePush {
   uint workgroupCount;
 };
 struct ClearPush {
-  uint results;  // word offset of the numbers of the results
+  uint results;  // word offset of the list of result indices
   uint resultCount;
   uint workgroupCount;
 };

@@ -1,4 +1,4 @@
-// Skins a vertex by the method of the module or constant.
+// Skins a vertex by METHOD. The macros BULGE and COMPARISON decide which methods the module contains.
 #ifndef DERMIS_BLEND_GLSL
 #define DERMIS_BLEND_GLSL
 
@@ -34,11 +34,11 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
 #else
 #if defined(BULGE) || defined(DERMIS_SKIN_GLSL)
     case METHOD_BLENDED:
-      return skinBlended(vertex, influences, pose, inputs.share, withNormal, withTangent);
+      return skinBlended(vertex, influences, pose, inputs.methodWeight, withNormal, withTangent);
     case METHOD_CENTER_OF_ROTATION:
       return skinCenterOfRotation(vertex, influences, pose, inputs.center, withNormal, withTangent);
     case METHOD_BULGE_CONTROLLED:
-      return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.share, withNormal, withTangent);
+      return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.methodWeight, withNormal, withTangent);
 #endif
 #ifndef BULGE
     case METHOD_LINEAR:

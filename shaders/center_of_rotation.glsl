@@ -1,5 +1,5 @@
-// Blends quaternions about a center of rotation that was computed at import (Le and Hodgins 2016). Also dual quaternions that are
-// moved towards this result. The center itself is skinned linearly, by the decomposed joints.
+// Blends quaternions about a center of rotation that was computed at import (Le and Hodgins 2016). The center itself is skinned
+// linearly, by the decomposed joints. `skinBulgeControlled` moves the dual-quaternion result towards this one (bulge_controlled).
 #ifndef DERMIS_CENTER_OF_ROTATION_GLSL
 #define DERMIS_CENTER_OF_ROTATION_GLSL
 

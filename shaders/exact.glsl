@@ -47,7 +47,8 @@ float inversePowerScale(float largest) {
 }
 
 // Vulkan permits an error of 2.5 units in the last place for a division, of 2 for an inverse square root, and of both together for
-// a square root. A step of Newton's method reduces each to about one rounding on any device. Zero and infinity give NaN.
+// a square root. A step of Newton's method reduces each to about one rounding on any device. A zero divisor, the inverse root of
+// zero, and infinite arguments give NaN. `squareRoot(0)` is 0.
 
 float quotient(float a, float b) {
   precise float guess = a / b;

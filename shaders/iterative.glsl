@@ -6,8 +6,8 @@
 #include "dual_quaternion.glsl"
 #include "dual_exponential.glsl"
 
-// Reached only if joints are nearly antipodal. Otherwise a few steps are enough.
-const uint MOST_STEPS = 20u;
+// The loop reaches the maximum only if joints are nearly antipodal. Usually a few steps are enough.
+const uint MAX_STEPS = 20u;
 
 void makeUnit(inout vec4 real, inout vec4 dual) {
   float inverse = inverseRoot(dot4(real, real));
@@ -47,7 +47,7 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
   Blend blend = blendJoints(influences, pose);
   vec4 pivot = paletteRotation(pose.palette, influences.joints.x);
   makeUnit(blend.real, blend.dual);
-  for (uint step = 0u; step < MOST_STEPS; ++step) {
+  for (uint step = 0u; step < MAX_STEPS; ++step) {
     float reach;
     Screw screw = meanScrew(blend.real, blend.dual, influences, pose, pivot, reach);
     vec4 real;

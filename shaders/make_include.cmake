@@ -8,7 +8,7 @@
 cmake_minimum_required(VERSION 3.25)
 get_filename_component(folder ${INPUT} DIRECTORY)
 
-# Semicolons, and brackets, would make lists of the text.
+# CMake would split the text at semicolons, and treats brackets specially.
 function(read_source path result)
   file(READ ${path} text)
   string(REPLACE ";" "@semicolon@" text "${text}")
@@ -26,7 +26,7 @@ while(text MATCHES "#include \"([A-Za-z_.]+)\"")
     list(APPEND included ${name})
     read_source(${folder}/${name} own)
   endif()
-  # Only the first: the others find it included.
+  # Replaces the first occurrence. Later ones are replaced by nothing, because the file is in `included`.
   string(FIND "${text}" "#include \"${name}\"" begin)
   string(LENGTH "#include \"${name}\"" length)
   math(EXPR end "${begin} + ${length}")
@@ -46,7 +46,7 @@ endforeach()
 list(REMOVE_DUPLICATES names)
 set(text " ${text} ")
 foreach(name IN LISTS names)
-  # Twice: neighbors share the character between them.
+  # Two passes: a match consumes the character after the name, so the first pass misses an adjacent name.
   foreach(pass RANGE 1)
     string(REGEX REPLACE "([^A-Za-z0-9_])${name}([^A-Za-z0-9_])" "\\1dermis_${name}\\2" text "${text}")
   endforeach()

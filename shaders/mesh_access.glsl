@@ -133,7 +133,7 @@ uint influenceJoint(Influences influences, uint slot) {
 // Data of a vertex that only some methods use.
 struct MethodInputs {
   vec3 center;
-  float share;  // weight of the dual quaternion result, or bulge control strength
+  float methodWeight;  // dual-quaternion weight (blended) or bulge strength (bulge_controlled), 0 to 1
 };
 
 // Reads a value per vertex from `section`, or returns `value` if the mesh has no such section.
@@ -148,10 +148,10 @@ MethodInputs methodInputsOf(uint mesh, uint vertex) {
     inputs.center = uintBitsToFloat(meshUnit((mesh + header.centers) / 4u + vertex).xyz);
   }
   if (METHOD == METHOD_BULGE_CONTROLLED) {
-    inputs.share = meshShare(mesh, vertex, header.bulgeStrengths, header.bulgeStrength);
+    inputs.methodWeight = meshShare(mesh, vertex, header.bulgeStrengths, header.bulgeStrength);
   }
   if (METHOD == METHOD_BLENDED) {
-    inputs.share = meshShare(mesh, vertex, header.dualQuaternionWeights, header.dualQuaternionWeight);
+    inputs.methodWeight = meshShare(mesh, vertex, header.dualQuaternionWeights, header.dualQuaternionWeight);
   }
   return inputs;
 }

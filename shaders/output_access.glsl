@@ -8,7 +8,7 @@
 #if defined(PAIRS) || defined(WIDE)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
 
-// Stores a position and the normal after it, two words at a time. This takes half as long with drivers that store lane by lane.
+// Stores a position and the normal after it, two words at a time. lavapipe stores each lane separately, so this takes half as long.
 void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
   uint pair = place / 8u;
   positionsPairs[pair] = packUint2x32(position.xy);
@@ -68,7 +68,7 @@ uvec4 loadRecordPosition(uint index) {
   return uvec4(unpackUint2x32(records24[index].x), high.x, 0u);
 }
 
-// Stores RECORD bytes at once. This takes less time with drivers that store lane by lane.
+// Stores RECORD bytes at once. lavapipe stores each lane separately, so one store takes less time.
 void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = recordWords(position, normal, tangent);
   uvec4 low = uvec4(words[0], words[1], words[2], words[3]);

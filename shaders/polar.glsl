@@ -137,9 +137,10 @@ ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
 }
 
-// Newton's method for the polar decomposition: improves q and computes S. Rᵀ C is symmetric for the right R. For R' = R (1 − [ω]×)
-// its asymmetry is the vector (tr S − S) ω, which the residual contains, rotated. Without this, the error of the rotation would be
-// a few roundings times its condition σ₁ / (σ₂ + σ₃), which is visible at vertices that have other joints, too.
+// Newton's method for the polar decomposition: improves q and computes S. For the right R, Rᵀ C is symmetric. If the current
+// rotation is R' = R (1 − [ω]×), the antisymmetric part of R'ᵀ C is the vector (tr S − S) ω. The residual, rotated back, is that
+// vector. Each step solves for ω. Without these steps the rotation would have an error of a few roundings times σ₁ / (σ₂ + σ₃).
+// Vertices with several joints would show it.
 ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   ScaleShear s;
   uint left = 3u;
@@ -177,8 +178,8 @@ float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   return dot3(r0, c);
 }
 
-// The polar decomposition of C, given by its rows. If the determinant is negative, R is the rotation of −C, and S has the sign. A
-// determinant that may be negative only by rounding (24 roundings of 2^-24) counts as 0, since that of a flat matrix may have
+// The polar decomposition of C, given by its rows. If the determinant is negative, R is the rotation of −C, and S is negated. A
+// determinant within 24 roundings (2^-24 each) of zero counts as 0, because rounding can give the determinant of a singular matrix
 // either sign.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));

@@ -16,7 +16,8 @@ void countClamped(uint result) {}
 
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { ResultRecord results[]; };
 #if defined(PAIRS) || defined(WIDE)
-// The same as pairs of words: three 64-bit loads read a box. Drivers that load lane by lane take less time for them.
+// The same as pairs of words: three 64-bit loads read a box. lavapipe loads each lane separately, so three 64-bit loads take less
+// time.
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer ResultPairs { uint64_t resultPairs[]; };
 #endif
 

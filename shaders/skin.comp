@@ -193,7 +193,7 @@ struct Work {
 };
 
 #ifdef HAS_MOTION
-// The position that this frame's will overwrite.
+// The position in the output, before this frame overwrites it.
 uvec4 keptPosition(Instance instance) {
 #ifdef WIDE
   if (RECORD == 24u && POSITION_FORMAT == FORMAT_FLOAT32X3) return loadRecordPosition(instance.recordPlace);
@@ -256,7 +256,7 @@ void skinInstance(Instance instance, Work work, bool scales) {
     if (TANGENTS) storeTangents(instance.places.z, tangent, formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
   }
 #ifdef HAS_MOTION
-  // Last, when most of the vertex' data is no longer needed.
+  // Done last, because most data of the vertex is no longer live.
   if (MOTION == MOTION_RESKINNED) {
     uvec4 words = previousPosition(instance, position, work);
     storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
@@ -275,8 +275,8 @@ const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u && MOTIO
 const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u;
 #endif
 
-// Skins some of an invocation's instances, one per bit, in order. Records are read once for a run of evenly spaced consecutive
-// instances. A run has as many instances as there are consecutive bits, or one if instances are not evenly spaced.
+// Skins the instances whose bits are set in `left`, in ascending order. Records are read once for a run of evenly spaced
+// consecutive instances. A run has as many instances as there are consecutive bits, or one if instances are not evenly spaced.
 void skinInstances(uint left, uint records, uvec4 offsets, bool even, Instance by, Work work, bool scales) {
   // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
   // lanes off, which doubles the work of an invocation with one instance.

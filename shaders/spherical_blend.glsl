@@ -1,7 +1,7 @@
-// Spherical blend skinning (Kavan and Žára 2005): blends quaternions about the point r that all joints move to nearly the same
-// place. r is the least-squares solution of (R_a − R_b) r = t_b − t_a over all pairs of joints, which is that of (R_j − mean R) r =
-// mean t − t_j over all joints. The rows are brought to triangular form one by one, because the normal equations would lose half of
-// the digits.
+// Spherical blend skinning (Kavan and Žára 2005). Blends quaternions about the point r whose images under all joints are nearest to
+// each other. r solves (R_a − R_b) r = t_b − t_a over all pairs of joints in the least-squares sense. The equations
+// (R_j − mean R) r = mean t − t_j over all joints have the same solution. The rows are brought to triangular form one by one,
+// because the normal equations would lose half of the digits.
 #ifndef DERMIS_SPHERICAL_BLEND_GLSL
 #define DERMIS_SPHERICAL_BLEND_GLSL
 

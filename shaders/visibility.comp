@@ -19,8 +19,8 @@ layout(set = 0, binding = BINDING_COUNTERS, std430) buffer Counters { CounterRec
 
 layout(push_constant) uniform Push { VisibilityPush push; };
 
-const uint MOST_INVOCATIONS = 128u;
-shared uint kept[MOST_INVOCATIONS];
+const uint MAX_INVOCATIONS = 128u;
+shared uint kept[MAX_INVOCATIONS];
 
 // Like barrier(), but it also orders storage buffers: after it, invocations may overwrite what others have read before it.
 // barrier() orders shared memory only.
@@ -104,9 +104,9 @@ void countWorkgroups(uint word, uint arguments) {
     group.workgroupEnd = workgroups;
     storeGroup(place, group);
   }
-  uint most = push.maxWorkgroups;
-  // `most` may be 2³² − 1. Workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
-  uint rows = workgroups / most + (workgroups % most != 0u ? 1u : 0u);
+  uint maxWorkgroups = push.maxWorkgroups;
+  // `maxWorkgroups` may be 2³² − 1. Workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
+  uint rows = workgroups / maxWorkgroups + (workgroups % maxWorkgroups != 0u ? 1u : 0u);
   storeIndirect(arguments, IndirectRecord(rows == 0u ? 0u : (workgroups + rows - 1u) / rows, rows, 1u, 0u));
   atomicAdd(counters.workgroups, workgroups);
 }

@@ -194,10 +194,11 @@ std::optional<std::vector<ByteModel>> byteModels() {
 bool printByteModels() {
   const std::optional<std::vector<ByteModel>> models = byteModels();
   if (!models) return false;
-  fmt::print("A vertex of an instance: four influences, rigid joints, {} instances an invocation\n",
-             instancesEach);
+  fmt::print(
+      "A vertex of an instance: four influences, rigid joints, {} instances per invocation\n",
+      instancesEach);
   for (const GpuSpeed& gpu : gpuSpeeds()) {
-    fmt::print("{}: L2 {} TB/s, L1 {} TB/s, {} x 10^12 float32 operations a second (assumed)\n",
+    fmt::print("{}: L2 {} TB/s, L1 {} TB/s, {} x 10^12 float32 operations per second (assumed)\n",
                gpu.name, gpu.cache, gpu.firstLevel, gpu.operations);
   }
   fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7} {:>7}", "method, formats, stores", "written",

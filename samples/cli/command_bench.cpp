@@ -47,7 +47,7 @@ ExitStatus checkUsage(const BenchOptions& options) {
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
-    return reportWrongUsage("-o OUT has a place for a number, but there is only one picture");
+    return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");
   return ExitStatus::done;
 }
 
@@ -138,10 +138,9 @@ Run addBench(CLI::App& app) {
       "Measure how many vertices per second are skinned: by method, format and number of "
       "instances, on a device and on the CPU, beside plain kernels");
   const auto options = std::make_shared<BenchOptions>();
-  command->add_option(
-      "MODEL", options->model,
-      "A .gltf or .glb file; its first skin is used [a figure of 10,000 vertices, 60 "
-      "joints and four influences everywhere]");
+  command->add_option("MODEL", options->model,
+                      "A .gltf or .glb file; its first skin is used [a figure of 10,000 vertices, "
+                      "60 joints and four influences per vertex]");
   command->add_option("--json", options->json, "Write the same numbers to a file");
   command->add_option("-o,--output", options->output, "Draw the numbers as bars: OUT.png");
   command->add_option(
@@ -156,7 +155,8 @@ Run addBench(CLI::App& app) {
                   "[{}]",
                   options->rounds));
   command->add_flag("--on-paper", options->onPaper,
-                    "Measure nothing; print the bytes per vertex and what limits GPUs");
+                    "Measure nothing; estimate bytes per vertex, speed and the limiting resource "
+                    "for typical GPUs");
   return [options] { return bench(*options); };
 }
 

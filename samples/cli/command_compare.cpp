@@ -52,7 +52,7 @@ ExitStatus checkPicture(const CompareOptions& options) {
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
-    return reportWrongUsage("-o OUT has a place for a number, but there is only one picture");
+    return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");
   if (samples::needsNoVulkan(options.device)) {
     return reportWrongUsage(fmt::format(
         "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
@@ -249,8 +249,9 @@ Run addCompare(CLI::App& app) {
       "difference: OUT.png");
   command
       ->add_option("--methods", options->methods,
-                   "Methods for the columns of the picture, separated by commas [those of the "
-                   "paper, and newer ones]")
+                   "Methods for the columns of the picture, separated by commas [linear, "
+                   "quaternion_translation, log_matrix, spherical_blend, dual_quaternion, "
+                   "center_of_rotation, if the model allows them]")
       ->delimiter(',')
       ->allow_extra_args(false)  // A model may follow.
       ->needs(output);
@@ -267,7 +268,8 @@ Run addCompare(CLI::App& app) {
   command->add_option("--repetitions", options->repetitions,
                       fmt::format("Runs of each method [{}]", options->repetitions));
   command->add_option("--instances", options->instances,
-                      "Number of instances in a run [enough for some million vertices]");
+                      "Number of instances in a run [about 8 million vertices on a GPU, 1.5 "
+                      "million on a CPU; fewer for small models and for models with many joints]");
   addShares(*command, options->shares);
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return compare(*options); };

@@ -18,8 +18,8 @@ ExitStatus listDevices() {
                VK_API_VERSION_MINOR(info.apiVersion), VK_API_VERSION_PATCH(info.apiVersion),
                info.unusable.empty() ? "usable" : "not usable: " + info.unusable);
     fmt::print(
-        "   storage buffers of {} MiB, {} a stage; {} workgroups a dimension; push descriptors: "
-        "{}; stores of 2 bytes: {}, of 1 byte: {}\n",
+        "   maximum storage buffer range {} MiB; {} storage buffers per stage; {} workgroups per "
+        "dimension; push descriptors: {}; 16-bit stores: {}; 8-bit stores: {}\n",
         info.maxStorageBufferRange >> 20, info.storageBuffersPerStage, info.maxWorkgroupCount,
         info.pushDescriptors ? "yes" : "no", info.storage16Bit ? "yes" : "no",
         info.storage8Bit ? "yes" : "no");

@@ -86,15 +86,15 @@ ExitStatus checkUsage(const RenderOptions& options) {
   if (*kind != PictureKind::png)
     return options.frames ? ExitStatus::done : reportWrongUsage("a film needs --frames");
   if (samples::hasWrongPattern(options.output))
-    return reportWrongUsage("-o OUT may have one place for a number, from %01d to %09d");
+    return reportWrongUsage("-o OUT may have one placeholder for a number, from %01d to %09d");
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && !pattern) {
     return reportWrongUsage(
-        "--frames needs a place for the number in -o OUT, such as frame%04d.png, or a film: .mp4, "
-        ".gif or .apng");
+        "--frames needs a placeholder for the number in -o OUT, such as frame%04d.png, or a film: "
+        ".mp4, .gif or .apng");
   }
   if (!options.frames && pattern)
-    return reportWrongUsage("-o OUT has a place for a number, so --frames is required");
+    return reportWrongUsage("-o OUT has a placeholder for a number, so --frames is required");
   return ExitStatus::done;
 }
 

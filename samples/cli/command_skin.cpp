@@ -76,17 +76,17 @@ ExitStatus checkUsage(const SkinOptions& options) {
     return reportWrongUsage("--fps must be a number above 0");
   }
   if (samples::hasWrongPattern(options.output)) {
-    return reportWrongUsage("-o OUT may have one place for a number, from %01d to %09d");
+    return reportWrongUsage("-o OUT may have one placeholder for a number, from %01d to %09d");
   }
   const bool pattern = samples::frameName(options.output, 0).has_value();
   if (options.frames && *options.frames == 0)
     return reportWrongUsage("--frames must be at least 1");
   if (options.frames && !pattern) {
     return reportWrongUsage(
-        "--frames needs a place for the number in -o OUT, such as pose%04d.ply");
+        "--frames needs a placeholder for the number in -o OUT, such as pose%04d.ply");
   }
   if (!options.frames && pattern) {
-    return reportWrongUsage("-o OUT has a place for a number, so --frames is required");
+    return reportWrongUsage("-o OUT has a placeholder for a number, so --frames is required");
   }
   return ExitStatus::done;
 }
@@ -103,8 +103,8 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
     const OutputMesh mesh = assemble(scene, std::move(*skinned));
     if (const std::size_t bad = countNonFinite(mesh); bad != 0) {
       const std::string message = fmt::format(
-          "{} vertices at {:.4g} s are not finite: joints of the pose, or vertices that no joint "
-          "moves, are not",
+          "{} vertices at {:.4g} s are not finite, because a joint matrix or a vertex of the file "
+          "is not finite",
           bad, time);
       if (!holdsNonFinite(format))
         return reportError(ExitStatus::badInput, message + "; only a .ply can hold them");

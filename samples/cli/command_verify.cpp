@@ -139,8 +139,8 @@ ExitStatus writeReports(const VerifyOptions& options, const std::string& device,
   return status;
 }
 
-/// The methods that a report of the CPU path does not cover.
-std::string notCovered(const samples::BatchTarget& target) {
+/// The methods that the target does not have.
+std::string missingMethods(const samples::BatchTarget& target) {
   std::string methods;
   for (const Method method : allMethods) {
     if (std::ranges::count(target.methods(), method) != 0) continue;
@@ -162,9 +162,8 @@ ExitStatus verifyOn(samples::TargetPool pool, const VerifyOptions& options,
   const ExitStatus written = writeReports(options, target.name(), verifier.models());
   fmt::print("device  {}\n", target.name());
   printReport(verifier.models());
-  if (const std::string methods = notCovered(target); !methods.empty())
-    fmt::print("not covered, since they are for comparison and only on Vulkan devices: {}\n",
-               methods);
+  if (const std::string methods = missingMethods(target); !methods.empty())
+    fmt::print("not verified (comparison methods need a Vulkan device): {}\n", methods);
   return written == ExitStatus::done ? verifier.status() : written;
 }
 
@@ -213,9 +212,10 @@ ExitStatus verify(const VerifyOptions& options) {
 }  // namespace
 
 Run addVerify(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("verify",
-                                         "Skin on the device with every method, format and way to "
-                                         "divide the work, and compare with the reference");
+  CLI::App* command =
+      app.add_subcommand("verify",
+                         "Skin on the device with every method, format and tuning (workgroup size, "
+                         "instances per invocation), and compare with the reference");
   const auto options = std::make_shared<VerifyOptions>();
   command->add_option("MODEL", options->models, "One or more .gltf or .glb files [random meshes]");
   command->add_flag("--random", options->random,

@@ -63,10 +63,10 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
                                       const ComparisonOptions& options, bool isCpu) {
   if (options.instances) {
     if (comparison.vertices > mostVertices / *options.instances) {
-      return Error{ErrorCode::invalidArgument,
-                   fmt::format("{} instances of {} vertices are more than the {} vertices that "
-                               "this command takes",
-                               *options.instances, comparison.vertices, mostVertices)};
+      return Error{
+          ErrorCode::invalidArgument,
+          fmt::format("--instances {}: {} × {} vertices exceed the maximum of {}",
+                      *options.instances, *options.instances, comparison.vertices, mostVertices)};
     }
     return *options.instances;
   }

@@ -212,7 +212,7 @@ class ComparisonDrawer {
   Result<void> drawHeatStrip(const ComparisonStrip& strip, ComparedFigures& figures) {
     const double most = hottest(figures);
     if (Result<void> made = figures.makeHeatMaps(most); !made) return made;
-    writeTitle(fmt::format("Distance from {}", methodName(Method::dualQuaternion)), "");
+    writeTitle(fmt::format("Difference from {}", methodName(Method::dualQuaternion)), "");
     writeScale(most, figures.size());
     if (Result<void> drawn = drawCells(strip, figures, true); !drawn) return drawn;
     std::vector<std::vector<std::string>> numbers;
@@ -235,9 +235,9 @@ class ComparisonDrawer {
     sheet_.left("0", style);
     const float from = sheet_.width("0", style) + gap;
     sheet_.gradient(colors, from, length, style.height);
-    sheet_.left(
-        fmt::format("{:g} ‰ of the model's size or more ({:.3g} units)", most / size * 1e3, most),
-        style, from + length + gap);
+    sheet_.left(fmt::format("{:g} ‰ of the model's diagonal or more ({:.3g} model units)",
+                            most / size * 1e3, most),
+                style, from + length + gap);
     sheet_.advance(std::round(style.height * lineGap));
     space(6);
   }

@@ -52,9 +52,9 @@ void printTitle(const ComparisonTitle& title, const MethodComparison& comparison
     fmt::print("timed    nothing: the reference is not made to be fast\n");
     return;
   }
-  fmt::print("timed    {} instances, {} vertices a run, positions and normals as float32\n",
+  fmt::print("timed    {} instances, {} vertices per run, positions and normals as float32\n",
              comparison.instances, comparison.instances * comparison.vertices);
-  fmt::print("         medians of {} runs, the methods in turn; {}\n", comparison.repetitions,
+  fmt::print("         medians of {} runs; methods take turns; {}\n", comparison.repetitions,
              clockName(comparison.clock));
   fmt::print("         linear takes {:.3f} ms\n",
              comparison.methods.front().seconds.value_or(0) * 1e3);
@@ -64,17 +64,19 @@ void printExplanation(const MethodComparison& comparison) {
   const bool byDriver = comparison.instructionSource == InstructionSource::driver;
   fmt::print(
       "\n"
-      "time          of linear's: less is faster\n"
-      "instructions  of the skin kernel, those of a loop once: {}\n"
-      "joint bytes   that the skin kernel reads of each joint of a palette\n"
-      "twist         a tube of two joints, twisted by {}°: its least radius, and the volume of\n"
-      "              the zone where both have weight, each of that in bind pose\n"
-      "bend          the tube bent by {}°: the least area of a section, the volume, and how far\n"
-      "              vertices get from the bones, in radii of the tube: its bulge\n"
-      "difference    from dual_quaternion on the model in this pose: the largest distance and\n"
-      "              the root mean square, of the diagonal of the model's box\n\n",
-      byDriver ? "the machine's, as its driver counts them"
-               : "SPIR-V that calculates or touches memory",
+      "time          relative to linear; smaller is faster\n"
+      "instructions  of the skin kernel; loop bodies are counted once; {}\n"
+      "joint bytes   that the skin kernel reads for each joint of a palette\n"
+      "twist         a tube of two joints, twisted by {}°: smallest radius, and volume of the\n"
+      "              blend zone, relative to bind pose\n"
+      "bend          the tube, bent by {}°: smallest cross-section area and volume, relative to\n"
+      "              bind pose\n"
+      "reach         largest distance of a vertex of the bent tube from the bones, in tube\n"
+      "              radii; 1 means no bulge\n"
+      "difference    from dual_quaternion, on the model in this pose: largest and rms distance,\n"
+      "              in % of the diagonal of the model's box\n\n",
+      byDriver ? "machine instructions, counted by the driver"
+               : "SPIR-V that computes or accesses memory",
       tubeTwistDegrees, tubeBendDegrees);
 }
 

@@ -24,7 +24,7 @@ std::string counted(std::uint32_t count, const char* what) {
 
 /// Formats with three digits and no exponent.
 std::string nanoseconds(double value) {
-  return fmt::format("{:.{}f} ns a vertex", value, value < 10 ? 2 : value < 100 ? 1 : 0);
+  return fmt::format("{:.{}f} ns per vertex", value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }
 
 std::vector<std::string> costOf(const MethodComparison& comparison, Method method) {
@@ -55,9 +55,9 @@ ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vecto
     strip.scene = &*subject.model;
     strip.pose = subject.pose;
     strip.title = samples::plainLine(std::filesystem::path(subject.name).filename().string());
-    strip.remark = samples::plainLine(subject.poseName) + ", the time that skinning takes";
+    strip.remark = samples::plainLine(subject.poseName) + "; skinning time";
   } else {
-    sheet.strips.back().remark += ", the time that skinning takes";
+    sheet.strips.back().remark += "; skinning time";
   }
   sheet.strips.back().showsCost = true;
   sheet.strips.back().hasHeatMap = true;

@@ -1,5 +1,7 @@
 #include "drawn_scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -84,9 +86,12 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
     ++instances;
   }
   const std::uint64_t all = joints * figures;
-  if (!std::in_range<std::uint32_t>(all) ||
-      !std::in_range<std::uint32_t>(std::uint64_t{instances} * figures)) {
-    return Error{ErrorCode::limitExceeded, "this number of figures has too many joints"};
+  for (const auto& [each, what] :
+       {std::pair{joints, "joints"}, {std::uint64_t{instances}, "meshes"}}) {
+    if (std::in_range<std::uint32_t>(each * figures)) continue;
+    return Error{ErrorCode::limitExceeded,
+                 fmt::format("{} figures of {} {} each exceed the maximum of {}", figures, each,
+                             what, std::numeric_limits<std::uint32_t>::max())};
   }
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};

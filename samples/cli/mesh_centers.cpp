@@ -16,7 +16,7 @@ namespace dermis::cli {
 namespace {
 
 /// Maximum influences per vertex; weaker ones are ignored for centers. Otherwise one vertex with
-/// many influences would give all vertices as many slots.
+/// many influences would give every vertex that many slots.
 constexpr std::uint32_t mostSlots = 32;
 
 /// 20 bytes in the solver, and temporarily the same again.
@@ -120,8 +120,8 @@ std::vector<float> solve(const CenterOfRotationSolver& solver) {
 
 Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
   return Error{ErrorCode::limitExceeded,
-               fmt::format("the centers of rotation of mesh {} take {}: they are left out, and so "
-                           "are the methods that need them",
+               fmt::format("mesh {}: its centers of rotation {}; they were not computed, so "
+                           "center_of_rotation and bulge_controlled are not available",
                            inQuotes(mesh.name), what)};
 }
 
@@ -136,14 +136,16 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
     if (!repaired) return repaired.error();
     joined.add(repaired->view(), primitive.triangles);
   }
-  if (!budget_.spend(joined.pairCount(), bytesPerPair)) return tooMuch(mesh, "so much memory");
+  if (!budget_.spend(joined.pairCount(), bytesPerPair))
+    return tooMuch(mesh, "need too much memory");
   const MeshView view = joined.view(mesh.name);
   const Result<CenterOfRotationSolver> solver =
       CenterOfRotationSolver::make(view, jointCount, joined.triangles());
   if (!solver) return solver.error();
   const std::uint64_t terms = solver->termCount();
   if (terms > termsLeft_)
-    return tooMuch(mesh, fmt::format("{} terms, where {} are left", terms, termsLeft_));
+    return tooMuch(
+        mesh, fmt::format("need {} terms, but {} remain of the file's limit", terms, termsLeft_));
   termsLeft_ -= terms;
   const std::vector<float> all = solve(*solver);
 

@@ -13,14 +13,14 @@ void addShares(CLI::App& command, MethodShares& shares) {
   // An empty string would be parsed as 0.
   command
       .add_option("--dual-quaternion-weight", shares.dualQuaternionWeight,
-                  fmt::format("For blended: from 0 (linear) to 1 (dual quaternions) [{}]",
+                  fmt::format("For blended: from 0 (linear) to 1 (dual_quaternion) [{}]",
                               shares.dualQuaternionWeight))
       ->check(CLI::Number);
   command
-      .add_option(
-          "--bulge-strength", shares.bulgeStrength,
-          fmt::format("For bulge_controlled: from 0 (bulges like dual quaternions) to 1 [{}]",
-                      shares.bulgeStrength))
+      .add_option("--bulge-strength", shares.bulgeStrength,
+                  fmt::format("For bulge_controlled: from 0 (bulges like dual_quaternion) to 1 "
+                              "(bulges as little as center_of_rotation) [{}]",
+                              shares.bulgeStrength))
       ->check(CLI::Number);
 }
 

@@ -170,9 +170,10 @@ Result<std::uint32_t> chooseClip(const gltf::Model& model,
   if (!wanted) return model.clips.empty() ? gltf::none : 0u;
   if (*wanted == "none") return gltf::none;
   if (const std::optional<std::uint32_t> clip = gltf::findClip(model, *wanted)) return *clip;
-  return Error{ErrorCode::invalidArgument,
-               fmt::format("--animation: there is no animation {}; the file has {}",
-                           inQuotes(*wanted), model.clips.size())};
+  return Error{
+      ErrorCode::invalidArgument,
+      fmt::format("--animation: there is no clip {}; the file has {} clip{}", inQuotes(*wanted),
+                  model.clips.size(), model.clips.size() == 1 ? "" : "s")};
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {

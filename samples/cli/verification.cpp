@@ -129,7 +129,7 @@ class PoseVerifier {
   Result<void> run(samples::TargetPool& pool, const std::function<void()>& done) {
     const auto isDivision = [this](const SceneBatch& batch) { return divides(batch); };
     const auto divisions = static_cast<std::size_t>(std::ranges::count_if(batches_, isDivision));
-    return pool.run({.tasks = batches_.size(), .settled = divisions, .done = done},
+    return pool.run({.tasks = batches_.size(), .pinnedTasks = divisions, .done = done},
                     [this](std::size_t index, samples::BatchTarget& target) {
                       return divides(batches_[index]) ? divide(target, index)
                                                       : store(target, index);
@@ -261,8 +261,8 @@ std::string VerifiedCase::failure() const {
   const auto add = [&text](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };
   if (comparison.exempt != comparison.expectedExempt) {
     add(
-        fmt::format("{} vertices were only required to be finite, expected {}; {} were skipped, "
-                    "expected {}",
+        fmt::format("{} vertices were checked only for being finite (expected {}), {} were skipped "
+                    "(expected {})",
                     comparison.exempt.onlyFinite, comparison.expectedExempt.onlyFinite,
                     comparison.exempt.skipped, comparison.expectedExempt.skipped));
   }

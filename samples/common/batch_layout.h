@@ -29,9 +29,9 @@ struct SkinRequest {
 };
 
 enum class Arrangement : std::uint8_t {
-  interleaved,  ///< attribute by attribute for each vertex, in one buffer
-  planar,       ///< each attribute of an instance on its own, in one buffer
-  separate,     ///< in a buffer for each attribute
+  interleaved,  ///< one buffer; the attributes of a vertex are adjacent
+  planar,       ///< one buffer; each attribute of an instance is a separate array
+  separate,     ///< a buffer for each attribute
 };
 
 /// How skinned vertices are stored. Normals and tangents are written if the mesh has them.
@@ -42,12 +42,12 @@ struct OutputLayout {
   Motion motion = Motion::none;
   bool bounds = false;
   Arrangement arrangement = Arrangement::interleaved;
-  std::uint32_t gap = 0;  ///< bytes after the attributes of each vertex that must stay as they are
+  std::uint32_t gap = 0;  ///< bytes after the attributes of each vertex, which must not change
 };
 
 struct BatchLayout {
   std::map<const PackedMesh*, std::uint64_t>
-      meshOffsets;  ///< A mesh that several requests share is stored once.
+      meshOffsets;  ///< a mesh that several requests share is stored once
   std::vector<PoseDescription> poseDescriptions;
   std::vector<std::span<const JointMatrix>> poses;  ///< in the same order
   std::vector<Job> jobs;                            ///< of the requests

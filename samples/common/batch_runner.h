@@ -1,5 +1,5 @@
-// Skins batches on a device or on the CPU, and waits for them. For commands and tests; an engine
-// would keep its buffers and not wait.
+// Skins batches on a device or on the CPU, and waits for them. For commands and tests. An engine
+// keeps its buffers and does not wait.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ namespace dermis::samples {
 
 /// The result of one request.
 struct SkinnedVertices {
-  std::vector<float> positions;      ///< 3 a vertex; empty if they are not stored as float32
-  std::vector<float> normals;        ///< likewise, or if the mesh has none
+  std::vector<float> positions;      ///< 3 per vertex; empty if they are not stored as float32
+  std::vector<float> normals;        ///< likewise; also empty if the mesh has none
   std::optional<PoseStatus> status;  ///< on a device; all 0 for linear
   InstanceResult result;             ///< if it was requested
   /// The stored attributes, tightly packed, by `Stream`.
@@ -32,7 +32,7 @@ struct SkinnedVertices {
   std::array<VertexFormat, streamCount> formats{};
   Box box;
 
-  /// One of them, for `compare`.
+  /// One of the streams, for `compareWithReference`.
   SkinnedAttribute attribute(Stream stream) const;
   SkinnedView view() const;
 };
@@ -49,13 +49,13 @@ struct RunOptions {
 struct BatchResult {
   std::vector<SkinnedVertices> instances;
   std::size_t dispatches = 0;
-  std::uint64_t untouchedBytesChanged =
-      0;  ///< bytes outside the attributes that are not as they were, where they are counted
+  /// Changed bytes outside the attributes, if `countUntouched`.
+  std::uint64_t untouchedBytesChanged = 0;
   std::string firstChanged;  ///< the first of them: "byte 12 of the positions' buffer"
 };
 
 /// Skins one batch after another into the same outputs, as an engine does in each frame. Packed
-/// meshes must outlive it and not change.
+/// meshes must outlive it and must not change.
 class BatchRunner {
  public:
   virtual ~BatchRunner() = default;
@@ -68,7 +68,7 @@ class BatchRunner {
 
  protected:
   explicit BatchRunner(const RunOptions& options) : options_(options) {}
-  /// Skins `layout_`. Returns what is not in the outputs: status and result of each instance.
+  /// Skins `layout_`. Returns status and result of each instance; vertices are in the outputs.
   virtual Result<BatchResult> skin() = 0;
   virtual std::span<const std::byte> outputBytes(std::size_t stream) const = 0;
   std::size_t outputOf(std::size_t stream) const { return layout_.oneOutput ? 0 : stream; }
@@ -81,14 +81,14 @@ class BatchRunner {
   void countChangedBytes(BatchResult& result) const;
 };
 
-/// A way to divide the work. It must not change any bit of the result.
+/// A division of the work among invocations or jobs. It must not change any bit of the result.
 struct Division {
   std::string name;
   Tuning tuning;
   std::string instructions;
 };
 
-/// What skins batches.
+/// A device, or the CPU, that skins batches.
 class BatchTarget {
  public:
   virtual ~BatchTarget() = default;
@@ -105,7 +105,7 @@ class BatchTarget {
   }
 };
 
-/// Both must outlive it.
+/// Device and context must outlive it.
 class VulkanTarget : public BatchTarget {
  public:
   VulkanTarget(Device& device, vulkan::Context& context) : device_(device), context_(context) {}
@@ -125,7 +125,7 @@ inline bool needsNoVulkan(std::string_view device) {
   return device == "cpu" || device == "reference";
 }
 
-/// Skins with dermis::cpu, with one of `cpu::targetNames`; empty: the best.
+/// Skins with dermis::cpu. `instructions` is one of `cpu::targetNames`; empty: the best.
 class CpuTarget : public BatchTarget {
  public:
   explicit CpuTarget(std::string instructions = {}) : instructions_(std::move(instructions)) {}

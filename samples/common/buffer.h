@@ -1,4 +1,4 @@
-// A buffer in memory that the CPU can access; it stays mapped.
+// A buffer in memory that the CPU can access. It stays mapped.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace dermis::samples {
 
 class MappedBuffer {
  public:
-  /// `size` may be 0: an empty range. `readBack`: in cached memory, for the CPU to read.
+  /// If `size` is 0, the range is empty. `readBack`: in cached memory, for the CPU to read.
   static Result<MappedBuffer> create(Device& device, std::uint64_t size, VkBufferUsageFlags usage,
                                      bool readBack = false);
   MappedBuffer() = default;

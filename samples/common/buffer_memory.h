@@ -12,8 +12,8 @@ namespace dermis::samples {
 
 class BufferMemory {
  public:
-  /// `size` may be 0: an empty range. The memory is of a type that has all flags of `required`, and
-  /// those of `preferred` if there is one.
+  /// If `size` is 0, the range is empty. The memory type has all flags of `required`, and those of
+  /// `preferred` if there is such a type.
   static Result<BufferMemory> create(Device& device, std::uint64_t size, VkBufferUsageFlags usage,
                                      VkMemoryPropertyFlags required,
                                      VkMemoryPropertyFlags preferred);
@@ -22,12 +22,12 @@ class BufferMemory {
   BufferMemory(BufferMemory&& other) noexcept { *this = std::move(other); }
   BufferMemory& operator=(BufferMemory&& other) noexcept;
 
-  /// Only for a buffer that is not empty.
+  /// The buffer must not be empty.
   Device& device() const { return *device_; }
   VkDeviceMemory memory() const { return memory_; }
   VkBuffer handle() const { return buffer_; }
   std::uint64_t size() const { return size_; }
-  /// The whole buffer; a null buffer if it is empty.
+  /// The whole buffer. If it is empty, the range has a null buffer.
   vulkan::BufferRange range() const { return {buffer_, 0, size_}; }
 
  private:

@@ -10,8 +10,8 @@
 namespace dermis::samples {
 namespace {
 
-constexpr std::array everydayMethods{Method::linear, Method::dualQuaternion, Method::blended,
-                                     Method::centerOfRotation, Method::bulgeControlled};
+constexpr std::array cpuMethods{Method::linear, Method::dualQuaternion, Method::blended,
+                                Method::centerOfRotation, Method::bulgeControlled};
 
 class CpuRunner : public BatchRunner {
  public:
@@ -160,7 +160,7 @@ DeviceLimits CpuTarget::limits() const {
   return limits;
 }
 std::span<const Method> CpuTarget::methods() const {
-  return everydayMethods;
+  return cpuMethods;
 }
 std::vector<Division> CpuTarget::divisions() const {
   std::vector<Division> all;

@@ -25,7 +25,7 @@ struct DeviceInfo {
   std::uint32_t storageBuffersPerStage = 0;
   bool pushDescriptors = false;
   bool storage16Bit = false;       ///< kernels can store 2 bytes
-  bool storage8Bit = false;        ///< ... and 1 byte
+  bool storage8Bit = false;        ///< kernels can store 1 byte
   bool int64 = false;              ///< kernels can use 64-bit integers
   bool scalarBlockLayout = false;  ///< kernels can store up to 32 bytes at once
   bool accelerationStructures = false;
@@ -35,25 +35,25 @@ struct DeviceInfo {
 };
 
 struct DeviceOptions {
-  /// "auto": the best that is usable, GPUs before CPUs; a number: that of `listDevices`; otherwise
-  /// a part of a name, whatever its case.
+  /// "auto": the best usable device, GPUs before CPUs; a number: the index in `listDevices`;
+  /// otherwise a part of a name, in upper or lower case.
   std::string device = "auto";
-  bool validation = false;      ///< with the Khronos layer, core and synchronization checks; fails
-                                ///< if there is none
-  bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor where the device has it
-  bool smallStorage = true;     ///< enable stores of 1 and 2 bytes where the device has them
+  bool validation = false;      ///< enable the Khronos layer with core and synchronization checks;
+                                ///< fails if it is not installed
+  bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor if the device has it
+  bool smallStorage = true;     ///< enable stores of 1 and 2 bytes if the device has them
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries if the device has them
-  bool graphics = false;        ///< the queue draws too; fails if the device has none that does
-  bool pipelineStatistics = false;  ///< enable queries that count invocations, where the device has
-                                    ///< them
-  vulkan::KernelSource kernels;     ///< of the context; none: the library's
-  /// The instance extensions that a window's surface needs. If there are any, the device must
-  /// have VK_KHR_swapchain, and it is enabled.
+  bool graphics = false;        ///< requires a graphics queue
+  /// Enable queries that count invocations if the device has them.
+  bool pipelineStatistics = false;
+  vulkan::KernelSource kernels;  ///< of the context; empty: the library's
+  /// Instance extensions for the surface of a window. If there are any, VK_KHR_swapchain is
+  /// required and enabled.
   std::vector<std::string> surfaceExtensions;
 };
 
-/// Fails with `missingFeature` if there is no loader, or no instance can be made.
+/// Fails with `missingFeature` if there is no loader, or if no instance can be created.
 Result<std::vector<DeviceInfo>> listDevices();
 
 class Device {
@@ -65,7 +65,7 @@ class Device {
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
-  /// The description for Dermis; valid as long as this object lives.
+  /// The description for Dermis. Valid while this object lives.
   vulkan::DeviceDescription description() const;
 
   const DeviceInfo& info() const { return info_; }
@@ -75,7 +75,7 @@ class Device {
   VkQueue queue() const { return queue_; }
   std::uint32_t queueFamily() const { return queueFamily_; }
 
-  /// The memory type that has all of `required` and, if there is one, all of `preferred` too.
+  /// A memory type with all flags of `required`, and with those of `preferred` if there is one.
   Result<std::uint32_t> memoryType(std::uint32_t allowedTypes, VkMemoryPropertyFlags required,
                                    VkMemoryPropertyFlags preferred) const;
 

@@ -11,12 +11,12 @@ namespace dermis::samples {
 
 class DeviceBuffer {
  public:
-  /// `size` may be 0: an empty range.
+  /// If `size` is 0, the range is empty.
   static Result<DeviceBuffer> create(Device& device, std::uint64_t size, VkBufferUsageFlags usage);
   DeviceBuffer() = default;
 
   vulkan::BufferRange range() const { return buffer_.range(); }
-  /// Waits for the kernels that were submitted before, and returns what they wrote.
+  /// Waits for all kernels that were submitted, and returns the contents.
   Result<std::vector<std::byte>> read() const;
 
  private:

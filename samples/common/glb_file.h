@@ -16,26 +16,26 @@ enum class GlbComponent : int {
   float32 = 5126
 };
 
-/// What a bufferView is for.
+/// The use of a bufferView.
 enum class GlbTarget : int { none = 0, vertices = 34962, indices = 34963 };
 
-/// Builds the binary chunk of a file, with the bufferViews and accessors that describe it: one
-/// bufferView for each accessor, each at a multiple of 4 bytes.
+/// Builds the binary chunk of a file, and the bufferViews and accessors that describe it. Each
+/// accessor has its own bufferView, which begins at a multiple of 4 bytes.
 class GlbBuffer {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Begins a bufferView. Everything that is put before `end` is its contents.
+  /// Begins a bufferView. It contains all values that are put before `end`.
   void begin();
   /// Appends the 1 to 4 lowest bytes of the value.
   void put(std::uint32_t value, int byteCount);
   void putFloat(float value);
   void putFloats(std::span<const float> values);
-  /// Ends it, and returns the index of an accessor for `count` elements of it. `type` is "SCALAR",
-  /// "VEC3", …
+  /// Ends the bufferView. Returns the index of an accessor for its `count` elements. `type` is
+  /// "SCALAR", "VEC3", …
   int end(GlbComponent component, const char* type, std::size_t count, GlbTarget target);
 
-  /// Access to an accessor, to add min, max or normalized.
+  /// An accessor, to which min, max or normalized can be added.
   Json& accessor(int index) { return accessors_[static_cast<std::size_t>(index)]; }
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
@@ -49,9 +49,9 @@ class GlbBuffer {
   Json accessors_ = Json::array();
 };
 
-/// The bytes of the file. `document` is everything but accessors, bufferViews and buffers, which
-/// are added. Names that are not UTF-8 are mended. Empty if the file would be larger than the
-/// 4 GiB that its header can say.
+/// Returns the bytes of the file. `document` has everything except accessors, bufferViews and
+/// buffers, which are added. Invalid UTF-8 in names is replaced. Empty if the file would be larger
+/// than 4 GiB, the maximum of the format.
 std::vector<std::byte> glbFile(nlohmann::ordered_json document, const GlbBuffer& buffer);
 
 }  // namespace dermis::samples

@@ -9,7 +9,7 @@
 namespace dermis::samples {
 namespace {
 
-/// Of a method, a parameter and its value: what a way to store covers.
+/// A method, a parameter and its value: a combination that an output covers.
 using Meeting = std::tuple<Method, std::size_t, std::uint32_t>;
 
 class MethodRotation {
@@ -35,7 +35,7 @@ class MethodRotation {
     return count;
   }
 
-  /// The method with the most new meetings and, of several, the one that came up least.
+  /// The method with the most new combinations; of several, the one that was used least.
   Method mostWanted(std::size_t output) const {
     const auto worth = [this, output](Method method) {
       return std::tuple(newMeetings(output, method),
@@ -44,7 +44,7 @@ class MethodRotation {
     return *std::ranges::max_element(all_, {}, worth);
   }
 
-  /// Whether there was a method left that does not meet all yet.
+  /// Adds the method that covers the most new combinations. Returns false if all are covered.
   bool addBest() {
     std::size_t most = 0, best = 0;
     Method bestMethod = Method::linear;

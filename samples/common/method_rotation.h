@@ -1,4 +1,4 @@
-// Chooses which methods are verified with which output, if all combinations would take too long.
+// Chooses which methods are verified with which output, because all combinations take too long.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace dermis::samples {
 
-/// For each of these ways the methods to verify in it: one, or as many as it takes. Over all of
-/// them every one of the methods meets every value of every parameter: the format of each
-/// attribute, arrangement, gap, motion, bounds and tuning. The same for the same ways.
+/// Returns the methods to verify with each output: at least one. Together, every method is combined
+/// with every value of every parameter: the format of each attribute, arrangement, gap, motion,
+/// bounds and tuning. Deterministic.
 std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs,
                                                  std::span<const Method> methods = allMethods);
 
-/// The values of an output case's parameters, each a number that no other value of that parameter
-/// has.
+/// The values of an output case's parameters. Different values of a parameter have different
+/// numbers.
 std::vector<std::uint32_t> parameterValues(const OutputCase& output);
 
 }  // namespace dermis::samples

@@ -1,5 +1,5 @@
-// Pairwise testing: chooses few of many combinations so that every pair of values still occurs in
-// one.
+// Pairwise testing: chooses a few of many combinations so that every pair of values occurs in at
+// least one.
 #pragma once
 
 #include <cstdint>

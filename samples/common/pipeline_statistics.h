@@ -1,4 +1,4 @@
-// Statistics of a driver about the machine code of a kernel.
+// The driver's statistics about the machine code of a kernel.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,18 @@
 
 namespace dermis::samples {
 
-/// Uses a second device on the same hardware, since `Device` may lack the required extension,
+/// Uses a second VkDevice on the same hardware, because `Device` may lack the required extension
 /// VK_KHR_pipeline_executable_properties.
 class PipelineStatistics {
  public:
-  /// Null if the driver has no such extension, or makes no device with it.
+  /// Null if the driver lacks the extension, or if no device can be created with it.
   static std::unique_ptr<PipelineStatistics> create(const Device& device);
   ~PipelineStatistics();
   PipelineStatistics(const PipelineStatistics&) = delete;
   PipelineStatistics& operator=(const PipelineStatistics&) = delete;
 
-  /// The machine instructions of a kernel that stores whole words; nothing if the driver does
-  /// not count them.
+  /// The number of machine instructions of a kernel that stores whole words. Empty if the driver
+  /// does not count them.
   std::optional<std::uint64_t> instructionCount(const Variant& variant,
                                                 const DeviceLimits& limits) const;
 

@@ -34,19 +34,19 @@ struct OwnedMesh {
 
 enum class Rigidity { rigid, uniformScale, shear, mirrored, mirroredAlongOneAxis };
 
-/// `influences` slots a vertex, of which a random number carry weight; one vertex in 50 carries
-/// none at all. What only some methods want is there too: dual-quaternion weights and bulge
-/// strengths, nothing and all among them, and random centers of rotation.
+/// Each vertex has `influences` slots. A random number of them have weight; in one vertex of 50
+/// none has. The mesh also has data that only some methods use: dual-quaternion weights and bulge
+/// strengths, which include 0 and 1, and random centers of rotation.
 OwnedMesh randomMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                      std::uint32_t influences, bool normals = true);
 
-/// Adds random unit tangents, of either hand, and `count` morph targets that displace every
-/// attribute of about one vertex in three.
+/// `addTangents` adds random unit tangents of either handedness. `addMorphs` adds `count` morph
+/// targets, which displace every attribute of about one vertex in three.
 void addTangents(OwnedMesh& mesh, std::uint32_t seed);
 void addMorphs(OwnedMesh& mesh, std::uint32_t seed, std::uint32_t count);
 
-/// Joint matrices of random rotations and translations within `reach`, and what `rigidity` asks
-/// for; in a mirrored pose every joint is mirrored.
+/// Returns joint matrices with random rotations, translations within `reach`, and the scale, shear
+/// or mirroring of `rigidity`. In a mirrored pose every joint is mirrored.
 std::vector<JointMatrix> randomPose(std::uint32_t seed, std::uint32_t jointCount, Rigidity rigidity,
                                     double reach = 1);
 

@@ -13,16 +13,16 @@ class RayTracingFeatures {
  public:
   /// Enables nothing.
   RayTracingFeatures() = default;
-  /// Queries the features of the device, which must have Vulkan 1.1.
+  /// Queries the features of the device, which must support Vulkan 1.1.
   RayTracingFeatures(const VulkanFunctions& functions, VkPhysicalDevice device,
                      const std::vector<VkExtensionProperties>& extensions);
 
   bool accelerationStructures() const { return structures_.accelerationStructure == VK_TRUE; }
   bool rayQueries() const { return queries_.rayQuery == VK_TRUE; }
 
-  /// The names of the extensions to enable, and their features for VkDeviceCreateInfo::pNext; none
-  /// and null if the device has no acceleration structures. The chain is made of this object's
-  /// members: it must stay where it is.
+  /// The names of the extensions to enable, and their features for VkDeviceCreateInfo::pNext. Empty
+  /// and null if the device has no acceleration structures. The chain consists of members of this
+  /// object, so the object must not be moved while the chain is used.
   std::vector<const char*> extensions() const;
   void* chain();
 

@@ -11,8 +11,8 @@
 namespace dermis::samples {
 
 /// Returns 3 floats per vertex. `threadCount` includes the calling thread; 0 means one for each
-/// core. The result is the same to the bit for any number of threads. `progress` is called on the
-/// calling thread with the fraction that is done, ascending to 1.
+/// core. The result has the same bits for any number of threads. `progress` is called on the
+/// calling thread with the completed fraction, which ascends to 1.
 std::vector<float> solveCenters(const CenterOfRotationSolver& solver, std::uint32_t threadCount,
                                 const std::function<void(float)>& progress = {});
 

@@ -9,7 +9,8 @@
 namespace dermis::samples {
 namespace {
 
-/// What integers stand for is within ±1 (0 to 1): positions and displacements are scaled to that.
+/// Integer formats store values from −1 to 1 (unorm: 0 to 1), so positions and displacements are
+/// divided by this.
 constexpr double positionRange = 2;
 
 template <typename T>

@@ -16,14 +16,14 @@ struct InputFormats {
   ComponentType directions = ComponentType::float32;  ///< normals, tangents and their displacements
   ComponentType joints = ComponentType::uint32;
   ComponentType weights = ComponentType::float32;
-  std::uint32_t setSize = 4;  ///< influences a set; as many sets as are needed
+  std::uint32_t setSize = 4;  ///< influences per set; there are as many sets as needed
   std::uint32_t gap = 0;      ///< bytes after each element
 };
 
-/// Owns the bytes. Movable: views point into vectors.
+/// Owns the bytes. Can be moved, because views point to the elements of vectors.
 class StoredMesh {
  public:
-  /// Positions lie within 2 of the origin.
+  /// Coordinates of positions must be from −2 to 2 if they are stored as integers.
   StoredMesh(const OwnedMesh& mesh, const InputFormats& formats);
 
   /// Valid while this object lives and is not assigned to.

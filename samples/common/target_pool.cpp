@@ -10,22 +10,22 @@
 namespace dermis::samples {
 namespace {
 
-/// Hands out the tasks of one call, and keeps what became of them.
+/// Hands out the tasks of one call, and collects their results.
 class Tasks {
  public:
   Tasks(const TargetPool::Work& work, std::size_t workers)
-      : work_(work), workers_(workers), next_(work.settled), end_(work.tasks) {
-    for (std::size_t worker = 0; worker < workers; ++worker) nextSettled_.push_back(worker);
+      : work_(work), workers_(workers), next_(work.pinnedTasks), end_(work.tasks) {
+    for (std::size_t worker = 0; worker < workers; ++worker) nextPinned_.push_back(worker);
   }
 
-  /// What a worker does next: its settled tasks, then any.
+  /// The next task of a worker: first its pinned tasks, then any.
   std::optional<std::size_t> take(std::size_t worker) {
     const std::lock_guard lock(mutex_);
-    std::size_t& settled = nextSettled_[worker];
-    const bool isSettled = settled < work_.settled;
-    const std::size_t index = isSettled ? settled : next_;
+    std::size_t& pinned = nextPinned_[worker];
+    const bool isPinned = pinned < work_.pinnedTasks;
+    const std::size_t index = isPinned ? pinned : next_;
     if (index >= end_) return {};
-    (isSettled ? settled : next_) += isSettled ? workers_ : 1;
+    (isPinned ? pinned : next_) += isPinned ? workers_ : 1;
     return index;
   }
   void end(std::size_t index, Result<void> result) {
@@ -49,9 +49,9 @@ class Tasks {
   const TargetPool::Work& work_;
   std::size_t workers_;
   std::mutex mutex_;
-  std::vector<std::size_t> nextSettled_;  ///< by worker
+  std::vector<std::size_t> nextPinned_;  ///< by worker
   std::size_t next_;
-  std::size_t end_;  ///< the lowest index that failed, or behind the last one
+  std::size_t end_;  ///< the lowest index that failed, or the number of tasks
   Result<void> result_;
   std::exception_ptr exception_;
 };

@@ -15,7 +15,7 @@
 
 namespace dermis::samples {
 
-/// Batches that differ in their methods only: they share the memory of meshes, poses and outputs.
+/// Batches that differ only in their methods. They share the memory of meshes, poses and outputs.
 class TimedBatches {
  public:
   /// Both must outlive this object. Fails with `vulkanError`.
@@ -24,14 +24,14 @@ class TimedBatches {
   TimedBatches& operator=(TimedBatches&&) = delete;
   ~TimedBatches();
 
-  /// Adds a batch and skins it once, for the first time drivers compile, and memory is touched.
-  /// But for the methods, requests are those of the batches before. What is skinned goes to one
-  /// buffer. Fails if the batch cannot be skinned.
+  /// Adds a batch and skins it once, because the first run includes compilation. Requests may
+  /// differ from those of earlier batches only in their methods. All output goes to one buffer.
+  /// Fails if the batch cannot be skinned.
   Result<void> add(std::span<const SkinRequest> requests, const OutputLayout& output,
                    const Tuning& tuning);
 
-  /// Skins a batch and returns the seconds that it took: on the device where it has timestamps,
-  /// from submission to the end of waiting otherwise.
+  /// Skins a batch and returns the time in seconds: the device's time if it has timestamps,
+  /// otherwise the time from submission to the end of waiting.
   Result<double> skin(std::size_t batch);
 
   bool hasTimestamps() const { return timestamps_.has(); }

@@ -14,8 +14,8 @@ namespace dermis::samples {
 /// Two timestamps, which one command buffer may write repeatedly.
 class Timestamps {
  public:
-  /// If the queue of the device does not support timestamps, the object has none (`has`). Fails
-  /// with `vulkanError`.
+  /// If the queue of the device does not support timestamps, `has` is false. Fails with
+  /// `vulkanError`.
   static Result<Timestamps> create(Device& device);
   Timestamps() = default;
   ~Timestamps();
@@ -35,7 +35,7 @@ class Timestamps {
   Device* device_ = nullptr;
   VkQueryPool pool_ = VK_NULL_HANDLE;
   std::uint64_t validBits_ = 0;  ///< a mask
-  double period_ = 0;            ///< seconds a tick
+  double period_ = 0;            ///< seconds per tick
 };
 
 }  // namespace dermis::samples

@@ -1,4 +1,4 @@
-// Asking the Khronos validation layer for core and synchronization checks, whatever its version.
+// Enables core and synchronization checks of the Khronos validation layer, old or new.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace dermis::samples {
 
-/// The structures for VkInstanceCreateInfo. Must live until the instance is created.
+/// The structures for VkInstanceCreateInfo. The object must live until the instance is created.
 class ValidationRequest {
  public:
   /// Fails with `missingFeature` if the layer is not installed.
@@ -19,8 +19,7 @@ class ValidationRequest {
   const std::vector<const char*>& extensions() const { return extensions_; }
 
  private:
-  // VK_EXT_layer_settings, declared here because Debian 12's headers are older than it (Vulkan 1.4,
-  // VK_EXT_layer_settings).
+  // VK_EXT_layer_settings (Vulkan 1.4), declared here because Debian 12's headers are older.
   struct LayerSetting {
     const char* layerName;
     const char* settingName;

@@ -90,9 +90,9 @@ constexpr InputValues allInputs{rigidities,  vertexCounts,  jointCounts,    infl
                                 morphCounts, positionTypes, directionTypes, jointTypes,
                                 weightTypes, setSizes,      inputGaps};
 
-// Each method meets each value, which takes about as many pipelines, and pipelines take time. So
-// Coverage::quick has at most three of each: everyday formats, one of each encoding, and numbers of
-// influences with kernels of their own.
+// Each method is combined with each value. That needs about as many pipelines, and pipelines take
+// time. So Coverage::quick has at most three values of each parameter: common formats, one of each
+// encoding, and numbers of influences that have their own kernels.
 constexpr std::array quickPositions{VertexFormat::float32x3, VertexFormat::float16x4,
                                     VertexFormat::snorm16x4};
 constexpr std::array quickNormals{VertexFormat::float32x3, VertexFormat::none,

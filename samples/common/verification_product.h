@@ -14,7 +14,7 @@
 
 namespace dermis::samples {
 
-/// The formats that are verified.
+/// The verified formats.
 inline constexpr std::array verifiedPositionFormats{
     VertexFormat::float32x3, VertexFormat::float32x4, VertexFormat::float16x3,
     VertexFormat::float16x4, VertexFormat::snorm16x3, VertexFormat::snorm16x4};
@@ -28,7 +28,7 @@ inline constexpr std::array verifiedTangentFormats{
     VertexFormat::snorm16x4,    VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
     VertexFormat::octahedral8x2};
 
-/// One way to store the skinned vertices, and to divide the work.
+/// A layout of the skinned vertices and a tuning.
 struct OutputCase {
   OutputLayout layout;
   Tuning tuning;
@@ -41,8 +41,8 @@ enum class Coverage : std::uint8_t {
   quick,  ///< common values, and one of each kind
 };
 
-/// Ways in which every two values of two parameters meet, as far as a device with these limits can
-/// store them.
+/// Output cases that combine every two values of two parameters, as far as a device with these
+/// limits supports them.
 std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage = Coverage::full);
 
 /// One instance to verify. Spans and views refer to the caller's memory.
@@ -54,7 +54,7 @@ struct InstanceToVerify {
   /// The expected result, in this pose and the previous one.
   const reference::SkinnedMesh* expected = nullptr;
   const reference::SkinnedMesh* expectedBefore = nullptr;
-  /// How many of their vertices may be exempt.
+  /// How many of their vertices are exempt.
   Exemptions exemptions = {}, exemptionsBefore = {};
 };
 
@@ -67,16 +67,16 @@ struct VerifiedInstance {
   bool passed() const { return comparison.passed() && wrong.empty(); }
 };
 
-/// Skins a batch as the case says and holds all of it against the reference: attributes, previous
-/// positions (frames before and after too), bounds, clamped vertices; and that no byte outside the
-/// attributes was touched. Where it is to be thorough, also that every byte of them was written,
-/// and that each instance comes out to the bit when it is skinned without the others. Fails if
-/// the batch cannot be skinned.
+/// Skins a batch and compares attributes, previous positions, bounds and clamped counts with the
+/// reference. If there is motion, this includes the frames before and after. Checks that no other
+/// byte was written. If `thorough`, also checks that every byte of the attributes was written, and
+/// that each instance has the same bits when it is skinned alone. Fails if the batch cannot be
+/// skinned.
 Result<std::vector<VerifiedInstance>> verifyBatch(BatchTarget& target,
                                                   std::span<const InstanceToVerify> instances,
                                                   const OutputCase& output, bool thorough = false);
 
-/// A random mesh in some input formats, with an awkward number of vertices, and an output.
+/// A random mesh in some input formats, with an awkward number of vertices, and an output case.
 struct RandomCase {
   InputFormats input;
   std::uint32_t vertices = 1, joints = 1, influences = 4, morphs = 0;
@@ -86,10 +86,10 @@ struct RandomCase {
   std::string inputName() const;
 };
 
-/// With the methods of the target, and outputs that it can store.
+/// Cases with the target's methods, and with output formats that it supports.
 std::vector<RandomCase> randomCases(const BatchTarget& target, Coverage coverage = Coverage::full);
 
-/// Three instances of the case's mesh, each in a pose of its own.
+/// Skins and verifies three instances of the case's mesh, each in its own pose.
 Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
                                                        const RandomCase& randomCase);
 

@@ -35,7 +35,7 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
   Box box = boxOf(positions);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!(box.max[axis] >= box.min[axis])) box.min[axis] = box.max[axis] = 0;
-    // Numbers that snorm16 can be relative to at all.
+    // Keeps the box in the range that snorm16 supports.
     box.min[axis] = std::clamp(box.min[axis], -1e37f, 1e37f);
     box.max[axis] = std::clamp(box.max[axis], -1e37f, 1e37f);
     const float side = box.max[axis] - box.min[axis];
@@ -81,7 +81,7 @@ class BatchVerifier {
   }
 
  private:
-  /// The frame of interest and, where there is motion, one before and one after.
+  /// The verified frame and, if there is motion, the frames before and after.
   struct Frames {
     BatchResult before, now, settled;
   };
@@ -96,13 +96,13 @@ class BatchVerifier {
     const Result<Frames> again = run(std::byte{0x5a}, all);
     if (!again) return again.error();
     for (const std::size_t index : all) {
-      // A byte that was not written would keep its old value, which differed.
+      // A byte that was not written keeps its old value, which differs between the two runs.
       if (again->now.instances[index].streams != frames.now.instances[index].streams)
         fail(index, "a byte of an attribute was not written, or two runs wrote different values");
       const Result<Frames> own = run(std::byte{0xa5}, {&index, 1});
       if (!own) return own.error();
       if (own->now.instances[0].streams != frames.now.instances[index].streams)
-        fail(index, "skinned alone, it does not have the same bits");
+        fail(index, "skinned alone, the instance has different bits");
     }
     return {};
   }
@@ -184,8 +184,11 @@ class BatchVerifier {
         compareWithReference(*instance.expectedBefore, view, instance.exemptionsBefore);
     if (!comparison) return comparison.error();
     if (comparison->exempt != comparison->expectedExempt)
-      fail(index, "the number of previous positions that were compared is " +
-                      std::to_string(comparison->compared) + ", which is not the expected number");
+      fail(index, "of the previous positions, " + std::to_string(comparison->exempt.onlyFinite) +
+                      " were checked only for being finite (expected " +
+                      std::to_string(comparison->expectedExempt.onlyFinite) + "), " +
+                      std::to_string(comparison->exempt.skipped) + " were skipped (expected " +
+                      std::to_string(comparison->expectedExempt.skipped) + ")");
     if (comparison->failures != 0) {
       fail(index, std::to_string(comparison->failures) +
                       " previous positions are outside their bound; the first is vertex " +
@@ -198,7 +201,7 @@ class BatchVerifier {
     const std::optional<Box> box = skinned.result.box();
     if (!box) return fail(index, "there is no box of the positions");
     if (skinned.positions.empty()) return checkBoundsNear(*box, index);
-    // Stored as float32, they are the very positions that were reduced.
+    // float32 positions are exactly those that the box was computed from.
     for (std::size_t axis = 0; axis < 3; ++axis) {
       float low = std::numeric_limits<float>::infinity(), high = -low;
       for (std::size_t i = axis; i < skinned.positions.size(); i += 3) {
@@ -210,8 +213,8 @@ class BatchVerifier {
     }
   }
 
-  /// As near as the positions themselves have to be. Where those of some vertices are a matter of
-  /// rounding, it may be larger than that of the others.
+  /// The box must be as accurate as the positions. If rounding decides the positions of some
+  /// vertices, the box may be larger than that of the other vertices.
   void checkBoundsNear(const Box& box, std::size_t index) {
     const reference::SkinnedMesh& expected = *instances_[index].expected;
     std::vector<reference::Double3> certain;

@@ -1,5 +1,5 @@
-// The Vulkan functions that the samples and tests call, loaded at run time so that a program starts
-// on a machine without a Vulkan loader. An engine has its own; dermis::vulkan does not use this.
+// The Vulkan functions that the samples and tests call. They are loaded at run time, so a program
+// starts on a machine without a Vulkan loader. dermis::vulkan does not use this file.
 #pragma once
 
 #include <vulkan/vulkan_core.h>
@@ -18,7 +18,7 @@
   X(CreateDevice)                           \
   X(GetDeviceProcAddr)
 
-/// Those of the sample renderer.
+/// The functions that only the sample renderer calls.
 #define DERMIS_SAMPLE_GRAPHICS_FUNCTIONS(X) \
   X(CreateImage)                            \
   X(DestroyImage)                           \

@@ -220,10 +220,13 @@ void CrowdReport::printTotals() const {
   } else {
     fmt::print("\n");
   }
-  fmt::print("instances {} of them skinned; left out: {} out of view, {} not due yet\n",
+  fmt::print("instances {} skinned, {} out of view, {} not due yet\n",
              share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
              share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
-  if (sums.refusals != 0) fmt::print("refused   a figure {} times\n", sums.refusals);
+  if (sums.refusals != 0) {
+    fmt::print("refused   {} time{} a figure could not be added, because a buffer was full\n",
+               sums.refusals, sums.refusals == 1 ? "" : "s");
+  }
   if (title_.isOnCpu) {
     fmt::print("memory    MiB: outputs {}\n", mebibytes(memory_.outputs));
     return;

@@ -39,10 +39,10 @@ std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
     return "--time must be a number of seconds, 0 or more";
   if (*kind != samples::PictureKind::png) return {};
   if (samples::hasWrongPattern(film.output))
-    return "--film may have one place for a number, from %01d to %09d";
+    return "--film may have one placeholder for a number, from %01d to %09d";
   if (hasFrames && !samples::frameName(film.output, 0)) {
-    return "--frames needs a place for the number in --film, such as frame%04d.png, or a film: "
-           ".mp4, .gif or .apng";
+    return "--frames needs a placeholder for the number in --film, such as frame%04d.png, or a "
+           "film: .mp4, .gif or .apng";
   }
   return {};
 }

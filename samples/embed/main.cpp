@@ -4,7 +4,8 @@
 //
 //   dermis_embed
 //
-// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
+// Exit status: 0 success; 4 no Vulkan device, or a Vulkan call of this program failed; 1 any other
+// error.
 
 #include <vulkan/vulkan.h>
 
@@ -62,7 +63,7 @@ Engine makeEngine() {
   auto instanceInfo = structure<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   instanceInfo.pApplicationInfo = &application;
   must(vkCreateInstance(&instanceInfo, nullptr, &engine.instance));
-  std::uint32_t one = 1;  // the first device, and its first family of queues
+  std::uint32_t one = 1;  // the first device, and its first queue family
   vkEnumeratePhysicalDevices(engine.instance, &one, &engine.physicalDevice);
   if (one == 0) must(VK_ERROR_INITIALIZATION_FAILED);
   const float priority = 1;

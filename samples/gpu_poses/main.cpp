@@ -3,7 +3,8 @@
 //
 //   dermis_gpu_poses
 //
-// Exit status: 0 success, 4 no Vulkan device, 1 any other error.
+// Exit status: 0 success; 4 no Vulkan device, or a Vulkan call of this program failed; 1 any other
+// error.
 
 #include <vulkan/vulkan.h>
 
@@ -60,7 +61,7 @@ Engine makeEngine() {
   auto instanceInfo = structure<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   instanceInfo.pApplicationInfo = &application;
   must(vkCreateInstance(&instanceInfo, nullptr, &engine.instance));
-  std::uint32_t one = 1;  // the first device, and its first family of queues
+  std::uint32_t one = 1;  // the first device, and its first queue family
   vkEnumeratePhysicalDevices(engine.instance, &one, &engine.physicalDevice);
   if (one == 0) must(VK_ERROR_INITIALIZATION_FAILED);
   const float priority = 1;
@@ -276,7 +277,7 @@ int main() {
     auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
     // [frame]
-    // The last frame may still read the poses.
+    // The previous frame may still read the poses.
     barrier(engine.commandBuffer, vulkan::overwriteScope(vulkan::Writer::compute));
     animation.record(engine.commandBuffer, static_cast<float>(frame));
     must(scene.markAllWritten());

@@ -26,7 +26,7 @@ Influences influencesAt(const Vec3& position) {
   const double along = armFrame.toLocal(position).y;
   const double forearm = smoothStep(elbowAlong - elbowZone, elbowAlong + elbowZone, along);
   const double hand = smoothStep(wristAlong - wristZone, wristAlong + wristZone, along);
-  return quantise({1.0 - forearm, forearm * (1.0 - hand), forearm * hand});
+  return quantize({1.0 - forearm, forearm * (1.0 - hand), forearm * hand});
 }
 
 Mesh makeMesh() {

@@ -72,7 +72,7 @@ Vec3 thumbTip(const Frame& frame) {
 
 Vec3 armCenter(const Frame& frame, double along) {
   const Section section = sectionAt(armSections(), along);
-  return frame.toModel({section.centreSide, along, section.centreFront});
+  return frame.toModel({section.centerSide, along, section.centerFront});
 }
 
 }  // namespace dermis::models

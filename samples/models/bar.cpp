@@ -36,7 +36,7 @@ void addVertex(Mesh& mesh, const Vec3& position, const Vec3& normal, const Vec3&
   mesh.positions.push_back(position);
   mesh.normals.push_back(normal);
   mesh.colors.push_back(color);
-  mesh.influences.push_back(quantise(weightsAt(position.x)));
+  mesh.influences.push_back(quantize(weightsAt(position.x)));
 }
 
 void addTriangle(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c) {

@@ -1,4 +1,4 @@
-// Sharp borders between colors on a mesh whose vertices know nothing of them.
+// Makes borders between colors sharp on a mesh that was created without them.
 #pragma once
 
 #include <functional>
@@ -12,13 +12,13 @@ namespace dermis::models {
 // The region that a point of the surface belongs to, as an index into a list of colors.
 using RegionAt = std::function<std::size_t(const Vec3&)>;
 
-// Moves vertices along edges onto the borders of regions, and evens out the others about them. The
-// surface is where `field` is 0.
+// Moves vertices along edges onto the borders of regions, and smooths the vertices next to them.
+// The surface is where `field` is 0.
 void snapToBorders(std::vector<Vec3>& positions, const std::vector<std::uint32_t>& indices,
                    const RegionAt& regionAt, const Field& field);
 
-// Gives each triangle the color of its region, and its vertices the region. A vertex between
-// regions is doubled, as it needs two colors.
+// Assigns each triangle to a region, and the region and its color to its vertices. A vertex between
+// regions is duplicated, because it needs several colors.
 void paint(Mesh& mesh, const RegionAt& regionAt, const std::vector<Vec3>& colors);
 
 }  // namespace dermis::models

@@ -1,5 +1,5 @@
-// The parts that the figure is made of. Left is +x, front +z, up +y; right-hand parts mirror left
-// ones.
+// The parts of the figure. Left is +x, up is +y, front is +z. The parts on the right mirror those
+// on the left.
 #pragma once
 
 #include <array>
@@ -12,8 +12,7 @@
 
 namespace dermis::models {
 
-// ---- Landmarks of the left half in rest, metres
-// -------------------------------------------------------------------
+// ---- Landmarks of the left half in the rest pose, in meters
 inline const Vec3 shoulderPoint(0.178, 1.425, -0.028);
 inline const Vec3 hipPoint(0.090, 0.915, -0.004);
 inline const Vec3 kneePoint(0.101, 0.490, 0.008);
@@ -25,18 +24,18 @@ inline constexpr double ballHeight = 0.024;
 
 // The left arm, 44° from the vertical.
 Frame leftArmFrame();
-// The left foot: origin on the ground under the ankle, `along` towards the toes, `front` up.
+// The left foot. The origin is on the ground under the ankle, `along` points towards the toes, and
+// `front` points up.
 Frame leftFootFrame();
 
 // ---- Surface
-// ------------------------------------------------------------------------------------------------------
 struct FigureShape {
   Shape whole;
-  Shape trunk;    // trunk, neck and head alone
-  Shape leftArm;  // with the hand
+  Shape trunk;    // trunk, neck and head only
+  Shape leftArm;  // including the hand
 };
 FigureShape figureShape();
-// The surface as quads, finer at hands, feet and head.
+// The surface, with smaller triangles at hands, feet and head.
 struct FigureSurface {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
@@ -45,8 +44,7 @@ struct FigureSurface {
 FigureSurface figureSurface(const FigureShape& shape);
 
 // ---- Skeleton
-// -----------------------------------------------------------------------------------------------------
-// The joints, in the order of the skin.
+// The joints of the skin, in order.
 enum class Bone : std::size_t {
   hips,
   spine,
@@ -80,24 +78,23 @@ inline constexpr std::size_t boneCount = static_cast<std::size_t>(Bone::count);
 constexpr std::size_t indexOf(Bone bone) {
   return static_cast<std::size_t>(bone);
 }
-// The same bone on the right; bones of the middle stay.
+// The same bone on the other side; a bone in the middle is returned unchanged.
 Bone mirrored(Bone bone);
 
 Skeleton figureSkeleton();
 
-// ---- What lies on the surface
-// ---------------------------------------------------------------------------------------
+// ---- Weights and colors of the surface
 std::vector<Influences> figureWeights(const FigureShape& shape, const Mesh& mesh);
-// Clothes, skin and hair: where each is, and its color. The shape must outlive the function that
-// is returned.
+// The regions of clothes, skin and hair, and their colors. The shape must outlive the returned
+// function.
 RegionAt figureRegions(const FigureShape& shape);
 const std::vector<Vec3>& figureColors();
-// Body, hair, shirt, trousers, shoes: as characters come, each with a material of its own.
+// Body, hair, shirt, trousers and shoes. Each has its own material, as in typical characters.
 std::vector<Part> figureParts();
 
 // ---- Clips
-// --------------------------------------------------------------------------------------------------------
-// Metres a second at which the ground would pass under the walking figure, towards −z.
+// The walking speed in meters per second: the feet move towards −z at this speed while they are on
+// the ground.
 double walkingSpeed();
 Clip walkClip();
 Clip idleClip();

@@ -1,5 +1,5 @@
-// Binary glTF 2.0 of a sample model: one skinned mesh of one primitive or several, one skin, its
-// clips.
+// Writes a sample model as binary glTF 2.0: one skinned mesh with one or more primitives, one skin,
+// and clips.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,13 @@ struct Model {
   std::string name;
   Skeleton skeleton;
   Mesh mesh;
-  std::vector<Part> parts;  // a primitive and a material each; empty: the mesh is all one
+  std::vector<Part> parts;  // each becomes a primitive with a material; empty: one primitive
   std::vector<Clip> clips;
   double roughness = 0.8;
 };
 
-// The bytes of the .glb file. They depend on the model alone: no date, no version, no order of a
-// hash table.
+// Returns the bytes of the .glb file. They depend only on the model, not on a date, a version or
+// the order of a hash table.
 std::vector<std::byte> writeGlb(const Model& model);
 
 }  // namespace dermis::models

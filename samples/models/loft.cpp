@@ -12,7 +12,7 @@ namespace {
 using Values = std::array<double, 5>;
 
 Values valuesOf(const Section& section) {
-  return {section.centreSide, section.centreFront, section.halfWidth, section.front, section.back};
+  return {section.centerSide, section.centerFront, section.halfWidth, section.front, section.back};
 }
 
 // The slope at an inner section is that between its neighbors; the curve is level at both ends.
@@ -37,7 +37,7 @@ Bound boundOf(const Frame& frame, const std::vector<Section>& sections) {
   double radius = 0.0;
   for (const Section& section : sections) {
     const double across = std::max({section.halfWidth, section.front, section.back}) +
-                          std::abs(section.centreSide) + std::abs(section.centreFront);
+                          std::abs(section.centerSide) + std::abs(section.centerFront);
     const double along = section.along - middle;
     radius = std::max(radius, std::sqrt(across * across + along * along));
   }
@@ -82,8 +82,8 @@ Solid loft(const Frame& frame, std::vector<Section> sections, double endBlend) {
   const auto field = [frame, endBlend, sections = std::move(sections)](const Vec3& point) {
     const Vec3 local = frame.toLocal(point);
     const Section section = sectionAt(sections, local.y);
-    const double x = local.x - section.centreSide;
-    const double y = local.z - section.centreFront;
+    const double x = local.x - section.centerSide;
+    const double y = local.z - section.centerFront;
     const double across =
         ellipseDistance(x, y, section.halfWidth, y > 0.0 ? section.front : section.back);
     const double past = std::max(sections.front().along - local.y, local.y - sections.back().along);

@@ -1,4 +1,4 @@
-// A solid through cross-sections: how limbs and the trunk are modelled.
+// A solid through cross-sections, for limbs and the trunk.
 #pragma once
 
 #include <vector>
@@ -7,17 +7,18 @@
 
 namespace dermis::models {
 
-// A cross-section at a place along the axis: two half ellipses that meet at the sides.
+// A cross-section at a position along the axis: two half ellipses that meet at the sides.
 struct Section {
   double along;
-  double centreSide;
-  double centreFront;
+  double centerSide;
+  double centerFront;
   double halfWidth;
   double front;
   double back;
 };
 
-// Where a loft lies: three unit vectors at right angles to one another. They may be left-handed.
+// The coordinate system of a loft: an origin and three orthogonal unit vectors. They may be
+// left-handed.
 struct Frame {
   Vec3 origin;
   Vec3 side;
@@ -28,11 +29,12 @@ struct Frame {
   Vec3 toModel(const Vec3& local) const;
 };
 
-// The section at a place along the axis, between the two nearest ones by cubic Hermite curves.
+// The section at a position along the axis, interpolated between the two nearest sections by cubic
+// Hermite curves.
 Section sectionAt(const std::vector<Section>& sections, double along);
 
-// The loft through `sections`, in ascending order along the axis; its flat ends are rounded over
-// `endBlend` metres.
+// The loft through `sections`, which must ascend along the axis. Its flat ends are rounded over
+// `endBlend` meters.
 Solid loft(const Frame& frame, std::vector<Section> sections, double endBlend);
 
 }  // namespace dermis::models

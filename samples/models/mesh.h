@@ -1,4 +1,4 @@
-// The geometry of a sample model, and what tests ask of it.
+// The geometry of a sample model.
 #pragma once
 
 #include <array>
@@ -24,24 +24,24 @@ struct Mesh {
   std::vector<Vec3> colors;          // linear red, green, blue, 0 to 1
   std::vector<std::size_t> regions;  // the region of each vertex; empty if not requested
   std::vector<Influences> influences;
-  std::vector<std::uint32_t> indices;  // triangles, counter-clockwise seen from outside
+  std::vector<std::uint32_t> indices;  // triangles, counterclockwise seen from outside
 };
 
-// Some of a mesh' regions.
+// A named set of regions of a mesh.
 struct Part {
   std::string name;
   std::vector<std::size_t> regions;
 };
 
-// The vertices of the part, in their order, with their triangles. No triangle of the mesh has
-// corners in two regions, and every vertex of the part is used.
+// The vertices of the part, in the order of the mesh, and its triangles. No triangle of the mesh
+// may have corners in two regions, and every vertex of the part must belong to a triangle.
 Mesh partOf(const Mesh& mesh, const Part& part);
 
-// For each vertex, its neighbors along triangle edges, in ascending order.
+// The neighbors of each vertex along triangle edges, in ascending order.
 std::vector<std::vector<std::uint32_t>> neighborsOf(std::size_t vertexCount,
                                                     const std::vector<std::uint32_t>& indices);
 
-// Unit normals of the vertices: the mean of the triangles about each, weighted by area.
+// Unit normals of the vertices: the mean normal of the adjacent triangles, weighted by area.
 std::vector<Vec3> smoothNormals(const std::vector<Vec3>& positions,
                                 const std::vector<std::uint32_t>& indices);
 

@@ -9,15 +9,16 @@
 
 namespace dermis::models {
 
-// A round bar of two joints along x. Clip "twist": joint 1 turns about the bar's axis to 175° and
-// back.
+// A round bar along x with two joints. Clip "twist": joint 1 rotates about the axis of the bar to
+// 175° and back.
 Model barModel();
 
-// An arm of three joints along x, palm to +z. Clip "bend": the elbow bends to 140° and back.
+// An arm along x with three joints; the palm faces +z. Clip "bend": the elbow bends to 140° and
+// back.
 Model armModel();
 
-// A person of 1.75 m in an A-pose, facing +z, in several meshes on one skeleton. Clips "walk",
-// "idle", "wave".
+// A person, 1.75 m tall, in an A-pose, facing +z. It has several primitives and one skeleton.
+// Clips: "walk", "idle" and "wave".
 Model figureModel();
 
 std::vector<std::byte> makeBar();

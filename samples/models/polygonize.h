@@ -1,5 +1,5 @@
-// From a field to quads: surface nets (Gibson, "Constrained Elastic Surface Nets", 1998) with a
-// vertex for each sheet of the surface in a cell, as in dual marching cubes (Nielson, 2004).
+// Converts a field to quads by surface nets (Gibson, "Constrained Elastic Surface Nets", 1998). A
+// cell has a vertex for each sheet of the surface in it, as in dual marching cubes (Nielson, 2004).
 #pragma once
 
 #include <array>
@@ -16,18 +16,19 @@ struct Grid {
   std::array<int, 3> cells;  // along x, y, z
 };
 
-// The grid of cells of size `cell` that holds the box from `low` to `high`, with the same middle.
+// The grid with cells of size `cell` that contains the box from `low` to `high` and has the same
+// center.
 Grid gridOver(const Vec3& low, const Vec3& high, double cell);
 
 using Quad = std::array<std::uint32_t, 4>;
 
 struct QuadMesh {
   std::vector<Vec3> positions;
-  std::vector<Quad> quads;  // counter-clockwise seen from outside
+  std::vector<Quad> quads;  // counterclockwise seen from outside
 };
 
-// A vertex in each cell that the surface crosses, a quad for each grid edge that it crosses. The
-// surface must stay inside the grid.
+// Makes vertices in each cell that the surface crosses, and a quad for each grid edge that it
+// crosses. The surface must be inside the grid.
 QuadMesh polygonize(const Field& field, const Grid& grid);
 
 }  // namespace dermis::models

@@ -1,4 +1,4 @@
-// Evens out a polygonized surface without leaving it.
+// Smooths the mesh of a polygonized surface; vertices stay on the surface.
 #pragma once
 
 #include "mesh.h"
@@ -6,14 +6,14 @@
 
 namespace dermis::models {
 
-// Moves each vertex towards the middle of its neighbors along the surface and back onto it,
-// `steps` times.
+// Moves each vertex towards the mean of its neighbors and then back onto the surface, `steps`
+// times.
 void relax(QuadMesh& mesh, const Field& field, int steps);
 
 // Moves each vertex onto the surface.
 void project(std::vector<Vec3>& positions, const Field& field);
 
-// Two triangles for each quad, split so that the worse one of them is as even as can be.
+// Splits each quad into two triangles, so that the worse triangle has the best possible shape.
 std::vector<std::uint32_t> triangulate(const QuadMesh& mesh);
 
 }  // namespace dermis::models

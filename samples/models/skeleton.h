@@ -11,7 +11,7 @@ namespace dermis::models {
 
 inline constexpr int noParent = -1;
 
-// A joint's rest pose in the model's space. A parent stands before its children.
+// The rest pose of a joint in model space. A parent precedes its children.
 struct Joint {
   std::string name;
   int parent = noParent;
@@ -22,14 +22,13 @@ struct Joint {
 struct Skeleton {
   std::vector<Joint> joints;
 
-  // Appends a joint and returns its index. `along` is where its own y axis points in rest.
+  // Appends a joint and returns its index. `along` is the direction of its y axis in the rest pose.
   int add(std::string name, int parent, const Vec3& position, const Vec3& along);
   int indexOf(const std::string& name) const;
 };
 
-// What a joint does at one moment. The turn is relative to the parent but written along the axes of
-// the model's space in rest, as an animator thinks of it ("bend about x"), whatever the joint's own
-// axes are.
+// The pose of a joint. The rotation is relative to the parent, but expressed in the axes of model
+// space in the rest pose ("bend about x"), not in the axes of the joint.
 struct JointPose {
   Quat turn{1.0, 0.0, 0.0, 0.0};
   Vec3 offset{0.0};  // only for joints without a parent
@@ -43,15 +42,15 @@ struct Clip {
   std::vector<Pose> poses;  // one for each time
 };
 
-// A joint's transform relative to its parent, as glTF stores it.
+// The transform of a joint relative to its parent, as in glTF.
 struct LocalTransform {
   Quat rotation;
   Vec3 translation;
 };
 LocalTransform localTransform(const Skeleton& skeleton, std::size_t joint, const JointPose& pose);
 
-// Samples `poseAt(phase)` for phase 0 to 1 in `intervals` steps; the last key repeats the first bit
-// for bit.
+// Samples `poseAt(phase)` from phase 0 to 1 in `intervals` steps. The last key has the same bits as
+// the first.
 template <typename PoseAt>
 Clip sampleCycle(std::string name, double duration, int intervals, const PoseAt& poseAt) {
   Clip clip{std::move(name), {}, {}};

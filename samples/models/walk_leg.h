@@ -1,26 +1,26 @@
-// The legs of the walk: where a foot is at each moment, and how a leg reaches there.
+// The legs of the walk: the pose of the foot at each time, and the rotations of the leg for it.
 #pragma once
 
 #include "figure.h"
 
 namespace dermis::models {
 
-inline constexpr double strideLength =
-    1.36;  // metres from a heel strike to the next one of the same foot
-inline constexpr double walkDuration = 1.1;  // seconds for a stride
+// Meters from a heel strike to the next one of the same foot.
+inline constexpr double strideLength = 1.36;
+inline constexpr double walkDuration = 1.1;  // seconds per stride
 
-// A left foot in the model's space. Angles are in radians against the ground, positive with the
-// toes up.
+// The pose of the left foot in model space. Angles are relative to the ground, in radians, and
+// positive if the toes point up.
 struct FootPose {
   Vec3 ankle;
   double pitch;
   double toePitch;
 };
 
-// The left foot at a phase of the stride, 0 to 1, with the heel strike at 0.
+// The left foot at a phase of the stride, from 0 to 1. The heel strike is at 0.
 FootPose footAt(double phase);
 
-// The turns, in the model's space, that bring a left leg from rest to a pose.
+// The rotations, in model space, from the rest pose of the left leg to a pose.
 struct LegTurns {
   Quat thigh;
   Quat shin;
@@ -29,8 +29,8 @@ struct LegTurns {
 };
 LegTurns reach(const Vec3& hip, const FootPose& foot);
 
-// How much farther than the leg is long the ankle would be, in metres: more than 0 means that the
-// foot slides.
+// The distance from hip to ankle minus the length of the leg, in meters. If it is above 0, the foot
+// slides.
 double overreach(const Vec3& hip, const FootPose& foot);
 
 }  // namespace dermis::models

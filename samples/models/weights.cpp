@@ -12,7 +12,7 @@ constexpr double negligible = 0.004;
 
 }  // namespace
 
-Influences quantise(const WeightRow& weights) {
+Influences quantize(const WeightRow& weights) {
   std::vector<std::size_t> order(weights.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
@@ -66,7 +66,7 @@ std::vector<Influences> diffuseWeights(const Mesh& mesh, const Diffusion& diffus
       const double weight = current[vertex * jointCount + joint];
       row[joint] = weight * diffusion.allowance(mesh.positions[vertex], joint);
     }
-    influences.push_back(quantise(row));
+    influences.push_back(quantize(row));
   }
   return influences;
 }

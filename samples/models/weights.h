@@ -1,4 +1,4 @@
-// Influences of vertices: spread along the surface, then cut to four and quantised.
+// Influences of vertices: weights spread along the surface, then the four largest are quantized.
 #pragma once
 
 #include <functional>
@@ -8,26 +8,27 @@
 
 namespace dermis::models {
 
-// The weight of every joint on one vertex.
+// The weights of all joints for one vertex.
 using WeightRow = std::vector<double>;
 
-// Keeps the four largest weights, rounds them to 1/65536 and makes them sum to exactly 1.
-Influences quantise(const WeightRow& weights);
+// Keeps the four largest weights, and rounds them to multiples of 1/65536 that sum to exactly 1.
+Influences quantize(const WeightRow& weights);
 
-// How weights spread from where they start.
+// Parameters of `diffuseWeights`.
 struct Diffusion {
   std::size_t jointCount;
-  // The joint that has all of a vertex's weight at the start.
+  // For each vertex, the joint with the initial weight 1.
   std::vector<std::size_t> nearestJoint;
-  // How much of a vertex's weight a step may replace, 0 to 1.
+  // For each vertex, how fast weights spread, 0 to 1. A step replaces half of this fraction of its
+  // weights.
   std::vector<double> spread;
   int steps;
-  // The part of its weight that a joint keeps on a vertex in the end, 0 to 1.
+  // The factor of a joint's final weight at a position, 0 to 1.
   std::function<double(const Vec3& position, std::size_t joint)> allowance;
 };
 
-// Spreads weights along the edges of the mesh. What spreads over the surface cannot jump from one
-// leg to the other or from an arm to the waist, however close they are in space.
+// Spreads weights along the edges of the mesh. Along the surface, weights cannot jump from one leg
+// to the other or from an arm to the waist, even if these are close in space.
 std::vector<Influences> diffuseWeights(const Mesh& mesh, const Diffusion& diffusion);
 
 }  // namespace dermis::models

@@ -19,10 +19,10 @@
 namespace dermis::samples {
 namespace {
 
-/// A place for a number in a name: "%", flags and digits, "d".
+/// A placeholder for a number in a name: "%", flags and digits, "d".
 struct Place {
   std::size_t begin = 0, end = 0;
-  std::string_view inside;  ///< what stands between "%" and "d"
+  std::string_view inside;  ///< between "%" and "d"
 
   bool isRight() const {
     return inside.size() == 2 && inside[0] == '0' && inside[1] >= '1' && inside[1] <= '9';

@@ -25,14 +25,14 @@ bool hasEnding(std::string_view name, std::string_view ending);
 /// number of the frame. Empty if the pattern has none.
 std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame);
 
-/// Whether a name has more than one place for a number, or one that is not %0Nd.
+/// Whether a name has more than one placeholder for a number, or one that is not %0Nd.
 bool hasWrongPattern(std::string_view name);
 
 /// An output that an option requests.
 struct RequestedOutput {
   std::string_view option;   ///< "--json"
   std::string name;          ///< empty: nothing
-  std::uint32_t frames = 1;  ///< if the name has a place for a number
+  std::uint32_t frames = 1;  ///< if the name has a placeholder for a number
 };
 
 /// Fails with `invalidArgument` if an output, or one of its frames, would overwrite an input file

@@ -33,7 +33,7 @@ render::Wrap wrapOf(gltf::Wrap wrap) {
 }
 
 Surface untexturedSurface(const gltf::Model& model, const gltf::Primitive& primitive) {
-  // What the file says nothing of is of no metal: glTF's own default would be dark.
+  // Without a material the surface is not metallic. glTF's default, fully metallic, looks dark.
   Surface surface;
   if (primitive.material == gltf::none) return surface;
   const gltf::Material& material = model.materials[primitive.material];
@@ -58,7 +58,7 @@ Result<std::uint32_t> Appearances::decode(std::uint32_t index,
   const gltf::Image& image = model_->images[index];
   const Result<render::TexturePixels> pixels = render::decodeImage(image.bytes, &budget_);
   if (!pixels) {
-    notes_.push_back(image.name + ": " + pixels.error().message + "; it is left out");
+    notes_.push_back(image.name + ": " + pixels.error().message + "; the texture is ignored");
     return 0u;
   }
   return renderer_->addTexture(*pixels, options);

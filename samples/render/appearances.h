@@ -1,4 +1,4 @@
-// How a model's primitives look, and the triangles of them, as the renderer takes them.
+// Converts the materials and triangles of a glTF model for the renderer.
 #pragma once
 
 #include <cstdint>
@@ -15,16 +15,16 @@ namespace dermis::samples {
 
 class Appearances {
  public:
-  /// All three must outlive it.
+  /// The arguments must outlive this object.
   Appearances(Device& device, render::Renderer& renderer, const gltf::Model& model)
       : device_(&device), renderer_(&renderer), model_(&model), budget_(model.budget) {}
 
-  /// A texture that cannot be decoded, or whose pixels take more memory than the model's file
-  /// justifies, is left out, with a note. Fails with `vulkanError`.
+  /// Ignores a texture, and adds a note, if it cannot be decoded or if its pixels need more memory
+  /// than the model's file justifies. Fails with `vulkanError`.
   Result<render::Surface> surface(const gltf::Primitive& primitive);
-  /// Made when it is first asked for; lives as long as this object. Fails with `vulkanError`.
+  /// Created by the first call. Valid while this object lives. Fails with `vulkanError`.
   Result<const render::Geometry*> geometry(const gltf::Primitive& primitive);
-  /// The same vertices with other triangles between them: a level of detail.
+  /// The same vertices with other triangles, for a level of detail. Fails with `vulkanError`.
   Result<render::Geometry> geometry(const gltf::Primitive& primitive,
                                     std::span<const std::uint32_t> triangles) const;
 
@@ -33,7 +33,7 @@ class Appearances {
  private:
   gltf::TextureUse textureUse(const gltf::Primitive& primitive) const;
   Result<std::uint32_t> texture(const gltf::TextureUse& use);
-  /// 0 if it is left out.
+  /// Returns 0 if the texture is ignored.
   Result<std::uint32_t> decode(std::uint32_t image, const render::TextureOptions& options);
 
   Device* device_;
@@ -41,9 +41,10 @@ class Appearances {
   const gltf::Model* model_;
   gltf::MemoryBudget budget_;  ///< for pixels
   std::map<const gltf::Primitive*, render::Geometry> geometries_;
-  /// The renderer's, by image and how it is wrapped; 0 for one that is left out.
+  /// Textures of the renderer, by image and wrap modes; 0 for an ignored texture.
   std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;
-  std::map<std::uint32_t, std::uint32_t> firstTextures_;  ///< by image: one with its pixels, or 0
+  /// The first texture of each image, which has the pixels; 0 for an ignored image.
+  std::map<std::uint32_t, std::uint32_t> firstTextures_;
   std::vector<std::string> notes_;
 };
 

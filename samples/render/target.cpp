@@ -87,7 +87,7 @@ Result<void> checkSize(const Device& device, VkFormat depthFormat, std::uint32_t
                 longestSide(device, depthFormat, VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT)});
   if (std::max(width, height) > longest)
     return tooLarge(device, width, height,
-                    "its longest side is " + std::to_string(longest) + " pixels");
+                    "the device's maximum is " + std::to_string(longest) + " pixels per side");
   VkPhysicalDeviceMemoryProperties memory{};
   device.functions().GetPhysicalDeviceMemoryProperties(device.physicalDevice(), &memory);
   std::uint64_t largestHeap = 0;

@@ -60,7 +60,7 @@ void drawFile(const Facts& facts, State& state) {
     sayDim("none");
   }
   if (!facts.notes.empty()) {
-    sayDim(facts.notes.size() == 1 ? "1 remark" : fmt::format("{} remarks", facts.notes.size()));
+    sayDim(facts.notes.size() == 1 ? "1 note" : fmt::format("{} notes", facts.notes.size()));
     if (ImGui::IsItemHovered()) {
       ImGui::BeginTooltip();
       ImGui::PushTextWrapPos(420);
@@ -141,10 +141,9 @@ void drawTimes(const Facts& facts) {
   fact("GPU, skinning", milliseconds(times.skinningSeconds));
   fact("GPU, drawing", milliseconds(times.drawingSeconds));
   fact("CPU, plan + record", milliseconds(times.planSeconds));
-  fact("pictures a second",
-       facts.framesPerSecond > 0 ? fmt::format("{:.1f}", facts.framesPerSecond) : "at rest");
-  if (facts.scale < 1)
-    sayDim(fmt::format("moving: drawn at {:.0f} % of the size", 100 * facts.scale));
+  fact("frames per second",
+       facts.framesPerSecond > 0 ? fmt::format("{:.1f}", facts.framesPerSecond) : "–");
+  if (facts.scale < 1) sayDim(fmt::format("while moving: {:.0f} % resolution", 100 * facts.scale));
   ImGui::Dummy({0, 2});
   sayDim(facts.device);
 }

@@ -24,13 +24,14 @@ Legend weightsLegend(const SceneView& view, const State& state) {
 
 void addError(const FigureError& error, Legend& legend) {
   legend.lines.push_back(std::string(methodName(error.method)));
-  legend.lines.push_back(fmt::format("  at most {:.2g}, {:.0f} % of its bound", error.greatest,
-                                     100 * error.greatestPartOfBound));
+  legend.lines.push_back(fmt::format("  largest error {:.2g}", error.greatest));
+  legend.lines.push_back(
+      fmt::format("  largest error ÷ bound {:.0f} %", 100 * error.greatestPartOfBound));
 }
 
 Legend errorLegend(const Facts& facts, const State& state) {
   // Only the author of the model knows the unit.
-  Legend legend{"error of position", "0", "", {}};
+  Legend legend{"position error", "0", "", {}};
   if (facts.errors == nullptr) {
     legend.lines.push_back("computing the reference …");
     return legend;

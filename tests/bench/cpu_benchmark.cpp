@@ -6,7 +6,7 @@
 //   dermis_cpu_benchmark [VERTICES|MODEL [INSTANCES [ROUNDS]]]    10,000 vertices, 200 instances,
 //   20
 //
-// A figure of 60 joints, four influences everywhere; or the first skin of a glTF file, whose
+// A figure of 60 joints, four influences per vertex; or the first skin of a glTF file, whose
 // instances are in different places of its first animation. Positions and normals in float32. The
 // conversion of poses is part of what is measured.
 

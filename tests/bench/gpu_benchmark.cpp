@@ -315,7 +315,7 @@ int measure(int argc, char** argv, samples::OpenDevice& open) {
   std::printf("device  %s (%s)\ndriver  %s\ncommit  %s\n", device.c_str(), type.c_str(),
               driver.c_str(), commit.c_str());
   std::printf(
-      "model   %u vertices of 60 joints, four influences everywhere; best of all rounds\n\n",
+      "model   %u vertices of 60 joints, four influences per vertex; best of all rounds\n\n",
       figureVertices);
   std::printf("%-8s %-40s %8s %7s %4s %5s %9s %10s %12s %8s %7s\n", "", "", "reads", "stores",
               "size", "each", "instances", "workgroups", "M vertices/s", "GB/s", "x copy");

@@ -106,9 +106,9 @@ TEST(CommandTest, WrongUsageNamesTheOptionAndTheSubcommandsHelp) {
   expectComplaint({"skin", bar, "-o", out, "--fps", "3"}, "--fps requires --frames");
   expectComplaint({"skin", bar, "-o", out, "--time", "nan"}, "--time must be a number of seconds");
   expectComplaint({"skin", bar, "-o", outFile("a%04d.ply")},
-                  "-o OUT has a place for a number, so --frames is required");
+                  "-o OUT has a placeholder for a number, so --frames is required");
   expectComplaint({"skin", bar, "-o", out, "--device", "cpu", "--animation", "zzz"},
-                  "--animation: there is no animation 'zzz'; the file has 1");
+                  "--animation: there is no clip 'zzz'; the file has 1 clip");
   expectComplaint({"render", bar, "-o", "a.png", "--elevation", "91"},
                   "--elevation must be from -90 to 90 degrees");
   expectComplaint({"compare", bar, "--repetitions", "0"}, "--repetitions must be from 1 to 10000");
@@ -372,13 +372,14 @@ std::string describe(const samples::Device& device) {
   text << properties.deviceName << "\n   " << types[properties.deviceType] << ", Vulkan "
        << VK_API_VERSION_MAJOR(properties.apiVersion) << '.'
        << VK_API_VERSION_MINOR(properties.apiVersion) << '.'
-       << VK_API_VERSION_PATCH(properties.apiVersion) << ", usable\n   storage buffers of "
-       << (properties.limits.maxStorageBufferRange >> 20) << " MiB, "
-       << properties.limits.maxPerStageDescriptorStorageBuffers << " a stage; "
+       << VK_API_VERSION_PATCH(properties.apiVersion)
+       << ", usable\n   maximum storage buffer range "
+       << (properties.limits.maxStorageBufferRange >> 20) << " MiB; "
+       << properties.limits.maxPerStageDescriptorStorageBuffers << " storage buffers per stage; "
        << properties.limits.maxComputeWorkGroupCount[0]
-       << " workgroups a dimension; push descriptors: " << yes(pushes)
-       << "; stores of 2 bytes: " << yes(halves.storageBuffer16BitAccess == VK_TRUE)
-       << ", of 1 byte: " << yes(bytes.storageBuffer8BitAccess == VK_TRUE) << '\n';
+       << " workgroups per dimension; push descriptors: " << yes(pushes)
+       << "; 16-bit stores: " << yes(halves.storageBuffer16BitAccess == VK_TRUE)
+       << "; 8-bit stores: " << yes(bytes.storageBuffer8BitAccess == VK_TRUE) << '\n';
   return text.str();
 }
 

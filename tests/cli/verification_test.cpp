@@ -33,15 +33,15 @@ std::shared_ptr<samples::BatchTarget> makeTarget() {
 TEST(TargetPoolTest, EachTaskRunsOnceWithATargetOfItsThread) {
   samples::TargetPool pool(makeTarget(), makeTarget, 3);
   std::array<std::atomic<int>, 100> ran{};
-  std::array<std::atomic<samples::BatchTarget*>, 7> settled{};
+  std::array<std::atomic<samples::BatchTarget*>, 7> pinned{};
   std::size_t done = 0;
   for (int round = 0; round < 4; ++round) {
     const Result<void> result =
-        pool.run({.tasks = ran.size(), .settled = settled.size(), .done = [&done] { ++done; }},
+        pool.run({.tasks = ran.size(), .pinnedTasks = pinned.size(), .done = [&done] { ++done; }},
                  [&](std::size_t index, samples::BatchTarget& target) -> Result<void> {
                    ++ran[index];
-                   if (index < settled.size()) {
-                     samples::BatchTarget* before = settled[index].exchange(&target);
+                   if (index < pinned.size()) {
+                     samples::BatchTarget* before = pinned[index].exchange(&target);
                      EXPECT_TRUE(before == nullptr || before == &target) << index;
                    }
                    return {};
@@ -50,7 +50,7 @@ TEST(TargetPoolTest, EachTaskRunsOnceWithATargetOfItsThread) {
   }
   EXPECT_EQ(done, 4 * ran.size());
   for (const std::atomic<int>& times : ran) EXPECT_EQ(times, 4);
-  const std::set<samples::BatchTarget*> used(settled.begin(), settled.end());
+  const std::set<samples::BatchTarget*> used(pinned.begin(), pinned.end());
   EXPECT_EQ(used.size(), 3u);
 }
 
@@ -58,18 +58,19 @@ TEST(TargetPoolTest, EachTaskRunsOnceWithATargetOfItsThread) {
 TEST(TargetPoolTest, TheFirstErrorInTheirOrderIsReported) {
   samples::TargetPool pool(makeTarget(), makeTarget, 2);
   std::atomic<bool> tenRuns = false;
-  const Result<void> result = pool.run(
-      {.tasks = 40, .settled = 5}, [&](std::size_t index, samples::BatchTarget&) -> Result<void> {
-        if (index < 9) return {};
-        // 9 ends while 10 runs.
-        if (index == 9) tenRuns.wait(false);
-        if (index == 10) {
-          tenRuns = true;
-          tenRuns.notify_all();
-          std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        }
-        return Error{ErrorCode::invalidMesh, std::to_string(index)};
-      });
+  const Result<void> result =
+      pool.run({.tasks = 40, .pinnedTasks = 5},
+               [&](std::size_t index, samples::BatchTarget&) -> Result<void> {
+                 if (index < 9) return {};
+                 // 9 ends while 10 runs.
+                 if (index == 9) tenRuns.wait(false);
+                 if (index == 10) {
+                   tenRuns = true;
+                   tenRuns.notify_all();
+                   std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                 }
+                 return Error{ErrorCode::invalidMesh, std::to_string(index)};
+               });
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().message, "9");
 }

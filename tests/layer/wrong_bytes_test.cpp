@@ -280,7 +280,7 @@ TEST_F(WrongBytesTest, WhatIsNotTwiceTheSameIsFound) {
              "a byte of an attribute was not written, or two runs wrote different values");
   const auto ofTheFirst = invert(0, Stream::normals, 39, 0, 1);
   expectOnly(verify(alone + now - 1, ofTheFirst, true), 0,
-             "skinned alone, it does not have the same bits");
+             "skinned alone, the instance has different bits");
 }
 
 }  // namespace

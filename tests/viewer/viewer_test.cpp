@@ -384,7 +384,7 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithItsOptions) {
       {{"--screenshot", "x.jpg"}, "--screenshot must end in .png, not be 'x.jpg'"},
       {{model, "--screenshot", model}, "--screenshot " + model + " would overwrite"},
       {{"--empty", "--animation", "walk"}, "--empty excludes --animation"},
-      {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no animation 'zzz'"},
+      {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no clip 'zzz'"},
   };
   for (const auto& [arguments, sentence] : wrong) {
     start(arguments);
