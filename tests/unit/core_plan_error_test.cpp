@@ -90,6 +90,19 @@ TEST_F(PlanErrors, MeshOffsets) {
   expectInvalid({"job 0"});
 }
 
+// A kernel may store them together, so it would write the normals to the wrong buffer.
+TEST_F(PlanErrors, NormalsBehindPositionsInAnotherBuffer) {
+  batch.jobs.clear();
+  batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 0, false}));
+  Job& only = batch.addJob(2, 1, Method::dualQuaternion, true);
+  only.tangents = {0, 16, VertexFormat::float32x4};
+  batch.hasSeparateOutputs = true;
+  batch.separateSizes = {1000 + batch.outputSize, 1000 + batch.outputSize, 160, 0};
+  expectInvalid({"job 0", "isOneBuffer"});
+  only.normals.offset += 4;
+  expectGood();
+}
+
 TEST_F(PlanErrors, BrokenPromises) {
   job().mesh = batch.meshes[1].info();
   job().normals = {};

@@ -109,7 +109,7 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// outside the pose, or if the mesh reaches beyond 1e38. A side may be infinite if numbers leave
 /// the range of float32. So check the box with `std::isfinite` before you use it for snorm16. It
 /// never contains a NaN. Joints that move no vertices have no effect. For a default-constructed
-/// `JointBounds` the box has min > max.
+/// `JointBounds` and a method with a proof the box has min > max.
 ///
 /// O(joints + pairs + trios). Any thread. Needs 32 KiB of stack, and allocates only if more than
 /// 128 joints move vertices.

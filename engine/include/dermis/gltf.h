@@ -159,7 +159,7 @@ struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;  ///< empty if the mesh is not decoded (see `load`)
   /// The largest number of morph targets of a primitive, decoded or not. A primitive with fewer has
-  /// the first of them.
+  /// the first targets; the others do not displace it.
   std::uint32_t morphTargetCount = 0;
   /// In the order of the morph targets. If there are fewer than targets, the others are 0.
   std::vector<float> morphWeights;
@@ -236,8 +236,8 @@ struct LoadOptions {
 /// The first bytes tell which kind of file it is.
 ///
 /// Nothing outside the folder of `path` is opened, not even through a symbolic link. `path` itself
-/// may be a link to a file elsewhere; the folder is then that of the link. Each file is read once,
-/// as far as it is needed. No file may be larger than 4 GiB.
+/// may be a link to a file elsewhere; the folder is then that of the link. Each file is read
+/// as far as it is needed, which must be at most 4 GiB.
 ///
 /// Only meshes that a skinned node of the default scene uses are decoded; the others have no
 /// primitives. The default scene is the one that the property `scene` selects, or scene 0. If the
@@ -249,8 +249,9 @@ struct LoadOptions {
 ///   An error in a part that nothing skinned or animated uses is a note instead;
 /// - `unsupportedFeature` if the file requires an unknown extension (for example mesh compression),
 ///   or is glTF 1.0;
-/// - `limitExceeded` if a file is larger than 4 GiB, or if the model needs more memory than the
-///   files' sizes justify (memory_budget.h).
+/// - `limitExceeded` if more than 4 GiB of a file are needed, if a skin has more than
+///   `maxPoseJoints` joints, if the model needs more memory than the files' sizes justify
+///   (memory_budget.h), or if there is not enough memory.
 DERMIS_GLTF_API Result<Model> load(const std::filesystem::path& path,
                                    const LoadOptions& options = {});
 

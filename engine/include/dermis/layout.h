@@ -18,11 +18,13 @@ namespace dermis {
 ///   `DeviceLimits::storage16Bit` is true, multiples of 2 are allowed. If `storage8Bit` is true,
 ///   too, any number is allowed. If a device has fewer storage buffers than `storageBuffersWanted`,
 ///   they must always be multiples of 4.
-/// - If normals begin where the format of the positions ends, tangents where that of the normals
-///   ends, and all strides are equal, Dermis takes the attributes for one interleaved vertex. They
-///   must then be in one buffer (`OutputSizes::isOneBuffer`).
-/// - If, in addition, positions and normals are float32x3 and the stride is a multiple of 8, the
-///   offset of the positions must be a multiple of 8.
+/// - If those of normals and tangents that are written directly follow the positions, in this
+/// order,
+///   without gaps and with the same stride, Dermis takes them for one interleaved vertex. They must
+///   then be in one buffer (`OutputSizes::isOneBuffer`). Previous positions do not matter.
+/// - If positions and normals are float32x3, normals directly follow positions, and both have the
+///   same stride, a multiple of 8: the offset of the positions must be a multiple of 8, and both
+///   must be in one buffer, wherever tangents are.
 struct OutputAttribute {
   std::uint64_t offset = 0;                  ///< bytes
   std::uint32_t stride = 0;                  ///< bytes, at least `formatSize(format)`

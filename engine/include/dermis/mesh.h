@@ -48,7 +48,9 @@ constexpr std::uint32_t componentSize(ComponentType type) {
 /// be part of interleaved vertices. Needs no alignment.
 struct AttributeView {
   const void* data = nullptr;  ///< the first element; null if the mesh does not have the attribute
-  std::uint32_t count = 0;     ///< number of elements: `MeshView::vertexCount`
+  /// Number of elements: `MeshView::vertexCount`, or the size of `MorphTargetView::vertices` if
+  /// that is not empty.
+  std::uint32_t count = 0;
   /// Bytes from one element to the next; at least the size of an element.
   std::uint32_t stride = 0;
   ComponentType type = ComponentType::float32;

@@ -63,10 +63,10 @@ struct DeviceLimits {
   bool storage16Bit = false;
   /// The same for 1 byte (VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
   bool storage8Bit = false;
-  /// Whether kernels read tables, meshes and palettes through uniform texel buffers, which is
-  /// faster on lavapipe. Requires that a uniform texel buffer of 4-byte texels can hold a whole
-  /// storage buffer range. Kernels that store less than 4 bytes at a time always read storage
-  /// buffers.
+  /// Whether kernels read tables, meshes and palettes, and in a batch with `Method::linear` poses,
+  /// through uniform texel buffers, which is faster on lavapipe. Requires that a uniform texel
+  /// buffer of 4-byte texels can hold a whole storage buffer range. Kernels that store less than 4
+  /// bytes at a time always read storage buffers.
   bool texelBuffers = false;
   /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64) to store 8
   /// bytes at a time, which is faster on lavapipe.
@@ -216,7 +216,9 @@ struct Batch {
 
 /// The compute shaders of Dermis.
 enum class Kernel : std::uint8_t {
-  palette,     ///< converts poses to palettes
+  /// Converts poses to palettes: joints in the form that the skin kernel reads. These are dual
+  /// quaternions, logarithms or matrices, and scale.
+  palette,
   skin,        ///< skins instances
   visibility,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
   clear,       ///< clears the results of instances that are skinned
@@ -444,10 +446,10 @@ class DERMIS_CORE_API Plan {
 
   /// The commands, in the order in which they must be issued. For a batch: the palette and clear
   /// kernels if there is anything to convert or clear, then the skin kernels, with a barrier before
-  /// the first that needs it. For a scene: a barrier after earlier compute, copy and indirect
-  /// accesses, copies and clears, the kernels, copies to `readBack`, and a barrier before the host
-  /// reads. In both cases the engine records the barriers between these commands and its own use of
-  /// the output (vulkan/scope.h).
+  /// the first that needs it. For a scene, in this order: a barrier that waits for earlier accesses
+  /// (compute, copy, indirect); copies and clears; the kernels; copies to `readBack`; a barrier
+  /// before the host reads. In both cases the engine records the barriers between these commands
+  /// and its own use of the output (vulkan/scope.h).
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
@@ -485,8 +487,9 @@ class DERMIS_CORE_API Plan {
   std::unique_ptr<PlanData> data_;
 };
 
-/// Turns a batch into commands: one dispatch for all poses, then one for each variant and output
-/// window. O(poses + jobs + morph weights). An empty batch gives an empty plan.
+/// Turns a batch into commands: one dispatch for each variant of the palette kernel, one that
+/// clears results if there are any, then one for each variant of the skin kernel and output window.
+/// O(poses + jobs + morph weights). An empty batch gives an empty plan.
 ///
 /// Fails with
 /// - `invalidArgument` if a job or pose breaks a rule above (the message names it by its index),
@@ -495,7 +498,9 @@ class DERMIS_CORE_API Plan {
 /// - `missingFeature` if an attribute is not at multiples of 4 bytes and the device cannot store
 ///   less, or if this build lacks the kernels of the method;
 /// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,
-///   if a dispatch has too many workgroups, or if the device has too few storage buffers for a job.
+///   if a dispatch has too many workgroups, if the device has too few storage buffers for a job, or
+///   if the attributes of a vertex must lie in one `OutputWindow` and do not
+///   (`DeviceLimits::separateRanges`).
 ///
 /// After a failure the plan is empty.
 DERMIS_CORE_API Result<void> makePlan(const Batch& batch, const DeviceLimits& limits,

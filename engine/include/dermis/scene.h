@@ -132,7 +132,7 @@ struct InstanceDescription {
   std::uint32_t updateInterval = 1;
   /// Whether a word of the visibility buffer, too, decides in each frame if the instance is
   /// visible: 0 means invisible. `InstanceChange::visible` must be true as well. An invisible
-  /// instance is neither skinned nor settled.
+  /// instance is neither skinned nor settled (`Job::settles`).
   ///
   /// The output of such an instance must lie in one storage buffer range. An output of at most 1/32
   /// of a range always does. If a larger one does not, because the output buffer is larger than one
@@ -201,8 +201,8 @@ struct StoreStatistics {
   std::uint64_t largestFree = 0;  ///< size of the largest free range
 };
 
-/// What the frame of the last `commit` does. Instances culled on the GPU are counted in
-/// `culledCandidates` only.
+/// What the frame of the last `commit` does; zeros after `abandonFrame`. Skinned and settled
+/// instances, vertices and bytes written do not include instances culled on the GPU.
 struct FrameWorkStatistics {
   std::uint64_t frame = 0;
   std::uint32_t instances = 0;  ///< in the scene
@@ -257,7 +257,9 @@ class DERMIS_CORE_API Scene {
   ///
   /// - `meshes`, `palettes`, `results`, `positions`: `GrowthCallback` reports when they grow.
   /// - `tables`, `upload`: `Plan::buffer` returns their size, which differs from frame to frame.
-  /// - `readBack`, `history`: `Plan::buffer` returns their size, too; they only grow. A larger
+  /// - `readBack`, `history`: `Plan::buffer` returns their size, too. They only grow: keep a buffer
+  /// that
+  ///   is larger than a plan needs (`history` has size 0 if a plan culls nothing). A larger
   ///   `history` gets the contents of the old one.
   /// - `upload`, `readBack`: one for each frame in flight.
   /// - `history`, `counters`, `visibility`: needed only if instances are culled on the GPU.
@@ -279,7 +281,7 @@ class DERMIS_CORE_API Scene {
 
   // -- Meshes, poses, instances. They may be added and removed at any time. Memory of removed
   // objects is reused once the frame that was begun last is complete. Functions fail with
-  // `invalidArgument` if a handle is stale.
+  // `invalidArgument` if a handle is null or its object was removed.
 
   /// Reserves memory for a packed mesh. The engine copies the bytes to `meshOffset` of the mesh
   /// buffer before the commands of the next plan, on the same queue. The first barrier of the plan
@@ -300,10 +302,10 @@ class DERMIS_CORE_API Scene {
   /// fails, it adds none.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
-  /// Where the current pose is. A pose that the GPU writes never moves. The first pose of a call of
-  /// `addPose` or `addPoses` that the GPU writes is at a multiple of
-  /// `DeviceLimits::minStorageBufferOffsetAlignment` of its pose buffer, all others are at
-  /// multiples of 16 bytes.
+  /// Where the current pose is. A pose that the GPU writes never moves. Its offset in its pose
+  /// buffer is a multiple of 16 bytes. The first of the poses that one call of `addPose` or
+  /// `addPoses` adds for the GPU to write is at a multiple of
+  /// `DeviceLimits::minStorageBufferOffsetAlignment`.
   Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` if an instance uses the pose.
   Result<void> removePose(PoseHandle pose);
@@ -313,8 +315,9 @@ class DERMIS_CORE_API Scene {
   /// `limitExceeded` if there is no room for it. `compact` may make room in the output.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   /// What `prepare` needs for such an instance with this mesh, pose and method. `everyVariant` then
-  /// lists two kernels for most instances, instead of ten. Another mesh with the same minimum and
-  /// maximum of influences, or another pose with the same `mayScale`, needs nothing more.
+  /// lists two kernels for most instances, instead of up to nine. Another mesh with the same
+  /// minimum and maximum of influences, or another pose with the same `mayScale`, needs nothing
+  /// more.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);
@@ -401,14 +404,13 @@ class DERMIS_CORE_API Scene {
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits. Spans are valid
-  // until the next `commit` or `abandonFrame`.
+  // until the next `commit` or `abandonFrame`. After `abandonFrame` all three lists are empty.
 
   /// Where the skinned vertices of an instance are. Before the first `commit` that skins it, the
   /// size is 0. An instance that is culled on the GPU has an output from its first `commit` on,
   /// even if the GPU has not skinned it.
   Result<InstanceOutput> output(InstanceHandle instance) const;
-  /// Instances that were skinned, in no particular order, without those culled on the GPU. Empty
-  /// after `abandonFrame`.
+  /// Instances that were skinned, in no particular order, without those culled on the GPU.
   std::span<const InstanceHandle> skinnedInstances() const;
   /// Instances of which only previous positions were written: they came to rest, or became
   /// visible in the same pose.

@@ -84,7 +84,8 @@ class DERMIS_SHADER_COMPILER_API ShaderCompiler {
 
   /// The files that the last `compile` included, each once, in the order in which it read them. A
   /// build, or a reload of shaders, watches these files. With a cache folder the list also has
-  /// files whose `#include` is disabled by a condition. If `compile` failed, the list ends there.
+  /// files whose `#include` is disabled by a condition. If `compile` failed, files after the error
+  /// may be missing.
   const std::vector<std::filesystem::path>& lastIncludes() const { return lastIncludes_; }
 
  private:

@@ -13,7 +13,8 @@ namespace dermis {
 
 /// The text on one line, without characters that a terminal interprets. Control characters (C0,
 /// DEL, C1), line and paragraph separators and the marks of bidirectional text are escaped: `\n`,
-/// `\u001b`, `\u202e`. Bytes that are not UTF-8 become `\xff`. Nothing else changes.
+/// `\u001b`, `\u202e`. A byte that is not UTF-8 becomes its hexadecimal value: `\xff`. Nothing else
+/// changes.
 DERMIS_CORE_API std::string oneLine(std::string_view text);
 
 /// The first characters of `oneLine(name)`, with "..." after them if there are more.

@@ -17,7 +17,7 @@ enum class MeshProblem : std::uint8_t {
   // The views are not valid. `repair` cannot help.
   emptyMesh,        ///< no vertices, or no positions
   noInfluenceSets,  ///< no influences, or a set without joints or weights
-  countMismatch,    ///< the count of an attribute is not the vertex count
+  countMismatch,    ///< the count of an attribute is not what `AttributeView::count` must be
   strideTooSmall,   ///< the stride of an attribute is less than the size of an element
   wrongFormat,      ///< an attribute has a component type or count that is not allowed
   morphVertices,    ///< vertices of a morph target are not ascending, or are outside the mesh

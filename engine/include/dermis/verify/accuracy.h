@@ -27,7 +27,7 @@ DERMIS_VERIFY_API double positionFormatBound(VertexFormat format,
                                              const reference::Double3& position, const Box& box);
 
 /// The same for unit normals. L = 127 or 32767 is the maximum integer of the format.
-/// - float16: 2^-11.
+/// - float16: 2^-11, plus √3 · 2^-25 for components below the smallest normal number.
 /// - snorm: √3 times half a step and a rounding, ½ / L + u.
 /// - octahedral: √18 δ, with δ = ½ / L + 12 u. An error of δ in both components moves the point on
 ///   the octahedron by (δ, δ, 2δ), which has length √6 δ. The projection onto the sphere divides it
@@ -95,8 +95,9 @@ struct SkinnedView {
 /// the vertex plus the bound of the format. Normals and tangents are compared if both have them.
 /// `exemptions` states how many vertices have no bound. `Comparison::passed` is the verdict.
 ///
-/// - A vertex that is not finite in the reference, or whose bound is not finite, fails, unless
-///   `VertexBounds::undefined` is set.
+/// - A vertex that is not finite in the reference fails, unless `VertexBounds::undefined` is set.
+/// So
+///   does one whose bound is not finite, unless `undefined` or `onlyFinite` is set.
 /// - The handedness must be equal to that of the reference. If `VertexBounds::eitherHandedness` is
 ///   set, it must be 1 or -1.
 /// - The fourth component of a position must be 1, that of a normal 0.

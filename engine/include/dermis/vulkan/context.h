@@ -44,7 +44,7 @@ struct DeviceDescription {
   ///
   /// Only `Context::create` reads the chain.
   const void* enabledFeatures = nullptr;
-  /// Whether kernels read tables, meshes and palettes through uniform texel buffers, if the device
+  /// Whether kernels read buffers through uniform texel buffers, if the device
   /// supports it (`DeviceLimits::texelBuffers`). `Plan::buffer` then returns
   /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers, and `maxStorageBufferRange` of
   /// `Context::limits` is at most what such a buffer can hold. Results are the same to the bit. If
@@ -120,8 +120,9 @@ class DERMIS_VULKAN_API Context {
   /// record during the call, for `frame` or an earlier frame; each of their dispatches uses either
   /// the old or the new kernel.
   ///
-  /// Fails with `vulkanError`, and with `invalidArgument` if there is no `kernelSource`, a module
-  /// is empty, or `completedFrame` is not before `frame`. If it fails, nothing changes.
+  /// Fails with `vulkanError`, and with `invalidArgument` if there are modules but no
+  /// `kernelSource`, a module is empty, or `completedFrame` is not before `frame`. If it fails,
+  /// nothing changes.
   Result<std::uint32_t> replaceKernels(std::span<const KernelModule> modules, std::uint64_t frame,
                                        std::uint64_t completedFrame) const;
 

@@ -42,7 +42,7 @@ struct MappedRange {
 
 /// What `SkinningSystem::create` needs to know.
 struct SkinningSystemDescription {
-  /// Required, not owned. The Context must outlive the system. It may be moved.
+  /// Required, not owned. The Context must outlive the system, but may be moved.
   Context* context = nullptr;
   // -- As in `SceneDescription`.
   std::uint32_t framesInFlight = 2;
@@ -66,9 +66,9 @@ struct SkinningSystemDescription {
   VkBufferUsageFlags outputUsage = vertexBufferUsage;
 
   /// Create and destroy all other buffers. Set both functions or none. Buffers are created by
-  /// `SkinningSystem::create`, by functions that add something, and by `record` if a frame needs
-  /// more memory for tables than all frames before it. If not set, the system allocates memory
-  /// blocks: small ones first, and at most 64 MiB each unless one buffer is larger.
+  /// `SkinningSystem::create`, by functions that add something, by `change`, and by `record` if a
+  /// frame needs larger buffers for tables, read-back or culling. If not set, the system allocates
+  /// memory blocks: small ones first, and at most 64 MiB each unless one buffer is larger.
   BufferCallbacks buffers;
   /// Whether the GPU time of each `record` is measured with timestamps. The queue family must
   /// support them.

@@ -90,7 +90,7 @@ Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStrea
     return subject.name() + ": its attributes are adjacent, with a stride of " +
            std::to_string(job.positions.stride);
   };
-  if (!batch.outputs.isOneBuffer && standsTogether(streams))
+  if (!batch.outputs.isOneBuffer && (standsTogether(streams) || standsInPairs(job)))
     return invalid(name() + ": all attributes must go to one buffer (OutputSizes::isOneBuffer)");
   if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
     return invalid(name() + ": positions must begin at a multiple of 8, not at " +
