@@ -14,7 +14,7 @@ glslang-dev glslang-tools spirv-tools
 libhwy-dev
 libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
-pkg-config libvulkan-volk-dev dpkg-dev
+pkg-config libvulkan-volk-dev dpkg-dev file
 libstb-dev fonts-dejavu-core
 libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
