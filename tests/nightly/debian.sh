@@ -110,7 +110,6 @@ inside cmake -S "/root/dermis-$version" -B /root/build -G Ninja -DCMAKE_INSTALL_
 inside cmake --build /root/build
 inside cmake --install /root/build --prefix /opt/dermis
 check /opt/dermis
-apt install dpkg-dev file
 inside cmake --build /root/build --target package
 rm -rf "$root/opt/dermis"
 # shellcheck disable=SC2086 # a list of words
