@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "dermis/cpu/skin.h"
+#include "joining_threads.h"
 #include "plain_batches.h"
 #include "timed_batches.h"
 
@@ -170,7 +171,7 @@ class CpuCrowd {
     std::vector<Result<void>> done(threads);
     const auto begin = std::chrono::steady_clock::now();
     {
-      std::vector<std::jthread> workers;
+      JoiningThreads workers;
       for (std::uint32_t thread = 0; thread < threads; ++thread) {
         const auto first = static_cast<std::uint32_t>(std::uint64_t{count} * thread / threads);
         const auto end = static_cast<std::uint32_t>(std::uint64_t{count} * (thread + 1) / threads);
@@ -178,7 +179,7 @@ class CpuCrowd {
           done[thread] = skinSome(method, first, end);
         };
         if (thread + 1 < threads) {
-          workers.emplace_back(work);
+          workers.start(work);
         } else {
           work();
         }

@@ -4,8 +4,9 @@
 #include <exception>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
+
+#include "joining_threads.h"
 
 namespace dermis::samples {
 namespace {
@@ -85,9 +86,8 @@ Result<void> TargetPool::run(const Work& work, const Task& task) {
     }
   };
   {
-    std::vector<std::jthread> others;
-    for (std::size_t worker = 1; worker < targets_.size(); ++worker)
-      others.emplace_back(serve, worker);
+    JoiningThreads others;
+    for (std::size_t worker = 1; worker < targets_.size(); ++worker) others.start(serve, worker);
     serve(0);
   }
   return tasks.result();
