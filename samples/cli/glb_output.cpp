@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -140,11 +141,10 @@ Json putPrimitive(GlbBuffer& buffer, const OutputPart& part) {
 
 /// The shortest decimal number that reads back as this float: 0.8, not 0.800000011920929.
 double shortest(float value) {
-  std::array<char, 32> digits;
-  const std::to_chars_result end = std::to_chars(digits.begin(), digits.end(), value);
-  double number = 0;
-  std::from_chars(digits.data(), end.ptr, number);
-  return number;
+  std::array<char, 32> digits{};
+  std::to_chars(digits.begin(), digits.end() - 1, value);
+  // libc++ 16 has no std::from_chars for double. Programs begin in the locale "C".
+  return std::strtod(digits.data(), nullptr);
 }
 
 template <std::size_t size>
