@@ -240,14 +240,23 @@ TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
     job.places = placeVertices(plainLayout, 4001).value();
     job.instances = {&instance, 1};
     ASSERT_TRUE(cpu::skin(job).ok());
+    const reference::SkinnedMesh expected = reference::skin(source.view(), pose, method).value();
+    // Random numbers differ between standard libraries, and with them whether rotations of a vertex
+    // are antipodal.
+    const Exemptions exemptions = exemptionsOf(expected);
+    EXPECT_LE(exemptions.onlyFinite, 4u);
+    EXPECT_EQ(exemptions.skipped, 0u);
     const Comparison comparison =
-        compareWithReference(reference::skin(source.view(), pose, method).value(),
+        compareWithReference(expected,
                              {{output.data(), 4001, 24, VertexFormat::float32x3},
                               {output.data() + 3, 4001, 24, VertexFormat::float32x3},
                               {},
-                              {}})
+                              {}},
+                             exemptions)
             .value();
-    EXPECT_TRUE(comparison.passed()) << methodName(method);
+    EXPECT_TRUE(comparison.passed())
+        << methodName(method) << ": " << comparison.worstPosition << " and "
+        << comparison.worstNormal << " of the bounds, " << exemptions.onlyFinite << " exempt";
   }
 }
 
