@@ -149,7 +149,7 @@ Parts partsOf(const math::Mat3& matrix) {
   return parts;
 }
 
-/// Those of R, for poses whose scale the kernels ignore. C may round to any R as before.
+/// Those of R, for poses whose scale the kernels ignore. R is as ambiguous as C makes it.
 Parts partsOfRotation(const Parts& parts) {
   Parts rotation;
   rotation.real = parts.real;
