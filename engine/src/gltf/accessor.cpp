@@ -170,12 +170,7 @@ void Source::checkView(std::size_t index) const {
 
 void Source::checkViews() const {
   for (std::size_t i = 0; i < content().bufferViews.size(); ++i) {
-    if (usage().views[i]) {
-      checkView(i);
-    } else {
-      notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
-                      [&] { checkView(i); });
-    }
+    notes_.tolerateUnlessUsed(usage().views[i], [&] { checkView(i); });
   }
 }
 
@@ -206,14 +201,9 @@ void Source::checkRange(int view, std::uint64_t byteOffset, std::uint64_t bytes,
 void Source::checkAccessors() {
   isFaulty_.resize(content().accessors.size());
   for (std::size_t i = 0; i < isFaulty_.size(); ++i) {
-    if (usage().accessors[i]) {
-      checkAccessor(i);
-      continue;
-    }
-    const bool good =
-        notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
-                        [&] { checkAccessor(i); });
-    isFaulty_[i] = !good || !hasBytes(content().accessors[i]);
+    const bool isUsed = usage().accessors[i];
+    const bool good = notes_.tolerateUnlessUsed(isUsed, [&] { checkAccessor(i); });
+    isFaulty_[i] = !good || (!isUsed && !hasBytes(content().accessors[i]));
   }
 }
 

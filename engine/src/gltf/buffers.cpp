@@ -103,10 +103,7 @@ std::vector<Buffer> loadBuffers(const Document& document,
   std::vector<bool> isLost(descriptions.size());
   // A buffer that nothing skinned uses may fail.
   const auto attempt = [&](std::size_t i, auto function) {
-    if (document.usage.buffers[i]) return function();
-    if (!notes.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
-                        function))
-      isLost[i] = true;
+    if (!notes.tolerateUnlessUsed(document.usage.buffers[i], function)) isLost[i] = true;
   };
   SideBuffers side(files);
   for (std::size_t i = 0; i < descriptions.size(); ++i) {

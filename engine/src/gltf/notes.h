@@ -86,6 +86,17 @@ class Notes {
     }
   }
 
+  /// Calls the function, which checks or reads an object of the file. If nothing skinned or
+  /// animated uses that object, as `tolerate`.
+  template <typename Function>
+  bool tolerateUnlessUsed(bool isUsed, Function function) {
+    if (!isUsed)
+      return tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
+                      function);
+    function();
+    return true;
+  }
+
   /// Adds a sentence for each kind: the first that was counted, and how many others there were.
   void appendTo(std::vector<std::string>& sentences) const {
     for (const Tally& tally : tallies_) {

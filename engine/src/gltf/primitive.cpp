@@ -372,13 +372,8 @@ void checkPrimitives(Source& source) {
   const auto& meshes = source.content().meshes;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     for (std::size_t j = 0; j < meshes[i].primitives.size(); ++j) {
-      const auto check = [&] { PrimitiveCheck(source, i, j).run(); };
-      if (source.usage().meshes[i]) {
-        check();
-      } else {
-        source.notes().tolerate(NoteKind::unused,
-                                "; ignored, since nothing skinned or animated uses it", check);
-      }
+      source.notes().tolerateUnlessUsed(source.usage().meshes[i],
+                                        [&] { PrimitiveCheck(source, i, j).run(); });
     }
   }
 }

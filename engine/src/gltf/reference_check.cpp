@@ -115,11 +115,7 @@ class ReferenceCheck {
   void checkUsed(const char* section, const std::vector<bool>& used, const json& placeholder,
                  Check check) {
     forEach(section, [&](json& item, const std::string& where, std::size_t i) {
-      if (used[i]) return check(item, where, i);
-      const bool good =
-          notes_.tolerate(NoteKind::unused, "; ignored, since nothing skinned or animated uses it",
-                          [&] { check(item, where, i); });
-      if (!good) item = placeholder;
+      if (!notes_.tolerateUnlessUsed(used[i], [&] { check(item, where, i); })) item = placeholder;
     });
   }
 
@@ -624,12 +620,7 @@ class ReferenceCheck {
       checkChannel(channels[i], used, join(where, " channel ", i));
     for (std::size_t i = 0; i < samplers.size(); ++i) {
       const auto check = [&] { checkSampler(samplers[i], used[i], join(where, " sampler ", i)); };
-      if (used[i]) {
-        check();
-      } else if (!notes_.tolerate(NoteKind::unused,
-                                  "; ignored, since nothing skinned or animated uses it", check)) {
-        samplers[i] = {{"input", 0}, {"output", 0}};
-      }
+      if (!notes_.tolerateUnlessUsed(used[i], check)) samplers[i] = {{"input", 0}, {"output", 0}};
     }
   }
 

@@ -82,13 +82,8 @@ void readSkins(Source& source, Model& model) {
     const tinygltf::Skin& from = content.skins[i];
     const std::string where = join("skin ", i);
     Skin skin;
-    const auto read = [&] { skin = readSkin(source, from, where); };
-    if (source.usage().skins[i]) {
-      read();
-    } else {
-      source.notes().tolerate(NoteKind::unused,
-                              "; ignored, since nothing skinned or animated uses it", read);
-    }
+    source.notes().tolerateUnlessUsed(source.usage().skins[i],
+                                      [&] { skin = readSkin(source, from, where); });
     skin.name = from.name;
     const bool oneRoot = std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {
       return roots[joint] == roots[skin.joints[0]];
