@@ -20,8 +20,8 @@ using uint = std::uint32_t;
 // BINDING_POSITIONS, and there are no results.
 DERMIS_CONSTANT BINDING_TABLES = 0u;
 DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
-// Written by the palette kernel. The skin kernel reads it; for linear blending of a batch it is the
-// joint matrices.
+// Palettes, written by the palette kernel and read by the skin kernel. For linear blending in a
+// batch, the joint matrices are bound here instead.
 DERMIS_CONSTANT BINDING_PALETTES = 2u;
 DERMIS_CONSTANT BINDING_POSITIONS = 3u;
 DERMIS_CONSTANT MIN_BINDING_COUNT = 4u;
@@ -110,9 +110,10 @@ struct MeshHeader {
   uint influences;  // InfluenceRecord
   uint centers;     // centers of rotation: 4 words for each vertex, in the layout of `normals`
   uint morphs;      // MorphRecord
-  uint dualQuaternionWeights;  // a float for each vertex. If the offset is 0, all vertices have …
-  float dualQuaternionWeight;  // … this value
-  // As dualQuaternionWeights: a float for each vertex; if 0, all have bulgeStrength.
+  // A float for each vertex. If the offset is 0, all vertices have dualQuaternionWeight.
+  uint dualQuaternionWeights;
+  float dualQuaternionWeight;
+  // A float for each vertex. If the offset is 0, all vertices have bulgeStrength.
   uint bulgeStrengths;
   float bulgeStrength;
   uint minInfluences;  // minimum influences of a vertex
@@ -126,7 +127,8 @@ struct PositionRecord {
   float x;
   float y;
   float z;
-  // Number of the first unit of its influences × 2, plus 1 if the last influence is padding.
+  // 2 × i, where i is the index of its first unit in the section of influences. Plus 1 if the last
+  // influence is padding.
   uint influences;
 };
 DERMIS_CONSTANT VERTEX_WORDS = 4u;
@@ -162,16 +164,16 @@ struct MorphBlockRecord {
 };
 DERMIS_CONSTANT MORPH_BLOCK_WORDS = 4u;
 
-// ---- Records. A struct of scalars has the same layout in C++ and in std430. tables.glsl has a
-// loader for each. NAME_WORDS is the size. The tables are one buffer of words; records begin at
-// multiples of four words.
+// ---- Records. A struct of scalars has the same layout in C++ and in std430. NAME_WORDS is the
+// size of a record in the tables or in a packed mesh. The tables are one buffer of words. Records
+// in it begin at multiples of four words, except ActiveMorph and CandidateRecord.
 
 // A pose that the palette kernel converts. Offsets into the poses and palettes buffers count units
 // of 16 bytes.
 struct PaletteRecord {
   uint matrices;  // the first joint matrix; each has 3 units
   // The palette: a status, then the joints, then the scale and shear parts of the joints if the
-  // pose may scale.
+  // pose may scale. For linear blending in a scene: only the joint matrices.
   uint place;
   uint jointCount;
   uint reserved;
@@ -203,8 +205,8 @@ struct GroupRecord {
   uint normalStride;
   uint tangentStride;
   uint previousStride;
-  // 1 if each word of the instance records increases by the same value from record to record. With
-  // snorm16 positions, also all boxes must be equal.
+  // If 1, the difference of each word of the instance records is constant from record to record.
+  // With snorm16 positions, all boxes are then also equal.
   uint evenlySpaced;
 };
 DERMIS_CONSTANT GROUP_WORDS = 12u;
@@ -252,15 +254,16 @@ struct ExtensionRecord {
 };
 DERMIS_CONSTANT EXTENSION_WORDS = 16u;
 
-// An active morph target. Two are in a unit, by ascending target.
+// An active morph target. The targets of an instance are sorted by `target`.
 struct ActiveMorph {
   uint target;
   float weight;
 };
 DERMIS_CONSTANT ACTIVE_MORPH_WORDS = 2u;
 
-// The bounds of the skinned positions of an instance. The same as InstanceResult: minimum and
-// maximum are integers that compare like the floats.
+// The result of an instance: the bounds of its skinned positions, and the number of clamped
+// vertices. The same as InstanceResult. Minimum and maximum are integers that compare like the
+// floats.
 struct ResultRecord {
   uint minX;
   uint minY;
@@ -278,8 +281,8 @@ struct ResultRecord {
 // One for each such instance, in the order of the instance records.
 struct CandidateRecord {
   uint slot;  // index into the visibility and history buffers
-  // Identifies the vertices that the slot should hold. No two instances, and no two states of one
-  // instance, have the same version.
+  // Identifies the skinned state that the output should have. No two instances, and no two states
+  // of one instance, have the same version.
   uint version;
 };
 DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
@@ -339,7 +342,7 @@ struct SkinPush {
   uint groupCount;
   uint workgroupCount;
   uint instances;               // word offset of the instance records
-  uint instancesPerInvocation;  // 1 to CONSTANT_INSTANCES
+  uint instancesPerInvocation;  // 1 to the value of CONSTANT_INSTANCES
   uint verticesPerInvocation;   // used only with texel buffers
 };
 struct VisibilityPush {
@@ -348,7 +351,7 @@ struct VisibilityPush {
   uint candidates;     // word offset of the candidate records
   uint instances;      // word offset of the instance records
   uint firstInstance;  // number of the first instance that is culled on the GPU
-  uint frame;          // number of this frame, counting the frames that were committed
+  uint frame;          // 1 + the number of earlier frames that were committed and not abandoned
   uint dispatches;     // word offset of the CulledDispatchRecords
   uint arguments;      // word offset of the IndirectRecords
   uint maxWorkgroups;  // maximum workgroups in x

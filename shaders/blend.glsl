@@ -55,7 +55,7 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
 // A vertex without influences stays in bind pose.
 Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
   // All loaded influences of such a vertex are joint 0. Most meshes have no such vertex: selecting the result afterwards costs less
-  // than a branch around everything, except for methods that iterate until they converge.
+  // than a branch around everything. Comparison methods branch, since some of them iterate until they converge.
 #ifdef COMPARISON
   const bool branches = true;
 #else

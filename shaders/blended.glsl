@@ -40,8 +40,8 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;
   skinned.position = position;
-  // The handedness is that of the dual quaternions, whose scale parts contain mirrors. If joints cancel, that of linear blending
-  // may differ.
+  // The handedness is that of the dual quaternions, whose scale parts contain the reflections. If the joints have nearly opposite
+  // rotations, linear blending may give the other handedness.
   if (withNormal) {
     precise vec3 normal = rest * straight.normal + share * skinned.normal;
     skinned.normal = unitOr(normal, skinned.normal);

@@ -22,7 +22,7 @@ vec3 linearPoint(Influences influences, Pose pose, vec3 point) {
   return sum;
 }
 
-// v' = Q S (v − c) + Σ w (R S c + t)
+// v' = Q S (v − c) + Σ w_j (R_j S_j c + t_j), where Q and S are blended.
 Vertex skinCenterOfRotation(Vertex vertex, Influences influences, Pose pose, vec3 center, bool withNormal, bool withTangent) {
   Blend blend = blendJoints(influences, pose);
   precise vec3 lever = vertex.position - center;

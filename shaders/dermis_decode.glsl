@@ -14,7 +14,8 @@ vec3 dermisDecodeOctahedral(vec2 stored) {
 }
 
 // A tangent of unit length from octahedral16x2 (`largest` is 32767) or octahedral8x2 (127); w is the handedness. `stored` is read
-// as snorm. The sign of its second component is the handedness; its absolute value, from 1 to `largest`, is the coordinate.
+// as snorm. The sign of its second component is the handedness. The absolute value of that component times `largest`, an integer
+// from 1 to `largest`, encodes the coordinate from -1 to 1.
 vec4 dermisDecodeOctahedralTangent(vec2 stored, float largest) {
   float handedness = stored.y < 0.0 ? -1.0 : 1.0;
   float y = (abs(stored.y) * largest - 1.0) / (largest - 1.0) * 2.0 - 1.0;

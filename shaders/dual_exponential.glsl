@@ -1,11 +1,12 @@
-// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix). They are polynomials, because the accuracy of
-// built-in sine and arc tangent differs between drivers.
+// Logarithm and exponential of unit dual quaternions (Kavan et al. 2008, appendix). They use polynomials instead of built-in sine
+// and arc tangent, whose accuracy differs between drivers.
 #ifndef DERMIS_DUAL_EXPONENTIAL_GLSL
 #define DERMIS_DUAL_EXPONENTIAL_GLSL
 
 #include "exact.glsl"
 
-// A pure dual quaternion: half the angle about a screw axis, and half the distance along it.
+// The logarithm of a unit dual quaternion. `real`: half the angle times the direction of the screw axis. `dual`: half the distance
+// along the axis times its direction, plus half the angle times its moment.
 struct Screw {
   vec3 real;
   vec3 dual;

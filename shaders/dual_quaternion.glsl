@@ -49,7 +49,7 @@ Blend blendJoints(Influences influences, Pose pose) {
 }
 
 // Since weights sum to 1, the blended part is the pivot's part plus the weighted differences of the others. If no joint of the
-// vertex scales, this is exactly 1, so the vertex has the same bits as with a palette in which no joint scales.
+// vertex scales, it is exactly the identity, so the vertex has the same bits as with a palette in which no joint scales.
 ScaleShear addScaleShear(ScaleShear blend, ScaleShear pivot, float weight, Pose pose, uint joint) {
   ScaleShear part = paletteScaleShear(pose, joint);
   precise vec3 diagonal = blend.diagonal + weight * (part.diagonal - pivot.diagonal);
@@ -127,7 +127,7 @@ Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation, bool
   return skinned;
 }
 
-// The translation of a dual quaternion of any length except 0. The division by the squared length replaces normalizing.
+// The translation of a dual quaternion of any length except 0. `factor` is 2 / |real|², so `real` need not be normalized.
 vec3 translationOf(vec4 real, vec4 dual, float factor) {
   precise vec3 translation = (real.w * dual.xyz - dual.w * real.xyz + cross3(real.xyz, dual.xyz)) * factor;
   return translation;

@@ -1,5 +1,6 @@
 // Arithmetic that a compiler may not reorder. Compilers may compute built-in dot, cross and normalize in any order, and differently
-// in each specialization of a kernel. So every sum that affects an output is written out here.
+// in each specialization of a kernel. So kernels write out every floating-point sum that affects an output, and compute it as
+// `precise`.
 #ifndef DERMIS_EXACT_GLSL
 #define DERMIS_EXACT_GLSL
 

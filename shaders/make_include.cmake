@@ -1,9 +1,9 @@
-# Makes one GLSL file that an engine can include: replaces each #include by the included file, once, and puts `dermis_` before the
-# name of every function, struct and constant that does not begin with it already.
+# Makes one GLSL file that an engine can include. Replaces the first #include of each file by its text, and removes the others. Puts
+# `dermis_` before the name of every function, struct and constant that does not begin with "dermis", "Dermis" or "DERMIS" already.
 #
 #   cmake -DINPUT=shaders/skin_include.glsl -DOUTPUT=dermis_skin.glsl -P make_include.cmake
 #
-# Finds names by the layout of the kernels' sources: at the beginning of a line.
+# Finds a declaration only at the beginning of a line, where the kernels' sources have all that are not in a function.
 
 cmake_minimum_required(VERSION 3.25)
 get_filename_component(folder ${INPUT} DIRECTORY)
@@ -52,7 +52,7 @@ foreach(name IN LISTS names)
   endforeach()
 endforeach()
 string(STRIP "${text}" text)
-# A shader that includes abi.h, too, has those names without a prefix as well.
+# A shader may also include abi.h, which declares the same names without the prefix.
 string(REPLACE "DERMIS_ABI_H" "DERMIS_SKIN_ABI_H" text "${text}")
 
 string(REPLACE "@open@" "[" text "${text}")

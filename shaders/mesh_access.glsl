@@ -1,4 +1,5 @@
-// Reads a packed mesh: data of every vertex in units of four words, all other data in words.
+// Reads a packed mesh: header, vertices, influences and morph records in units of four words; displacements, dual-quaternion
+// weights and bulge strengths in words.
 #ifndef DERMIS_MESH_ACCESS_GLSL
 #define DERMIS_MESH_ACCESS_GLSL
 
@@ -72,7 +73,7 @@ const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
 // Whether a vertex with `count` influences has this one. A constant if FULL.
 bool hasSlot(uint count, uint slot) { return FULL || slot < count; }
 
-// The influences of one vertex: the loaded ones, and the place of all of them.
+// The influences of one vertex: the loaded ones, the first unit of all of them, and their number.
 struct Influences {
   uint unit;
   uint count;

@@ -22,7 +22,7 @@ bool findDisplacement(uint mesh, MorphRecord target, uint vertex, out uint word)
   return true;
 }
 
-// `first` is the word offset of the active targets in the tables, which are in ascending order.
+// `number` is the index of the vertex. The active targets begin at word `first` of the tables, sorted by target.
 void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint count, bool withNormal, bool withTangent) {
   precise vec3 position = vertex.position;
   precise vec3 normal = vertex.normal;

@@ -1,5 +1,5 @@
 // Stores skinned attributes. Each attribute has its own binding; several bindings may refer to the same buffer. With ONE_OUTPUT,
-// all attributes use one binding, for devices that permit only few storage buffers per stage.
+// all attributes use one binding, for devices that allow only a few storage buffers per stage.
 #ifndef DERMIS_OUTPUT_ACCESS_GLSL
 #define DERMIS_OUTPUT_ACCESS_GLSL
 

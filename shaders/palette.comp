@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Converts joint matrices (3×4) to unit dual quaternions and, if poses may scale, the scale and shear parts of joints that are not
-// rigid. One workgroup converts one palette, so that the status of the whole palette needs no second pass.
+// Converts joint matrices (3×4) to unit dual quaternions and, if poses may scale, to scale and shear parts (the identity for rigid
+// joints). One workgroup converts one palette, so that the status of the whole palette needs no second pass.
 //   LOGARITHMS      converts to logarithms of the rigid parts instead of dual quaternions
 
 #include "abi.h"
@@ -62,8 +62,8 @@ vec4 scaleShearUnit(ScaleShear part, uint number) {
   return number == 0u ? vec4(part.diagonal, part.mixed.x) : vec4(part.mixed.yz, 0.0, 0.0);
 }
 
-// There is one load and one store, each in a loop: lavapipe compiles every load and store into a loop over lanes, and that is most
-// of the time to compile this kernel.
+// The loop over joints has one load and one store, each in an inner loop: lavapipe compiles every load and store into a loop over
+// lanes, which takes most of the compile time of this kernel.
 void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;

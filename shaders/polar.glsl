@@ -33,8 +33,8 @@ void turnJacobi(inout float app, inout float aqq, inout float apq, inout float a
 }
 
 // The rotation nearest to a matrix, as a unit quaternion: the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix (Horn
-// 1987, "Closed-form solution of absolute orientation using unit quaternions"). It is also the right rotation for a matrix of rank
-// 2, and finite for any matrix. Computed by cyclic Jacobi; `refineRotation` makes it accurate.
+// 1987, "Closed-form solution of absolute orientation using unit quaternions"). It is also correct for a matrix of rank 2, and
+// finite for any matrix. Computed by cyclic Jacobi; `refineRotation` makes it accurate.
 vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   precise float xx = r0.x - r1.y - r2.z;
   precise float yy = -r0.x + r1.y - r2.z;
@@ -52,7 +52,7 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   vec4 vw = vec4(0.0, 0.0, 0.0, 1.0);
 
   // A sweep is three turns. Each turn rotates the pairs xy and zw, and then y, z and w change places. Convergence is quadratic:
-  // most matrices need four or five sweeps.
+  // most matrices need two to four sweeps.
   [[dont_unroll]] for (uint turn = 0u; turn < 24u; ++turn) {
     precise float outside = abs(xy) + abs(xz) + abs(xw) + abs(yz) + abs(yw) + abs(zw);
     precise float inside = abs(xx) + abs(yy) + abs(zz) + abs(ww);
@@ -83,8 +83,8 @@ vec4 nearestRotation(vec3 r0, vec3 r1, vec3 r2) {
   return unitQuaternion(q);
 }
 
-// Adds a b to a sum that is stored as two floats, without rounding errors. The product is split by Dekker's method (1971, "A
-// floating-point technique for extending the available precision"), the sum by Knuth's.
+// Adds the product a b to a sum that is stored as two floats: the rounding errors of product and sum go to `rest`. The product is
+// split by Dekker's method (1971, "A floating-point technique for extending the available precision"), the sum by Knuth's.
 void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
   precise vec4 product = a * b;
   precise float wideA = 4097.0 * a;
@@ -103,11 +103,11 @@ void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
 }
 
 // The residual of q as an eigenvector of Horn's matrix H of C (see `nearestRotation`): H q − (q · H q) q. If C stretches by 1000,
-// the residual is a millionth of the terms, and more than one digit of it is needed.
+// the residual is a millionth of the terms. Plain floats would leave one digit of it, and more are needed.
 vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 sum = vec4(0.0);
   vec4 rest = vec4(0.0);
-  // The second and third row are like the first, with x, y and z rotated.
+  // The second and third rows are like the first, with x, y and z permuted cyclically.
   [[dont_unroll]] for (uint axis = 0u; axis < 3u; ++axis) {
     addExactly(sum, rest, r0.x, vec4(q.x, -q.y, -q.z, q.w));
     addExactly(sum, rest, r0.y, vec4(q.y, q.x, -q.w, -q.z));
@@ -125,8 +125,8 @@ vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return residual;
 }
 
-// The symmetric part of Rᵀ C. Its columns are those of C, rotated back. q has length 1 except for rounding errors, so 2 / |q|² is
-// nearly 2 (2 − |q|²).
+// The symmetric part of Rᵀ C. The columns of Rᵀ C are the columns of C, rotated back. q has length 1 except for rounding errors, so
+// 2 / |q|² is nearly 2 (2 − |q|²).
 ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 back = vec4(-q.xyz, q.w);
   precise float factor = 2.0 * (2.0 - dot4(q, q));
@@ -137,10 +137,10 @@ ScaleShear scaleShearOf(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return ScaleShear(vec3(s0.x, s1.y, s2.z), mixed);
 }
 
-// Newton's method for the polar decomposition: improves q and computes S. For the right R, Rᵀ C is symmetric. If the current
-// rotation is R' = R (1 − [ω]×), the antisymmetric part of R'ᵀ C is the vector (tr S − S) ω. The residual, rotated back, is that
-// vector. Each step solves for ω. Without these steps the rotation would have an error of a few roundings times σ₁ / (σ₂ + σ₃).
-// Vertices with several joints would show it.
+// Newton's method for the polar decomposition: improves q and computes S. For the exact R, Rᵀ C is symmetric. If the current
+// rotation is R' = R (1 − [ω]×), then R'ᵀ C − Cᵀ R' is [(tr S − S) ω]×. The residual, rotated back, is the vector (tr S − S) ω.
+// Each step solves for ω. Without these steps the rotation would have an error of a few roundings times σ₁ / (σ₂ + σ₃). Vertices
+// with several joints would show it.
 ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   ScaleShear s;
   uint left = 3u;
@@ -169,8 +169,8 @@ ScaleShear refineRotation(inout vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   return s;
 }
 
-// The determinant of a matrix, given by its rows. `magnitude` is the sum of the absolute values of all products: its rounding error
-// is relative to that.
+// The determinant of a matrix, given by its rows. `magnitude` is the sum of the absolute values of all products. The bound of the
+// determinant's rounding error is proportional to it.
 float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   vec3 c = cross3(r1, r2);
   precise vec3 uncancelled = abs(r1.yzx * r2.zxy) + abs(r1.zxy * r2.yzx);

@@ -1,4 +1,4 @@
-// Quaternions are x, y, z, w, with the product of Hamilton.
+// Quaternions are (x, y, z, w), with w the scalar, and are multiplied by the Hamilton product.
 #ifndef DERMIS_QUATERNION_GLSL
 #define DERMIS_QUATERNION_GLSL
 
@@ -9,10 +9,11 @@ vec4 unitQuaternion(vec4 q) {
   return unit;
 }
 
-// The unit quaternion of a matrix C that is nearly a rotation, given by its rows. The first guess is the column of the symmetric
-// matrix below that has the largest of the four squared components (Shepperd 1978). For a rotation all columns are multiples of the
-// quaternion. If C is not quite orthogonal, the error of the guess is up to 1.25 times the largest row sum of CᵀC − 1. A step of
-// the power method squares this error, so that the result is the rotation of the polar decomposition.
+// The unit quaternion of a matrix C that is nearly a rotation, given by its rows. For a rotation, all columns of the symmetric
+// matrix below are multiples of the quaternion, and its diagonal is 4x², 4y², 4z², 4w². The first guess is the column with the
+// largest diagonal entry (Shepperd 1978). If C is not quite orthogonal, the rotation of the guess is off by at most √5 / 2 times
+// the largest sum of absolute values in a row of CᵀC − 1. A step of the power method leaves less than the square of that sum, so
+// that the result is the rotation of the polar decomposition.
 vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
   precise float x = 1.0 + r0.x - r1.y - r2.z;
   precise float y = 1.0 - r0.x + r1.y - r2.z;
@@ -43,7 +44,7 @@ vec3 rotateBy(vec4 q, float factor, vec3 v) {
   return turned;
 }
 
-// The dual part of a rigid transform: ½ (0, t) q.
+// The dual part of a rigid transform: ½ (t, 0) q.
 vec4 dualPart(vec4 q, vec3 t) {
   precise vec3 vector = 0.5 * (q.w * t + cross3(t, q.xyz));
   precise float scalar = -0.5 * dot3(t, q.xyz);

@@ -7,7 +7,7 @@
 
 #ifdef ONE_OUTPUT
 
-// There is no buffer for results, and no plan has any.
+// There is no results buffer, and no plan has results.
 void clearResult(uint result) {}
 void addToBounds(uint result, vec3 position) {}
 void countClamped(uint result) {}
@@ -49,8 +49,8 @@ ResultBox resultBox(uint result) {
 #endif
 }
 
-// Most positions do not change the box, so it is cheaper to compare first. The values that are read may be outdated, but then the
-// box is only larger now.
+// Most positions do not change the box, so it is cheaper to compare first. The values that are read may be out of date. Since a box
+// only grows, this costs at most a needless atomic operation.
 #define ADD_EXTREME(least, greatest, bits, before, after, value) \
   if (!isNan(value)) {                                           \
     if (bits < (before)) atomicMin(least, bits);                 \

@@ -1,10 +1,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Skins vertices. A workgroup processes consecutive vertices of one mesh. Each invocation skins its vertex for several instances of
-// that mesh, so that a vertex is read once. Macros select the features of a module (CMakeLists.txt lists the modules). With all
-// features in one module, drivers would take several times as long to create each pipeline. The macros:
-//   HALVES, BYTES   attributes may begin at any 2 bytes, or any byte (needs features of the device)
+// Skins vertices. A workgroup processes consecutive vertices of one mesh. Each invocation skins a vertex (with TEXELS, one or more)
+// for up to INSTANCES instances of that mesh, so that a vertex is read once for all of them. Macros select the features of a module
+// (CMakeLists.txt lists the modules). With all features in one module, drivers would take several times as long to create each
+// pipeline. The macros:
+//   HALVES, BYTES   attributes may begin at multiples of 2 bytes (requires storage16Bit), or at any byte (also storage8Bit)
 //   EXTRAS          previous positions and results; separate modules, since layers and drivers treat everything that a module
 //                   declares as used, whatever its specialization constants are
 //   BULGE           the methods that reduce the bulge (blended, center of rotation, bulge-controlled), instead of linear and dual
@@ -109,7 +110,7 @@ uint findGroup(uint number) {
   return low;
 }
 
-// `first` receives the place of the influences.
+// `first` receives PositionRecord::influences.
 Vertex bindVertex(Sections sections, uint vertex, out uint first) {
   Vertex bind = Vertex(vec3(0.0), vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0));
   PositionRecord position = loadPosition(sections.positions + vertex);
@@ -265,8 +266,8 @@ void skinInstance(Instance instance, Work work, bool scales) {
 }
 
 // Whether instances with scaling joints have their own loop. lavapipe predicates instead of branching, so without that loop rigid
-// instances pay for the scale, too. The second loop takes longer to compile. Comparison methods do without it, and so do
-// invocations with few instances (the default for GPUs, which branch).
+// instances pay for the scale, too. A second loop lengthens compilation. Comparison methods, MOTION_RESKINNED and invocations with
+// few instances (the default for GPUs, which branch) do without it.
 #ifdef COMPARISON
 const bool APART = false;
 #elif defined(HAS_MOTION)
@@ -306,8 +307,8 @@ void main() {
 #else
   const uint vertices = 1u;
 #endif
-  // Workgroups process all vertices for some instances, then all vertices for the next instances, so that palettes stay in the
-  // cache.
+  // Consecutive workgroups process all vertices for some instances, then all vertices for the next instances, so that palettes stay
+  // in the cache.
   uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x * vertices + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED

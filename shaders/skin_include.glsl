@@ -14,8 +14,8 @@
 //
 // Parameters of the functions:
 // - `mesh` is the byte offset of the packed mesh in its buffer, divided by 4.
-// - `palette` is Plan::paletteOffset, divided by 16; for linear, PoseDescription::matrixOffset, divided by 16. A pose that no job
-//   uses is converted only if PoseDescription::isReadByShaders is set.
+// - `palette` is Plan::paletteOffset, divided by 16; for linear, PoseDescription::matrixOffset, divided by 16. If no job needs the
+//   dual quaternions of a pose, it is converted to them only if PoseDescription::isReadByShaders is set.
 // - `jointCount` is the number of joints of the pose.
 //
 // Morph targets are not applied: an engine adds them between dermisBindVertex and dermisSkinVertex.
@@ -75,7 +75,8 @@ DermisVertex dermisBindVertex(uint mesh, uint vertex) {
   return bind;
 }
 
-// Skins a vertex. The result is in the space of the joint matrices. Its directions have unit length, the handedness is 1 or -1.
+// Skins a vertex. The joint matrices map bind space to the space of the result. The directions of the result have unit length, or
+// are zero if those of `bind` are zero. The handedness is 1 or -1.
 DermisVertex dermisSkinVertex(DermisVertex bind, uint mesh, uint vertex, uint palette, uint jointCount) {
   Sections sections = sectionsOf(mesh);
   uint first = loadPosition(sections.positions + vertex).influences;
@@ -86,7 +87,7 @@ DermisVertex dermisSkinVertex(DermisVertex bind, uint mesh, uint vertex, uint pa
   return DermisVertex(skinned.position, skinned.normal, skinned.tangent);
 }
 
-// Both in one.
+// Calls dermisBindVertex, then dermisSkinVertex.
 DermisVertex dermisSkin(uint mesh, uint vertex, uint palette, uint jointCount) {
   return dermisSkinVertex(dermisBindVertex(mesh, vertex), mesh, vertex, palette, jointCount);
 }

@@ -37,8 +37,7 @@ void addRow(inout System system, vec4 row) {
   eliminate(system.r2, row, 2u);
 }
 
-// One-sided Jacobi: rotates two columns so that they are orthogonal, and va and vb with them. Returns false if they were
-// orthogonal.
+// One-sided Jacobi: rotates two columns so that they are orthogonal, and va and vb with them. Returns false if they already were.
 bool orthogonalize(inout vec3 a, inout vec3 b, inout vec3 va, inout vec3 vb) {
   precise float alpha = dot3(a, a);
   precise float beta = dot3(b, b);

@@ -8,13 +8,15 @@ struct Vertex {
   vec3 position;
   vec3 normal;   // of unit length; zero if there is none
   vec4 tangent;  // the same; w is the handedness, 1 or -1
-  // As the mesh stores them, without normalizing. Scaling starts from these: a direction that is normalized, transformed by a joint
-  // that does not scale, and normalized again would differ in its last bits from one that is normalized once.
+  // The directions before normalizing: from the mesh, plus morph displacements. Scaling starts from these: a direction that is
+  // normalized, transformed by a joint that does not scale, and normalized again would differ in its last bits from one that is
+  // normalized once.
   vec3 givenNormal;
   vec3 givenTangent;
 };
 
-// Called once for all instances: a method that only rotates a vertex need not normalize.
+// Called before the loop over instances or, with morph targets, for each instance. A method that only rotates a vertex need not
+// normalize again.
 void makeDirectionsUnit(inout Vertex vertex, bool withNormal, bool withTangent) {
   vertex.givenNormal = vertex.normal;
   vertex.givenTangent = vertex.tangent.xyz;

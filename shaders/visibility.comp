@@ -34,7 +34,7 @@ uint wordOfInstance(uint number) { return push.instances + number * INSTANCE_WOR
 // Whether the skin kernel must process an instance. The flags in `instance.joints` say how.
 //
 // A slot may have the history of an earlier instance. This does no harm. No two instances have the same version, so a new instance
-// is skinned. It restarts its motion in the first frame in which it is listed here. If it is not visible then, the last visible
+// is skinned. It restarts its motion in the first frame in which it is a candidate. If it is not visible then, the last visible
 // frame of the slot is an earlier one, so motion restarts when it becomes visible.
 bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
   uint slot = candidate.slot;
@@ -46,7 +46,7 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
     history[slot].version = candidate.version;
     atomicAdd(counters.skinned, 1u);
     if ((instance.joints & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
-    // If the instance was out of view, its old positions are not the previous ones.
+    // If the instance was not visible in the previous frame, its stored positions may not be those of that frame.
     if (!wasVisible && (instance.joints & INSTANCE_HAS_MOTION) != 0u) instance.joints |= INSTANCE_RESTARTS;
     // If motion restarts, previous positions are equal to positions: there is nothing to settle.
     history[slot].moves = (instance.joints & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
@@ -105,7 +105,8 @@ void countWorkgroups(uint word, uint arguments) {
     storeGroup(place, group);
   }
   uint maxWorkgroups = push.maxWorkgroups;
-  // `maxWorkgroups` may be 2³² − 1. Workgroups and rows are at most 2³¹ each (PlanBuilder::addDispatch).
+  // `maxWorkgroups` may be 2³² − 1, so adding it before the division could overflow. Workgroups and rows are at most 2³¹ each, so
+  // adding these cannot (PlanBuilder::addDispatch).
   uint rows = workgroups / maxWorkgroups + (workgroups % maxWorkgroups != 0u ? 1u : 0u);
   storeIndirect(arguments, IndirectRecord(rows == 0u ? 0u : (workgroups + rows - 1u) / rows, rows, 1u, 0u));
   atomicAdd(counters.workgroups, workgroups);

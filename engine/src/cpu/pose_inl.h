@@ -54,8 +54,8 @@ HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
   return hn::And(hn::Gt(dot3(j.r0, cross3(j.r1, j.r2)), hn::Zero(d)), near);
 }
 
-/// The unit quaternion of a matrix that is nearly a rotation: a first guess from the largest of the
-/// four squared components (Shepperd 1978), then one step of the power method.
+/// The unit quaternion of a matrix that is nearly a rotation: a first guess from the component of
+/// the quaternion with the largest square (Shepperd 1978), then one step of the power method.
 template <class D>
 HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
   const Vec<D> one = hn::Set(d, 1.0f);

@@ -1,6 +1,6 @@
-// The visible part of the light. The key light has a penumbra that grows with the distance of the occluder. The sky consists of
-// many weak lights, each with its own shadow map. Together they give ambient light with occlusion by nearby surfaces: dark under
-// the chin, between the legs, and where a foot meets the ground.
+// Visibility of the lights. The key light has a penumbra that grows with the distance to the occluder. The sky consists of many
+// weak lights, each with its own shadow map. Together they give ambient light with occlusion by nearby surfaces: dark under the
+// chin, between the legs, and where a foot meets the ground.
 #ifndef DERMIS_RENDER_LIGHTING_GLSL
 #define DERMIS_RENDER_LIGHTING_GLSL
 
@@ -80,7 +80,8 @@ vec2 skyLight(vec3 position, vec3 normal, float radius) {
   return light;
 }
 
-// The background as displayed, in linear values: lighter at the horizon, darker above and below.
+// The background as displayed, in linear values: a radial gradient from `horizonColor`, a little below the center, to
+// `zenithColor`.
 vec3 backgroundAt(vec2 pixel) {
   vec2 place = (pixel - view.viewport.xy) / view.viewport.zw;
   vec2 fromCenter = place - vec2(0.5, 0.62);

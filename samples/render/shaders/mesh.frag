@@ -28,7 +28,7 @@ vec3 surfaceNormal() {
   return gl_FrontFacing ? normal : -normal;
 }
 
-// From low to high values: slate, teal, yellow, red.
+// From low to high values: slate, teal, green, yellow, red.
 vec3 heat(float value) {
   const vec3 stops[5] = vec3[](vec3(0.10, 0.13, 0.22), vec3(0.05, 0.32, 0.42), vec3(0.25, 0.60, 0.30),
                                vec3(0.90, 0.65, 0.10), vec3(0.75, 0.05, 0.03));

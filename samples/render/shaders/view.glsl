@@ -14,15 +14,19 @@ layout(std140, set = 0, binding = 0) uniform View {
   vec4 keyDirection;                // towards the light; w: tangent of its angular radius
   vec4 keyColor;                    // reflected by a white surface that faces the light
   vec4 skyColor;                    // reflected by a white surface under the whole sky
-  vec4 bounceColor;                 // reflected by a white surface above the ground
+  vec4 bounceColor;                 // reflected by a white surface that faces the ground
   vec4 rimDirection;                // towards the rim light; w: its strength
-  vec4 shadow;                      // key: texel, depth range; sky: texel (lengths in the world); w: 1 / map size
-  vec4 sky;                         // x: number of lights, y: 1 / map size; z: widest penumbra of the key light, w: of the sky, as a part of its map
+  vec4 shadow;                      // x: key texel, y: key depth range, z: sky texel (world units);
+                                    // w: 1 / size of the key map
+  vec4 sky;                         // x: number of lights, y: 1 / size of their maps;
+                                    // z: widest penumbra of the key light, in world units;
+                                    // w: filter radius of the sky on the ground, as a fraction of its map
   vec4 horizonColor;                // of the background, as displayed, in linear values
   vec4 zenithColor;
   vec4 ground;                      // center; w: radius at which it has faded into the background
   vec4 viewport;                    // origin and size in pixels
-  vec4 haze;                        // x: distance at which it begins, y: 1 / distance to the maximum, z: maximum
+  vec4 haze;                        // x: distance at which it begins,
+                                    // y: 1 / (distance from there to the maximum), z: maximum
 } view;
 
 #endif

@@ -499,7 +499,7 @@ void PlanBuilder::writeInstances() {
 
 namespace {
 
-/// Whether each word increases by the same amount from record to record.
+/// Whether the difference of each word from record to record is constant.
 bool areEvenlySpaced(std::span<const std::uint32_t> records) {
   if (records.size() < 2 * abi::INSTANCE_WORDS) return false;
   std::array<std::uint32_t, abi::INSTANCE_WORDS> expected, step;
