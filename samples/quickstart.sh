@@ -1,6 +1,6 @@
 #!/bin/sh
-# From a fresh clone to a skinned figure and a crowd, proven right: installs what is missing, builds, skins the figure on a Vulkan
-# device (on a machine without a GPU: Mesa's lavapipe), compares every vertex with the reference, and draws two pictures.
+# From a fresh clone to a verified skinned figure and crowd: installs what is missing, builds, skins the figure on a Vulkan device
+# (on a machine without a GPU: Mesa's lavapipe), compares every vertex with the reference, and draws two pictures.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -11,7 +11,7 @@ log=build/quickstart.log
 mkdir -p build
 if ! { cmake --preset release -DDERMIS_BUILD_TESTS=OFF && cmake --build build/release; } >"$log" 2>&1; then
   tail -n 40 "$log" >&2
-  echo "quickstart: the build failed; all that it printed is in $log" >&2
+  echo "quickstart: the build failed; its output is in $log" >&2
   exit 1
 fi
 
@@ -26,7 +26,7 @@ echo
 echo "The Vulkan devices of this machine:"
 "$dermis" devices
 echo
-echo "Skinning the figure's walk, 8 poses with dual quaternions, on the best of them ..."
+echo "Skinning the figure's walk, 8 poses with dual quaternions, on the best device ..."
 "$dermis" skin "$models/figure.glb" --animation walk --frames 8 --fps 8 -o "$out/figure-%02d.ply"
 echo "The methods side by side, as numbers and as a picture ..."
 "$dermis" compare "$models/figure.glb" --animation wave --time 1.2 --json "$out/compare.json" \
@@ -43,7 +43,7 @@ echo
 echo "The methods side by side, a picture:             $out/compare.png"
 echo "A crowd, a picture:                              $out/crowd.png"
 echo "The skinned figure (open it in any mesh viewer): $out/figure-00.ply ... figure-07.ply"
-echo "What was compared, and how near it came:         $out/verify.json"
+echo "What was compared, and the errors:               $out/verify.json"
 echo "What the crowd cost:                             $out/crowd.json"
 echo "To turn the figure around in a window:           $viewer $models/figure.glb"
 echo "The command to try on models of your own:        $dermis --help"

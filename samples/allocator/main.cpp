@@ -120,8 +120,8 @@ class Allocator {
     vkFreeMemory(engine_.device, allocation.memory, nullptr);
   }
 
-  std::uint32_t buffers = 0;  ///< that exist now
-  std::uint64_t bytes = 0;    ///< that were ever allocated
+  std::uint32_t buffers = 0;  ///< number of buffers that exist now
+  std::uint64_t bytes = 0;    ///< total size of all buffers that were created
 
  private:
   const Engine& engine_;
@@ -230,7 +230,7 @@ int main() {
     std::uint32_t submitted = 0;
     for (std::uint32_t frame = 1; frame <= frameCount; ++frame) {
       must(scene.beginFrame(frame, submitted));
-      if (frame <= lostFrame) {  // it rests from then on
+      if (frame <= lostFrame) {  // after the lost frame the pose does not change
         const float angle = 0.5f * static_cast<float>(frame);
         pose[1] = {{{std::cos(angle), 0, std::sin(angle), 0},
                     {0, 1, 0, 0},

@@ -39,9 +39,10 @@ struct Crowd {
   std::vector<SkinRequest> requests(Method method, std::uint32_t count) const;
 };
 
-/// Joins all primitives of a file that the first one's skin moves to one mesh. Makes
-/// `instanceCount` instances, each at a different time of the file's first clip. Fails if the file
-/// has no skinned primitive, or one without normals or with other than four influences per vertex.
+/// Joins all primitives that use the skin of the first one into one mesh. Makes `instanceCount`
+/// instances, each at a different time of the file's first clip. Fails if the file has no skinned
+/// primitive, or if one of the joined primitives has no normals, or does not have four influences
+/// per vertex.
 Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
 
 /// A long figure of 60 joints with four influences per vertex. The joints of a vertex are

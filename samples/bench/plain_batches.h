@@ -20,8 +20,8 @@ namespace dermis::samples {
 enum class PlainKernel : std::uint8_t { dualQuaternion, linear, copy };
 inline constexpr std::size_t plainKernelCount = 3;
 
-/// A crowd on a device. Each kernel skins it into the same memory. The number of dispatches is that
-/// of the storage buffer ranges that the output needs; each has whole instances.
+/// A crowd on a device. Each kernel skins it into the same memory. There is one dispatch for each
+/// storage buffer range that the output needs; each range holds whole instances.
 class PlainBatches {
  public:
   /// Skins the crowd once with each kernel, so that drivers have compiled and memory has been

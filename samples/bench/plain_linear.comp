@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push {
   uint vertexCount;
   uint jointCount;
-  uint firstInstance;  // of this dispatch, in the matrices; its output begins the range
+  uint firstInstance;  // first instance of this dispatch in the matrices; the output range begins with it
 };
 
 // 48 bytes per vertex: position, normal, four 16-bit joints, four weights.

@@ -1,4 +1,4 @@
-// Measures how long a new scene takes to its first skinned frame.
+// Measures the time to the first skinned frame of a new scene.
 #pragma once
 
 #include "crowd.h"
@@ -11,7 +11,7 @@ namespace dermis::samples {
 /// in its own cache.
 struct StartUp {
   double seconds = 0;
-  double secondsWithoutScale = 0;  ///< if the pose may not scale
+  double secondsWithoutScale = 0;  ///< with `mayScale` false
 };
 
 /// Fails if the device does.

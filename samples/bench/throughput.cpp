@@ -19,7 +19,7 @@ namespace {
 
 using Section = ThroughputSection;
 
-/// Comparison methods are slow: one round of them has fewer instances, by this factor.
+/// Comparison methods are slow, so a round skins fewer instances with them, by this factor.
 constexpr std::uint32_t comparisonShare = 10;
 /// Instances per job of the CPU.
 constexpr std::uint32_t instancesOfJob = 16;

@@ -26,7 +26,7 @@ struct ThroughputRow {
   double millionVerticesPerSecond = 0;
 };
 
-/// The rows, measured in turns.
+/// The rows. A round measures each of them once.
 class Throughput {
  public:
   /// Prepares all rows, and skins each once. Without a device, only the rows of the CPU. `open` and
@@ -41,7 +41,7 @@ class Throughput {
   virtual Result<void> runRound() = 0;
 
   const std::vector<ThroughputRow>& rows() const { return rows_; }
-  /// The number of rows that `create` makes.
+  /// The number of `step` calls of `create`. It makes fewer rows if the device lacks a feature.
   static std::size_t rowCount(const OpenDevice* open, const Crowd& crowd);
 
  protected:

@@ -7,8 +7,7 @@
 
 namespace dermis::cli {
 
-/// The sample models `bar` and `arm`, each in the middle of its clip, where it is twisted or bent
-/// most.
+/// The sample models `bar` and `arm`. Each is twisted or bent most in the middle of its clip.
 struct BuiltInScenes {
   Scene bar, arm;
 };

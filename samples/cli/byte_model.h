@@ -14,7 +14,7 @@ namespace dermis::cli {
 struct ByteModel {
   std::string name;
   double written = 0;   ///< to memory
-  double stored = 0;    ///< sectors of 32 bytes that the stores touch, counted for each store
+  double stored = 0;    ///< bytes of the 32-byte sectors that each store touches, over all stores
   double meshRead = 0;  ///< shared by the instances of an invocation
   double paletteRead = 0;
   double operations = 0;       ///< multiplications and additions counted separately

@@ -42,10 +42,10 @@ ExitStatus checkUsage(const BenchOptions& options) {
   if (options.instances == 0 || options.instances > mostInstances)
     return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostInstances));
   if (options.device == "reference")
-    return reportWrongUsage("--device reference cannot be timed: it is not made to be fast");
+    return reportWrongUsage("--device reference cannot be timed: it is not optimized for speed");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
-    return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
+    return reportWrongUsage(fmt::format("-o OUT must end in .png; it is '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");
   return ExitStatus::done;
@@ -136,13 +136,13 @@ Run addBench(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
       "Measure how many vertices per second are skinned: by method, format and number of "
-      "instances, on a device and on the CPU, beside plain kernels");
+      "instances, on a device and on the CPU, compared with plain kernels");
   const auto options = std::make_shared<BenchOptions>();
   command->add_option("MODEL", options->model,
                       "A .gltf or .glb file; its first skin is used [a figure of 10,000 vertices, "
                       "60 joints and four influences per vertex]");
-  command->add_option("--json", options->json, "Write the same numbers to a file");
-  command->add_option("-o,--output", options->output, "Draw the numbers as bars: OUT.png");
+  command->add_option("--json", options->json, "Write the results to a file as JSON");
+  command->add_option("-o,--output", options->output, "Draw the results as a bar chart: OUT.png");
   command->add_option(
       "--device", options->device,
       "auto, cpu (the CPU only), a number from 'dermis devices', or part of a name");
@@ -151,8 +151,8 @@ Run addBench(CLI::App& app) {
       fmt::format("Number of instances, each with its own pose [{}]", options->instances));
   command->add_option(
       "--rounds", options->rounds,
-      fmt::format("Number of rounds; each measures every row once, and the best round counts "
-                  "[{}]",
+      fmt::format("Number of rounds; each measures every row once, and the best time of a row "
+                  "counts [{}]",
                   options->rounds));
   command->add_flag("--on-paper", options->onPaper,
                     "Measure nothing; estimate bytes per vertex, speed and the limiting resource "

@@ -50,12 +50,13 @@ ExitStatus checkPicture(const CompareOptions& options) {
     return reportWrongUsage("--animation and --time need a MODEL");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::pictureKind(options.output) != samples::PictureKind::png)
-    return reportWrongUsage(fmt::format("-o OUT must end in .png, not be '{}'", options.output));
+    return reportWrongUsage(fmt::format("-o OUT must end in .png; it is '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");
   if (samples::needsNoVulkan(options.device)) {
     return reportWrongUsage(fmt::format(
-        "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
+        "--device {} cannot draw; use a Vulkan device, such as lavapipe ('dermis devices')",
+        options.device));
   }
   if (options.width < leastWidth || options.width > largestWidth)
     return reportWrongUsage(
@@ -240,7 +241,8 @@ ExitStatus compare(const CompareOptions& options) {
 Run addCompare(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "compare",
-      "Time each method on the device, and show what it does to a twist, a bend and a model");
+      "Time each method on the device, and show how it deforms a twisted tube, a bent tube and a "
+      "model");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file [with -o: a built-in arm]");
   CLI::Option* output = command->add_option(
@@ -250,8 +252,8 @@ Run addCompare(CLI::App& app) {
   command
       ->add_option("--methods", options->methods,
                    "Methods for the columns of the picture, separated by commas [linear, "
-                   "quaternion_translation, log_matrix, spherical_blend, dual_quaternion, "
-                   "center_of_rotation, if the model allows them]")
+                   "quaternion_translation, log_matrix, spherical_blend, dual_quaternion and, if "
+                   "the model allows it, center_of_rotation]")
       ->delimiter(',')
       ->allow_extra_args(false)  // A model may follow.
       ->needs(output);
@@ -264,7 +266,7 @@ Run addCompare(CLI::App& app) {
   command->add_option("--device", options->device,
                       "auto, cpu (SIMD on one thread), reference (nothing is timed), a number from "
                       "'dermis devices', or part of a name");
-  command->add_option("--json", options->json, "Write the same numbers to a file");
+  command->add_option("--json", options->json, "Write the results to a file as JSON");
   command->add_option("--repetitions", options->repetitions,
                       fmt::format("Runs of each method [{}]", options->repetitions));
   command->add_option("--instances", options->instances,

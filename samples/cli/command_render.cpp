@@ -72,7 +72,7 @@ ExitStatus checkUsage(const RenderOptions& options) {
   const std::optional<PictureKind> kind = samples::pictureKind(options.output);
   if (!kind) {
     return reportWrongUsage(
-        fmt::format("-o OUT must end in .png, .mp4, .gif or .apng, not be '{}'", options.output));
+        fmt::format("-o OUT must end in .png, .mp4, .gif or .apng; it is '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
     return reportWrongUsage(fmt::format("--method: there is no method '{}'; the methods are {}",
@@ -80,7 +80,8 @@ ExitStatus checkUsage(const RenderOptions& options) {
   }
   if (samples::needsNoVulkan(options.device)) {
     return reportWrongUsage(fmt::format(
-        "--device {} cannot draw; software Vulkan can: 'dermis devices' lists it", options.device));
+        "--device {} cannot draw; use a Vulkan device, such as lavapipe ('dermis devices')",
+        options.device));
   }
   if (const ExitStatus numbers = checkNumbers(options); numbers != ExitStatus::done) return numbers;
   if (*kind != PictureKind::png)
@@ -216,9 +217,9 @@ render::CameraOptions Film::cameraOptions() const {
   return camera;
 }
 
-/// The ground is at the lowest point of the clip, so that no foot goes through it. In a still that
-/// hovers only slightly, it is at the lowest point of the pose. It is slightly lower, because a
-/// flat sole would otherwise coincide with it.
+/// The ground is at the lowest point of the clip, so that no foot goes through it. If the pose of a
+/// still is only slightly above that point, the ground is at the lowest point of the pose. It is
+/// lowered a little, because a flat sole would otherwise coincide with it.
 float groundUnder(const Box& pose, const Box& extent) {
   const float height = extent.max[1] - extent.min[1];
   const bool hovers = pose.min[1] - extent.min[1] < 0.04f * height;
@@ -415,7 +416,8 @@ ExitStatus renderModel(const RenderOptions& options) {
 }  // namespace
 
 Run addRender(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("render", "Draw a model, a crowd of it, or a film");
+  CLI::App* command =
+      app.add_subcommand("render", "Draw a picture or a film of a model, or of a crowd");
   const auto options = std::make_shared<RenderOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
   command

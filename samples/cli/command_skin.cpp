@@ -57,7 +57,7 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
 ExitStatus checkUsage(const SkinOptions& options) {
   if (!outputFormat(options.output)) {
     return reportWrongUsage(
-        fmt::format("-o OUT must end in .ply, .obj or .glb, not be '{}'", options.output));
+        fmt::format("-o OUT must end in .ply, .obj or .glb; it is '{}'", options.output));
   }
   if (!methodFromName(options.method)) {
     return reportWrongUsage(fmt::format("--method: there is no method '{}'; the methods are {}",

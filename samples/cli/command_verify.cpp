@@ -219,10 +219,10 @@ Run addVerify(CLI::App& app) {
   const auto options = std::make_shared<VerifyOptions>();
   command->add_option("MODEL", options->models, "One or more .gltf or .glb files [random meshes]");
   command->add_flag("--random", options->random,
-                    "Also verify random meshes: pairs of methods, inputs and outputs");
+                    "Also verify random meshes, with other input formats and unusual sizes");
   command->add_flag("--quick", options->quick,
                     "Verify in seconds: all methods, but fewer formats, numbers of influences and "
-                    "sizes, by pairs");
+                    "sizes");
   command->add_option(
       "--device", options->device,
       "auto, cpu (SIMD on the CPU), a number from 'dermis devices', or part of a name");

@@ -1,4 +1,5 @@
-// The subcommands. Each adds itself to the command line. It returns the exit status of the program.
+// The subcommands. Each function adds one to the command line, and returns the function that runs
+// it.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -39,7 +39,7 @@ class ComparedFigures {
   }
   const FigureDifference& difference(std::size_t method) const { return differences_[method]; }
 
-  /// Makes the heat maps. `hottest` is the distance with the last color.
+  /// Makes the heat maps. `hottest` is the distance that the last color stands for.
   Result<void> makeHeatMaps(double hottest);
 
   Result<void> addDraws(std::size_t method, std::vector<samples::render::Draw>& draws) const;

@@ -71,7 +71,7 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
     return *options.instances;
   }
   const std::uint64_t wanted = (isCpu ? verticesOnCpu : verticesOnGpu) / comparison.vertices;
-  // Joint matrices, and the largest palettes of all the methods.
+  // The joint matrices, and a palette of the largest size for each method except `linear`.
   std::uint64_t bytes = 0;
   for (const samples::SkinRequest& part : instance)
     bytes += part.pose.size() * (48 + 80 * (allMethods.size() - 1));
@@ -204,7 +204,7 @@ class MethodComparer {
       step_();
       if (differences.count == 0 || !(size > 0)) continue;
       compared.largestDifference = differences.largest / size;
-      compared.meanSquareDifference =
+      compared.rootMeanSquareDifference =
           std::sqrt(differences.squares / static_cast<double>(differences.count)) / size;
     }
     return {};
@@ -314,7 +314,7 @@ class MethodComparer {
     });
   }
 
-  /// Plans for a device with all features that Dermis uses.
+  /// Plans for a device with enough storage buffers and no optional features.
   Result<void> planOnly() {
     DeviceLimits limits;
     limits.maxStorageBuffersPerStage = storageBuffersWanted;

@@ -25,7 +25,7 @@ struct ComparedMethod {
   // Distances from `dualQuaternion` in the model's pose, as a fraction of its size. Empty if no
   // vertex is finite.
   std::optional<double> largestDifference;
-  std::optional<double> meanSquareDifference;  ///< root mean square
+  std::optional<double> rootMeanSquareDifference;
 };
 
 enum class Clock : std::uint8_t { none, timestamps, submission, oneThread };
@@ -55,7 +55,8 @@ struct ComparisonTimer {
   bool isCpu = false;
 };
 
-/// How many times `compareMethods` calls `step`.
+/// The maximum number of times that `compareMethods` calls `step`: methods that the scene does not
+/// allow are skipped.
 std::size_t comparisonSteps(const ComparisonOptions& options, const ComparisonTimer& timer);
 
 /// Compares all methods in one pose of a scene that has a part with a mesh. All parts must have

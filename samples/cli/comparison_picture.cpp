@@ -68,7 +68,7 @@ double roundedUp(double value) {
   return 10 * power;
 }
 
-/// The height that a picture of a given width needs, so that a box fills it.
+/// The ratio of height to width of a picture that a box fills, within limits.
 float heightForWidth(const Box& box, const render::CameraOptions& options) {
   const render::Camera camera = render::frameBoxes({&box, 1}, box, options, 1);
   const glm::vec3 up = glm::cross(camera.towardsEye, camera.right);
@@ -195,8 +195,8 @@ class ComparisonDrawer {
     return numbers;
   }
 
-  /// The distance with the last color. Linear blending is the common reference: if it is shown, its
-  /// largest distance is used.
+  /// The distance that the last color stands for. If linear blending is shown, its largest distance
+  /// is used, rounded up, so that pictures of different methods have the same scale.
   double hottest(const ComparedFigures& figures) const {
     double largest = 0, linear = 0;
     for (std::size_t column = 0; column < methods_.size(); ++column) {

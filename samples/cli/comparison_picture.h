@@ -24,7 +24,7 @@ struct ComparisonColumn {
 
 /// A row of pictures of one scene; the columns differ only in the method.
 struct ComparisonStrip {
-  const Scene* scene = nullptr;  ///< allows all methods, and `dualQuaternion`
+  const Scene* scene = nullptr;  ///< must allow all methods of the columns, and `dualQuaternion`
   ScenePose pose;
   std::string title, remark;
   samples::render::CameraOptions camera;

@@ -49,7 +49,7 @@ void printTitle(const ComparisonTitle& title, const MethodComparison& comparison
   fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
              comparison.scales ? ", some of which scale or shear" : "");
   if (comparison.clock == Clock::none) {
-    fmt::print("timed    nothing: the reference is not made to be fast\n");
+    fmt::print("timed    nothing: the reference is not optimized for speed\n");
     return;
   }
   fmt::print("timed    {} instances, {} vertices per run, positions and normals as float32\n",
@@ -93,7 +93,7 @@ void printTable(const MethodComparison& comparison) {
         methodName(compared.method), cell(compared.time, "{:.2f}"),
         cell(compared.instructions, "{}"), compared.bytesPerJoint, twisted.leastRadius,
         twisted.volume, bent.leastSection, bent.volume, bent.reach,
-        percent(compared.largestDifference), percent(compared.meanSquareDifference));
+        percent(compared.largestDifference), percent(compared.rootMeanSquareDifference));
   }
 }
 
@@ -117,7 +117,7 @@ Json describe(const ComparedMethod& compared) {
                   {"volume", bent.volume},
                   {"reach", bent.reach}};
   json["difference"] = {{"largest", optionalNumber(compared.largestDifference)},
-                        {"rootMeanSquare", optionalNumber(compared.meanSquareDifference)}};
+                        {"rootMeanSquare", optionalNumber(compared.rootMeanSquareDifference)}};
   return json;
 }
 

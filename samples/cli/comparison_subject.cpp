@@ -12,8 +12,7 @@
 namespace dermis::cli {
 namespace {
 
-/// The comparison of the paper, plus a widely used method and a newer one. With all nine, the
-/// pictures would be too small.
+/// The methods that are compared by default. With all nine, the pictures would be too small.
 constexpr std::array usualMethods{Method::linear,         Method::quaternionTranslation,
                                   Method::logMatrix,      Method::sphericalBlend,
                                   Method::dualQuaternion, Method::centerOfRotation};

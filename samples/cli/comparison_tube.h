@@ -18,7 +18,7 @@ struct TubeShape {
   double leastRadius = 1;
   /// The smallest area of a ring of vertices across the tube.
   double leastSection = 1;
-  /// The signed volume of the zone only, closed at its end rings.
+  /// The signed volume of the blend zone only, closed at its end rings.
   double volume = 1;
   /// The largest distance of a vertex from the bones, in radii: 1 if nothing bulges.
   double reach = 1;
@@ -26,13 +26,13 @@ struct TubeShape {
 
 struct TubeComparison {
   TubeShape twisted;  ///< by `tubeTwistDegrees` about its axis
-  TubeShape bent;     ///< by `tubeBendDegrees` about a line through its axis
+  TubeShape bent;     ///< by `tubeBendDegrees` about a line perpendicular to its axis
 };
 
-/// Compares with the reference. The tube is that of the sample bar, with finer subdivision: length
-/// 1, radius 0.1. Weights change linearly over the zone of length 0.4 about its middle, where the
-/// second joint is. Bind space begins at the other end. Centers of rotation are the centers of the
-/// rings.
+/// Skins the tube with the reference, twisted, bent and in bind pose. The tube is that of the
+/// sample bar, with finer subdivision: length 1, radius 0.1. Weights change linearly over the blend
+/// zone of length 0.4 about its middle, where the second joint is. The origin of bind space is at
+/// one end of the tube. Centers of rotation are the centers of the rings.
 Result<TubeComparison> compareTube(Method method, const MethodShares& shares);
 
 }  // namespace dermis::cli

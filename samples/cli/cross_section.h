@@ -7,7 +7,7 @@
 
 namespace dermis::cli {
 
-/// The range of the sections, across the x axis of bind space.
+/// The sections are perpendicular to the x axis of bind space, from `from` to `to`.
 struct SectionRange {
   double from = 0, to = 0;
 };

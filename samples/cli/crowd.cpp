@@ -8,7 +8,7 @@
 namespace dermis::cli {
 namespace {
 
-/// A number from 0 to 1 that depends only on the figure and the purpose (Wellons 2018, "Prospecting
+/// A number in [0, 1) that depends only on the figure and the purpose (Wellons 2018, "Prospecting
 /// for hash functions").
 double chance(std::uint32_t figure, std::uint32_t purpose) {
   std::uint32_t bits = figure * 0x9e3779b9u + purpose * 0x85ebca6bu + 1;

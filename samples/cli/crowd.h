@@ -15,8 +15,8 @@ struct Role {
   double phase = 0;  ///< seconds ahead of the first figure
 };
 
-/// The first figure plays `clip` unchanged. The others play the same clip, or successive clips of
-/// the model if `isVaried`, each with its own phase. The result is the same every time.
+/// The first figure plays `clip` unchanged. The others play the same clip or, if `isVaried`, a
+/// pseudorandom clip of the model, each with its own phase. The result is the same every time.
 std::vector<Role> castCrowd(const gltf::Model& model, std::uint32_t clip, bool isVaried,
                             std::uint32_t figures);
 

@@ -18,7 +18,7 @@ namespace dermis::cli {
 /// Every figure of a crowd is the whole scene in its own pose.
 class DrawnScene {
  public:
-  /// `device`, `renderer` and `scene` must outlive it. The scene's method must be allowed.
+  /// `device`, `renderer` and `scene` must outlive it. The scene must allow the method.
   static Result<DrawnScene> create(samples::OpenDevice& device, samples::render::Renderer& renderer,
                                    const Scene& scene, std::uint32_t figures, Method method);
   /// Creates one figure for each method, in this order.

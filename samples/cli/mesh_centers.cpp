@@ -105,7 +105,7 @@ class JoinedMesh {
   std::vector<float> positions_, weights_;
   std::vector<std::uint32_t> joints_, triangles_;
   std::vector<JointWeight> influences_;
-  std::vector<std::size_t> ends_;  ///< of each vertex' influences
+  std::vector<std::size_t> ends_;  ///< of the influences of each vertex
   InfluenceSet set_;
 };
 

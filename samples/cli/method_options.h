@@ -1,4 +1,4 @@
-// Options of subcommands that have --method.
+// Options of the methods, for subcommands with --method or --methods.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,7 +10,7 @@
 
 namespace dermis::cli {
 
-/// The shares of every vertex, 0 to 1.
+/// Parameters of methods, the same for every vertex, from 0 to 1.
 struct MethodShares {
   double dualQuaternionWeight = static_cast<double>(MeshView().dualQuaternionWeight);
   double bulgeStrength = static_cast<double>(MeshView().bulgeStrength);

@@ -77,8 +77,8 @@ class Preparer {
     if (mesh != nullptr) return mesh;
     if (!PreparedMesh::spend(primitive, model.budget)) {
       return Error{ErrorCode::limitExceeded,
-                   fmt::format("mesh '{}' for {} joints: it needs more memory than a file of this "
-                               "size justifies",
+                   fmt::format("mesh '{}' for {} joints: it needs more memory than the limit for a "
+                               "file of this size",
                                primitive.name, joints)};
     }
     const CentersOfPrimitive findCenters = [&]() -> Result<std::vector<float>> {
@@ -120,7 +120,7 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
   if (!spendOnParts(model)) {
     return inFile({ErrorCode::limitExceeded,
                    fmt::format("its nodes and primitives make {} parts, which need more memory "
-                               "than a file of this size justifies",
+                               "than the limit for a file of this size",
                                model.skinnedPrimitives.size())});
   }
   Preparer preparer(scene, preparation);

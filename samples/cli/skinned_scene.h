@@ -1,4 +1,5 @@
-// Prepares a glTF file for skinning: shared by `skin`, `verify` and `info`.
+// Prepares a glTF file for skinning: for the subcommands that load a model as a scene, and for the
+// viewer.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +28,7 @@ struct ScenePart {
 struct Scene {
   std::unique_ptr<gltf::Model> model;
   std::vector<ScenePart> parts;
-  std::vector<std::string> warnings;  ///< repairs
+  std::vector<std::string> warnings;  ///< repairs, and centers of rotation that were not computed
   std::vector<std::string> remarks;   ///< problems that `validate` counts and `pack` handles
   std::vector<std::string> notes;     ///< problems that were repaired on reading, and what is left
                                       ///< out or not skinned

@@ -252,8 +252,8 @@ std::string VerifiedCase::failure() const {
   std::string text;
   if (comparison.failures != 0) {
     text = fmt::format(
-        "{} vertices are outside their bound; the first is {}. Positions reach {:.3g} of the bound "
-        "(vertex {}), normals {:.3g} (vertex {}), tangents {:.3g} (vertex {})",
+        "{} vertices are outside their bound; the first is {}. Largest error divided by its bound: "
+        "positions {:.3g} (vertex {}), normals {:.3g} (vertex {}), tangents {:.3g} (vertex {})",
         comparison.failures, comparison.firstFailure, comparison.worstPosition,
         comparison.worstPositionVertex, comparison.worstNormal, comparison.worstNormalVertex,
         comparison.worstTangent, comparison.worstTangentVertex);

@@ -24,8 +24,8 @@ struct OutputToVerify {
 /// The output for all divisions of the work: positions, normals and tangents as float32.
 samples::OutputCase divisionOutput(const samples::Division& division);
 
-/// Figures that are skinned together, in one pose and one way. Ways have consecutive indices: first
-/// the divisions of the work, then the outputs.
+/// Figures that are skinned together, in one pose and one way. `way` is an index: first into the
+/// divisions of the work, then into the outputs.
 struct SceneBatch {
   std::size_t pose = 0;
   std::size_t way = 0;

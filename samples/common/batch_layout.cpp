@@ -36,7 +36,7 @@ class OutputPlacer {
       }
     }
     if (output_.arrangement == Arrangement::interleaved) {
-      // Positions and normals that are stored in pairs begin at multiples of 8 bytes.
+      // Kernels that store 8 bytes at a time need instances at multiples of 8 bytes.
       sizes_.positions = (sizes_.positions + vertices * vertexSize + 7) / 8 * 8;
     }
   }

@@ -42,7 +42,7 @@ struct OutputLayout {
   Motion motion = Motion::none;
   bool bounds = false;
   Arrangement arrangement = Arrangement::interleaved;
-  std::uint32_t gap = 0;  ///< bytes after the attributes of each vertex, which must not change
+  std::uint32_t gap = 0;  ///< bytes after each vertex (interleaved) or element; never written
 };
 
 struct BatchLayout {

@@ -40,7 +40,7 @@ struct SkinnedVertices {
 struct RunOptions {
   /// On the CPU, a job has at most `workgroupSize` vertices of `instancesPerInvocation` instances.
   Tuning tuning;
-  std::string instructions;  ///< of the CPU, one of `cpu::targetNames`; empty: the target's
+  std::string instructions;  ///< CPU instruction set of `cpu::targetNames`; empty: chosen by target
   OutputLayout output;
   std::byte poison{0xa5};  ///< initial contents of the outputs
   bool countUntouched = true;

@@ -118,7 +118,7 @@ Result<BatchResult> CpuRunner::skin() {
   std::vector<std::vector<MorphWeight>> morphs;
   std::vector<cpu::Instance> instances;
   for (Job& job : layout_.jobs) {
-    // Sorted by target.
+    // cpu::skin expects morph weights in the order of their morph targets.
     for (std::span<const MorphWeight>* weights : {&job.morphs, &job.previousMorphs}) {
       std::vector<MorphWeight>& own = morphs.emplace_back(weights->begin(), weights->end());
       std::ranges::sort(own, {}, &MorphWeight::target);

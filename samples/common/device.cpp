@@ -78,7 +78,7 @@ std::vector<VkExtensionProperties> deviceExtensions(const VulkanFunctions& funct
   return extensions;
 }
 
-/// The first family that can do all of it, or nothing.
+/// Finds the first family with all of these flags. Returns false if there is none.
 bool findFamily(const VulkanFunctions& functions, VkPhysicalDevice device, VkQueueFlags wanted,
                 std::uint32_t& family) {
   std::uint32_t count = 0;
@@ -130,7 +130,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
   }
   std::uint32_t family = 0;
   if (properties.apiVersion < VK_API_VERSION_1_1) {
-    info.unusable = "it has no Vulkan 1.1";
+    info.unusable = "it does not support Vulkan 1.1";
   } else if (!findFamily(functions, device, VK_QUEUE_COMPUTE_BIT, family)) {
     info.unusable = "it has no compute queue";
   }
@@ -260,8 +260,8 @@ Result<void> Device::choose(const std::string& wanted) {
     if (better) best = index;
   }
   if (best == infos.size()) {
-    return unusable("there is no Vulkan device '" + wanted + "'; 'dermis devices' lists the " +
-                    std::to_string(infos.size()) + " devices of this machine");
+    return unusable("there is no Vulkan device '" + wanted +
+                    "'; 'dermis devices' lists those of this machine");
   }
   if (!infos[best].unusable.empty()) {
     return unusable("device '" + infos[best].name + "' cannot be used: " + infos[best].unusable);
@@ -272,12 +272,12 @@ Result<void> Device::choose(const std::string& wanted) {
 }
 
 Result<void> Device::createDevice(const DeviceOptions& options) {
-  // If there is a queue that draws, there is one that computes as well (Vulkan 1.3, 4.1).
+  // Vulkan 1.3, 4.1: if graphics is supported, some family supports both graphics and compute.
   VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT;
   if (options.graphics) wanted |= VK_QUEUE_GRAPHICS_BIT;
   if (!findFamily(functions_, physicalDevice_, wanted, queueFamily_)) {
-    return unusable("device '" + info_.name + "' has no queue that can " +
-                    (options.graphics ? "draw" : "compute"));
+    return unusable("device '" + info_.name + "' has no " +
+                    (options.graphics ? "graphics" : "compute") + " queue");
   }
   std::vector<const char*> extensions;
   if (options.pushDescriptors && info_.pushDescriptors)

@@ -38,7 +38,7 @@ class OpenPairs {
       }
     }
   }
-  /// How many a value would close beside those that are chosen already.
+  /// Number of open pairs that this value forms with the values that are already chosen.
   std::uint32_t gain(const std::vector<std::uint32_t>& chosen, std::size_t parameter,
                      std::uint32_t value) const {
     std::uint32_t count = 0;

@@ -112,7 +112,7 @@ PipelineStatistics::~PipelineStatistics() {
   functions_->DestroyDevice(device_, nullptr);
 }
 
-// As vulkan/kernels.h says.
+// The layouts that vulkan/kernels.h describes, without the texel buffers.
 bool PipelineStatistics::createLayouts() {
   std::array<VkDescriptorSetLayoutBinding, storageBuffersWanted> bindings{};
   for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {
@@ -174,7 +174,7 @@ std::optional<std::uint64_t> PipelineStatistics::readCount(VkPipeline pipeline) 
   std::vector<VkPipelineExecutableStatisticKHR> statistics(count, empty);
   functions_->GetPipelineExecutableStatisticsKHR(device_, &info, &count, statistics.data());
   for (const VkPipelineExecutableStatisticKHR& statistic : statistics) {
-    // Mesa's drivers call it so; others have none.
+    // The names that Mesa's drivers use.
     const std::string_view name = statistic.name;
     if (name == "Instructions" || name == "Instruction Count") return valueOf(statistic);
   }

@@ -20,8 +20,9 @@ class PipelineStatistics {
   PipelineStatistics(const PipelineStatistics&) = delete;
   PipelineStatistics& operator=(const PipelineStatistics&) = delete;
 
-  /// The number of machine instructions of a kernel that stores whole words. Empty if the driver
-  /// does not count them.
+  /// The number of machine instructions of a kernel. The kernel must store whole words, since the
+  /// second device enables no optional features for other stores. Empty if the driver does not
+  /// count instructions.
   std::optional<std::uint64_t> instructionCount(const Variant& variant,
                                                 const DeviceLimits& limits) const;
 

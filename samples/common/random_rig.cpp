@@ -44,7 +44,7 @@ glm::dmat3 scaleShear(Random& random, Rigidity rigidity) {
   const glm::dmat3 stretch =
       diagonal(random.between(0.5, 2), random.between(0.5, 2), random.between(0.5, 2));
   if (rigidity == Rigidity::mirroredAlongOneAxis) {
-    // Thin ones among them.
+    // Factors down to 0.01 make some of the joints nearly flat.
     const glm::dmat3 mirror = diagonal(1, random.between(0.1, 2), -random.between(0.01, 2));
     return frame * mirror * glm::transpose(frame);
   }

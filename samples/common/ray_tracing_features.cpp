@@ -45,7 +45,7 @@ RayTracingFeatures::RayTracingFeatures(const VulkanFunctions& functions, VkPhysi
   functions.GetPhysicalDeviceFeatures2(device, &features);
   if (addresses.bufferDeviceAddress != VK_TRUE || structures.accelerationStructure != VK_TRUE)
     return;
-  // Nothing else that the device has is asked for: capture and replay, host builds.
+  // Optional features, such as capture and replay or host builds, stay disabled.
   addresses_.sType = addresses.sType;
   addresses_.bufferDeviceAddress = VK_TRUE;
   structures_.sType = structures.sType;

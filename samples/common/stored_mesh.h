@@ -1,4 +1,4 @@
-// A mesh in the formats that assets use: float16, normalized integers, any interleaving.
+// A mesh in the formats that assets use: float16, normalized integers, any stride.
 #pragma once
 
 #include <cstddef>

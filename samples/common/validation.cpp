@@ -41,8 +41,8 @@ Result<void> ValidationRequest::prepare(PFN_vkGetInstanceProcAddr getInstancePro
   features_.pEnabledValidationFeatures = &synchronization_;
   extensions_ = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
   if (hasSettings) {
-    // Newer layers look at what shaders access only when told to: without this no missing barrier
-    // between two dispatches is reported.
+    // Newer layers check the accesses of shaders only with this setting. Without it, they do not
+    // report a missing barrier between two dispatches.
     shaderAccesses_ = {layer, "syncval_shader_accesses_heuristic", 0, 1, &on_};
     settings_ = {layerSettingsType, nullptr, 1, &shaderAccesses_};
     features_.pNext = &settings_;

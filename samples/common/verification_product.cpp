@@ -90,9 +90,9 @@ constexpr InputValues allInputs{rigidities,  vertexCounts,  jointCounts,    infl
                                 morphCounts, positionTypes, directionTypes, jointTypes,
                                 weightTypes, setSizes,      inputGaps};
 
-// Each method is combined with each value. That needs about as many pipelines, and pipelines take
-// time. So Coverage::quick has at most three values of each parameter: common formats, one of each
-// encoding, and numbers of influences that have their own kernels.
+// Each method is combined with each value. Most combinations need a pipeline of their own, which
+// takes time to build. So Coverage::quick has at most three values of each parameter: common
+// formats of different encodings, and numbers of influences with different kernels.
 constexpr std::array quickPositions{VertexFormat::float32x3, VertexFormat::float16x4,
                                     VertexFormat::snorm16x4};
 constexpr std::array quickNormals{VertexFormat::float32x3, VertexFormat::none,
@@ -304,7 +304,7 @@ Result<std::vector<VerifiedInstance>> verifyRandomCase(BatchTarget& target,
     expected[instance + 3] = std::move(*before);
     verified.expected = &expected[instance];
     verified.expectedBefore = &expected[instance + 3];
-    // All joints are finite: no vertex is without an answer.
+    // All joints are finite, so every vertex has a defined result.
     verified.exemptions = {exemptionsOf(expected[instance]).onlyFinite, 0};
     verified.exemptionsBefore = {exemptionsOf(expected[instance + 3]).onlyFinite, 0};
   }

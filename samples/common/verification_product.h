@@ -1,4 +1,4 @@
-// Verifies every way to skin: combinations of methods, inputs and outputs, by pairs.
+// Verifies every way to skin: combinations of methods, inputs and outputs that cover all pairs.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ inline constexpr std::array verifiedTangentFormats{
 struct OutputCase {
   OutputLayout layout;
   Tuning tuning;
-  std::string name() const;  ///< "float16x4, normals octahedral8x2, interleaved, ..."
+  std::string name() const;  ///< "positions float16x4, normals octahedral8x2, interleaved, ..."
 };
 
 /// How many values of each parameter are verified.

@@ -30,7 +30,8 @@ Box boxOf(const std::vector<reference::Double3>& positions) {
   return box;
 }
 
-/// A box with sides: wider than the positions or, for every other instance, too small for them.
+/// A box with sides of positive length: larger than the positions need or, if `clamps`, too small
+/// for them, unless they are close together.
 Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
   Box box = boxOf(positions);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -171,7 +172,7 @@ class BatchVerifier {
     const auto& now = frames.now.instances[index].streams;
     const auto& settled = frames.settled.instances[index].streams;
     if (before[previous] != before[positions])
-      fail(index, "in a first frame, previous positions are not the current ones");
+      fail(index, "when motion restarts, previous positions are not the current ones");
     if (output_.layout.motion == Motion::kept && now[previous] != before[positions])
       fail(index, "previous positions are not those of the frame before");
     if (settled[positions] != now[positions] || settled[previous] != now[positions])

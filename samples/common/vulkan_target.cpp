@@ -131,7 +131,7 @@ Result<BatchResult> VulkanRunner::skin() {
   return result;
 }
 
-/// The results of the others must be equal to those of the first, to the bit.
+/// Results with the other tunings must have the same bits as results with the first.
 constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
 
 }  // namespace

@@ -37,7 +37,7 @@ Result<Character> Character::load(const std::filesystem::path& path,
   const gltf::Model& model = *character.model_;
 
   const Error tooMuch{ErrorCode::limitExceeded,
-                      fmt::format("{}: it needs more memory than a file of this size justifies",
+                      fmt::format("{}: it needs more memory than the limit for a file of this size",
                                   inQuotes(path.filename().string()))};
   std::vector<std::uint32_t> skins, numbers(model.skins.size(), gltf::none);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {

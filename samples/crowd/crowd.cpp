@@ -88,7 +88,7 @@ InstanceDescription Crowd::describe(const Part& part) const {
 }
 
 // [crowd-add]
-/// A figure is a pose and some meshes that share it: body, hair, clothes.
+/// A figure has a pose for each skin, and an instance of each mesh: body, hair, clothes.
 Result<void> Crowd::add(CrowdFigure& figure) {
   for (const std::uint32_t jointCount : character_->jointCounts()) {
     Result<PoseHandle> pose = system_.addPose(jointCount);
@@ -107,7 +107,7 @@ Result<void> Crowd::add(CrowdFigure& figure) {
   return {};
 }
 
-/// May be called at any time: vertices that frames in flight draw stay until these are complete.
+/// May be called at any time: vertices of frames in flight stay valid until those frames complete.
 Result<void> Crowd::remove(CrowdFigure& figure) {
   for (const InstanceHandle instance : std::exchange(figure.instances, {})) {
     if (Result<void> removed = system_.removeInstance(instance); !removed) return removed;
@@ -154,7 +154,7 @@ Result<void> Crowd::skinFrame(std::uint64_t frame, std::uint64_t completedFrame,
     description.visibility = *visibility;
   }
 
-  // This program copies the vertices to check them. To draw them, use vertexInput in both.
+  // The check copies the vertices. To draw them, use vertexInput in both barriers.
   recordBarrier(*device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
   if (Result<void> done = system.record(commandBuffer, description); !done) return done;
   recordBarrier(*device_, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));

@@ -26,7 +26,7 @@ struct CrowdOptions {
   std::uint32_t framesInFlight = 3;
   std::uint64_t outputBudget = 0;  ///< bytes; 0: enough for all figures
   bool culledOnGpu = false;        ///< the GPU decides which instances are visible
-  bool measuresGpuTime = false;    ///< the queue has timestamps
+  bool measuresGpuTime = false;    ///< requires a queue with timestamps
 };
 
 /// The handles of a figure.
@@ -57,8 +57,8 @@ class Crowd {
   /// Call it in each frame. Uses all cores.
   dermis::Result<void> skinOnCpu(std::uint64_t frame);
 
-  /// Call it after the last frame, for each frame that the GPU has completed, to complete its
-  /// statistics.
+  /// Call it after the last frame, for each frame that the GPU has completed. `statistics` then
+  /// returns the GPU time and counts of that frame.
   dermis::Result<void> complete(std::uint64_t frame, std::uint64_t completedFrame) {
     return system_.onDevice()->beginFrame(frame, completedFrame);
   }

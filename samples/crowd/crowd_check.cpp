@@ -192,8 +192,8 @@ void CrowdCheck::count(const Capture& capture, const Instance& instance,
   }
   if (totals_.failures++ != 0) return;
   totals_.firstFailure = fmt::format(
-      "frame {}, instance {} of generation {}, part {}, vertex {}: its error is {:.3g} "
-      "times its bound",
+      "frame {}, instance {} of generation {}, part {}: vertex {} is the first outside its bound; "
+      "the largest error is {:.3g} times its bound",
       capture.frame, instance.shown.handle.index, instance.shown.handle.generation,
       instance.shown.part, finding.firstFailure, finding.worst);
 }

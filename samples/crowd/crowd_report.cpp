@@ -81,12 +81,13 @@ Json jsonOf(const CheckTotals& check) {
 
 void CrowdReport::printTitle() const {
   fmt::print("device  {}{}\n", title_.device, title_.isOnCpu ? "" : ", driver " + title_.driver);
-  fmt::print("model   {}: {} vertices in {} meshes of one pose\n", title_.model,
+  fmt::print("model   {}: {} vertices in {} skinned meshes\n", title_.model,
              title_.verticesOfFigure, title_.meshes);
   if (title_.isOnCpu) {
-    fmt::print("frames  means of {} each\n\n", rowFrames);
+    fmt::print("frames  each row is the mean of up to {} frames\n\n", rowFrames);
   } else {
-    fmt::print("frames  {} in flight; means of {} each\n\n", title_.framesInFlight, rowFrames);
+    fmt::print("frames  {} in flight; each row is the mean of up to {} frames\n\n",
+               title_.framesInFlight, rowFrames);
   }
   fmt::print(
       "                                                                    upload   plan+record  "
@@ -96,7 +97,7 @@ void CrowdReport::printTitle() const {
       title_.isOnCpu ? "jobs" : "GPU");
 }
 
-/// If the GPU decides, the CPU learns the number only when the frame is complete.
+/// With culling on the GPU, the CPU learns the number only when the frame is complete.
 std::optional<std::uint32_t> CrowdReport::skinnedBy(const Frame& frame) const {
   if (!title_.culledOnGpu) return frame.cpu.skinnedInstances;
   return frame.gpu ? std::optional(frame.gpu->skinnedInstances) : std::nullopt;
@@ -187,7 +188,7 @@ void CrowdReport::finish(const Crowd& crowd) {
   printTotals();
 }
 
-/// Sums over the frames for which the number of skinned instances is known.
+/// Sums over all frames. Instances are counted only in frames whose skinned count is known.
 void CrowdReport::sumUp() {
   std::uint64_t timedVertices = 0;
   double gpuSeconds = 0;
@@ -224,7 +225,7 @@ void CrowdReport::printTotals() const {
              share(sums.skinned, sums.instances), share(sums.outOfView, sums.instances),
              share(sums.displayed - std::min(sums.displayed, sums.skinned), sums.instances));
   if (sums.refusals != 0) {
-    fmt::print("refused   {} time{} a figure could not be added, because a buffer was full\n",
+    fmt::print("refused   {} time{}: a figure could not be added because a buffer was full\n",
                sums.refusals, sums.refusals == 1 ? "" : "s");
   }
   if (title_.isOnCpu) {

@@ -38,7 +38,7 @@ class CrowdReport {
 
   const ReportTitle& title() const { return title_; }
   void printTitle() const;
-  /// From now on prints nothing before `finish`, since standard error shows the progress of a film.
+  /// From now on, prints nothing until `finish`: standard error shows the progress of the film.
   void printLater() { printsLater_ = true; }
   /// Call it after each record. Prints a row when there are enough frames for one. `counts` is what
   /// `ShownPoses` has counted so far.
@@ -47,8 +47,7 @@ class CrowdReport {
   void addCompleted(const Crowd& crowd);
   /// Frames count from 1.
   const Frame& frame(std::uint64_t number) const { return frames_[number - 1]; }
-  /// Number of skinned instances of a frame; empty if the GPU decided and the result is not known
-  /// yet.
+  /// Number of skinned instances of a frame. With culling on the GPU, empty if it is not known yet.
   std::optional<std::uint32_t> skinnedBy(const Frame& frame) const;
   /// Prints the rest of the table and the totals.
   void finish(const Crowd& crowd);

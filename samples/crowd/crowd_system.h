@@ -14,7 +14,7 @@ class CrowdSystem {
   explicit CrowdSystem(dermis::vulkan::SkinningSystem system) : system_(std::move(system)) {}
   explicit CrowdSystem(dermis::cpu::SkinningSystem system) : system_(std::move(system)) {}
 
-  /// Only one of them exists.
+  /// Exactly one of the two is not null.
   const dermis::vulkan::SkinningSystem* onDevice() const {
     return std::get_if<dermis::vulkan::SkinningSystem>(&system_);
   }

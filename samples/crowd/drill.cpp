@@ -42,7 +42,7 @@ constexpr std::uint32_t jumpPeriod = 131, jumpSpread = 53;
 
 }  // namespace
 
-/// When it returns, and after a jump, it is in another clip or at another time of the clip.
+/// A figure that returns plays the next clip. After a jump, it is at another time of its clip.
 PoseKey Drill::poseAt(std::uint32_t figure, std::uint64_t frame) const {
   const std::uint64_t comings = clockOf(figure, frame, awaySpread) / awayPeriod;
   const std::uint64_t jumps = clockOf(figure, frame, jumpSpread) / jumpPeriod;
@@ -58,8 +58,8 @@ FigureFrame Drill::at(std::uint32_t figure, std::uint64_t frame) const {
   now.pose = poseAt(figure, frame);
   now.teleports = clockOf(figure, frame, jumpSpread) % jumpPeriod == 0;
 
-  // Distances are relative to the radius of the crowd, so that a crowd of any size has figures at
-  // each.
+  // Distances are relative to the radius of the crowd, so that all update intervals occur, whatever
+  // its size is.
   const double radius = spacing * std::sqrt(static_cast<double>(count()));
   const Camera camera = cameraAt(frame, radius);
   const Place own = placeOf(figure);

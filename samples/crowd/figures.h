@@ -1,5 +1,5 @@
-// What the figures do, as a function of the frame: position, motion, and visibility to the camera.
-// In an engine the game decides this.
+// What each figure does, as a function of the frame: presence, pose, teleports, visibility, update
+// interval. In an engine the game decides this.
 #pragma once
 
 #include <cstdint>

@@ -28,7 +28,7 @@ constexpr double figureHeight = 1.75;
 /// Direction of the sun in degrees. It does not move with the camera.
 constexpr float sunAzimuth = 205, sunElevation = 38;
 
-/// Cells of the grids for coarser triangles, as fractions of a figure's height.
+/// Cells of the grids for coarser triangles, as fractions of the character's longest side.
 constexpr std::array coarseCells{0.009, 0.016, 0.03};
 
 /// A box around the whole crowd in all frames, so that shadows do not crawl.
@@ -37,8 +37,8 @@ Box boxOf(const FlightPlan& plan, double height) {
   return {{-side, 0, -side}, {side, static_cast<float>(1.3 * height), side}};
 }
 
-/// Each shadow map draws everything in view again. Large crowds get fewer and finer maps, since
-/// their figures are small.
+/// Each shadow map needs another draw of everything in view, so larger crowds get fewer sky maps.
+/// The maps are large, since the figures in a picture are small.
 render::ShadowSizes shadowSizes(std::uint64_t triangles) {
   render::ShadowSizes sizes;
   sizes.keyMap = 4096;
@@ -146,7 +146,7 @@ render::View Film::viewAt(std::uint64_t frame) const {
   // The haze begins half a radius in front of this distance.
   view.camera.distance = 0.5f * render::radiusOf(view.casters) + static_cast<float>(5 * plan.unit);
   view.style = styleAt(view.camera);
-  // Slightly below the soles, which are as flat as the ground.
+  // Slightly below the soles, because flat soles would otherwise coincide with the ground.
   view.groundHeight = static_cast<float>(-0.004 * plan.unit);
   view.groundRadius = static_cast<float>(3 * plan.crowdRadius);
   return view;

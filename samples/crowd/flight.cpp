@@ -29,7 +29,7 @@ constexpr std::array keys{
     Key{20, 2.00, 4.2, 20, 0.85, 0.4},     // over the last rows, all of the crowd ahead
     Key{48, 1.62, 3.1, 60, 0.75, 0.2},     // low over heads
     Key{80, 1.12, 2.1, 120, 1.05, 0.85},   // down into the aisle
-    Key{112, 1.00, 1.5, 156, 1.12, 1.05},  // those who walk come by
+    Key{112, 1.00, 1.5, 156, 1.12, 1.05},  // walking figures pass by
     Key{144, 1.00, 1.5, 186, 0.95, 1.05}, Key{180, 1.10, 2.3, 220, 1.10, 0.6},
     Key{224, 1.70, 6.5, 260, 0.95, 0.0},  // up, looking back over the rings
     Key{280, 2.12, 13.0, 288, 0.45, 0.0}, Key{336, 2.18, 9.0, 340, 0.65, 0.0},
@@ -99,7 +99,7 @@ Eye Flight::at(double time) const {
     return place < 1 ? place * plan_.aisleRadius
                      : plan_.aisleRadius + (place - 1) * (plan_.crowdRadius - plan_.aisleRadius);
   };
-  // The camera is nearer to a smaller crowd.
+  // The camera flies lower over a smaller crowd.
   const double scale = std::clamp(plan_.crowdRadius / (24 * plan_.unit), 0.45, 3.0);
   const double radius = radiusOf(along(&Key::radius, time));
   const double wanted = along(&Key::height, time);

@@ -86,8 +86,8 @@ double lowestOf(std::span<const Points> ticks) {
   return lowest;
 }
 
-/// A point that touches the ground in two ticks does not slide. So its displacement in the clip,
-/// reversed, is the movement of the character.
+/// A point that touches the ground in two consecutive ticks does not slide. So its displacement in
+/// the clip, reversed, is the movement of the character.
 ClipGait gaitOf(std::span<const Points> ticks, double height) {
   ClipGait gait;
   gait.ground = lowestOf(ticks);
@@ -103,7 +103,7 @@ ClipGait gaitOf(std::span<const Points> ticks, double height) {
     }
   }
   const double x = -median(movedX), z = -median(movedZ);
-  // In a whole clip, walking moves the character farther than swaying.
+  // A character that moves less than this in a whole clip is swaying, not walking.
   if (std::hypot(x, z) * static_cast<double>(ticks.size()) < 0.2 * height) return gait;
   gait.stepX = x;
   gait.stepZ = z;

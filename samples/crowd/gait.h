@@ -1,4 +1,5 @@
-// Measures from its soles how a character moves over the ground when it plays a clip in place.
+// Measures how a character would move over the ground when it plays a clip in place, from the
+// motion of its soles.
 #pragma once
 
 #include <vector>

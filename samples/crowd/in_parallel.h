@@ -1,4 +1,4 @@
-// A loop over all cores.
+// A parallel loop on all cores.
 #pragma once
 
 #include <algorithm>

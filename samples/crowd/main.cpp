@@ -1,5 +1,6 @@
-// The engine that uses crowd.h. Figures of several meshes, each with its own clip and phase,
-// appear, disappear, jump and leave the view while frames are in flight.
+// The engine around crowd.h. Figures appear, disappear, teleport and leave the view while frames
+// are in flight. Each figure consists of all skinned meshes of the model, and has its own clip and
+// phase.
 
 #include <fmt/format.h>
 

@@ -26,7 +26,7 @@ constexpr double mostFramesPerSecond = 240, latestStart = 1e6;
 std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   const std::optional<samples::PictureKind> kind = samples::pictureKind(film.output);
   if (!kind)
-    return fmt::format("--film must end in .mp4, .gif, .apng or .png, not be '{}'", film.output);
+    return fmt::format("--film must end in .mp4, .gif, .apng or .png; it is '{}'", film.output);
   for (const std::uint32_t side : {film.width, film.height}) {
     if (side < smallestSide || side > largestSide) {
       return fmt::format("--width and --height must be from {} to {} pixels", smallestSide,
@@ -36,7 +36,7 @@ std::string complaintAbout(const FilmRequest& film, bool hasFrames) {
   if (!(film.framesPerSecond >= 1 && film.framesPerSecond <= mostFramesPerSecond))
     return fmt::format("--fps must be from 1 to {}", mostFramesPerSecond);
   if (!(film.start >= 0 && film.start <= latestStart))
-    return "--time must be a number of seconds, 0 or more";
+    return fmt::format("--time must be from 0 to {} seconds", latestStart);
   if (*kind != samples::PictureKind::png) return {};
   if (samples::hasWrongPattern(film.output))
     return "--film may have one placeholder for a number, from %01d to %09d";
@@ -71,7 +71,7 @@ Result<void> checkOutputFiles(const Options& options,
 }
 
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options) {
-  CLI::App app("Skins a crowd with dermis::vulkan::SkinningSystem, and checks every vertex.",
+  CLI::App app("Skins a crowd with a SkinningSystem, and compares its vertices with the reference.",
                "dermis_crowd");
   app.footer(samples::exitStatusHelp);
   bool skipsVerification = false;
@@ -92,7 +92,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
          "Memory for skinned vertices in MiB; figures that do not fit are added later [enough "
          "for all]")
       ->check(CLI::Range(1u, mostMebibytes));
-  app.add_option("--json", options.json, "Write the same numbers to a file");
+  app.add_option("--json", options.json, "Write the results to a file as JSON");
   app.add_option("--check-every", options.checkInterval,
                  "Compare all vertices of every N-th frame and of the last frame [10]")
       ->check(CLI::Range(1u, mostFrames));

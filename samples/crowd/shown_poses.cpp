@@ -54,7 +54,7 @@ void ShownPoses::followInstance(const Crowd& crowd, const FigureFrame& now, Entr
 
 void ShownPoses::display(const FigureFrame& now, Entry& entry, std::uint64_t frame,
                          Skinned skinned) {
-  // Positions from before it left the view, or before a jump, do not count as motion.
+  // After a return to the view or a jump, previous positions are the current ones.
   const bool restarts = entry.restarts || !entry.isDisplayed;
   const auto mayRest = [&](const ShownPose& pose) {
     // In each complete interval there is a frame in which it is skinned.

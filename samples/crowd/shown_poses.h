@@ -24,8 +24,8 @@ struct ShownPose {
 struct ShownInstance {
   dermis::InstanceHandle handle;
   std::uint32_t part = 0;
-  /// One pose. Several if the GPU decides, since the CPU does not know in which frames the GPU
-  /// skinned the instance.
+  /// One pose. With culling on the GPU there may be several, since the CPU does not know in which
+  /// frames the GPU skinned the instance.
   std::vector<ShownPose> poses;
 };
 

@@ -16,7 +16,7 @@ namespace crowd {
 struct PanelNumbers {
   std::string device;
   std::uint64_t figures = 0, verticesOfFigure = 0, instances = 0;
-  /// Numbers of instances. Empty if the GPU decided and the numbers are not known.
+  /// Numbers of instances. With culling on the GPU, empty if they are not known.
   std::optional<std::uint64_t> skinned, notDue;
   std::uint64_t outOfView = 0;
   std::optional<std::uint64_t> vertices;  ///< skinned

@@ -14,13 +14,14 @@ namespace {
 /// Purposes of `chance`.
 enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
 
-// In meters, for a figure of 1.75 m. An animal that is longer than high is measured by its length.
+// In meters, for a figure of 1.75 m. A long animal is measured by its length.
 constexpr double standingSpacing = 0.95;
 constexpr double aisleInside = 1.6, aisleWidth = 3.0;
 constexpr double ringSpacing = 1.3, walkingSpacing = 1.75;
 constexpr std::uint32_t ringsOneWay = 3;
 
-/// Distance from the feet that a figure and its shadow may reach.
+/// Radius of a sphere around the middle of a figure that contains the figure and almost all of its
+/// shadow.
 constexpr double reach = 2.3;
 
 /// An update may be late as long as the feet move less than this number of pixels.

@@ -36,7 +36,7 @@ class Stroll final : public Figures {
   struct Role {
     std::uint32_t clip = 0, phase = 0;
     double radius = 0, angle = 0;  ///< about the middle, at the beginning
-    double step = 0;               ///< angle that it moves on in each frame
+    double step = 0;               ///< angle by which it moves in each frame
     double yaw = 0;                ///< direction in which it looks; 0 is outwards
     double scale = 1;
   };

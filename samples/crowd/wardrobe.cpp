@@ -58,7 +58,7 @@ const std::vector<Colors>& allColors() {
   return all;
 }
 
-/// The color of the largest part of it, without eyes and soles.
+/// The median color of the part, by channel, which ignores small areas such as eyes and soles.
 Color ownColor(const gltf::Primitive& primitive) {
   const std::size_t count = primitive.colors.size() / 4;
   if (count == 0) return {1, 1, 1};

@@ -1,6 +1,6 @@
 // An engine that manages buffers and instances itself. It turns a batch of instances into a plan
-// and records the plan. A hundred instances of one mesh are skinned into its vertex buffer, and
-// every vertex of the last frame is compared with the reference.
+// and records the plan. A hundred instances of one mesh are skinned into the engine's vertex
+// buffer, and every vertex of the last frame is compared with the reference.
 //
 //   dermis_embed
 //

@@ -87,7 +87,7 @@ Engine makeEngine() {
 
 struct Buffer {
   VkBuffer buffer = VK_NULL_HANDLE;
-  const std::byte* bytes = nullptr;  ///< if it is mapped
+  const std::byte* bytes = nullptr;  ///< null if the memory is not mapped
 };
 
 Buffer makeBuffer(const Engine& engine, VkDeviceSize size, VkBufferUsageFlags usage,
@@ -242,7 +242,7 @@ int main() {
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
   vulkan::Context context = must(vulkan::Context::create(device));
 
-  // -- Dermis: while loading. The engine has a buffer for poses, and tells Dermis.
+  // -- Dermis: while loading. The engine creates the buffer of the poses and passes it to Dermis.
   vulkan::SkinningSystemDescription description;
   description.context = &context;
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;

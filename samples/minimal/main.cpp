@@ -1,4 +1,4 @@
-// The smallest engine: a device without a window and one character that bends. At the end it checks
+// The smallest engine: a device without a window and one twisting character. At the end it checks
 // every vertex of the last frame.
 //
 //   dermis_minimal
@@ -171,7 +171,7 @@ int main() {
   // -- Each frame.
   std::vector<JointMatrix> pose(2);
   for (std::uint32_t frame = 1; frame <= frameCount; ++frame) {
-    const float angle = 0.5f * static_cast<float>(frame);  // joint 1 turns about the strip
+    const float angle = 0.5f * static_cast<float>(frame);  // joint 1 turns about the strip's axis
     pose[1] = {{{std::cos(angle), 0, std::sin(angle), 0},
                 {0, 1, 0, 0},
                 {-std::sin(angle), 0, std::cos(angle), 0}}};
@@ -206,8 +206,8 @@ int main() {
   const auto expected = must(reference::skin(mesh, pose, Method::dualQuaternion));
   const Comparison comparison = must(compareWithReference(expected, skinned));
   // [/compare]
-  std::printf("%u vertices, %u frames: %s, worst error %.0f %% of its bound\n", vertexCount,
-              frameCount, comparison.passed() ? "every vertex is right" : "WRONG",
+  std::printf("%u vertices, %u frames: %s, worst position error %.0f %% of its bound\n",
+              vertexCount, frameCount, comparison.passed() ? "every vertex is right" : "WRONG",
               100 * comparison.worstPosition);
   return comparison.passed() ? 0 : 1;  // the operating system takes the device back
 }

@@ -38,6 +38,6 @@ struct DrawBlock {
   glm::vec4 surface{0.0f};
   std::int32_t shadowIndex = 0;
 };
-static_assert(sizeof(DrawBlock) == 84, "128 bytes of push constants are all that is guaranteed");
+static_assert(sizeof(DrawBlock) == 84, "Vulkan guarantees only 128 bytes of push constants");
 
 }  // namespace dermis::samples::render

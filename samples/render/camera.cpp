@@ -36,7 +36,7 @@ void addCorners(const Box& box, std::vector<glm::vec3>& corners) {
   }
 }
 
-/// The distance that the eye must have, along a line that may be chosen, so that |x - center| <=
+/// The smallest distance of the eye for which there is a `center` with |x - center| <=
 /// slope · (distance - z) for every point (x, z).
 float fittingDistance(std::span<const glm::vec2> points, float slope) {
   // One border is determined by the largest x + slope·z, the other by the largest -x + slope·z.

@@ -91,9 +91,9 @@ void light(const LightingStyle& style, const Camera& camera, const Box& casters,
   block.shadow.y = keyView.depth;
   block.shadow.w = 1 / static_cast<float>(sizes.keyMap);
   lightSky(casters, sizes, block);
-  // About the length of the shadow of a figure's top on the ground, or a little less.
   const float height = casters.max[1] - casters.min[1];
   block.sky.w = 0.03f * height * block.sky.y / block.shadow.z;
+  // About the radius of the penumbra at the top of a figure's shadow, or a little less.
   block.sky.z = 0.6f * height * style.keySize / key.y;
 
   block.eye = camera.isOrthographic ? glm::vec4(camera.towardsEye, 0) : glm::vec4(camera.eye, 1);

@@ -26,7 +26,7 @@ class PictureWriter {
   virtual Result<void> finish() = 0;
 };
 
-/// PNG files: OUT, or OUT with the number of each picture in its place.
+/// PNG files: OUT, or OUT with its placeholder replaced by the number of each picture.
 std::unique_ptr<PictureWriter> writePngs(const std::string& output);
 
 /// Fails with `missingFeature` if ffmpeg, which films need, is not in the PATH, and on Windows.

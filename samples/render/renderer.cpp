@@ -345,7 +345,7 @@ Result<void> Renderer::recordView(VkCommandBuffer commandBuffer,
           recordDraws(commandBuffer, frame.set, {draws.begin(), blended}, Step::mesh, -1);
       !done)
     return done;
-  // Drawn after what hides it, and not at all from below.
+  // The ground is drawn after what may hide it, and not at all from below.
   if (view.groundHeight && (view.camera.isOrthographic ? view.camera.towardsEye.y > 0
                                                        : view.camera.eye.y > *view.groundHeight)) {
     key.step = Step::ground;

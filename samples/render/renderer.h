@@ -2,7 +2,7 @@
 // pictures and films of the samples; an engine has its own renderer.
 //
 //   Renderer renderer = *Renderer::create(device);
-//   RenderFrame frame = *renderer.createFrame(device, {1280, 720});
+//   RenderFrame frame = *renderer.createFrame({1280, 720});
 //   context.record(commandBuffer, …);                          // or SkinningSystem::record
 //   … the barrier vulkan::outputScope(Consumer::vertexInput) …
 //   renderer.record(commandBuffer, frame, views);

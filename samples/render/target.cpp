@@ -51,7 +51,7 @@ std::array<VkSubpassDependency, 2> pictureDependencies() {
 
 /// Bytes per pixel of the largest image of a picture: four samples of color.
 constexpr std::uint64_t largestPerPixel = 4 * 4;
-/// Bytes per pixel in all: the same for depth, the resolved image, and its copy.
+/// Bytes per pixel in all: four samples of color and of depth, the resolved image, and its copy.
 constexpr std::uint64_t bytesPerPixel = 2 * largestPerPixel + 4 + 4;
 
 Error tooLarge(const Device& device, std::uint32_t width, std::uint32_t height,

@@ -132,7 +132,7 @@ Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, gltf::Memo
   if (budget != nullptr && !budget->spend(pixels)) {
     return Error{ErrorCode::limitExceeded,
                  "its " + std::to_string(width) + " x " + std::to_string(height) +
-                     " pixels take more memory than a file of this size justifies"};
+                     " pixels take more memory than the limit for a file of this size"};
   }
   const std::unique_ptr<stbi_uc, void (*)(void*)> decoded(
       stbi_load_from_memory(bytes, size, &width, &height, &channels, 4), stbi_image_free);

@@ -1,4 +1,4 @@
-// Which way round triangles are when they are skinned.
+// The winding order of triangles after skinning.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace dermis::samples {
 
-/// Whether most joints of a pose mirror: then triangles are wound the other way.
+/// Whether most joints of a pose mirror. Then skinning reverses the winding order.
 bool isMirrored(std::span<const JointMatrix> pose);
 
 }  // namespace dermis::samples

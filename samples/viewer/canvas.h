@@ -1,6 +1,6 @@
 // The contents of the window before they are shown: the picture of the scene, and the interface on
-// top. This is a separate image, because those of a window need not be readable, and screenshots
-// read it.
+// top. This is a separate image, because screenshots read it, and images of a swapchain need not be
+// readable.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@
 
 namespace dermis::viewer {
 
-/// The last state of a scene: a pose, and the vertices skinned with it.
+/// A figure of the last picture: its method, and its vertices as the device skinned them.
 struct SkinnedFigure {
   Method method = Method::dualQuaternion;
   std::vector<std::vector<float>> positions;  ///< by part, 3 per vertex; empty for a fixed part

@@ -229,7 +229,7 @@ void drawTransport(const SceneView& view, const Area& picture, State& state) {
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav);
   ImGui::PopStyleColor();
   ImGui::PopStyleVar();
-  if (ImGui::Button(state.playback.isPlaying() ? "Stop" : "Play", {58, 0}))
+  if (ImGui::Button(state.playback.isPlaying() ? "Pause" : "Play", {58, 0}))
     state.playback.setPlaying(!state.playback.isPlaying());
   ImGui::SameLine();
   drawClipChoice(view, state);

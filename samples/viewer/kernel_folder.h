@@ -25,7 +25,7 @@ class KernelFolder {
   /// Looks for changed files; call when all earlier pictures are complete. Returns nothing if no
   /// file has changed. Fails once if a kernel cannot be compiled; the old kernels stay.
   virtual Result<std::optional<KernelUpdate>> reload(const vulkan::Context& context) = 0;
-  /// The number of modules, and their source.
+  /// The numbers of kernels that were compiled and that came from the cache.
   virtual std::string summary() const = 0;
 };
 

@@ -9,7 +9,7 @@ namespace {
 constexpr double stepSeconds = 1.0 / 30;
 
 constexpr std::array help{
-    KeyHelp{"Space", "play or stop"},
+    KeyHelp{"Space", "play or pause"},
     KeyHelp{"←  →", "one step back or forward; with Shift, ten"},
     KeyHelp{"Home", "go to the beginning of the clip"},
     KeyHelp{"↑  ↓   [  ]", "previous clip, next clip"},
@@ -25,10 +25,10 @@ constexpr std::array help{
     KeyHelp{nullptr, nullptr},
     KeyHelp{"Left drag", "orbit"},
     KeyHelp{"Right drag", "pan; also the middle button"},
-    KeyHelp{"Wheel", "nearer or farther"},
-    KeyHelp{"F", "frame the whole model; with Shift, from the front"},
+    KeyHelp{"Wheel", "zoom in or out"},
+    KeyHelp{"F", "frame the whole model; with Shift, from the initial direction"},
     KeyHelp{nullptr, nullptr},
-    KeyHelp{"O", "open a file: type or paste its path, or drop it here"},
+    KeyHelp{"O", "open a file: type or paste its path, or drop it on the window"},
     KeyHelp{"P  S", "take a screenshot"},
     KeyHelp{"U", "show or hide the panel"},
     KeyHelp{"H  F1", "this help"},

@@ -48,7 +48,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
       app.add_option("MODEL", options.model, "A .gltf or .glb file [the sample figure]");
   CLI::Option* empty = app.add_flag("--empty", isEmpty, "Start without a model")->excludes(model);
   app.add_option("--method", method, methodNames() + " [dual_quaternion]");
-  app.add_option("--compare", comparison, "Show another method beside it");
+  app.add_option("--compare", comparison, "A second method, to show side by side with the first");
   app.add_option("--animation", options.animation,
                  "A clip's number or name, or none for the rest pose [the first]")
       ->excludes(empty);
@@ -82,7 +82,7 @@ std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& o
     return samples::reportWrongUsage("--time must be a number of seconds");
   if (!options.screenshot.empty() && !samples::hasEnding(options.screenshot, ".png")) {
     return samples::reportWrongUsage(
-        fmt::format("--screenshot must end in .png, not be '{}'", options.screenshot));
+        fmt::format("--screenshot must end in .png; it is '{}'", options.screenshot));
   }
   const samples::RequestedOutput screenshot{"--screenshot", options.screenshot};
   const std::filesystem::path input = options.model;

@@ -26,7 +26,7 @@ struct Options {
   bool validates = false;
 };
 
-/// Nothing: go on; otherwise help was printed, or an error.
+/// Empty if the program should continue. Otherwise help or an error was printed.
 std::optional<samples::ExitStatus> readOptions(int argc, char** argv, Options& options);
 
 }  // namespace dermis::viewer

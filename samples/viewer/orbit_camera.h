@@ -14,7 +14,7 @@ class OrbitCamera {
   void frame(const Box& box, float aspect);
   /// Whether the camera has not been moved since `frame`.
   bool isFramed() const { return isFramed_; }
-  /// Resets the view to the front, slightly from above.
+  /// Resets the direction to 28° beside the front, slightly from above.
   void resetDirection();
 
   /// Turns the camera. Arguments are fractions of the picture's height, to the right and down.

@@ -60,8 +60,8 @@ class SceneView {
   const std::vector<std::string>& notes() const { return drawn_->notes(); }
   std::uint64_t vertexCount() const;
 
-  /// The box around all poses of a clip and the ground. The first call for a clip skins some poses,
-  /// and waits.
+  /// `extent` returns the box around some poses of a clip. Its first call for a clip skins them,
+  /// and waits. `withGround` extends that box by the ground.
   Result<Box> extent(std::uint32_t clip);
   static Box withGround(const Box& extent);
 

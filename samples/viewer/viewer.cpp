@@ -176,7 +176,7 @@ void Viewer::handleMouseButton(const SDL_MouseButtonEvent& button) {
   }
 }
 
-// -- What follows from it -----------------------------------------------------------------------
+// -- Reactions ----------------------------------------------------------------------------------
 
 void Viewer::update() {
   const Clock::time_point now = Clock::now();
@@ -238,7 +238,7 @@ void Viewer::adopt(LoadedScene loaded) {
     state_.error.clear();
     hasSoughtCenters_ = loaded.request.findsCenters;
   } else {
-    state_.methods = methods_;  // The requested file may have been for another method.
+    state_.methods = methods_;  // The file may have been read again for one of these methods.
     const std::string name = fileName(path), message = done.error().message;
     fail(samples::ExitStatus::badInput,
          message.find(name) == std::string::npos ? name + ": " + message : message);

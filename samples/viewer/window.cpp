@@ -82,7 +82,7 @@ Result<Surface> Surface::create(const Window& window, const samples::Device& dev
   Surface surface;
   surface.instance_ = device.description().instance;
   if (SDL_Vulkan_CreateSurface(window.handle(), surface.instance_, &surface.surface_) == SDL_FALSE)
-    return failed("the window has no Vulkan surface");
+    return failed("cannot create a Vulkan surface for the window");
   VkBool32 isSupported = VK_FALSE;
   vkGetPhysicalDeviceSurfaceSupportKHR(device.physicalDevice(), device.queueFamily(),
                                        surface.surface_, &isSupported);

@@ -605,15 +605,15 @@ FileBuilder copies(std::size_t nodes, std::size_t primitives, std::size_t vertic
 
 // 64 MiB and 64 times the file; and what has no end in memory has none in time.
 TEST_F(BadInput, NothingThatAFileMultipliesIsMadeBeyondItsBudget) {
-  const std::string justifies = "than a file of this size justifies";
-  expectRefusedSoon(writeModel("parts.gltf", copies(5000, 5000, 3)), justifies);
-  expectRefusedSoon(writeModel("vertices.gltf", copies(400, 1, 100'000)), justifies);
+  const std::string limit = "than the limit for a file of this size";
+  expectRefusedSoon(writeModel("parts.gltf", copies(5000, 5000, 3)), limit);
+  expectRefusedSoon(writeModel("vertices.gltf", copies(400, 1, 100'000)), limit);
   FileBuilder name = copies(1, 20'000, 3);
   name.json["nodes"][0]["name"] = std::string(1'000'000, 'N');
-  expectRefusedSoon(writeModel("name.gltf", name), justifies);
+  expectRefusedSoon(writeModel("name.gltf", name), limit);
   FileBuilder targets = copies(20'000, 1, 3);
   targets.primitive()["targets"] = std::vector<Json>(100'000, Json::object());
-  expectRefusedSoon(writeModel("targets.gltf", targets), justifies);
+  expectRefusedSoon(writeModel("targets.gltf", targets), limit);
 }
 
 TEST_F(BadInput, FilesThatAreNoModelsAreRefusedBeforeTheyAreRead) {

@@ -96,7 +96,7 @@ TEST(WrongBytesCommandsTest, TheCrowdsCheckTellsWhichVertexIsWrong) {
   EXPECT_EQ(result.status, 1) << result.output << result.errors;
   EXPECT_EQ(countOf(result.errors, "instances are wrong; the first: frame 1, "), 1u)
       << result.errors;
-  EXPECT_EQ(countOf(result.errors, ", vertex "), 1u) << result.errors;
+  EXPECT_EQ(countOf(result.errors, ": vertex "), 1u) << result.errors;
   EXPECT_EQ(countOf(result.output, "are inside their bounds"), 0u) << result.output;
   EXPECT_GE(nlohmann::json::parse(readText(json)).at("check").at("failures").get<int>(), 1);
   // The layer alone changes nothing.

@@ -208,7 +208,8 @@ TEST_F(WrongBytesTest, AWrongByteOfAnAttributeIsFoundAtItsVertex) {
 
 TEST_F(WrongBytesTest, AWrongPreviousPositionIsFound) {
   const auto wrong = invert(2, Stream::previousPositions, 5, 3, 0x80);
-  expectOnly(verify(before, wrong), 2, "in a first frame, previous positions are not the current");
+  expectOnly(verify(before, wrong), 2,
+             "when motion restarts, previous positions are not the current");
   expectOnly(verify(now, wrong), 2, "previous positions are not those of the frame before");
   expectOnly(verify(now, wrong), 2,
              "1 previous positions are outside their bound; the first is vertex 5");

@@ -374,7 +374,7 @@ TEST(GltfAccessor, RefusesToMultiplyAFile) {
   file.attributes() = {{"POSITION", file.addFloats(Floats(300'000), "VEC3")}};
   const Json primitive = file.primitive();
   for (int i = 0; i < 1000; ++i) file.json["meshes"][0]["primitives"].push_back(primitive);
-  expectError(file.load(), ErrorCode::limitExceeded, "than a file of this size justifies");
+  expectError(file.load(), ErrorCode::limitExceeded, "than the limit for a file of this size");
 }
 
 }  // namespace

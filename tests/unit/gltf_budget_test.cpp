@@ -209,8 +209,8 @@ TEST_F(GltfBudget, LeavesImagesOutThatAreTooMuch) {
   for (const gltf::Image& image : model.images) shown += image.bytes.empty() ? 0u : 1u;
   EXPECT_GT(shown, 50u);
   EXPECT_LT(shown, 150u) << "a budget of 64 MiB and 64 times 1 MB";
-  EXPECT_TRUE(hasNote(model, "justifies; it is left out (and " + std::to_string(count - shown - 1) +
-                                 " more of this kind)"))
+  EXPECT_TRUE(hasNote(model, "a file of this size; it is left out (and " +
+                                 std::to_string(count - shown - 1) + " more of this kind)"))
       << testing::PrintToString(model.notes);
 }
 

@@ -236,7 +236,7 @@ TEST(GltfContainer, RefusesCountlessEmptyThings) {
   std::string text = R"({"asset": {"version": "2.0"}, "materials": [{})";
   for (int i = 0; i < 300'000; ++i) text += ",{}";
   expectError(loadFromMemory(bytesOf(text + "]}"), {}), ErrorCode::limitExceeded,
-              "300001 materials: it needs more memory than a file of this size justifies");
+              "300001 materials: it needs more memory than the limit for a file of this size");
 }
 
 }  // namespace

@@ -381,7 +381,7 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithItsOptions) {
       {{"--compare", "cubic"}, "--compare: there is no method 'cubic'"},
       {{"--time", ""}, "--time has an empty value"},
       {{"--bogus"}, "there is no option --bogus"},
-      {{"--screenshot", "x.jpg"}, "--screenshot must end in .png, not be 'x.jpg'"},
+      {{"--screenshot", "x.jpg"}, "--screenshot must end in .png; it is 'x.jpg'"},
       {{model, "--screenshot", model}, "--screenshot " + model + " would overwrite"},
       {{"--empty", "--animation", "walk"}, "--empty excludes --animation"},
       {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no clip 'zzz'"},

@@ -28,7 +28,7 @@ void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
       budget.spend(count, bytesEach))
     return;
   fail(ErrorCode::limitExceeded,
-       join(where, ": it needs more memory than a file of this size justifies"));
+       join(where, ": it needs more memory than the limit for a file of this size"));
 }
 
 }  // namespace dermis::gltf
