@@ -142,7 +142,7 @@ TEST_F(ReplaceKernelsTest, WhatCannotBeIsRefused) {
   const Result<std::uint32_t> nothing = context->replaceKernels({&empty, 1}, 5, 3);
   ASSERT_FALSE(nothing.ok());
   EXPECT_NE(nothing.error().message.find("'" + skin + "'"), std::string::npos);
-  const vulkan::Context withoutSource = std::move(*vulkan::Context::create(mock.description()));
+  const vulkan::Context withoutSource = *vulkan::Context::create(mock.description());
   const Result<std::uint32_t> refused = withoutSource.replaceKernels({&module, 1}, 5, 3);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::invalidArgument);

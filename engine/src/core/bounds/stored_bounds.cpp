@@ -44,11 +44,12 @@ bool hasNan(std::span<const float> numbers) {
   return std::ranges::any_of(numbers, [](float number) { return std::isnan(number); });
 }
 
+/// Copies the elements to the first of the bytes, and removes these from the span.
 template <typename Element>
-void append(std::vector<std::byte>& bytes, const std::vector<Element>& elements) {
-  const std::size_t end = bytes.size(), size = elements.size() * sizeof(Element);
-  bytes.resize(end + size);
-  if (size != 0) std::memcpy(bytes.data() + end, elements.data(), size);
+void put(std::span<std::byte>& bytes, const std::vector<Element>& elements) {
+  const std::size_t size = elements.size() * sizeof(Element);
+  if (size != 0) std::memcpy(bytes.data(), elements.data(), size);
+  bytes = bytes.subspan(size);
 }
 
 template <typename Element>
@@ -104,23 +105,25 @@ Result<void> checkTrios(const JointBounds& bounds) {
 
 std::vector<std::byte> JointBounds::bytes() const {
   static_assert(std::endian::native == std::endian::little, "the words are little-endian");
-  std::vector<std::byte> bytes(sizeof(Header));
-  append(bytes, joints);
-  append(bytes, pairs);
-  append(bytes, trios);
+  const std::uint64_t words = wordsOf(joints.size(), pairs.size(), trios.size());
+  std::vector<std::byte> bytes(static_cast<std::size_t>(4 * words));
+  std::span<std::byte> rest = std::span(bytes).subspan(sizeof(Header));
+  put(rest, joints);
+  put(rest, pairs);
+  put(rest, trios);
   Header header{magic,
                 version,
                 0,
-                static_cast<std::uint32_t>(bytes.size() / 4),
+                static_cast<std::uint32_t>(words),
                 static_cast<std::uint32_t>(joints.size()),
                 static_cast<std::uint32_t>(pairs.size()),
                 static_cast<std::uint32_t>(trios.size()),
                 requiredJoints,
                 unweighted};
   std::memcpy(bytes.data(), &header, sizeof(header));
-  std::vector<std::uint32_t> words(bytes.size() / 4);
-  std::memcpy(words.data(), bytes.data(), bytes.size());
-  header.checksum = checksumOfBlob(words);
+  std::vector<std::uint32_t> blob(bytes.size() / 4);
+  std::memcpy(blob.data(), bytes.data(), bytes.size());
+  header.checksum = checksumOfBlob(blob);
   std::memcpy(bytes.data(), &header, sizeof(header));
   return bytes;
 }
