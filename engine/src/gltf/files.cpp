@@ -188,7 +188,8 @@ Bytes SideFiles::read(const FileToRead& file, std::uint64_t needed, const std::s
 
 std::vector<std::filesystem::path> SideFiles::paths() const {
   std::vector<std::filesystem::path> paths;
-  for (const auto& [path, bytes] : read_) paths.push_back(path);
+  for (const auto& [path, bytes] : read_)
+    if (bytes != nullptr) paths.push_back(path);  // null if reading failed
   return paths;
 }
 
