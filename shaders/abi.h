@@ -31,7 +31,8 @@ DERMIS_CONSTANT BINDING_PREVIOUS = 6u;
 DERMIS_CONSTANT BINDING_RESULTS = 7u;
 DERMIS_CONSTANT BINDING_COUNT = 8u;
 
-// Uniform texel buffers of variants that read through them. They are views of the same ranges.
+// Uniform texel buffers of variants that read through them. They are views of the ranges that are
+// bound as the storage buffers of tables, meshes and palettes.
 DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;     // 16 bytes per texel
 DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;      // 16 bytes per texel
 DERMIS_CONSTANT BINDING_MESH_WORDS = 10u;      // 4 bytes per texel
@@ -54,8 +55,9 @@ DERMIS_CONSTANT CONSTANT_MOTION = 11u;
 DERMIS_CONSTANT CONSTANT_MORPHS = 12u;  // 0 or 1
 DERMIS_CONSTANT CONSTANT_BOUNDS = 13u;  // 0 or 1
 DERMIS_CONSTANT CONSTANT_SCALES = 14u;  // 0 or 1: whether palettes may be two-phase
-DERMIS_CONSTANT CONSTANT_FULL = 15u;    // 0 or 1: every vertex has exactly CONSTANT_INFLUENCES
-DERMIS_CONSTANT CONSTANT_RECORD = 16u;  // bytes of one store of all attributes, or RECORD_*
+// 0 or 1: whether every vertex has exactly as many influences as CONSTANT_INFLUENCES says.
+DERMIS_CONSTANT CONSTANT_FULL = 15u;
+DERMIS_CONSTANT CONSTANT_RECORD = 16u;  // bytes of all attributes, stored together; or RECORD_*
 DERMIS_CONSTANT CONSTANT_COUNT = 17u;
 DERMIS_CONSTANT RECORD_APART = 0u;     // each attribute is stored separately
 DERMIS_CONSTANT RECORD_IN_PAIRS = 1u;  // float32x3 positions and normals, 8 bytes at a time
@@ -143,8 +145,8 @@ DERMIS_CONSTANT INFLUENCE_WORDS = 2u;
 
 // A morph target. The vertices of the mesh form blocks of MORPH_BLOCK_VERTICES. There is a record
 // for each block from the first that has a displaced vertex to the last. A displacement has 3
-// floats for each attribute of the target, in the order of MORPH_HAS_*. Both records begin at
-// multiples of 4 words.
+// floats for each attribute of the target, in the order of MORPH_HAS_*. MorphRecord and
+// MorphBlockRecord begin at multiples of 4 words.
 struct MorphRecord {
   uint firstBlock;
   uint blockCount;
@@ -198,15 +200,15 @@ struct GroupRecord {
   uint mesh;          // word offset of the packed mesh in the mesh buffer
   uint firstVertex;
   uint vertexEnd;
-  uint vertexGroups;  // workgroups that process each vertex once
+  uint vertexGroups;  // workgroups needed to process every vertex of the group once
   uint firstInstance;
   uint instanceCount;
   uint positionStride;  // strides are in bytes
   uint normalStride;
   uint tangentStride;
   uint previousStride;
-  // If 1, the difference of each word of the instance records is constant from record to record.
-  // With snorm16 positions, all boxes are then also equal.
+  // If 1, each word of the instance records changes by a constant amount from one record to the
+  // next. With snorm16 positions, all boxes are then also equal.
   uint evenlySpaced;
 };
 DERMIS_CONSTANT GROUP_WORDS = 12u;
@@ -321,7 +323,8 @@ struct CounterRecord {
   uint workgroups;
 };
 
-// Bindings of the visibility kernel. It also writes the tables.
+// Further bindings of the visibility kernel. It also has BINDING_TABLES, which it reads and writes,
+// and BINDING_RESULTS (not with ONE_OUTPUT).
 DERMIS_CONSTANT BINDING_VISIBILITY = 1u;
 DERMIS_CONSTANT BINDING_HISTORY = 2u;
 DERMIS_CONSTANT BINDING_COUNTERS = 3u;

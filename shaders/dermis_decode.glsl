@@ -27,8 +27,8 @@ vec3 dermisDecodePosition(vec3 stored, vec3 boxMin, vec3 boxMax) {
   return 0.5 * (boxMin + boxMax) + stored * (0.5 * (boxMax - boxMin));
 }
 
-// For shaders that read attributes as words from a storage buffer instead of vertex input. The results are arguments for the
-// functions above.
+// For shaders that read attributes as words from a storage buffer instead of vertex input. Results for octahedral attributes and
+// snorm16 positions are arguments for the functions above. Other results are final.
 vec4 dermisUnpackSnorm16(uvec2 words) { return vec4(unpackSnorm2x16(words.x), unpackSnorm2x16(words.y)); }
 vec2 dermisUnpackOctahedral16(uint word) { return unpackSnorm2x16(word); }
 vec4 dermisUnpackSnorm8(uint word) { return unpackSnorm4x8(word); }

@@ -5,8 +5,8 @@
 #include "exact.glsl"
 #include "vertex.glsl"
 
-// The rows of a blended 3×3 matrix, and the sign of its determinant. The matrix is scaled so that no product of two entries leaves
-// the range of a float.
+// The rows of a blended 3×3 matrix, and the sign of its determinant. If poses may scale, the matrix is scaled so that no product of
+// two or three entries overflows, and the square of the largest entry does not underflow.
 struct DirectionMap {
   vec3 r0;
   vec3 r1;
@@ -14,8 +14,9 @@ struct DirectionMap {
   float side;
 };
 
-// If no pose may scale, products are in range without scaling. The scale is a power of two, so results have the same bits with and
-// without it.
+// If no pose may scale, the matrix is not scaled. Linear blending applies the scale of joints even then; its products are in range
+// for joint scales between 2^-30 and 2^30. Otherwise, the matrix is multiplied by a power of two. If products are in range anyway,
+// results have the same bits with and without this multiplication.
 DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
   if (!SCALES) return DirectionMap(r0, r1, r2, dot3(r0, cross3(r1, r2)) < 0.0 ? -1.0 : 1.0);
   float scale = powerScale(max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2))));

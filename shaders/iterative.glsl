@@ -57,7 +57,8 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
     blend.real = quaternionProduct(blend.real, real);
     blend.dual = movedDual;
     makeUnit(blend.real, blend.dual);
-    // The tolerance is five roundings. It is computed with scaling, since the square of `reach` may be infinite or 0.
+    // The tolerance is five roundings (2^-24 each); 9e-14 is about its square. The shift and `reach` are scaled, since the square
+    // of `reach` may be infinite or 0.
     float scale = powerScale(reach);
     precise float scaledReach = scale * reach;
     precise vec3 shift = scale * screw.dual;

@@ -3,7 +3,8 @@
 #
 #   cmake -DINPUT=shaders/skin_include.glsl -DOUTPUT=dermis_skin.glsl -P make_include.cmake
 #
-# Finds a declaration only at the beginning of a line, where the kernels' sources have all that are not in a function.
+# Finds a declaration only at the beginning of a line. In the kernels' sources, the declaration of every function, struct and global
+# constant begins a line.
 
 cmake_minimum_required(VERSION 3.25)
 get_filename_component(folder ${INPUT} DIRECTORY)

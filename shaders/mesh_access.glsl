@@ -52,7 +52,7 @@ MorphBlockRecord loadMorphBlock(uint word) {
   return MorphBlockRecord(a.x, a.y, a.z, a.w);
 }
 
-// The first unit of each section of the mesh.
+// The first units of the first four sections of the mesh, counted from the beginning of the mesh buffer.
 struct Sections {
   uint positions;
   uint normals;
@@ -73,7 +73,7 @@ const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
 // Whether a vertex with `count` influences has this one. A constant if FULL.
 bool hasSlot(uint count, uint slot) { return FULL || slot < count; }
 
-// The influences of one vertex: the loaded ones, the first unit of all of them, and their number.
+// The influences of one vertex: the unit at which they begin, their number, and the loaded ones.
 struct Influences {
   uint unit;
   uint count;

@@ -59,7 +59,8 @@ uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
 layout(set = 0, binding = BINDING_POSITIONS, scalar) buffer Records24 { u64vec3 records24[]; };
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 
-// `index` counts records. It is incremented from instance to instance, because lavapipe divides slowly.
+// The index of the record at a byte offset. Between evenly spaced instances, `advance` (skin.comp) adds a constant to the index
+// instead, because lavapipe divides slowly.
 uint recordPlace(uint byte) { return byte / max(RECORD, 1u); }
 
 // Loads the float32x3 position at the beginning of a 24-byte record.
@@ -99,8 +100,7 @@ layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsU
 const uint RECORD_WORDS = RECORD / 4u;
 const uint STAGED_WORDS = gl_WorkGroupSize.x * RECORD_WORDS + 3u;
 shared uint staged[STAGED_WORDS * 2u];
-uint stagedRecords;     // records of this workgroup: at the end of a mesh, fewer than its
-                        // invocations
+uint stagedRecords;     // records of this workgroup: fewer than its invocations if fewer vertices are left in the group
 uint firstStaged = 0u;  // start of the half that is filled next
 
 uint recordPlace(uint byte) { return byte; }

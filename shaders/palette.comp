@@ -45,7 +45,8 @@ bool isRigid(vec3 r0, vec3 r1, vec3 r2) {
 #ifdef LOGARITHMS
 const uint UNITS_OF_JOINT = UNITS_OF_LOGARITHM;
 
-// The logarithm of a rigid transform, by the shorter rotation: rows of [ω]× | v, which is twice its screw.
+// Row `number` of the logarithm [ω]× | v of a rigid transform. ω and v are twice the real and dual parts of `screw`, which `main`
+// computes for the shorter rotation.
 vec4 jointUnit(Screw screw, uint number) {
   precise vec3 turn = 2.0 * screw.real;
   precise vec3 shift = 2.0 * screw.dual;

@@ -102,8 +102,10 @@ void addExactly(inout vec4 sum, inout vec4 rest, float a, vec4 b) {
   rest = restSoFar;
 }
 
-// The residual of q as an eigenvector of Horn's matrix H of C (see `nearestRotation`): H q − (q · H q) q. If C stretches by 1000,
-// the residual is a millionth of the terms. Plain floats would leave one digit of it, and more are needed.
+// The residual of q as an eigenvector of Horn's matrix H of C (see `nearestRotation`): H q − (q · H q) q. For the q that
+// `nearestRotation` returns, it is a few roundings (2^-24 each) of the terms that cancel. Plain floats would leave hardly a digit
+// of it, and more are needed: if C stretches one axis 1000 times as much as the others, a rotation by ω about that axis changes the
+// residual by only a few thousandths of ω, relative to these terms.
 vec4 eigenvectorResidual(vec4 q, vec3 r0, vec3 r1, vec3 r2) {
   vec4 sum = vec4(0.0);
   vec4 rest = vec4(0.0);
@@ -179,8 +181,8 @@ float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
 }
 
 // The polar decomposition of C, given by its rows. If the determinant is negative, R is the rotation of −C, and S is negated. A
-// determinant within 24 roundings (2^-24 each) of zero counts as 0, because rounding can give the determinant of a singular matrix
-// either sign.
+// determinant whose absolute value is at most 1.43e-6 × `magnitude` (24 roundings of 2^-24 each) counts as 0, because rounding can
+// give the determinant of a singular matrix either sign.
 void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
   float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
   if (largest == 0.0) {

@@ -16,8 +16,8 @@ void countClamped(uint result) {}
 
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { ResultRecord results[]; };
 #if defined(PAIRS) || defined(WIDE)
-// The same as pairs of words: three 64-bit loads read a box. lavapipe loads each lane separately, so three 64-bit loads take less
-// time.
+// The same buffer in 64-bit words. lavapipe loads each lane separately, so reading a box by three 64-bit loads takes less time than
+// by six 32-bit loads.
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer ResultPairs { uint64_t resultPairs[]; };
 #endif
 

@@ -318,7 +318,8 @@ void main() {
 #else
   if (vertex >= group.vertexEnd) return;
 #endif
-  // All shares except the last have the same size, so that workgroups take equally long and the load of threads is balanced.
+  // The instances of the group are divided into shares; each invocation skins one share. All shares except the last have the same
+  // size, so that workgroups take about the same time, and the work is spread evenly over the threads.
   uint share = INSTANCES;
   if (INSTANCES > 1u) {
     uint maxShare = push.instancesPerInvocation;

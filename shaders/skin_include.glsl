@@ -1,5 +1,6 @@
 // For an engine's own vertex, mesh or compute shaders: skins a vertex of a packed mesh, with the arithmetic of Dermis' kernels. The
-// build makes this file from the sources of the kernels. It puts `dermis_` before every name that is not for engines.
+// build makes dermis_skin.glsl from skin_include.glsl and the sources of the kernels. It puts `dermis_` before every name that is
+// not for engines.
 //
 // These macros may be defined before the #include:
 //   DERMIS_METHOD              0 linear, 1 dual quaternions (the default), 6 blended, 7 center of rotation, 8 bulge-controlled
@@ -61,7 +62,7 @@ uvec4 paletteBits(uint unit) { return DERMIS_PALETTE_UNIT(unit); }
 struct DermisVertex {
   vec3 position;
   vec3 normal;   // zero if the mesh has no normals
-  vec4 tangent;  // zero if the mesh has no tangents; w is the handedness
+  vec4 tangent;  // xyz is zero if the mesh has no tangents; w is the handedness
 };
 
 // A vertex in bind pose, as the mesh stores it. Directions need not have unit length.

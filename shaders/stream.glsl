@@ -1,5 +1,6 @@
 // One output attribute: declares its buffer as words and, if the kernel may store smaller or larger units, as halves, bytes and
-// vectors. Included once for each attribute, with STREAM_BINDING and the names to declare defined.
+// vectors. Included once for each attribute that has its own binding. STREAM_BINDING and the names to declare must be defined
+// before.
 
 layout(set = 0, binding = STREAM_BINDING, std430) buffer STREAM_WORDS_BLOCK { uint STREAM_WORDS[]; };
 #ifdef HALVES

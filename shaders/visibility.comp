@@ -4,8 +4,8 @@
 
 // Chooses, among the instances that are culled on the GPU, those that are visible and have something new to show. In the first pass
 // (VISIBILITY_CHOOSES) a workgroup processes the instances of one group, and moves the records of the chosen ones to the front, in
-// their order (a prefix sum). In the second pass (VISIBILITY_COUNTS) a workgroup processes the groups of one dispatch, and writes
-// the number of its workgroups. With ONE_OUTPUT there are no results, and four storage buffers in all.
+// their order (a prefix sum). In the second pass (VISIBILITY_COUNTS) a workgroup processes the groups of one dispatch: it writes
+// their `workgroupEnd`, and the arguments of the dispatch. With ONE_OUTPUT there are no results, and four storage buffers in all.
 
 #define TABLES_ARE_WRITTEN
 #include "results.glsl"

@@ -1,8 +1,9 @@
-// Stops a build whose flags let the compiler take NaN, infinities or signs of zeros for impossible,
-// or change the order of operations: checks would pass silently, and error bounds would not hold.
+// Stops a build whose flags let the compiler assume that there are no NaN, infinities or signed
+// zeros, or change the order of operations: checks would pass silently, and error bounds would not
+// hold.
 // The x87 unit of 32-bit x86 would round to `float` only when a value is stored.
 // CMake's targets switch these flags off; a build from the list of files must do so itself.
-// Included by Dermis' sources only. Flush-to-zero is not looked for: it is set when a program is
+// Included by Dermis' sources only. Flush-to-zero is not checked: it is set when a program is
 // linked or runs, and subnormal numbers are within the error bounds.
 #pragma once
 
@@ -12,7 +13,7 @@
 #error "Dermis: compile without -ffast-math, -ffinite-math-only, -fno-signed-zeros, /fp:fast"
 #endif
 
-// 0: each type is calculated as itself. 16: so is a 16-bit type.
+// 0: `float` and larger types are evaluated in their own precision. 16: the 16-bit type too.
 #if (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16) || \
     (defined(_M_IX86_FP) && _M_IX86_FP < 2)
 #error "Dermis: compile for SSE2 and not for the x87 unit: -msse2 -mfpmath=sse, /arch:SSE2"

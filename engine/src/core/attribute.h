@@ -53,8 +53,8 @@ inline float fromHalf(std::uint16_t half) {
   return std::bit_cast<float>(sign | bits);
 }
 
-/// A component of a position, normal, tangent or morph displacement: integers by their largest
-/// value, no less than -1.
+/// A component of any attribute except joints and weights. Normalized integers are divided by their
+/// largest value; signed ones are at least -1.
 inline double loadReal(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
   switch (view.type) {
     case ComponentType::float32:
@@ -86,7 +86,8 @@ inline float loadPosition(const MeshView& mesh, std::uint32_t vertex, std::uint3
                             static_cast<double>(mesh.positionOffset[component]));
 }
 
-/// A component of a morph target's displacement of a position; `element` counts the target's own.
+/// A component of a morph target's displacement of a position. `element` is an index into the
+/// target's own elements, not a vertex of the mesh.
 inline float loadMorphPosition(const MorphTargetView& target, std::uint32_t element,
                                std::uint32_t component) {
   return static_cast<float>(loadReal(target.positions, element, component) *

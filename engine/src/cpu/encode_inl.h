@@ -236,13 +236,13 @@ HWY_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, st
   }
 }
 
-// -- Positions and normals in float32, side by side: the layout that most engines use.
+// -- Positions and normals in float32, side by side.
 
 inline constexpr std::size_t vertexFloats = 6;
 inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
 
-/// Stores four vertices of each block of the vectors, positions and normals side by side, at that
-/// block's address in `to`.
+/// The 128-bit blocks i of the six vectors hold the positions and normals of four vertices, side by
+/// side. Stores them at `to[i]`.
 HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
   for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
 }

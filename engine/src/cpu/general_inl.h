@@ -28,7 +28,7 @@ template <class D>
 struct Vertex {
   Vec3<D> position;
   Vec3<D> normal, tangent;            ///< of unit length, or zero
-  Vec3<D> givenNormal, givenTangent;  ///< as stored in the mesh; scale/shear parts apply to these
+  Vec3<D> givenNormal, givenTangent;  ///< before normalizing; scale/shear parts apply to these
   Vec<D> hand;
 };
 
@@ -75,8 +75,9 @@ HWY_INLINE Vec3<D> throughMatrix(const Matrix<D>& m, const Vec3<D>& p) {
           hn::Add(dot3(m.r2.x, m.r2.y, m.r2.z, p.x, p.y, p.z), m.r2.w)};
 }
 
-/// The 3×3 matrix that transforms directions, by its rows, and the sign of its determinant. It is
-/// scaled so that no product of two of its entries leaves the range of a float.
+/// The 3×3 matrix that transforms directions, by its rows, and the sign of its determinant. Unless
+/// `isModerate` (see `directionMap`), it is scaled so that no product of two or three entries
+/// overflows, and the square of the largest entry does not underflow.
 template <class D>
 struct DirectionMap {
   Vec3<D> r0, r1, r2;
@@ -194,8 +195,8 @@ HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
   }
 }
 
-/// Σ w e of one vertex, over as many floats of each entry as there are lanes. An entry has 8
-/// `units` floats. If `influences` is 0, `count` is the number of influences.
+/// Σ w e of one vertex, over as many floats of each entry as there are lanes. An entry has
+/// 8 · `units` floats. If `influences` is 0, `count` is the number of influences.
 template <int influences, class D>
 HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
                             const std::uint16_t* HWY_RESTRICT numbers,

@@ -24,8 +24,8 @@ struct alignas(32) Lanes {
 /// Denotes an identity joint, the only joint of vertices without influences.
 inline constexpr std::uint32_t stillJoint = 0xffffffff;
 
-/// Influences store indices into the lists of a section, multiplied by this, so that an entry can
-/// be addressed without further arithmetic.
+/// Influences store indices into the lists of a section, multiplied by this: for entries of eight
+/// floats, the offset of the entry in floats.
 inline constexpr std::uint32_t indexScale = 8;
 
 /// A pivot and a joint that influences vertices of that pivot, as indices into `Section`'s joints.

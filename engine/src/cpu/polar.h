@@ -10,9 +10,9 @@ struct ScaleShear {
   float mixed[3] = {0, 0, 0};  ///< xy xz yz
 };
 
-/// The rotation nearest to the 3×3 part C of a joint matrix, as a unit quaternion x y z w, and the
-/// scale/shear part. With a negative determinant R is the rotation of −C and S has the sign. `rows`
-/// must be finite.
+/// The rotation R nearest to the 3×3 part C of a joint matrix, as a unit quaternion x y z w, and
+/// the scale/shear part S. If the determinant of C is negative by more than rounding, R is the
+/// rotation nearest to −C, and S = Rᵀ C has a negative determinant. `rows` must be finite.
 void polarParts(const float rows[3][4], float rotation[4], ScaleShear& scaleShear);
 
 }  // namespace dermis::cpu

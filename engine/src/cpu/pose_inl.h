@@ -1,5 +1,5 @@
-// Converts poses to what vertices read: unit dual quaternions of joints and of pairs, scale/shear
-// parts, and matrices. The formulas are those of the palette kernel (shaders/palette.comp).
+// Converts poses to what vertices read: unit dual quaternions of joints and of pairs, and
+// scale/shear parts. The formulas are those of the palette kernel (shaders/palette.comp).
 
 // clang-format off
 #if defined(DERMIS_CPU_POSE_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -89,7 +89,7 @@ HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
           hn::Mul(q.w, inverse)};
 }
 
-/// The dual part of rigid transforms: ½ (0, t) q.
+/// The dual part of rigid transforms: ½ (t, 0) q.
 template <class D>
 HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
   const Vec3<D> axis{q.x, q.y, q.z};

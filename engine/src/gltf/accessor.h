@@ -23,8 +23,8 @@ struct Format {
 /// A file opened for reading: its structure and its bytes.
 class Source {
  public:
-  /// Checks every bufferView and accessor against the buffers. Decoded data is spent on the budget.
-  /// Budget and notes must outlive this object. Throws `Failure`.
+  /// Checks every bufferView and accessor against the buffers. Reading data spends its memory from
+  /// the budget. Budget and notes must outlive this object. Throws `Failure`.
   Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget, Notes& notes);
 
   const tinygltf::Model& content() const { return document_.content; }

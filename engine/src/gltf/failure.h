@@ -1,5 +1,5 @@
-// How this module reports errors internally: a `Failure` is thrown, and `loadFromMemory` turns it
-// into a `Result`. No exception leaves the module.
+// How this module reports errors internally: a `Failure` is thrown, and `load` and `loadFromMemory`
+// turn it into a `Result`. No exception leaves the module.
 #pragma once
 
 #include <concepts>

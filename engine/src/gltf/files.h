@@ -1,4 +1,5 @@
-// The files of a model: opened only in its folder, and read once, only as far as needed.
+// Reads the files of a model: side files only inside the folder of the model, and each file only as
+// far as needed.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +26,8 @@ struct FileToRead {
   std::uint64_t size = 0;
 };
 
-/// A path for messages. `string` uses the code page of the machine with some standard libraries on
-/// Windows, and throws if that lacks a character.
+/// A path for messages. `path::string` uses the code page of the machine with some standard
+/// libraries on Windows, and throws if that lacks a character.
 std::string utf8(const std::filesystem::path& path);
 
 /// Throws `Failure` with `ioError` if there is no such file, it is a folder, or access is denied.

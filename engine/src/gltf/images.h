@@ -30,9 +30,9 @@ struct Appearance {
 /// takes. Throws `Failure` with `limitExceeded`.
 Appearance findAppearance(const nlohmann::json& root, MemoryBudget& budget);
 
-/// Fills in `images` and the textures of the materials. Only images that a material shows are read,
-/// equal ones once. Side files are read by the same rules as those of buffers. An image that cannot
-/// be read gives a note.
+/// Fills in `images` and the textures of the materials. Only images that a material shows are read;
+/// equal ones are kept once. Side files are read by the same rules as those of buffers. An image
+/// that cannot be read gives a note.
 void readImages(const Appearance& appearance, const Source& source, SideFiles& files, Model& model);
 
 }  // namespace dermis::gltf

@@ -1,5 +1,5 @@
-// Notes of a `Model` about its file: broken rules whose intent is clear, and what is left out.
-// Notes are counted by kind, so that a file cannot produce a note per byte.
+// Notes of a `Model` about its file: broken rules where the meaning of the file is clear, and what
+// is left out. Notes are counted by kind, so that a file cannot produce a note per byte.
 #pragma once
 
 #include <array>
@@ -44,7 +44,7 @@ enum class NoteKind : std::uint8_t {
   channel,          ///< without effect, or a duplicate
   animatedMatrix,   ///< decomposed
   restOfTriangles,  ///< indices that do not form a triangle
-  // Not a fault of the file, or of this file.
+  // Remarks: never errors, even if strict.
   noPositions,
   noTimes,
   image,
@@ -87,7 +87,7 @@ class Notes {
   }
 
   /// Calls the function, which checks or reads an object of the file. If nothing skinned or
-  /// animated uses that object, as `tolerate`.
+  /// animated uses that object, a `Failure` is handled as in `tolerate`.
   template <typename Function>
   bool tolerateUnlessUsed(bool isUsed, Function function) {
     if (!isUsed)

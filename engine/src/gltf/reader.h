@@ -9,7 +9,7 @@
 
 namespace dermis::gltf {
 
-/// tinygltf's −1 for "none".
+/// An index from tinygltf; its −1 becomes `none`.
 inline std::uint32_t indexOf(int index) {
   return index < 0 ? none : static_cast<std::uint32_t>(index);
 }
@@ -45,7 +45,7 @@ std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh);
 std::string primitivePlace(std::size_t mesh, std::size_t primitive);
 
 /// Divides a quaternion by its length. If that is impossible (length 0 or not finite), it becomes
-/// the identity, as in three.js. Returns how far from 1 the length was.
+/// the identity. Returns how far from 1 the length was, or 1 if it was impossible.
 double normalizeQuaternion(std::array<double, 4>& quaternion);
 
 }  // namespace dermis::gltf

@@ -1,4 +1,4 @@
-// Compiled modules on disk, one file an entry.
+// Compiled modules on disk, one file per entry.
 #pragma once
 
 #include <array>
@@ -23,11 +23,11 @@ class Cache {
  public:
   explicit Cache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// The module stored under `key`. An entry that is damaged, or that another version of Dermis
-  /// wrote, is deleted, and `problem` says so.
+  /// The module stored under `key`. An entry that is damaged, has another key, or has another
+  /// version of the cache's format is deleted, and `problem` says so.
   CacheLookup load(const CacheKey& key) const;
 
-  /// Makes the folder where it is missing. Fails with `ioError`.
+  /// Creates the folder if it does not exist. Fails with `ioError`.
   Result<void> store(const CacheKey& key, std::span<const std::uint32_t> words) const;
 
  private:

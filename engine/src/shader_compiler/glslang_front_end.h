@@ -25,7 +25,8 @@ struct FrontEndOutput {
 Result<FrontEndOutput> translateToSpirv(const ShaderSource& source, bool debugInfo,
                                         IncludeResolver& resolver);
 
-/// The version of everything whose change may change what `translateToSpirv` writes.
+/// The versions of glslang and of its SPIR-V generator, which the output of `translateToSpirv`
+/// depends on.
 std::string frontEndVersion();
 
 }  // namespace dermis

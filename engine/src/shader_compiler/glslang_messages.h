@@ -1,4 +1,4 @@
-// glslang's log, read back.
+// Finds the error in glslang's log.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace dermis {
 
-/// The first error in an info log of glslang as "FILE:LINE: text", or as "NAME: text" where it
-/// names no line. `name` is the source's.
+/// The first error in an info log of glslang as "FILE:LINE: text", or as "NAME: text" if it names
+/// no line. Without an error, `text` is the first line of the log. `name` is the source's.
 std::string firstError(std::string_view log, std::string_view name);
 
 }  // namespace dermis

@@ -20,8 +20,8 @@ enum class IncludeForm {
   angled   ///< `#include <name>`: the include folders only.
 };
 
-/// Reads each file once, so that the search for the cache's key and the compilation after it see
-/// the same text even if the file changes in between.
+/// Reads each file once, so that the hash for the cache and the compilation after it see the same
+/// text even if the file changes in between.
 class IncludeResolver {
  public:
   explicit IncludeResolver(const std::vector<std::filesystem::path>& includeFolders)
@@ -31,7 +31,7 @@ class IncludeResolver {
   const IncludeFile* resolve(std::string_view name, std::string_view includingFile,
                              IncludeForm form);
 
-  /// Every file that `resolve` found, in the order of the first time.
+  /// All files that `resolve` found, in the order in which they were first found.
   const std::vector<std::filesystem::path>& filesRead() const { return filesRead_; }
 
  private:

@@ -11,12 +11,12 @@
 namespace dermis {
 
 /// Adds every file that `text` may include, directly or through others, to `hash`, and returns
-/// their paths. Conditions are not evaluated: a file behind an `#if` that is false counts, and one
-/// that does not exist counts by its absence, so that the hash changes when it appears.
+/// their paths. Conditions are not evaluated: files inside a false `#if` are added too. If a file
+/// does not exist, that is added, so that the hash changes when the file appears.
 ///
-/// It reads lines of the form `#include "name"` and `#include <name>`. What hides from it (a
-/// comment or a line continuation between `#` and the name) is noticed by comparing with what the
-/// compiler really included.
+/// It reads lines of the form `#include "name"` and `#include <name>`. It misses others (with a
+/// comment or a line continuation between `#` and the name); the caller notices them by comparing
+/// with what the compiler included.
 std::set<std::string> hashIncludes(std::string_view text, const std::string& name,
                                    IncludeResolver& resolver, Hash128& hash);
 

@@ -1,4 +1,4 @@
-// The IncludeResolver as glslang wants to call it.
+// Adapts IncludeResolver to glslang's interface.
 #pragma once
 
 #include <glslang/Public/ShaderLang.h>
@@ -35,12 +35,12 @@ class Includer final : public glslang::TShader::Includer {
   std::string describeCycle(const std::string& path) const;
 
   IncludeResolver& resolver_;
-  // Owned here, not by who calls releaseInclude: glslang does not call it for all after an error.
+  // Owned here, not freed in releaseInclude: after an error glslang does not call it for every one.
   std::deque<IncludeResult> results_;
   std::deque<std::string> reasons_;
   std::string mainFile_;
   std::vector<const IncludeResult*> open_;  ///< The files being read now, outermost first.
-  std::string refusal_;  ///< Why includeLocal just refused; empty when it did not.
+  std::string refusal_;  ///< Why includeLocal refused the last name; empty if it did not.
   std::set<std::string> used_;
   std::size_t includedBytes_ = 0;
 };

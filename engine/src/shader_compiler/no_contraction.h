@@ -14,22 +14,23 @@ namespace dermis {
 /// An instruction that a driver, or SPIRV-Tools before it, may fuse with others or reorder.
 struct ContractableInstruction {
   std::string opcode;      ///< "OpFMul"
-  std::string function;    ///< Its name where the module has debug information, otherwise empty.
+  std::string function;    ///< Its name if the module has debug information, otherwise empty.
   std::string file;        ///< As above.
   std::uint32_t line = 0;  ///< As above; 0: not known.
 };
 
-/// Every instruction of a module that is made of additions and multiplications of floats and is not
-/// decorated NoContraction, which is what GLSL's `precise` becomes.
+/// Every floating-point instruction of a module that can be contracted and is not decorated
+/// NoContraction, which is what GLSL's `precise` becomes.
 ///
-/// What counts is what SPIR-V calls arithmetic (OpFAdd to OpDot; the specification, 3.42.13) and
-/// the functions of GLSL.std.450 that are defined as sums of products (`length`, `mix`, `fma`, …):
-/// glslang decorates none of those, nor OpDot and OpFMod, so that a kernel has to write them out.
-/// Left out is what rounds at most once, whatever the compiler does: negation, `abs`, `min`,
-/// conversions, comparisons; and what is one operation of the device: `sqrt`, `inversesqrt`, `sin`.
+/// These are SPIR-V's arithmetic instructions on floats (OpFAdd to OpDot; the specification,
+/// 3.42.13) and functions of GLSL.std.450 that consist of such arithmetic (`length`, `mix`, `fma`,
+/// …). glslang decorates none of those functions, nor OpDot and OpFMod, so kernels must write them
+/// out. Operations that round at most once however they are compiled are left out (negation, `abs`,
+/// `min`, conversions, comparisons), and so are single operations of the device (`sqrt`,
+/// `inversesqrt`, `sin`).
 ///
 /// Decorations through OpGroupDecorate, which no GLSL compiler writes, are not seen. Fails with
-/// `invalidData` if the words are no SPIR-V module in the machine's byte order.
+/// `invalidData` if the words are not a SPIR-V module in the machine's byte order.
 DERMIS_SHADER_COMPILER_API Result<std::vector<ContractableInstruction>> findContractable(
     std::span<const std::uint32_t> words);
 

@@ -21,7 +21,7 @@ double readComponent(const AttributeView& view, std::size_t element, std::uint32
 /// The first three components.
 glm::dvec3 readVector(const AttributeView& view, std::size_t element);
 
-/// A vertex' position: the stored value times the mesh's scale, plus its offset.
+/// A vertex's position: the stored value times the mesh's scale, plus its offset.
 glm::dvec3 readPosition(const MeshView& mesh, std::size_t vertex);
 
 struct Influence {

@@ -18,8 +18,8 @@ struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
                         ///< value of joint j
   double stretch = 1;   ///< max σ_j; 1 for a vertex without weight
-  double distance = 0;  ///< |p|, from the origin of the bind pose; if there is a center of
-                        ///< rotation c, |p| + 2 |c|
+  double distance = 0;  ///< |p|, from the origin of the bind pose; for methods that need a center
+                        ///< of rotation c: |p| + 2 |c|
   double rigidShortcut = 0;  ///< max |σ − 1| of the joints that kernels treat as rigid
   /// Maximum error of the bind pose in float32, in units of u: for p in the mesh's units, for
   /// directions times |n| and |t|. One rounding for a stored value that is not a float32; two for
@@ -48,16 +48,17 @@ struct Conditioning {
                              ///< normalized
   double tangentLength = 1;  ///< likewise
   bool normalRotatedOnly =
-      true;  ///< blended rotations of rigid joints: directions are not transformed by a 3×3
+      true;  ///< directions are only rotated: all joints of the vertex count as rigid in the
+             ///< kernels, and the method is neither `linear` nor `blended`
   bool handednessAmbiguous = false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: rounding decides its sign
   /// The result is discontinuous here, and rounding decides between its values: |dot| with the
   /// pivot below 1e-5; `logMatrix`: a joint rotated by 180° within 2e-5; `dualQuaternionIterative`:
   /// a joint nearly opposite to the blend; `sphericalBlend`: a singular value within 1e-5 of the
-  /// least.
+  /// limit 1e-3, up to which it is not used.
   bool signAmbiguous = false;
-  bool degenerate = false;  ///< a joint of rank ≤ 1, or with σ₂ + σ₃ < 2^-100, or not finite: a
-                            ///< result only has to be finite
-  bool undefined = false;  ///< a joint is not finite: no result is defined
+  bool degenerate = false;  ///< a joint is degenerate (`Joint::degenerate`) or not finite: a result
+                            ///< only has to be finite
+  bool undefined = false;   ///< a joint is not finite: no result is defined
 };
 
 /// Maximum distance of a float32 position from the reference's: 6 u · scale for `linear`, 24 u · A²
@@ -71,14 +72,15 @@ struct Conditioning {
 /// as inaccurate as it permits. docs/accuracy.md says which parts are derived and which are fitted.
 double positionBound(Method method, const Conditioning& conditioning);
 
-/// Maximum distance between a float32 unit normal and the reference's. A normal turned by a blended
-/// rotation: 1.5e-6 · `turning` · A + `rigidShortcut`. A normal transformed by the blended 3×3 M of
-/// `linear`: 6 u / a + 2 u, a = `normalAlignment`. In two phases a normal is transformed by M, (6 u
-/// + 2 `rigidShortcut`) / a, and then turned, so that both errors add up; those of `blended` are
-/// divided by `normalLength`. The error of the bind pose, u · `normalRounding`, and the change of M
-/// by flushed denormals, 2^-120 / `stretch`, are divided by a as well. Negative if a normal only
-/// has to be finite and of unit length: if a · `normalLength` < 1e-3, or the error of the bind pose
-/// exceeds 0.05 a because displacements nearly cancel.
+/// Maximum distance between a float32 unit normal and the reference's. Negative if a normal only
+/// has to be finite and of unit length. With turn = 1.5e-6 · `turning` · A, bind = u ·
+/// `normalRounding`, a = `normalAlignment`, l = `normalLength` (1 except for `blended`), and f =
+/// 2^-120 / `stretch` for the change of M by flushed denormals:
+/// - blended rotations of rigid joints: turn + `rigidShortcut` + bind; negative if bind > 0.05;
+/// - the blended 3×3 M of `linear`: (6 u + bind + f) / a + 2 u;
+/// - two phases, M and then a rotation: ((6 u + 2 `rigidShortcut` + bind + f) / a + turn) / l.
+/// The last two are negative if a · l < 1e-3, or if bind + f > 0.05 · a · l because displacements
+/// nearly cancel.
 double normalBound(Method method, const Conditioning& conditioning);
 
 /// The same for tangents, with `tangentAlignment`, `tangentRounding` and `tangentLength`, and with

@@ -31,9 +31,9 @@ struct PolarParts {
               ///< + σ₃ < 2^-100, so that flushing denormals to 0 on a GPU would turn it
 };
 
-/// If the determinant is negative, the rotation is that of −matrix, and the scale part has the
-/// sign. A matrix whose determinant is 0 except for rounding in float32 counts as flat, not
-/// mirrored: the rotation of its two axes, det +1.
+/// If the determinant is negative, the rotation is that of −matrix, and scaleShear has a negative
+/// determinant. A matrix whose determinant is 0 except for rounding in float32 counts as flat, not
+/// mirrored: two axes determine the rotation, and the third is chosen so that its determinant is 1.
 PolarParts polarParts(const glm::dmat3& matrix);
 
 struct Joint {

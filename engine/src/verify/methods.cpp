@@ -278,7 +278,7 @@ BindVertex skinBlended(const VertexToSkin& vertex, Conditioning& conditioning) {
           unitOrZero(tangent), turned.handedness};
 }
 
-/// The distance of the center has the same effect as that of the vertex' position.
+/// The distance of the center has the same effect as that of the vertex's position.
 void conditionCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
   const double distance = 2 * glm::length(vertex.inputs.center);
   conditioning.leverage = conditioning.stretch * distance;

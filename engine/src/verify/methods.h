@@ -36,9 +36,9 @@ BindVertex skinVertex(const VertexToSkin& vertex, Method method, Conditioning& c
 /// The strongest influence. On a tie, the one with the lowest joint.
 const Influence& pivotOf(std::span<const Influence> influences);
 
-/// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1), where the pivot
-/// has the greatest weight and the real part unit length; and the scale/shear parts blended
-/// linearly.
+/// The rigid parts blended as dual quaternions (Kavan et al. 2007, algorithm 1), and the
+/// scale/shear parts blended linearly. The pivot is the influence with the greatest weight. The
+/// real part of the result has unit length.
 struct RigidBlend {
   Rigid rigid;
   glm::dmat3 scaleShear{0.0};

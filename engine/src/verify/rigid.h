@@ -1,6 +1,5 @@
-// Rigid transforms as dual quaternions, for the reference. It does not use dual_quat.h: templates
-// on GLM's quaternions would bring their layout, which an engine may change by a macro, into the
-// library.
+// Rigid transforms as dual quaternions, for the reference. It does not use GLM's quaternions: an
+// engine may change their layout by a macro.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -20,7 +19,7 @@ Rigid operator*(const Rigid& a, double factor);
 Rigid operator+(const Rigid& a, const Rigid& b);
 Rigid operator-(const Rigid& a);
 
-/// d = ½ (0, t) q, for a unit quaternion q.
+/// d = ½ (t, 0) q, for a unit quaternion q.
 Rigid rigidOf(const glm::dvec4& rotation, const glm::dvec3& translation);
 /// The inverse of a unit dual quaternion.
 Rigid conjugate(const Rigid& a);
@@ -35,7 +34,8 @@ glm::dvec3 rotate(const glm::dvec4& rotation, const glm::dvec3& v);
 glm::dvec3 transformPoint(const Rigid& a, const glm::dvec3& point);
 glm::dmat3 matrixOf(const glm::dvec4& rotation);
 
-/// Half the angle about the screw axis, and half the distance along it. The dual quaternion must
+/// `real`: half the angle times the direction of the screw axis. `dual`: half the distance along
+/// the axis times its direction, plus half the angle times its moment. The dual quaternion must
 /// have unit length. Kavan et al. 2008, appendix.
 Rigid log(const Rigid& a);
 /// The inverse of `log`.

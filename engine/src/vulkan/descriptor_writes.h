@@ -13,8 +13,8 @@ namespace dermis::vulkan {
 
 class DescriptorWrites {
  public:
-  /// Bindings without a buffer are left out: the kernel does not use them. `bound` must outlive
-  /// this object.
+  /// Bindings without a buffer are left out: the kernel's module does not declare them, or the
+  /// kernel is not recorded. `bound` must outlive this object.
   explicit DescriptorWrites(const BoundBuffers& bound, VkDescriptorSet set = VK_NULL_HANDLE) {
     for (std::uint32_t binding = 0; binding < bound.buffers.size(); ++binding) {
       if (bound.buffers[binding].buffer == VK_NULL_HANDLE) continue;

@@ -30,8 +30,8 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
-  /// Builds a pipeline unless it exists. Fails with `missingFeature` if the device, or this build
-  /// of Dermis, has no module for the variant.
+  /// Builds a pipeline unless it exists. Fails with `missingFeature` if the device lacks a feature
+  /// that the variant needs, or if this build of Dermis (or `kernelSource`) has no module for it.
   Result<void> build(const Variant& variant, VkPipelineLayout layout);
 
   /// `Context::replaceKernels`.

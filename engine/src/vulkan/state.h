@@ -30,8 +30,8 @@ struct ContextState {
     return limits.maxStorageBuffersPerStage < storageBuffersWanted ? abi::MIN_BINDING_COUNT
                                                                    : abi::BINDING_COUNT;
   }
-  /// Texel bindings follow the storage buffers. Devices with fewer storage buffers do not use texel
-  /// buffers.
+  /// Texel bindings follow the storage buffers. Devices with fewer than `storageBuffersWanted`
+  /// storage buffers do not use texel buffers.
   std::uint32_t texelBindingCount() const {
     return limits.texelBuffers ? abi::TEXEL_BINDING_COUNT : 0;
   }
@@ -39,8 +39,8 @@ struct ContextState {
   Result<void> createLayouts();
   Result<void> prepare(std::span<const Variant> variants) const;
   Result<void> prepare(const PipelineNeeds& needs, const Tuning& withTuning) const;
-  /// Descriptor sets and the pool that has them, without push descriptors. The pool must be
-  /// destroyed even if it fails.
+  /// Without push descriptors: creates a pool and allocates descriptor sets from it. The caller
+  /// must destroy the pool even if this fails.
   Result<void> allocateSets(std::uint32_t count, VkDescriptorPool& pool,
                             std::vector<VkDescriptorSet>& sets) const;
   /// `poseBuffers`: of a scene, those that the palette kernel reads.
@@ -74,7 +74,7 @@ using Windows = std::array<std::uint32_t, streamCount>;
 /// Buffers that commands of a scene use besides the bound ones.
 struct FrameBuffers {
   BufferRange upload, readBack, visibility, history, counters;
-  /// For the visibility kernel, without push descriptors. It is written when it is recorded: the
+  /// For the visibility kernel, without push descriptors. `recordCommands` writes the set: the
   /// frame that used it last must be complete.
   VkDescriptorSet visibilitySet = VK_NULL_HANDLE;
 };
@@ -104,9 +104,9 @@ struct BindingsState {
 
   Result<void> createTexelViews();
 
-  // Without push descriptors: a set of the palette kernel for each pose buffer, then for each
-  // window one for those who read poses and one for those who read palettes, all outputs at windows
-  // of one number.
+  // Without push descriptors: a set of the palette kernel for each pose buffer; then, for each
+  // window number, two sets of the skin kernel: one with poses and one with palettes. All outputs
+  // of a set are bound at the window of that number, or at their last one.
   VkDescriptorPool pool = VK_NULL_HANDLE;
   std::vector<VkDescriptorSet> sets;
 
@@ -114,8 +114,8 @@ struct BindingsState {
   std::size_t skinSet(BufferRole joints, std::uint32_t window) const {
     return poseBuffers.size() + std::size_t{window} * 2 + (joints == BufferRole::poses ? 0 : 1);
   }
-  /// The number of the window that all attributes of a dispatch are written to, if it is the same
-  /// (`DeviceLimits::separateRanges`).
+  /// The window number of all outputs of a dispatch that have several windows. They must have the
+  /// same one, as they do if `DeviceLimits::separateRanges` is false.
   static std::uint32_t commonWindow(const DispatchCommand& dispatch);
 
   /// Whether a plan can be recorded with these buffers and the existing pipelines.

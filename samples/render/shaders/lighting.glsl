@@ -1,6 +1,6 @@
-// Visibility of the lights. The key light has a penumbra that grows with the distance to the occluder. The sky consists of many
-// weak lights, each with its own shadow map. Together they give ambient light with occlusion by nearby surfaces: dark under the
-// chin, between the legs, and where a foot meets the ground.
+// Visibility of the lights; also the background and dithering. The key light has a penumbra that grows with the distance to the
+// occluder. The sky consists of many weak lights, each with its own shadow map. Together they give ambient light with occlusion by
+// nearby surfaces: dark under the chin, between the legs, and where a foot meets the ground.
 #ifndef DERMIS_RENDER_LIGHTING_GLSL
 #define DERMIS_RENDER_LIGHTING_GLSL
 

@@ -37,8 +37,8 @@ vec3 heat(float value) {
   return mix(stops[stop], stops[stop + 1], place - float(stop));
 }
 
-// Walter et al. 2007, "Microfacet models for refraction", with Schlick's Fresnel term; times the
-// cosine, for a light of unit irradiance.
+// GGX (Walter et al. 2007, "Microfacet models for refraction") with the masking-shadowing term of Hammon 2017 ("PBR diffuse
+// lighting for GGX+Smith microsurfaces") and Schlick's Fresnel term; times the cosine, for a light of unit irradiance.
 vec3 specular(vec3 normal, vec3 towardsEye, vec3 towardsLight, float roughness, vec3 reflectance) {
   vec3 half_ = normalize(towardsEye + towardsLight);
   float cosineLight = max(dot(normal, towardsLight), 0.0);

@@ -19,7 +19,7 @@ layout(std140, set = 0, binding = 0) uniform View {
   vec4 shadow;                      // x: key texel, y: key depth range, z: sky texel (world units);
                                     // w: 1 / size of the key map
   vec4 sky;                         // x: number of lights, y: 1 / size of their maps;
-                                    // z: widest penumbra of the key light, in world units;
+                                    // z: maximum penumbra radius of the key light, in world units;
                                     // w: filter radius of the sky on the ground, as a fraction of its map
   vec4 horizonColor;                // of the background, as displayed, in linear values
   vec4 zenithColor;

@@ -42,7 +42,8 @@ inline double reachOf(const Range& range) {
   return math::length(math::max(math::abs(range.min), math::abs(range.max)));
 }
 
-/// The float next to `value` that is not above it; never beyond the infinities.
+/// The largest float that is not above `value`. A finite `value` above all finite floats gives the
+/// largest of them; one below all finite floats gives -inf.
 inline float roundDown(double value) {
   constexpr float largest = std::numeric_limits<float>::max();
   if (value < -static_cast<double>(largest)) return -std::numeric_limits<float>::infinity();
@@ -94,7 +95,7 @@ inline Affine cross(const Affine& a, const math::Vec3& v) {
           math::cross(a.offset, v)};
 }
 
-/// How far each direction of an `Extent` reaches, in double precision.
+/// `Extent::reach` in double precision.
 struct Reach {
   std::array<double, 26> values;
 
@@ -105,8 +106,8 @@ struct Reach {
 };
 
 /// A range that contains the image of all points of an extent, which must not be empty. A row d of
-/// the map is a sum, with factors that are not negative, of the directions at the corners of the
-/// triangle around d. So the same sum of their reaches bounds the reach along d.
+/// the map lies between three of the 26 directions, to a face, an edge and a corner of the cube: it
+/// is a sum of them with factors ≥ 0. So the same sum of their reaches bounds the reach along d.
 Range imageOf(const Affine& map, const Extent& extent);
 
 /// The box around an extent.

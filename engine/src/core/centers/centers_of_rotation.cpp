@@ -51,7 +51,7 @@ struct Vertices {
 
 /// The triangles that contribute, in their order.
 struct Triangles {
-  InfluenceLists influences;  ///< the mean of their vertices', by rising joint
+  InfluenceLists influences;  ///< the mean of their vertices', in ascending order of joints
   std::vector<Moment> moments;
 };
 
@@ -117,7 +117,8 @@ bool equal(std::span<const Influence> a, std::span<const Influence> b) {
                     });
 }
 
-/// Triangles of equal weights become one group; groups with the same joints are consecutive.
+/// Triangles with the same influences become one group; groups with the same joints are
+/// consecutive.
 std::vector<Group> group(const Triangles& triangles) {
   std::vector<std::uint32_t> order(triangles.moments.size());
   std::iota(order.begin(), order.end(), 0u);

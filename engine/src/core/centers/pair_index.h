@@ -17,7 +17,7 @@ struct Influence {
   double weight = 0;
 };
 
-/// Σ weight · (centroid, 1): their quotient is a center.
+/// Σ weight · (centroid, 1). (x, y, z) / sum is a center.
 struct Moment {
   double x = 0, y = 0, z = 0, sum = 0;
 
@@ -29,8 +29,9 @@ struct Moment {
   }
 };
 
-/// Triangles of equal weights. Their similarity to any vertex is the same, so one sum of moments
-/// represents them all. `influences` are by ascending joint.
+/// Triangles with the same influences, which are the mean of their vertices'. Their similarity to
+/// any vertex is the same, so one sum of moments represents them all. `influences` are in ascending
+/// order of joints.
 struct Group {
   std::span<const Influence> influences;
   Moment moment;  ///< weighted by area
@@ -41,8 +42,8 @@ class PairIndex {
   explicit PairIndex(std::span<const Group> groups);
 
   /// Adds the contribution of two influences of a vertex to its center: the moments of all groups,
-  /// times their similarity for this pair. j and k are taken in one order only; the factor of 2
-  /// cancels.
+  /// times their similarity for this pair. Callers pass each pair in one order only: the factor of
+  /// 2 cancels when the moment is divided by its sum.
   void addSimilar(const Influence& first, const Influence& second, Moment& sum) const;
 
   /// Number of groups that have both joints.
@@ -59,8 +60,8 @@ class PairIndex {
   const Range* rangeOf(const Influence& first, const Influence& second) const;
 
   std::unordered_map<std::uint32_t, Range> ranges_;
-  /// An entry a group and pair; those of one pair together, filled up to a multiple of `lanes` by
-  /// entries without weight.
+  /// A group has an entry for each pair of its joints. The entries of one pair are consecutive,
+  /// padded to a multiple of 8 (`lanes`) with entries of weight 0.
   std::vector<double> lowWeights_, highWeights_;
   std::vector<std::uint32_t> groups_;
   std::vector<Moment> moments_;  ///< by group

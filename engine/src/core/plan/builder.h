@@ -34,7 +34,9 @@ inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, boo
 
 // -- Groups.
 
-/// One mesh with one output layout, in one dispatch; the instances follow in the instance table.
+/// Runs of instances with equal keys form a group: one mesh or a part of its vertices, one variant,
+/// one output layout. A dispatch skins one or more groups. The instance records of a group are
+/// consecutive in the tables.
 struct GroupKey {
   std::uint64_t mesh = 0;     ///< bytes into the mesh buffer
   std::uint64_t variant = 0;  ///< its key
@@ -67,16 +69,16 @@ struct Placing {
   Subject subject;
   OutputWindows windows;
   std::uint32_t jointCount = 0;  ///< of its palette
-  bool mayScale = false;         ///< a palette that it reads may
+  bool mayScale = false;         ///< a palette that it reads may scale
   bool isCulled = false;         ///< the GPU chooses whether it is skinned
 };
 
 /// Groups exist as long as they contain instances.
 class Groups {
  public:
-  /// Appends a run for each output range that the vertices of a job lie in, and takes part in their
-  /// groups. Fails with `limitExceeded` if a kernel cannot see all windows of a run, or the GPU
-  /// would choose more than one; nothing is appended then.
+  /// Cuts the vertices of a job into runs (`cutIntoRuns`), appends them, and acquires their groups.
+  /// Fails with `limitExceeded` if a kernel cannot see all windows of a run, or if the instance is
+  /// culled on the GPU and needs more than one run; nothing is appended then.
   Result<void> place(const Job& job, const OutputStreams& streams, const Placing& placing,
                      const DeviceLimits& limits, const Tuning& tuning,
                      std::vector<PlacedRun>& runs);
@@ -101,8 +103,8 @@ class Groups {
 
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> free_;
-  std::vector<std::uint32_t> heads_;  ///< a hash table: a power of two of lists of entries
-  /// that was acquired: consecutive instances mostly have the same group
+  std::vector<std::uint32_t> heads_;  ///< hash table: lists of entries; its size is a power of two
+  /// The group that was acquired last: consecutive instances mostly have the same one.
   std::uint32_t last_ = notUsed;
   LayoutNeeds lastLayout_;  ///< of the job that was placed last …
   FormNeeds lastForm_;
@@ -119,7 +121,8 @@ struct InstanceExtras {
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
-  /// Motion::reskinned: a palette as instance records name it, and the morph weights of that time.
+  /// For Motion::reskinned: the first unit and the number of joints of the previous pose's palette
+  /// (for `linear`, of its matrices), and the previous morph weights.
   bool hasPrevious = false;
   std::uint32_t previousPalette = 0, previousJoints = 0;
   std::vector<MorphWeight> previousMorphs;
@@ -134,7 +137,7 @@ void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>&
 /// The data with which the GPU decides whether an instance is skinned.
 struct Candidate {
   std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
-  std::uint32_t version = 0;  ///< of what it should show; different for all instances and poses
+  std::uint32_t version = 0;  ///< of the state that it should show; unique within a scene
 };
 
 /// Offsets of a frame's results and counters in its read-back buffer.
@@ -157,11 +160,11 @@ struct PlanSizes {
   std::uint64_t meshes = 0, poses = 0, gpuPoses = 0, palettes = 0;
   std::uint32_t results = 0;  ///< their number
   OutputSizes outputs;
-  bool isScene = false;  ///< there are the buffers of a scene
+  bool isScene = false;  ///< the buffers of a scene exist
   std::uint32_t slots =
       0;  ///< of a scene: words of visibility, records of history; 0 if the GPU chooses nothing
 
-  /// Of one buffer, given those of the tables.
+  /// Of one buffer. `tables` is the size of the tables in bytes.
   BufferRequirement requirement(BufferRole role, std::uint64_t tables,
                                 const DeviceLimits& limits) const;
 };
@@ -176,7 +179,7 @@ inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
 /// The work of a frame of a scene, besides skinning.
 struct FrameWork {
   std::uint32_t frame = 0;               ///< counts records, from 1
-  std::uint32_t clearHistory = 0;        ///< its records that are clear, or in use
+  std::uint32_t clearHistory = 0;        ///< records of the history that are clear, or in use
   std::span<const CopyCommand> moves;    ///< of outputs
   std::span<const CopyCommand> results;  ///< to the read-back buffer
 };
@@ -194,8 +197,9 @@ struct PlanData {
 
   std::vector<Command> commands;
   std::vector<Variant> variants;
-  /// Palette records, the numbers of results to clear, group records, instance records, then
-  /// extensions and active morph targets; at last what is culled on the GPU.
+  /// Palette records, the numbers of results to clear, group records, instance records, extensions
+  /// (each followed by its active morph targets). If the GPU culls: candidates, their dispatches,
+  /// and indirect arguments.
   std::vector<std::uint32_t> tables;
   /// Place of each palette in the palettes buffer, for each form, or notUsed.
   std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
@@ -215,8 +219,8 @@ class PlanBuilder {
   void begin(PlanData& plan, Groups& groups, const DeviceLimits& limits, const Tuning& tuning,
              const PlanSizes& sizes);
 
-  /// A palette to be converted, from one of the pose buffers of a scene. All palettes come before
-  /// `finish`, in any order with the rest.
+  /// A palette to be converted, from one of the pose buffers (a batch has only number 0). Palettes
+  /// and instances may be added in any order.
   void addPalette(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
                   PaletteForm form, bool mayScale) {
     while (palettes_.size() <= source.buffer) palettes_.emplace_back();
@@ -312,7 +316,7 @@ class PlanBuilder {
   std::vector<std::uint32_t> order_;
   std::vector<Dispatch> dispatches_;
   std::array<DispatchCommand, 2> visibility_;  ///< the passes of the visibility kernel
-  abi::VisibilityPush culled_{};               ///< where the tables have what it works on
+  abi::VisibilityPush culled_{};               ///< push constants of the visibility kernel
   std::uint32_t culledGroups_ = 0;
 };
 

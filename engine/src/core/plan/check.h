@@ -21,7 +21,7 @@ Error notAValue(const std::string& what, Enum value, const char* name) {
   return invalid(what + " is " + std::to_string(static_cast<unsigned>(value)) +
                  ", which is not a value of " + name);
 }
-/// For a buffer of a batch that is larger than a storage buffer range.
+/// For a buffer that is larger than `DeviceLimits::maxStorageBufferRange`.
 Error tooLargeForRange(const std::string& name, std::uint64_t size, const DeviceLimits& limits);
 
 /// The object at fault, at the beginning of a message: "job 17", "the instance".

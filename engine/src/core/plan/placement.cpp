@@ -144,7 +144,8 @@ bool isAligned(const OutputStreams& streams, const Variant& variant) {
   return variant.recordBytes == 0 || streams[0].offset % variant.recordBytes == 0;
 }
 
-/// The skin kernel for a job without its form, with wide stores if `areAligned`.
+/// The skin kernel for a job, except for the members that `chooseForm` sets. It has wide stores if
+/// `areAligned`.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning,
                       bool areAligned) {
   Variant variant = outputVariant(job);

@@ -1,5 +1,5 @@
-// Chooses the kernel of an instance, and the place of its vertices. This is known before there is a
-// frame.
+// Chooses the kernel of an instance, and the output windows that its vertices are written to.
+// Neither depends on a frame.
 #pragma once
 
 #include <array>
@@ -50,7 +50,7 @@ inline std::uint8_t storeUnit(const OutputStream& stream) {
   return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
 }
 
-/// Whether the kernel finds something out about the instance.
+/// Whether the kernel writes an `InstanceResult`: bounds, or the number of clamped vertices.
 inline bool hasResult(const Job& job) {
   return job.bounds || isSnormPosition(job.positions.format);
 }
@@ -73,7 +73,8 @@ Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning);
 Variant clearVariant(const Tuning& tuning);
 Variant visibilityVariant(const Tuning& tuning);
 
-/// The skin kernel for a job, without its form. It depends on nothing else in the batch.
+/// The skin kernel for a job, except for the members that `chooseForm` sets. It depends on nothing
+/// else in the batch.
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning);
 
 /// All inputs of `layoutVariant`, for one device and tuning. Consecutive instances mostly have the
@@ -92,18 +93,18 @@ struct LayoutNeeds {
   std::array<std::uint32_t, streamCount> strides{}, residues{};
 };
 
-/// What the form of a skin kernel depends on, besides the method.
+/// The inputs of `chooseForm`, besides the method and the promises.
 struct FormNeeds {
-  std::uint32_t influences = 0;  ///< of a vertex, at most
-  bool full = false;             ///< every vertex has as many
-  bool scales = false;           ///< a palette that it reads may
-  bool morphs = false;           ///< any is active
+  std::uint32_t influences = 0;  ///< maximum of a vertex
+  bool full = false;             ///< every vertex has that many
+  bool scales = false;           ///< a palette that the kernel reads may scale
+  bool morphs = false;           ///< a morph target is active
 
   friend bool operator==(const FormNeeds&, const FormNeeds&) = default;
 };
 
 FormNeeds formNeeds(const Job& job, bool mayScale);
-/// Sets all members of the variant that depend on its form.
+/// Sets `influences`, `fullInfluences`, `scales` and `morphs` of the variant.
 void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& variant);
 
 /// Whether kernels on the device may store an attribute, or all of a vertex, at once.
@@ -112,8 +113,8 @@ inline bool storesWidely(const DeviceLimits& limits) {
          limits.maxStorageBuffersPerStage >= storageBuffersWanted;
 }
 
-/// Whether positions and normals of a job are float32x3 that stand together, with a stride that
-/// lets a kernel store them 8 bytes at a time.
+/// Whether the normals of a job directly follow its positions, both are float32x3, and their stride
+/// is a multiple of 8. A kernel can then store them 8 bytes at a time.
 inline bool standsInPairs(const Job& job) {
   return job.positions.format == VertexFormat::float32x3 &&
          job.normals.format == VertexFormat::float32x3 &&
@@ -121,8 +122,8 @@ inline bool standsInPairs(const Job& job) {
          job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
 }
 
-/// Whether what a job has of normals and tangents stands right behind its positions, so that a
-/// kernel may store all of a vertex together.
+/// Whether a job has normals or tangents, and they directly follow the positions of each vertex. A
+/// kernel may then store the whole vertex at once.
 inline bool standsTogether(const OutputStreams& streams) {
   const OutputStream &positions = streams[0], &normals = streams[1], &tangents = streams[2];
   const std::uint64_t end = positions.offset + positions.size;
@@ -133,8 +134,7 @@ inline bool standsTogether(const OutputStreams& streams) {
          standsAt(tangents, end + normals.size);
 }
 
-// -- Windows: output that is larger than a storage buffer range may be is written through several
-// ranges.
+// -- Windows: ranges through which an output larger than `maxStorageBufferRange` is written.
 
 /// What the windows of the outputs depend on, besides jobs.
 struct OutputWindows {
@@ -143,11 +143,11 @@ struct OutputWindows {
 
   std::uint64_t range = 0;                    ///< bytes of the largest window
   std::uint64_t step = 0;                     ///< `outputWindowStep`
-  std::array<bool, streamCount> oversized{};  ///< output is larger than a window …
-  bool isAnyOversized = false;                ///< … mostly none is
+  std::array<bool, streamCount> oversized{};  ///< the output is larger than a window
+  bool isAnyOversized = false;                ///< usually false
 };
 
-/// Vertices of one job of which each attribute lies in one window of its buffer.
+/// Consecutive vertices of one job. Each of their attributes lies in one window of its buffer.
 struct VertexRun {
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;

@@ -58,7 +58,7 @@ struct ScenePose {
   std::uint64_t version = 1;
   std::array<Form, paletteFormCount> forms;
   std::uint32_t users = 0;
-  std::uint32_t firstInstance = notUsed;  ///< of its instances, which are a list
+  std::uint32_t firstInstance = notUsed;  ///< of the linked list of its instances
 };
 
 /// Where an instance's vertices are, or will be.
@@ -70,8 +70,8 @@ struct Place {
   friend bool operator==(const Place&, const Place&) = default;
 };
 
-/// The part of an instance that changes and frames read for all instances. It is separate from the
-/// rest, so that caches hold it for many instances.
+/// The part of an instance that `change`, `setVisibility` and `plan` read for many instances. It is
+/// separate from the rest, so that caches hold it for many instances.
 struct InstanceState {
   std::uint32_t generation = 0;  ///< of its handle; 0: there is none
   std::uint32_t updateInterval = 1;
@@ -82,14 +82,15 @@ struct InstanceState {
   bool hasMotion = false;
   bool restartsMotion = true;     ///< when it is skinned next
   bool isUrgent = true;           ///< skinned at once, regardless of its interval
-  bool isMoving = false;          ///< its previous positions are others, as of the last record
+  bool isMoving = false;          ///< previous positions may differ, as of the last record
   std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
   std::uint64_t hiddenAfter = 0;  ///< the last record that displayed it before it was hidden
 };
 
 struct SceneInstance {
-  // The members that a frame reads to skin it are together, the first in the cache line of the
-  // slot: with lavapipe the caches hold vertices when the next frame begins.
+  // The members that a frame reads to skin an instance come first, the first of them in the cache
+  // line that begins the slot. With lavapipe, skinning evicts instances from the caches, so each
+  // cache line must be fetched again in the next frame.
   bool isShifting = false;  ///< among the shifting
   Method method = Method::dualQuaternion;
   std::uint32_t pose = 0;  ///< index
@@ -110,7 +111,7 @@ struct SceneInstance {
   std::uint32_t restartVersion = 0;  ///< the one that restarts its motion
   std::uint32_t culledIndex = notUsed;
 
-  // Seldom looked at.
+  // Rarely read.
   MeshHandle mesh;
   PoseHandle poseHandle;
   bool bounds = false;
@@ -212,7 +213,7 @@ class SceneBooks {
     state.isListed = true;
     pending_.push_back({index, state.generation});
   }
-  /// Null for a handle of no instance.
+  /// Null if there is no instance with this handle.
   InstanceState* findState(InstanceHandle handle) {
     if (handle.index >= states_.size() || handle.generation == 0) return nullptr;
     InstanceState& state = states_[handle.index];

@@ -30,7 +30,7 @@ class DERMIS_CORE_API RangeAllocator {
   /// The smallest gap that holds `size` at a multiple of `alignment`, which need not be a power of
   /// two; nothing if there is none. `size` is not 0.
   std::optional<Range> allocate(std::uint64_t size, std::uint64_t alignment);
-  /// The same in the gap of the lowest offset, where the range ends at or before `end`.
+  /// The same in the gap with the lowest offset in which the range ends at or before `end`.
   std::optional<Range> allocateBelow(std::uint64_t size, std::uint64_t alignment,
                                      std::uint64_t end);
   void free(const Range& range);

@@ -37,7 +37,8 @@ class SlotMap {
     Slot& slot = slots_[handle.index];
     slot.thing = Thing{};
     slot.isUsed = false;
-    // After 2^32 objects a slot is never used again: otherwise a handle could repeat or be null.
+    // After 2^32 - 1 objects a slot is never used again: its generation would be 0 (a null handle)
+    // or repeat.
     if (++slot.generation != 0) free_.push_back(handle.index);
     --size_;
   }

@@ -10,7 +10,7 @@ namespace dermis::tool {
 struct EmbeddedModule {
   std::string name;  ///< A C++ identifier: the symbol is NAME_spirv.
   std::vector<std::uint32_t> words;
-  std::vector<std::string> unless;  ///< Macros: left out where one of them is defined.
+  std::vector<std::string> unless;  ///< Macros: the module is left out if one of them is defined.
 };
 
 /// Declares `extern const std::span<const std::uint32_t> NAME_spirv` for each module, and a

@@ -48,8 +48,8 @@ class SystemBuffer {
   std::uint64_t size_ = 0;
 };
 
-/// A buffer that a larger one may replace in the next `record`, which copies its contents; or a
-/// range of the engine, which never grows.
+/// A buffer that a larger one may replace in the next `record`, which copies its contents (except
+/// palettes, which are converted again); or a range of the engine, which never grows.
 struct GrowingBuffer {
   SystemBuffer own;     ///< as of the last `record`
   SystemBuffer larger;  ///< from the next one on

@@ -71,7 +71,7 @@ struct SkinningSystem::State {
 
   ContextState* context;  ///< its address stays the same when the Context is moved
   SystemFunctions functions;
-  std::unique_ptr<MemoryBlocks> blocks;  ///< where the engine has no allocator
+  std::unique_ptr<MemoryBlocks> blocks;  ///< null if the engine has an allocator
   BufferSource source;
   Scene scene;
   std::unique_ptr<State*> self;  ///< what the scene's growth callback is given
@@ -82,10 +82,10 @@ struct SkinningSystem::State {
   SystemBuffer tables, counters;
   Bindings bindings;
   bool bindingsAreOld = true;
-  bool isGrowing = false;  ///< one of the buffers has a larger one
+  bool isGrowing = false;  ///< the next `record` replaces a buffer by a larger one
   std::uint64_t outputGeneration = 1;
   VkBufferUsageFlags outputUsage = 0;  ///< the engine's
-  /// Without push descriptors: one for each slot.
+  /// Without push descriptors: a set of the visibility kernel for each slot, and their pool.
   VkDescriptorPool visibilityPool = VK_NULL_HANDLE;
   std::vector<VkDescriptorSet> visibilitySets;
   std::uint64_t frameNumber = 0;

@@ -22,7 +22,8 @@ class Timestamps {
 
   void begin(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
   void end(VkCommandBuffer commandBuffer, std::uint32_t frame) const;
-  /// The GPU time of a complete frame; empty if the queue has no timestamps.
+  /// The GPU time of a complete frame; empty if timestamps are not created, not available, or not
+  /// in ascending order.
   std::optional<double> seconds(std::uint32_t frame) const;
 
  private:
