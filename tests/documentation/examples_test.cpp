@@ -185,7 +185,8 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   // [cpu-frame]
   scene.beginFrame();
   std::ranges::copy(jointMatrices, must(scene.writePose(figure.pose)).begin());
-  for (const cpu::PlannedJob& job : must(scene.jobs())) threadPool.run([&] { cpu::skin(job); });
+  const std::span<const cpu::PlannedJob> jobs = must(scene.jobs());
+  for (const cpu::PlannedJob& job : jobs) threadPool.run([&] { cpu::skin(job); });
   threadPool.wait();
   const InstanceOutput output = must(scene.output(instance));
   const std::byte* skinned = scene.outputBytes().data() + output.offset;
