@@ -129,13 +129,15 @@ TEST(ScopeTest, InputScopesWaitForWritersAndReaders) {
   }
 }
 
-// Write after read: an execution dependency, from the kernels to the writer.
+// Write after read, and after the write that was read: an execution dependency from the kernels,
+// and the access of the writer.
 TEST(ScopeTest, OverwritersWaitForKernels) {
   expectScope(vulkan::overwriteScope(Writer::compute).source, kernelsRead, "source");
-  expectScope(vulkan::overwriteScope(Writer::compute).destination, kernelsRead, "compute");
+  expectScope(vulkan::overwriteScope(Writer::compute).destination,
+              {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT}, "compute");
   expectScope(vulkan::overwriteScope(Writer::transfer).source, kernelsRead, "source");
   expectScope(vulkan::overwriteScope(Writer::transfer).destination,
-              {VK_PIPELINE_STAGE_TRANSFER_BIT, 0}, "transfer");
+              {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}, "transfer");
 }
 
 TEST(ScopeTest, Synchronization2HasTheSameStagesAndAccesses) {

@@ -104,9 +104,11 @@ Dependency inputScope(PreviousUse use) {
   return {};
 }
 
+// The kernels only read, so the source needs no access. The barrier before that `record` made the
+// earlier writes available. To write after them, the destination needs an access.
 Dependency overwriteScope(Writer writer) {
-  constexpr VkPipelineStageFlags transfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
-  return {{compute, 0}, {writer == Writer::compute ? compute : transfer, 0}};
+  if (writer == Writer::compute) return {{compute, 0}, {compute, VK_ACCESS_SHADER_WRITE_BIT}};
+  return {{compute, 0}, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}};
 }
 
 Dependency outputScope(Consumer consumer, QueueTransfer transfer) {

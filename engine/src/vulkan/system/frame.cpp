@@ -84,9 +84,10 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
 Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   if (uploads.empty()) return recorded;
-  const Dependency afterReads = overwriteScope(Writer::transfer);
-  context->table.cmdPipelineBarrier(commandBuffer, afterReads.source.stages,
-                                    afterReads.destination.stages, 0, 0, nullptr, 0, nullptr, 0,
+  const Dependency overwrite = overwriteScope(Writer::transfer);
+  const VkMemoryBarrier barrier = memoryBarrier(overwrite);
+  context->table.cmdPipelineBarrier(commandBuffer, overwrite.source.stages,
+                                    overwrite.destination.stages, 0, 1, &barrier, 0, nullptr, 0,
                                     nullptr);
   for (MeshUpload& upload : uploads) {
     const BufferRange to = meshes.range();
