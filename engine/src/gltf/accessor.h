@@ -102,8 +102,8 @@ class Source {
   std::vector<Buffer> buffers_;
   MemoryBudget& budget_;
   Notes& notes_;
-  std::vector<bool> isFaulty_;  ///< Accessors that may not be read. Nothing that is skinned uses
-                                ///< them.
+  std::vector<bool> isFaulty_;  ///< accessors that must not be read; nothing skinned or animated
+                                ///< uses them
 };
 
 /// The name of a component type and normalization: "normalized unsigned byte".

@@ -23,8 +23,8 @@ struct Buffer {
 };
 
 /// Loads all buffers. Throws `Failure`: `ioError` if a file cannot be read or lies outside the
-/// folder, or `limitExceeded`. A buffer that nothing skinned uses may fail, and a buffer may be
-/// shorter than its byteLength; each gives a note.
+/// folder, `invalidData` if a data URI is malformed, or `limitExceeded`. A buffer that nothing
+/// skinned uses may fail, and a buffer may be shorter than its byteLength; each gives a note.
 std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
                                 SideFiles& files, MemoryBudget& budget, Notes& notes);

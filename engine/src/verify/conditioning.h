@@ -64,9 +64,9 @@ struct Conditioning {
 /// Maximum distance of a float32 position from the reference's: 6 u · scale for `linear`, 24 u · A²
 /// · (scale + `leverage`) for the others, where u = `floatRounding`, A = max(1, 1 / (4 |b|)), |b| =
 /// `blendLength`. The kernels do not decompose a joint that is rigid except for rounding (det > 0,
-/// ‖CᵀC − 1‖∞ ≤ 8e-6); this adds `rigidShortcut` · `distance`. Inputs that are not float32, and
-/// morph targets, add u · `positionRounding` · `stretch`. A GPU may flush denormals to 0, which
-/// adds 2^-120 (1 + `distance`).
+/// ‖CᵀC − 1‖∞ ≤ 8e-6); except for `linear`, this adds `rigidShortcut` · `distance`. Inputs that are
+/// not float32, and morph targets, add u · `positionRounding` · `stretch`. A GPU may flush
+/// denormals to 0, which adds 2^-120 (1 + `distance`).
 ///
 /// Holds for every device that computes as Vulkan requires, with division, `sqrt` and `inversesqrt`
 /// as inaccurate as it permits. docs/accuracy.md says which parts are derived and which are fitted.

@@ -50,11 +50,11 @@ BindVertex moveRigidly(const VertexToSkin& vertex, const glm::dmat3& scaleShear,
                        const glm::dvec4& rotation, const glm::dvec3& translation,
                        Conditioning& conditioning);
 
-/// DIB, Kavan et al. 2008.
+/// Dual quaternion iterative blending (Kavan et al. 2008), beginning with `start`.
 Rigid iterate(const VertexToSkin& vertex, Rigid start, Conditioning& conditioning);
 /// exp(Σ w log C), C the rigid parts.
 Rigid blendLogarithms(const VertexToSkin& vertex, Conditioning& conditioning);
-/// Kavan and Žára 2005: the point on whose destination the rigid parts agree best.
+/// Kavan and Žára 2005: the point that all rigid parts move most nearly to the same place.
 glm::dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning);
 
 /// The 3×3 that transforms directions, and what its sign depends on.

@@ -84,7 +84,7 @@ struct BindingsState {
 
   const ContextState* context = nullptr;
   BatchBuffers buffers;
-  std::vector<BufferRange> poseBuffers;  ///< of a batch, its only one
+  std::vector<BufferRange> poseBuffers;  ///< of a batch: the only one
   std::uint64_t windowStep = 0;
   /// Views of the buffers that kernels read through texel buffers, if they do.
   VkBufferView tableTexels = VK_NULL_HANDLE;

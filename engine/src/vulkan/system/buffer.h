@@ -11,7 +11,7 @@
 
 namespace dermis::vulkan {
 
-/// What buffers are created with. Outlives them.
+/// The context and the callbacks that create buffers. Must outlive the buffers.
 struct BufferSource {
   const ContextState* context = nullptr;
   BufferCallbacks callbacks;
@@ -48,8 +48,8 @@ class SystemBuffer {
   std::uint64_t size_ = 0;
 };
 
-/// A buffer that a larger one may replace in the next `record`, which copies its contents (except
-/// palettes, which are converted again); or a range of the engine, which never grows.
+/// A buffer of the system, or a range of the engine. The next `record` may replace a buffer of the
+/// system by a larger one; it copies the contents, except palettes, which it converts again.
 struct GrowingBuffer {
   SystemBuffer own;     ///< as of the last `record`
   SystemBuffer larger;  ///< from the next one on

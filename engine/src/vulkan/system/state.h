@@ -74,7 +74,7 @@ struct SkinningSystem::State {
   std::unique_ptr<MemoryBlocks> blocks;  ///< null if the engine has an allocator
   BufferSource source;
   Scene scene;
-  std::unique_ptr<State*> self;  ///< what the scene's growth callback is given
+  std::unique_ptr<State*> self;  ///< argument of the scene's growth callback
   Plan plan;                     ///< of the frame
 
   GrowingBuffer meshes, palettes, output, results, history;
