@@ -1,6 +1,6 @@
-// Stops a build whose flags let the compiler assume that there are no NaN, infinities or signed
-// zeros, or change the order of operations: checks would pass silently, and error bounds would not
-// hold.
+// Stops a build with flags such as -ffast-math. With them, compilers assume that NaN, infinities
+// and signed zeros do not occur, and reorder operations. Checks would pass silently, and error
+// bounds would not hold.
 // The x87 unit of 32-bit x86 would round to `float` only when a value is stored.
 // CMake's targets switch these flags off; a build from the list of files must do so itself.
 // Included by Dermis' sources only. Flush-to-zero is not checked: it is set when a program is
