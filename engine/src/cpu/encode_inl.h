@@ -1,13 +1,5 @@
 // Encodes attributes in the formats of VertexFormat, by the rules of shaders/encode.glsl.
-
-// clang-format off
-#if defined(DERMIS_CPU_ENCODE_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef DERMIS_CPU_ENCODE_INL_H
-#undef DERMIS_CPU_ENCODE_INL_H
-#else
-#define DERMIS_CPU_ENCODE_INL_H
-#endif
-// clang-format on
+#pragma once
 
 #include <cstdint>
 #include <cstring>
@@ -31,7 +23,7 @@ struct Encoded {
 
 /// IEEE 754 binary16, rounded to nearest, ties to even.
 template <class D>
-HWY_INLINE Words<D> halfBits(D d, Vec<D> value) {
+DERMIS_INLINE Words<D> halfBits(D d, Vec<D> value) {
   const hn::RebindToUnsigned<D> du;
   const auto set = [&](std::uint32_t word) HWY_ATTR { return hn::Set(du, word); };
   const Words<D> bits = hn::BitCast(du, value);
@@ -52,21 +44,21 @@ HWY_INLINE Words<D> halfBits(D d, Vec<D> value) {
 
 /// Clamps to [-1, 1]; NaN becomes 0.
 template <class D>
-HWY_INLINE Vec<D> clampUnit(D d, Vec<D> value) {
+DERMIS_INLINE Vec<D> clampUnit(D d, Vec<D> value) {
   const Vec<D> one = hn::Set(d, 1.0f), minusOne = hn::Set(d, -1.0f);
   const Vec<D> number = hn::IfThenElseZero(hn::Eq(value, value), value);
   return hn::Max(minusOne, hn::Min(one, number));
 }
 
 template <class D>
-HWY_INLINE Words<D> snorm(D d, Vec<D> value, float largest) {
+DERMIS_INLINE Words<D> snorm(D d, Vec<D> value, float largest) {
   const hn::RebindToUnsigned<D> du;
   return hn::BitCast(du, hn::NearestInt(hn::Mul(clampUnit(d, value), hn::Set(d, largest))));
 }
 
 /// The octahedron's lower half is folded outwards.
 template <class D>
-HWY_INLINE void octahedral(D d, const Vec3<D>& v, Vec<D>& x, Vec<D>& y) {
+DERMIS_INLINE void octahedral(D d, const Vec3<D>& v, Vec<D>& x, Vec<D>& y) {
   const Vec<D> zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   const Vec<D> sum = hn::Add(hn::Add(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
   const Vec<D> divisor = hn::IfThenElse(hn::Eq(sum, zero), one, sum);
@@ -81,7 +73,7 @@ HWY_INLINE void octahedral(D d, const Vec3<D>& v, Vec<D>& x, Vec<D>& y) {
 
 /// Maps [-1, 1] to 1 … `largest`, negated for a left-handed frame.
 template <class D>
-HWY_INLINE Words<D> signedByHand(D d, Vec<D> value, Vec<D> hand, float largest) {
+DERMIS_INLINE Words<D> signedByHand(D d, Vec<D> value, Vec<D> hand, float largest) {
   const hn::RebindToSigned<D> di;
   const hn::RebindToUnsigned<D> du;
   const Vec<D> half = hn::Set(d, 0.5f);
@@ -93,19 +85,19 @@ HWY_INLINE Words<D> signedByHand(D d, Vec<D> value, Vec<D> hand, float largest) 
 }
 
 template <class D>
-HWY_INLINE Words<D> pair16(D, Words<D> low, Words<D> high) {
+DERMIS_INLINE Words<D> pair16(D, Words<D> low, Words<D> high) {
   const hn::RebindToUnsigned<D> du;
   return hn::Or(hn::And(low, hn::Set(du, 0xffffu)), hn::ShiftLeft<16>(high));
 }
 template <class D>
-HWY_INLINE Words<D> byteOf(D, Words<D> value) {
+DERMIS_INLINE Words<D> byteOf(D, Words<D> value) {
   const hn::RebindToUnsigned<D> du;
   return hn::And(value, hn::Set(du, 0xffu));
 }
 
 /// Any format but the octahedral ones.
 template <class D>
-HWY_INLINE Encoded<D> encodeComponents(D d, VertexFormat format, const Vec4<D>& v) {
+DERMIS_INLINE Encoded<D> encodeComponents(D d, VertexFormat format, const Vec4<D>& v) {
   const hn::RebindToUnsigned<D> du;
   const Words<D> zero = hn::Zero(du);
   switch (format) {
@@ -133,13 +125,13 @@ HWY_INLINE Encoded<D> encodeComponents(D d, VertexFormat format, const Vec4<D>& 
 
 /// If the format is relative to a box, `v` already is.
 template <class D>
-HWY_INLINE Encoded<D> encodePosition(D d, VertexFormat format, const Vec3<D>& v) {
+DERMIS_INLINE Encoded<D> encodePosition(D d, VertexFormat format, const Vec3<D>& v) {
   return encodeComponents(d, format, Vec4<D>{v.x, v.y, v.z, hn::Set(d, 1.0f)});
 }
 
 template <class D>
-HWY_INLINE Encoded<D> encodeOctahedral(D d, VertexFormat format, const Vec3<D>& v,
-                                       const Vec<D>* hand) {
+DERMIS_INLINE Encoded<D> encodeOctahedral(D d, VertexFormat format, const Vec3<D>& v,
+                                          const Vec<D>* hand) {
   const hn::RebindToUnsigned<D> du;
   const Words<D> zero = hn::Zero(du);
   const bool isWide = format == VertexFormat::octahedral16x2;
@@ -158,20 +150,20 @@ inline bool isOctahedral(VertexFormat format) {
 }
 
 template <class D>
-HWY_INLINE Encoded<D> encodeNormal(D d, VertexFormat format, const Vec3<D>& v) {
+DERMIS_INLINE Encoded<D> encodeNormal(D d, VertexFormat format, const Vec3<D>& v) {
   if (isOctahedral(format)) return encodeOctahedral<D>(d, format, v, nullptr);
   return encodeComponents(d, format, Vec4<D>{v.x, v.y, v.z, hn::Zero(d)});
 }
 
 template <class D>
-HWY_INLINE Encoded<D> encodeTangent(D d, VertexFormat format, const Vec3<D>& v, Vec<D> hand) {
+DERMIS_INLINE Encoded<D> encodeTangent(D d, VertexFormat format, const Vec3<D>& v, Vec<D> hand) {
   if (isOctahedral(format)) return encodeOctahedral<D>(d, format, v, &hand);
   return encodeComponents(d, format, Vec4<D>{v.x, v.y, v.z, hand});
 }
 
 /// Calls `copy` with the size of a format as a constant.
 template <class Copy>
-HWY_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
+DERMIS_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
   switch (bytes) {
     case 2:
       return copy(std::integral_constant<std::size_t, 2>());
@@ -192,9 +184,9 @@ HWY_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
 
 /// Copies an attribute of vertices `first` to `end`; faster if there are exactly `most`.
 template <std::size_t most = 0>
-HWY_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
-                          std::size_t fromStride, std::uint32_t bytes, std::size_t first,
-                          std::size_t end) {
+DERMIS_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
+                             std::size_t fromStride, std::uint32_t bytes, std::size_t first,
+                             std::size_t end) {
   bySize(bytes, [&](auto size) {
     if constexpr (most != 0) {
       if (end - first == most) {
@@ -211,8 +203,8 @@ HWY_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* 
 /// Stores lanes `first` to `end` of an attribute, `stride` bytes apart. `to` is the address of lane
 /// 0, even if lane 0 is not stored.
 template <class D>
-HWY_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, std::byte* to,
-                           std::size_t stride, std::size_t first, std::size_t end) {
+DERMIS_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, std::byte* to,
+                              std::size_t stride, std::size_t first, std::size_t end) {
   constexpr std::size_t lanes = hn::MaxLanes(d);
   const auto word = [&](std::size_t k) HWY_ATTR { return hn::BitCast(d, value.words[k]); };
   const bool isWhole = end - first == lanes && stride % sizeof(float) == 0 &&
@@ -243,11 +235,11 @@ inline constexpr std::size_t blockFloats = blockVertices * vertexFloats;
 
 /// The 128-bit blocks i of the six vectors hold the positions and normals of four vertices, side by
 /// side. Stores them at `to[i]`.
-HWY_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
+DERMIS_INLINE void storeBlocks(Four d, const Vec<Four> chunks[6], float* const to[1]) {
   for (std::size_t k = 0; k < 6; ++k) hn::StoreU(chunks[k], d, to[0] + k * 4);
 }
 #if HWY_MAX_BYTES >= 32
-HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to[2]) {
+DERMIS_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to[2]) {
   for (std::size_t k = 0; k < 6; k += 2) {
     hn::StoreU(hn::ConcatLowerLower(d, chunks[k + 1], chunks[k]), d, to[0] + k * 4);
     hn::StoreU(hn::ConcatUpperUpper(d, chunks[k + 1], chunks[k]), d, to[1] + k * 4);
@@ -255,7 +247,7 @@ HWY_INLINE void storeBlocks(Eight d, const Vec<Eight> chunks[6], float* const to
 }
 #endif
 #if HWY_MAX_BYTES >= 64
-HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
+DERMIS_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* const to[4]) {
   const Eight half;
   for (std::size_t k = 0; k < 6; k += 2) {
     // The even blocks of both chunks, and the odd ones.
@@ -271,7 +263,7 @@ HWY_INLINE void storeBlocks(Sixteen d, const Vec<Sixteen> chunks[6], float* cons
 #endif
 
 template <class D>
-HWY_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* const* to) {
+DERMIS_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float* const* to) {
   const hn::Repartition<double, D> dd;
   const auto pair = [&](Vec<D> a, Vec<D> b, bool upper) HWY_ATTR {
     return hn::BitCast(dd, upper ? hn::InterleaveUpper(d, a, b) : hn::InterleaveLower(d, a, b));
@@ -301,11 +293,11 @@ inline bool areSideBySide(const TaskInstance& instance) {
 }
 
 /// Stores one vertex per lane.
-HWY_INLINE void storeWhole(Four d, const Vec3<Four>& p, const Vec3<Four>& n, float* to) {
+DERMIS_INLINE void storeWhole(Four d, const Vec3<Four>& p, const Vec3<Four>& n, float* to) {
   storeVertices(d, p, n, &to);
 }
 #if HWY_MAX_BYTES >= 32
-HWY_INLINE void storeWhole(Eight d, const Vec3<Eight>& p, const Vec3<Eight>& n, float* to) {
+DERMIS_INLINE void storeWhole(Eight d, const Vec3<Eight>& p, const Vec3<Eight>& n, float* to) {
   float* const halves[2] = {to, to + 4 * vertexFloats};
   storeVertices(d, p, n, halves);
 }
@@ -313,5 +305,3 @@ HWY_INLINE void storeWhole(Eight d, const Vec3<Eight>& p, const Vec3<Eight>& n, 
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per target

@@ -1,14 +1,6 @@
 // The general path: every method, format and option, one instance at a time. plain_inl.h has a
 // faster path for the common case, with the same operations in the same order.
-
-// clang-format off
-#if defined(DERMIS_CPU_GENERAL_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef DERMIS_CPU_GENERAL_INL_H
-#undef DERMIS_CPU_GENERAL_INL_H
-#else
-#define DERMIS_CPU_GENERAL_INL_H
-#endif
-// clang-format on
+#pragma once
 
 #include <array>
 #include <cstring>
@@ -33,14 +25,14 @@ struct Vertex {
 };
 
 template <class D>
-HWY_INLINE Vec3<D> loadVector(D d, const Lanes* lanes, std::size_t first) {
+DERMIS_INLINE Vec3<D> loadVector(D d, const Lanes* lanes, std::size_t first) {
   return {hn::Load(d, lanes[0].v + first), hn::Load(d, lanes[1].v + first),
           hn::Load(d, lanes[2].v + first)};
 }
 
 /// Rotates v by q, where `factor` is 2 / |q|²: v + factor r × (r × v + w v).
 template <class D>
-HWY_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>& v) {
+DERMIS_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>& v) {
   const Vec3<D> axis{q.x, q.y, q.z};
   const Vec3<D> inner = add3(cross3(axis, v), scale3(v, q.w));
   return add3(v, scale3(cross3(axis, inner), factor));
@@ -48,8 +40,8 @@ HWY_INLINE Vec3<D> turnDirection(const Vec4<D>& q, Vec<D> factor, const Vec3<D>&
 
 /// Rotates and translates a point: p + factor (r × (r × p + w p + d) + w d − dw r).
 template <class D>
-HWY_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> factor,
-                             const Vec3<D>& p) {
+DERMIS_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> factor,
+                                const Vec3<D>& p) {
   const Vec3<D> axis{q.x, q.y, q.z}, shift{dual.x, dual.y, dual.z};
   const Vec3<D> inner = add3(add3(cross3(axis, p), scale3(p, q.w)), shift);
   const Vec3<D> outer = sub3(add3(cross3(axis, inner), scale3(shift, q.w)), scale3(axis, dual.w));
@@ -57,7 +49,7 @@ HWY_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> facto
 }
 
 template <class D>
-HWY_INLINE Vec<D> turningFactor(D d, const Vec4<D>& q) {
+DERMIS_INLINE Vec<D> turningFactor(D d, const Vec4<D>& q) {
   const Vec<D> square = hn::Add(dot3(q.x, q.y, q.z, q.x, q.y, q.z), hn::Mul(q.w, q.w));
   return hn::Div(hn::Set(d, 2.0f), square);
 }
@@ -69,7 +61,7 @@ struct Matrix {
 };
 
 template <class D>
-HWY_INLINE Vec3<D> throughMatrix(const Matrix<D>& m, const Vec3<D>& p) {
+DERMIS_INLINE Vec3<D> throughMatrix(const Matrix<D>& m, const Vec3<D>& p) {
   return {hn::Add(dot3(m.r0.x, m.r0.y, m.r0.z, p.x, p.y, p.z), m.r0.w),
           hn::Add(dot3(m.r1.x, m.r1.y, m.r1.z, p.x, p.y, p.z), m.r1.w),
           hn::Add(dot3(m.r2.x, m.r2.y, m.r2.z, p.x, p.y, p.z), m.r2.w)};
@@ -86,8 +78,8 @@ struct DirectionMap {
 
 /// `isModerate`: no entry is so large or small that the matrix must be scaled.
 template <class D>
-HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r1,
-                                        const Vec3<D>& r2, bool isModerate) {
+DERMIS_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r1,
+                                           const Vec3<D>& r2, bool isModerate) {
   DirectionMap<D> map{r0, r1, r2, hn::Zero(d)};
   if (!isModerate) {
     const Vec<D> scale = powerScale(d, hn::Max(largest3(r0), hn::Max(largest3(r1), largest3(r2))));
@@ -99,23 +91,24 @@ HWY_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>& r
 /// Multiplies by the cofactor matrix and the sign of the determinant, so that a mirror gives the
 /// direction of the inverse transpose.
 template <class D>
-HWY_INLINE Vec3<D> mapNormal(const DirectionMap<D>& map, const Vec3<D>& n) {
+DERMIS_INLINE Vec3<D> mapNormal(const DirectionMap<D>& map, const Vec3<D>& n) {
   const Vec3<D> turned{dot3(cross3(map.r1, map.r2), n), dot3(cross3(map.r2, map.r0), n),
                        dot3(cross3(map.r0, map.r1), n)};
   return scale3(turned, map.side);
 }
 template <class D>
-HWY_INLINE Vec3<D> mapTangent(const DirectionMap<D>& map, const Vec3<D>& t) {
+DERMIS_INLINE Vec3<D> mapTangent(const DirectionMap<D>& map, const Vec3<D>& t) {
   return {dot3(map.r0, t), dot3(map.r1, t), dot3(map.r2, t)};
 }
 
 template <class D>
-HWY_INLINE DirectionMap<D> directionMap(D d, const Matrix<D>& m, bool isModerate) {
+DERMIS_INLINE DirectionMap<D> directionMap(D d, const Matrix<D>& m, bool isModerate) {
   return directionMap(d, Vec3<D>{m.r0.x, m.r0.y, m.r0.z}, Vec3<D>{m.r1.x, m.r1.y, m.r1.z},
                       Vec3<D>{m.r2.x, m.r2.y, m.r2.z}, isModerate);
 }
 template <class D>
-HWY_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal, bool isModerate) {
+DERMIS_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal,
+                                    bool isModerate) {
   return unitOr(d, mapNormal(directionMap(d, m, isModerate), normal), normal);
 }
 
@@ -131,8 +124,8 @@ struct Wanted {
 /// Transforms `normal` and `tangent` by a map and stores them in `v`. A direction that becomes zero
 /// keeps its value in `v`.
 template <class D, class Wanted>
-HWY_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& normal,
-                              const Vec3<D>& tangent, Wanted wanted, Vertex<D>& v) {
+DERMIS_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& normal,
+                                 const Vec3<D>& tangent, Wanted wanted, Vertex<D>& v) {
   if (wanted.normals) v.normal = unitOr(d, mapNormal(map, normal), v.normal);
   if constexpr (Wanted::tangents) {
     v.tangent = unitOr(d, mapTangent(map, tangent), v.tangent);
@@ -142,8 +135,8 @@ HWY_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& no
 
 /// Transforms a vertex by a blended matrix.
 template <class D, class Wanted>
-HWY_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, Wanted wanted,
-                                   bool isModerate) {
+DERMIS_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, Wanted wanted,
+                                      bool isModerate) {
   Vertex<D> skinned = v;
   skinned.position = throughMatrix(m, v.position);
   if (wanted.any()) {
@@ -159,12 +152,12 @@ struct Part {
 };
 
 template <class D>
-HWY_INLINE Part<D> partOf(Vec<D> xx, Vec<D> yy, Vec<D> zz, Vec<D> xy, Vec<D> xz, Vec<D> yz) {
+DERMIS_INLINE Part<D> partOf(Vec<D> xx, Vec<D> yy, Vec<D> zz, Vec<D> xy, Vec<D> xz, Vec<D> yz) {
   return {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
 }
 
 template <class D>
-HWY_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
+DERMIS_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
   return {dot3(part.r0, p), dot3(part.r1, p), dot3(part.r2, p)};
 }
 
@@ -180,7 +173,10 @@ struct Slots {
 
 /// Calls `sum` with the number of influences: a compile-time constant up to 4, or 0 for more.
 template <class Sum>
-HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
+DERMIS_INLINE void byInfluences([[maybe_unused]] std::uint32_t influences, const Sum& sum) {
+#ifdef DERMIS_CPU_GENERAL_ONLY
+  influences = 0;
+#endif
   switch (influences) {
     case 1:
       return sum(std::integral_constant<int, 1>());
@@ -198,9 +194,9 @@ HWY_INLINE void byInfluences(std::uint32_t influences, const Sum& sum) {
 /// Σ w e of one vertex, over as many floats of each entry as there are lanes. An entry has
 /// 8 · `units` floats. If `influences` is 0, `count` is the number of influences.
 template <int influences, class D>
-HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
-                            const std::uint16_t* HWY_RESTRICT numbers,
-                            const float* HWY_RESTRICT weights, std::size_t count) {
+DERMIS_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
+                               const std::uint16_t* HWY_RESTRICT numbers,
+                               const float* HWY_RESTRICT weights, std::size_t count) {
   if (influences != 0) count = influences;
   Vec<D> sum = hn::Mul(hn::Set(d, weights[0]), hn::Load(d, entries + numbers[0] * units));
   for (std::size_t i = 1; i < count; ++i)
@@ -210,7 +206,8 @@ HWY_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t 
 
 #if HWY_MAX_BYTES >= 32
 /// Transposes the lower and the upper halves of eight rows of eight floats.
-HWY_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec4<Eight>& low, Vec4<Eight>& high) {
+DERMIS_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec4<Eight>& low,
+                             Vec4<Eight>& high) {
   low = {hn::ConcatLowerLower(d, rows[4], rows[0]), hn::ConcatLowerLower(d, rows[5], rows[1]),
          hn::ConcatLowerLower(d, rows[6], rows[2]), hn::ConcatLowerLower(d, rows[7], rows[3])};
   high = {hn::ConcatUpperUpper(d, rows[4], rows[0]), hn::ConcatUpperUpper(d, rows[5], rows[1]),
@@ -267,7 +264,7 @@ HWY_NOINLINE HWY_ATTR void sumEntries(Four d, const float* entries, std::size_t 
 
 /// Gathers the entry of each vertex's pivot, one per lane.
 template <std::size_t K, class D>
-HWY_INLINE void pivotEntries(D d, const float* entries, const Slots& slots, Vec4<D>* found) {
+DERMIS_INLINE void pivotEntries(D d, const float* entries, const Slots& slots, Vec4<D>* found) {
   constexpr std::size_t lanes = hn::MaxLanes(d);
   HWY_ALIGN float all[lanes * 4 * K];
   for (std::size_t lane = 0; lane < lanes; ++lane)
@@ -377,7 +374,7 @@ struct MethodInputs {
 };
 
 template <class D>
-HWY_INLINE Part<D> blendParts(D d, const Palette& palette, const Slots& slots) {
+DERMIS_INLINE Part<D> blendParts(D d, const Palette& palette, const Slots& slots) {
   Vec4<D> pivot[2], sum[2];
   pivotEntries<2>(d, palette.scaleShears, slots, pivot);
   sumEntries<2>(d, palette.scalePairs, 1, slots.pairs, slots, sum);
@@ -387,7 +384,7 @@ HWY_INLINE Part<D> blendParts(D d, const Palette& palette, const Slots& slots) {
 }
 
 template <class D>
-HWY_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) {
+DERMIS_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) {
   Vec4<D> rows[3];
   sumEntries<3>(d, palette.rows, 2, slots.joints, slots, rows);
   return {rows[0], rows[1], rows[2]};
@@ -396,8 +393,8 @@ HWY_INLINE Matrix<D> blendRows(D d, const Palette& palette, const Slots& slots) 
 /// Interpolates between a linearly blended vertex and a rotated one. Handedness comes from the
 /// latter.
 template <class D, class Wanted>
-HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
-                                 Vec<D> share, Wanted wanted) {
+DERMIS_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
+                                    Vec<D> share, Wanted wanted) {
   const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
   const auto mix = [&](const Vec3<D>& a, const Vec3<D>& b)
                        HWY_ATTR { return add3(scale3(a, rest), scale3(b, share)); };
@@ -413,9 +410,9 @@ HWY_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>
 
 /// `scales`: the palette has scale/shear parts.
 template <bool scales, class D, class Wanted>
-HWY_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const Slots& slots,
-                                const Palette& palette, const MethodInputs<D>& inputs,
-                                Wanted wanted) {
+DERMIS_INLINE Vertex<D> skinVertex(D d, Method method, const Vertex<D>& bind, const Slots& slots,
+                                   const Palette& palette, const MethodInputs<D>& inputs,
+                                   Wanted wanted) {
   if (method == Method::linear)
     return throughMatrix(d, blendRows(d, palette, slots), bind, wanted, palette.isModerate);
   Vec4<D> blend[2];
@@ -478,12 +475,13 @@ struct Findings {
 
 /// Mask of lanes `first` to `end`.
 template <class D>
-HWY_INLINE hn::Mask<D> lanesFrom(D d, std::size_t first, std::size_t end) {
+DERMIS_INLINE hn::Mask<D> lanesFrom(D d, std::size_t first, std::size_t end) {
   return hn::AndNot(hn::FirstN(d, first), hn::FirstN(d, end));
 }
 
 template <class D>
-HWY_INLINE void addPositions(D d, const Vec3<D>& position, hn::Mask<D> counts, Findings& findings) {
+DERMIS_INLINE void addPositions(D d, const Vec3<D>& position, hn::Mask<D> counts,
+                                Findings& findings) {
   const Vec<D> all[3] = {position.x, position.y, position.z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // NaN leaves the bounds unchanged: both comparisons are false.
@@ -529,8 +527,8 @@ inline void loadBlock(const MeshData& mesh, std::uint32_t block,
 }
 
 template <class D, class Wanted>
-HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, std::size_t lane,
-                                const BlockVertices* morphed, Wanted wanted) {
+DERMIS_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, std::size_t lane,
+                                   const BlockVertices* morphed, Wanted wanted) {
   const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   Vertex<D> v{none, none, none, none, none, hn::Set(d, 1.0f)};
   const auto at = [&](const std::vector<Lanes>& lanes, std::size_t components)
@@ -552,7 +550,7 @@ HWY_INLINE Vertex<D> bindVertex(D d, const MeshData& mesh, std::uint32_t block, 
 
 /// Maps a position from the instance's box to [-1, 1].
 template <class D>
-HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& position) {
+DERMIS_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& position) {
   const auto along = [&](Vec<D> v, std::size_t axis) HWY_ATTR {
     return hn::Mul(hn::Sub(v, hn::Set(d, instance.boxCenter[axis])),
                    hn::Set(d, instance.boxInverse[axis]));
@@ -562,9 +560,9 @@ HWY_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D>& 
 
 /// Skins lanes `first` to `end` of the vector that starts at lane `lane` of a block.
 template <bool scales, bool tangents, class D>
-HWY_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
-                          std::size_t first, std::size_t end, const BlockVertices* morphed,
-                          const BlockVertices* morphedBefore, Findings& findings) {
+DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
+                             std::size_t first, std::size_t end, const BlockVertices* morphed,
+                             const BlockVertices* morphedBefore, Findings& findings) {
   const Task& job = task.task;
   const MeshData& mesh = *job.mesh;
   const VertexPlaces& places = job.places;
@@ -677,5 +675,3 @@ inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per target

@@ -2,15 +2,7 @@
 // dual quaternions or matrices. Several instances are skinned at a time: weights and joint indices
 // are read once for all of them, and each instance has its own 128 bits of a vector, so that data
 // is exchanged between instances only when results are stored.
-
-// clang-format off
-#if defined(DERMIS_CPU_PLAIN_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef DERMIS_CPU_PLAIN_INL_H
-#undef DERMIS_CPU_PLAIN_INL_H
-#else
-#define DERMIS_CPU_PLAIN_INL_H
-#endif
-// clang-format on
+#pragma once
 
 #include "cpu/general_inl.h"
 
@@ -30,7 +22,7 @@ struct InEveryBlock {
   std::size_t first;
 
   template <class D>
-  HWY_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
+  DERMIS_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
     return {hn::LoadDup128(d, lanes[0].v + first), hn::LoadDup128(d, lanes[1].v + first),
             hn::LoadDup128(d, lanes[2].v + first)};
   }
@@ -38,15 +30,16 @@ struct InEveryBlock {
 /// Loads the three components of eight vertices, one per lane.
 struct InAllLanes {
   template <class D>
-  HWY_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
+  DERMIS_INLINE Vec3<D> load(D d, const Lanes* lanes) const {
     return loadVector(d, lanes, 0);
   }
 };
 
 /// Loads positions and normals as late as possible, to save registers.
 template <class D, class Place>
-HWY_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual, const Lanes* positions,
-                             const Lanes* normals, const Place& place, float* const* to) {
+DERMIS_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual,
+                                const Lanes* positions, const Lanes* normals, const Place& place,
+                                float* const* to) {
   const Vec<D> factor = turningFactor(d, real);
   const Vec3<D> position = movePoint(real, dual, factor, place.load(d, positions));
   storeVertices(d, position, turnDirection(real, factor, place.load(d, normals)), to);
@@ -55,8 +48,8 @@ HWY_INLINE void turnAndStore(D d, const Vec4<D>& real, const Vec4<D>& dual, cons
 /// Skins as many instances as D has blocks. `pairs`: for each pair, the real parts of all
 /// instances; the dual parts follow `dual` floats later.
 template <int influences, class D>
-HWY_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
-                              std::size_t dual, float* const* outputs) {
+DERMIS_INLINE void turnInstances(D d, const PlainTask& task, const float* HWY_RESTRICT pairs,
+                                 std::size_t dual, float* const* outputs) {
   constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
   const std::size_t count = influences != 0 ? influences : task.run.influences;
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
@@ -108,8 +101,8 @@ struct ScaledPalette {
 
 /// Like `turnInstances`, with two-phase scale.
 template <int influences, class D>
-HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPalette& palette,
-                                    float* const* outputs) {
+DERMIS_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPalette& palette,
+                                       float* const* outputs) {
   constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
   const std::size_t count = influences != 0 ? influences : task.run.influences;
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
@@ -176,8 +169,8 @@ HWY_INLINE void turnScaledInstances(D d, const PlainTask& task, const ScaledPale
 /// Like `turnInstances`, by blended matrices. `rows`: for each joint, the first rows of all
 /// instances; the second and third rows follow `rowFloats` and 2 `rowFloats` floats later.
 template <int influences, class D>
-HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTRICT rows,
-                              std::size_t rowFloats, float* const* outputs) {
+DERMIS_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTRICT rows,
+                                 std::size_t rowFloats, float* const* outputs) {
   constexpr std::size_t lanes = hn::MaxLanes(d), blocks = lanes / 4;
   const std::size_t count = influences != 0 ? influences : task.run.influences;
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
@@ -225,8 +218,8 @@ HWY_INLINE void moveInstances(D d, const PlainTask& task, const float* HWY_RESTR
 #if HWY_MAX_BYTES >= 32
 /// Skins one instance: a vector first holds a dual quaternion, then a component of eight vertices.
 template <int influences>
-HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RESTRICT pairs,
-                             float* output) {
+DERMIS_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RESTRICT pairs,
+                                float* output) {
   const std::size_t count = influences != 0 ? influences : task.run.influences;
   const std::uint64_t slot = task.run.slotOf(task.firstBlock);
   const std::uint16_t* HWY_RESTRICT number = task.mesh.pairNumbers.data() + slot;
@@ -251,5 +244,3 @@ HWY_INLINE void turnInstance(Eight d, const PlainTask& task, const float* HWY_RE
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per target

@@ -1,14 +1,6 @@
 // Converts poses to what vertices read: unit dual quaternions of joints and of pairs, and
 // scale/shear parts. The formulas are those of the palette kernel (shaders/palette.comp).
-
-// clang-format off
-#if defined(DERMIS_CPU_POSE_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef DERMIS_CPU_POSE_INL_H
-#undef DERMIS_CPU_POSE_INL_H
-#else
-#define DERMIS_CPU_POSE_INL_H
-#endif
-// clang-format on
+#pragma once
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +30,7 @@ struct DualQuaternions {
 
 /// det > 0, and the absolute values of each row of CᵀC − 1 sum to at most 8e-6.
 template <class D>
-HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
+DERMIS_INLINE auto areRigid(D d, const Joints<D>& j) {
   const Vec3<D> c0{j.r0.x, j.r1.x, j.r2.x};
   const Vec3<D> c1{j.r0.y, j.r1.y, j.r2.y};
   const Vec3<D> c2{j.r0.z, j.r1.z, j.r2.z};
@@ -57,7 +49,7 @@ HWY_INLINE auto areRigid(D d, const Joints<D>& j) {
 /// The unit quaternion of a matrix that is nearly a rotation: a first guess from the component of
 /// the quaternion with the largest square (Shepperd 1978), then one step of the power method.
 template <class D>
-HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
+DERMIS_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
   const Vec<D> one = hn::Set(d, 1.0f);
   const Vec<D> more = hn::Add(one, j.r0.x), less = hn::Sub(one, j.r0.x);
   const Vec<D> x = hn::Sub(hn::Sub(more, j.r1.y), j.r2.z);
@@ -91,7 +83,7 @@ HWY_INLINE Vec4<D> quaternionOf(D d, const Joints<D>& j) {
 
 /// The dual part of rigid transforms: ½ (t, 0) q.
 template <class D>
-HWY_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
+DERMIS_INLINE Vec4<D> dualPart(D d, const Vec4<D>& q, const Vec3<D>& t) {
   const Vec3<D> axis{q.x, q.y, q.z};
   const Vec<D> half = hn::Set(d, 0.5f);
   const Vec3<D> vector = scale3(add3(scale3(t, q.w), cross3(t, axis)), half);
@@ -118,8 +110,8 @@ struct PoseTask {
 
 /// The matrices of `count` joints from `first` on, 12 floats each: in place if they are contiguous,
 /// otherwise in `copies`.
-HWY_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, std::size_t count,
-                                   float* copies) {
+DERMIS_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, std::size_t count,
+                                      float* copies) {
   const std::uint32_t begin = task.joints[first];
   bool isRow = first + count <= task.joints.size();
   for (std::size_t i = 1; isRow && i < count; ++i) isRow = task.joints[first + i] == begin + i;
@@ -217,9 +209,9 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
 /// Writes a dual quaternion for each pair, in the hemisphere of its pivot, for as many instances as
 /// D has blocks. The values of these instances are adjacent.
 template <class D>
-HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
-                             const DualQuaternionArray<const float>& joints,
-                             const DualQuaternionArray<float>& to) {
+DERMIS_INLINE void convertPairs(D d, std::span<const Pair> pairs,
+                                const DualQuaternionArray<const float>& joints,
+                                const DualQuaternionArray<float>& to) {
   const hn::Repartition<double, D> dd;
   const auto sign = hn::SignBit(d);
   float* place = to.first;
@@ -240,9 +232,9 @@ HWY_INLINE void convertPairs(D d, std::span<const Pair> pairs,
 
 /// Writes the joint's scale/shear part minus the pivot's, for each pair.
 template <class D>
-HWY_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
-                               const DualQuaternionArray<const float>& parts,
-                               const DualQuaternionArray<float>& to) {
+DERMIS_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
+                                  const DualQuaternionArray<const float>& parts,
+                                  const DualQuaternionArray<float>& to) {
   float* place = to.first;
   for (const Pair& pair : pairs) {
     const float* const joint = parts.first + std::size_t{pair.joint} * parts.stride;
@@ -256,5 +248,3 @@ HWY_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per target

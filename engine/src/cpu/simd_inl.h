@@ -1,17 +1,16 @@
-// Vectors of floats, and of three and four of them. Compiled once for each instruction set.
-
-// clang-format off
-#if defined(DERMIS_CPU_SIMD_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef DERMIS_CPU_SIMD_INL_H
-#undef DERMIS_CPU_SIMD_INL_H
-#else
-#define DERMIS_CPU_SIMD_INL_H
-#endif
-// clang-format on
+// Vectors of floats, and of three and four of them. See kernels_inl.h.
+#pragma once
 
 #include <cstdint>
 
 #include "hwy/highway.h"
+
+// Where vectors are plain arrays, inlining everything costs a minute of compile time.
+#ifdef DERMIS_CPU_GENERAL_ONLY
+#define DERMIS_INLINE inline
+#else
+#define DERMIS_INLINE HWY_INLINE
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
@@ -47,45 +46,45 @@ struct Vec4 {
 // Each operation rounds once on every target: no fused operations and no estimates.
 
 template <class V>
-HWY_INLINE V dot3(V ax, V ay, V az, V bx, V by, V bz) {
+DERMIS_INLINE V dot3(V ax, V ay, V az, V bx, V by, V bz) {
   return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
 }
 template <class D>
-HWY_INLINE Vec<D> dot3(const Vec3<D>& a, const Vec3<D>& b) {
+DERMIS_INLINE Vec<D> dot3(const Vec3<D>& a, const Vec3<D>& b) {
   return dot3(a.x, a.y, a.z, b.x, b.y, b.z);
 }
 template <class D>
-HWY_INLINE Vec3<D> cross3(const Vec3<D>& a, const Vec3<D>& b) {
+DERMIS_INLINE Vec3<D> cross3(const Vec3<D>& a, const Vec3<D>& b) {
   return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
           hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
           hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
 }
 template <class D>
-HWY_INLINE Vec3<D> add3(const Vec3<D>& a, const Vec3<D>& b) {
+DERMIS_INLINE Vec3<D> add3(const Vec3<D>& a, const Vec3<D>& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 template <class D>
-HWY_INLINE Vec3<D> sub3(const Vec3<D>& a, const Vec3<D>& b) {
+DERMIS_INLINE Vec3<D> sub3(const Vec3<D>& a, const Vec3<D>& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 template <class D>
-HWY_INLINE Vec3<D> scale3(const Vec3<D>& a, Vec<D> factor) {
+DERMIS_INLINE Vec3<D> scale3(const Vec3<D>& a, Vec<D> factor) {
   return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
 }
 template <class M, class D>
-HWY_INLINE Vec3<D> choose3(M mask, const Vec3<D>& yes, const Vec3<D>& no) {
+DERMIS_INLINE Vec3<D> choose3(M mask, const Vec3<D>& yes, const Vec3<D>& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y),
           hn::IfThenElse(mask, yes.z, no.z)};
 }
 template <class D>
-HWY_INLINE Vec<D> largest3(const Vec3<D>& a) {
+DERMIS_INLINE Vec<D> largest3(const Vec3<D>& a) {
   return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
 }
 
 /// The power of two that scales a normal number to between a half and 4, and a subnormal one to at
 /// least 2^-23, so that its square neither overflows nor underflows to 0.
 template <class D>
-HWY_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
+DERMIS_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
   const hn::RebindToUnsigned<D> du;
   const auto exponent = hn::ShiftRight<23>(hn::BitCast(du, largest));
   const auto scaled = hn::Sub(hn::Set(du, 253u), hn::Min(exponent, hn::Set(du, 252u)));
@@ -94,7 +93,7 @@ HWY_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
 
 /// `v` normalized, whatever its magnitude, or `fallback` if its length is 0.
 template <class D>
-HWY_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
+DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
   const Vec3<D> scaled = scale3(v, powerScale(d, largest3(v)));
   const Vec<D> square = dot3(scaled, scaled);
   const Vec<D> inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square));
@@ -103,13 +102,13 @@ HWY_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
 
 /// The sign of `value` as 1 or -1; the sign of -0 is 1.
 template <class D>
-HWY_INLINE Vec<D> sideOf(D d, Vec<D> value) {
+DERMIS_INLINE Vec<D> sideOf(D d, Vec<D> value) {
   return hn::IfThenElse(hn::Lt(value, hn::Zero(d)), hn::Set(d, -1.0f), hn::Set(d, 1.0f));
 }
 
 /// Transposes the 4×4 matrix in each block.
 template <class D>
-HWY_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
+DERMIS_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
   const hn::Repartition<double, D> dd;
   const auto lowAb = hn::BitCast(dd, hn::InterleaveLower(d, a, b));
   const auto highAb = hn::BitCast(dd, hn::InterleaveUpper(d, a, b));
@@ -122,14 +121,14 @@ HWY_INLINE void transpose4(D d, Vec<D>& a, Vec<D>& b, Vec<D>& c, Vec<D>& e) {
 }
 
 /// Loads four floats for each lane, `stride` floats apart, as four vectors. Any alignment.
-HWY_INLINE Vec4<Four> loadRows(Four d, const float* from, std::size_t stride) {
+DERMIS_INLINE Vec4<Four> loadRows(Four d, const float* from, std::size_t stride) {
   Vec4<Four> rows{hn::LoadU(d, from), hn::LoadU(d, from + stride), hn::LoadU(d, from + 2 * stride),
                   hn::LoadU(d, from + 3 * stride)};
   transpose4(d, rows.x, rows.y, rows.z, rows.w);
   return rows;
 }
 #if HWY_MAX_BYTES >= 32
-HWY_INLINE Vec4<Eight> loadRows(Eight d, const float* from, std::size_t stride) {
+DERMIS_INLINE Vec4<Eight> loadRows(Eight d, const float* from, std::size_t stride) {
   const Four four;
   const float* const upper = from + 4 * stride;
   Vec4<Eight> rows{
@@ -143,7 +142,7 @@ HWY_INLINE Vec4<Eight> loadRows(Eight d, const float* from, std::size_t stride) 
 #endif
 
 /// The inverse of `loadRows`.
-HWY_INLINE void storeRows(Four d, Vec4<Four> rows, float* to, std::size_t stride) {
+DERMIS_INLINE void storeRows(Four d, Vec4<Four> rows, float* to, std::size_t stride) {
   transpose4(d, rows.x, rows.y, rows.z, rows.w);
   hn::StoreU(rows.x, d, to);
   hn::StoreU(rows.y, d, to + stride);
@@ -151,7 +150,7 @@ HWY_INLINE void storeRows(Four d, Vec4<Four> rows, float* to, std::size_t stride
   hn::StoreU(rows.w, d, to + 3 * stride);
 }
 #if HWY_MAX_BYTES >= 32
-HWY_INLINE void storeRows(Eight d, const Vec4<Eight>& rows, float* to, std::size_t stride) {
+DERMIS_INLINE void storeRows(Eight d, const Vec4<Eight>& rows, float* to, std::size_t stride) {
   const Four four;
   storeRows(four,
             Vec4<Four>{hn::LowerHalf(four, rows.x), hn::LowerHalf(four, rows.y),
@@ -167,5 +166,3 @@ HWY_INLINE void storeRows(Eight d, const Vec4<Eight>& rows, float* to, std::size
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#endif  // per target

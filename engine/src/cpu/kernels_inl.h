@@ -1,28 +1,19 @@
-// The SIMD code of all instruction sets, and the choice among them.
+// The code of one instruction set: a job is skinned section by section. Each of the sources
+// kernels_*.cpp compiles it for one of Highway's targets, whose macros it defines before. None is
+// compiled with the compiler's flags for instructions: those would also compile inline functions of
+// the standard library with them, which the linker may then choose for all other code.
+#pragma once
 
-// Disables refinements of AVX-512 (the lowest eight bits) and SSSE3, which would change nothing,
-// and SVE, whose vectors have no fixed size.
-#ifndef HWY_DISABLED_TARGETS
-#define HWY_DISABLED_TARGETS (0xff | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-#endif
-// Highway considers this target broken with GCC before 12.3 (bug 106322). Dermis does not use the
-// affected operations; tests compare the resulting bits.
-#ifndef HWY_BROKEN_EMU128
-#define HWY_BROKEN_EMU128 0
-#endif
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "cpu/kernels.cpp"
-#include "strict_floating_point.h"
-
-#include "hwy/foreach_target.h"
-// Must come after foreach_target.h.
-#include "hwy/highway.h"
-
+#include <algorithm>
 #include <bit>
+#include <cstring>
+#include <span>
 
 #include "cpu/general_inl.h"
+#include "cpu/kernels.h"
+#ifndef DERMIS_CPU_GENERAL_ONLY
 #include "cpu/plain_inl.h"
+#endif
 #include "cpu/task.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -109,6 +100,8 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
 
 // -- The fast path (plain_inl.h).
 
+#ifndef DERMIS_CPU_GENERAL_ONLY
+
 inline bool isPlainTask(const Task& task) {
   return (task.method == Method::dualQuaternion || task.method == Method::linear) &&
          task.places.motion == Motion::none && task.places.tangents.format == VertexFormat::none &&
@@ -163,9 +156,9 @@ inline DualQuaternionArray<const T> readOnly(const DualQuaternionArray<T>& array
 /// Skins a partial block: skins the whole block to a temporary buffer and copies the part to the
 /// output.
 template <class Skin>
-HWY_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t first,
-                         std::uint32_t end, std::size_t instances, float* const* outputs,
-                         const Skin& skin) {
+DERMIS_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t first,
+                            std::uint32_t end, std::size_t instances, float* const* outputs,
+                            const Skin& skin) {
   CacheLine blocks[mostInstances][blockFloats * sizeof(float) / sizeof(CacheLine)];
   float* beside[mostInstances];
   for (std::size_t i = 0; i < instances; ++i) beside[i] = blocks[i]->v;
@@ -180,8 +173,8 @@ HWY_INLINE void skinPart(const SectionTask& part, const Run& run, std::uint32_t 
 /// Calls `skin` for the blocks of each run that lie in the job. `skinPart` handles blocks that lie
 /// in the job only partly.
 template <class Skin>
-HWY_INLINE void forRuns(const SectionTask& part, std::size_t instances, float* const* outputs,
-                        const Skin& skin) {
+DERMIS_INLINE void forRuns(const SectionTask& part, std::size_t instances, float* const* outputs,
+                           const Skin& skin) {
   const MeshData& mesh = *part.task.mesh;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
     const Run& run = mesh.runs[number];
@@ -369,17 +362,21 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   skinGroup(PlainKind::scaled, part, scaled);
 }
 
+#endif  // DERMIS_CPU_GENERAL_ONLY
+
 // -- A job.
 
 inline HWY_ATTR void skinSection(const SectionTask& part) {
+#ifndef DERMIS_CPU_GENERAL_ONLY
   if (isPlainTask(part.task)) {
     skinPlainly(part);
     return;
   }
+#endif
   for (const TaskInstance& instance : part.task.instances) skinGenerally(part, instance);
 }
 
-HWY_ATTR void skinTask(const Task& task, Scratch* scratch) {
+inline HWY_ATTR void skinTask(const Task& task, Scratch* scratch) {
   const MeshData& mesh = *task.mesh;
   std::uint32_t first = task.firstVertex;
   const std::uint32_t end = task.vertexEnd;
@@ -397,63 +394,3 @@ HWY_ATTR void skinTask(const Task& task, Scratch* scratch) {
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
-#include <string>
-
-namespace dermis::cpu {
-namespace {
-
-HWY_EXPORT(skinTask);
-
-/// A build for one instruction set has a dispatch table with one entry, which must be called
-/// directly.
-constexpr bool isForOne = std::size(HWY_DISPATCH_TABLE(skinTask)) == 1;
-
-std::int64_t usable() {
-  return isForOne ? HWY_TARGETS : hwy::SupportedTargets() & HWY_TARGETS;
-}
-
-/// Dermis has its own: Highway's is shared by the whole process, and the engine may use it too.
-hwy::ChosenTarget& chosenTarget() {
-  static hwy::ChosenTarget chosen;
-  static const bool isReady = (chosen.Update(usable()), true);
-  static_cast<void>(isReady);
-  return chosen;
-}
-
-}  // namespace
-
-void dispatchTask(const Task& task, Scratch* scratch) {
-  HWY_DISPATCH_TABLE(skinTask)[isForOne ? 0 : chosenTarget().GetIndex()](task, scratch);
-}
-
-std::vector<std::string_view> targetNames() {
-  std::vector<std::string_view> names;
-  for (std::int64_t rest = usable(); rest != 0; rest &= rest - 1)  // the best have the lowest bits
-    names.emplace_back(hwy::TargetName(rest & -rest));
-  return names;
-}
-
-Result<void> setTarget(std::string_view name) {
-  if (name.empty()) {
-    chosenTarget().Update(usable());
-    return {};
-  }
-  std::string all;
-  for (std::int64_t rest = usable(); rest != 0; rest &= rest - 1) {
-    const std::int64_t target = rest & -rest;
-    if (name == hwy::TargetName(target)) {
-      chosenTarget().Update(target);
-      return {};
-    }
-    if (!all.empty()) all.append(", ");
-    all.append(hwy::TargetName(target));
-  }
-  std::string message = "the instruction set '";
-  message.append(name).append("' is not available; available here and in this build: ");
-  return Error{ErrorCode::invalidArgument, message + all};
-}
-
-}  // namespace dermis::cpu
-#endif

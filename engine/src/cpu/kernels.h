@@ -1,0 +1,29 @@
+// The instruction sets that this build has code for. Each has a source file, kernels_*.cpp.
+#pragma once
+
+#include <cstdint>
+
+#include "cpu/task.h"
+
+#if defined(__x86_64__) || defined(_M_X64)
+#define DERMIS_CPU_HAS_AVX2
+#if !defined(_MSC_VER) || defined(__clang__)  // Highway considers it broken with cl
+#define DERMIS_CPU_HAS_AVX3
+#endif
+#endif
+#if defined(DERMIS_CPU_HAS_AVX2) || defined(__i386__) || defined(_M_IX86)
+#define DERMIS_CPU_HAS_SSE4
+#endif
+
+namespace dermis::cpu {
+
+struct InstructionSet {
+  std::int64_t target;                               ///< Highway's bit
+  void (*skin)(const Task& task, Scratch* scratch);  ///< see `dispatchTask`
+};
+
+extern const InstructionSet avx3, avx2, sse4;
+/// What every processor has that runs the program.
+extern const InstructionSet baseline;
+
+}  // namespace dermis::cpu

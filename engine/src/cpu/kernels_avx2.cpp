@@ -1,0 +1,13 @@
+// The kernels for Highway's target AVX2.
+#include "cpu/kernels.h"
+
+#ifdef DERMIS_CPU_HAS_AVX2
+#define HWY_BASELINE_TARGETS HWY_AVX2
+#define HWY_DISABLED_TARGETS (~HWY_AVX2)
+#define HWY_BROKEN_TARGETS 0
+#include "cpu/kernels_inl.h"
+
+namespace dermis::cpu {
+const InstructionSet avx2{HWY_TARGET, HWY_NAMESPACE::skinTask};
+}
+#endif

@@ -1,0 +1,13 @@
+// The kernels for Highway's target AVX3.
+#include "cpu/kernels.h"
+
+#ifdef DERMIS_CPU_HAS_AVX3
+#define HWY_BASELINE_TARGETS HWY_AVX3
+#define HWY_DISABLED_TARGETS (~HWY_AVX3)
+#define HWY_BROKEN_TARGETS 0
+#include "cpu/kernels_inl.h"
+
+namespace dermis::cpu {
+const InstructionSet avx3{HWY_TARGET, HWY_NAMESPACE::skinTask};
+}
+#endif
