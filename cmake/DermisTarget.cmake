@@ -112,3 +112,19 @@ endfunction()
 function(dermis_without_exceptions target)
   target_compile_options(${target} PRIVATE $<IF:$<BOOL:${MSVC}>,/GR-,-fno-exceptions;-fno-rtti>)
 endfunction()
+
+# dermis_precompile(TARGET HEADERS...): precompiles headers of the standard library and these in Dermis' own builds, about a quarter
+# of the compile time. Every file still includes what it uses: the nightly part `clang` builds without.
+function(dermis_precompile target)
+  if(PROJECT_IS_TOP_LEVEL)
+    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstring> <functional> <limits> <map> <memory> <optional>
+      <span> <string> <string_view> <utility> <vector> ${ARGN})
+  endif()
+endfunction()
+
+# dermis_precompile_as(TARGET OTHER): uses the precompiled headers of OTHER, whose compile options must be the same.
+function(dermis_precompile_as target other)
+  if(PROJECT_IS_TOP_LEVEL)
+    target_precompile_headers(${target} REUSE_FROM ${other})
+  endif()
+endfunction()

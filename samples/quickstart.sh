@@ -17,8 +17,8 @@ fi
 
 dermis=build/release/samples/cli/dermis
 crowd=build/release/samples/crowd/dermis_crowd
-viewer=build/release/samples/viewer/dermis_viewer
-models=build/release/samples/models
+viewer=build/release/samples/showcase/viewer/dermis_viewer
+models=samples/models
 out=build/quickstart
 mkdir -p "$out"
 

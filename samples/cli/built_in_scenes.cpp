@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "models.h"
+#include "built_in_models.h"
 
 namespace dermis::cli {
 namespace {
@@ -14,9 +14,9 @@ double middleOfClip(const Scene& scene) {
 }  // namespace
 
 Result<BuiltInScenes> loadBuiltInScenes(const MeshPreparation& preparation) {
-  Result<Scene> bar = loadScene(models::makeBar(), "bar.glb", preparation);
+  Result<Scene> bar = loadScene(embeddedBar, "bar.glb", preparation);
   if (!bar) return bar.error();
-  Result<Scene> arm = loadScene(models::makeArm(), "arm.glb", preparation);
+  Result<Scene> arm = loadScene(embeddedArm, "arm.glb", preparation);
   if (!arm) return arm.error();
   return BuiltInScenes{std::move(*bar), std::move(*arm)};
 }

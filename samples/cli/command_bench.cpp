@@ -7,16 +7,16 @@
 #include <utility>
 #include <vector>
 
-#include "batch_runner.h"
 #include "byte_model.h"
 #include "commands.h"
-#include "driver_version.h"
-#include "open_device.h"
-#include "program/file_name.h"
-#include "program/output_file.h"
-#include "program/progress.h"
-#include "render/picture_writer.h"
-#include "start_up.h"
+#include "kit/batch_runner.h"
+#include "kit/bench/start_up.h"
+#include "kit/driver_version.h"
+#include "kit/file_name.h"
+#include "kit/open_device.h"
+#include "kit/output_file.h"
+#include "kit/progress.h"
+#include "kit/render/picture_writer.h"
 #include "throughput_report.h"
 
 namespace dermis::cli {

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "commands.h"
-#include "device.h"
+#include "kit/device.h"
 
 namespace dermis::cli {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "commands.h"
 #include "dermis/text.h"
-#include "program/plain_text.h"
+#include "kit/plain_text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

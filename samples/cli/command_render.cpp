@@ -9,15 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include "batch_runner.h"
 #include "commands.h"
 #include "crowd.h"
 #include "drawn_scene.h"
+#include "kit/batch_runner.h"
+#include "kit/file_name.h"
+#include "kit/progress.h"
+#include "kit/render/pass_counter.h"
+#include "kit/render/picture_writer.h"
 #include "method_options.h"
-#include "program/file_name.h"
-#include "program/progress.h"
-#include "render/pass_counter.h"
-#include "render/picture_writer.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "commands.h"
+#include "kit/file_name.h"
+#include "kit/open_device.h"
+#include "kit/progress.h"
 #include "mesh_output.h"
 #include "method_options.h"
-#include "open_device.h"
-#include "program/file_name.h"
-#include "program/progress.h"
 #include "scene_skinner.h"
 #include "skinned_scene.h"
 #include "vertex_normals.h"

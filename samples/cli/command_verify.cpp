@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "commands.h"
-#include "open_device.h"
-#include "program/progress.h"
+#include "kit/open_device.h"
+#include "kit/progress.h"
 #include "verification_report.h"
 
 namespace dermis::cli {

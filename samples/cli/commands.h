@@ -10,8 +10,8 @@
 #include <string>
 
 #include "dermis/gltf.h"
-#include "program/exit_status.h"
-#include "program/file_name.h"
+#include "kit/exit_status.h"
+#include "kit/file_name.h"
 
 namespace dermis::cli {
 

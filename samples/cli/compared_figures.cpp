@@ -5,8 +5,8 @@
 #include <cstring>
 #include <utility>
 
-#include "barrier.h"
 #include "dermis/vulkan/scope.h"
+#include "kit/barrier.h"
 
 namespace dermis::cli {
 namespace {

@@ -13,9 +13,9 @@
 #include "comparison_instructions.h"
 #include "dermis/cpu/skin.h"
 #include "dermis/verify/reference.h"
-#include "pipeline_statistics.h"
+#include "kit/pipeline_statistics.h"
+#include "kit/timed_batches.h"
 #include "scene_skinner.h"
-#include "timed_batches.h"
 
 namespace dermis::cli {
 namespace {

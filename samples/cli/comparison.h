@@ -9,8 +9,8 @@
 
 #include "comparison_tube.h"
 #include "dermis/method.h"
+#include "kit/open_device.h"
 #include "method_options.h"
-#include "open_device.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

@@ -11,9 +11,9 @@
 #include <glm/geometric.hpp>
 
 #include "compared_figures.h"
+#include "kit/render/heat_colors.h"
+#include "kit/render/renderer.h"
 #include "picture_sheet.h"
-#include "render/heat_colors.h"
-#include "render/renderer.h"
 
 namespace dermis::cli {
 namespace {

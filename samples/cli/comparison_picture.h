@@ -10,9 +10,9 @@
 
 #include "cross_section.h"
 #include "dermis/method.h"
-#include "open_device.h"
-#include "render/camera.h"
-#include "render/picture.h"
+#include "kit/open_device.h"
+#include "kit/render/camera.h"
+#include "kit/render/picture.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "program/output_file.h"
-#include "program/plain_text.h"
+#include "kit/output_file.h"
+#include "kit/plain_text.h"
 
 namespace dermis::cli {
 namespace {

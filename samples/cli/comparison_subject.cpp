@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <iterator>
 
-#include "program/plain_text.h"
+#include "kit/plain_text.h"
 
 namespace dermis::cli {
 namespace {

@@ -10,10 +10,10 @@
 #include <set>
 #include <utility>
 
-#include "barrier.h"
 #include "bind_pose.h"
 #include "dermis/vulkan/scope.h"
-#include "render/winding.h"
+#include "kit/barrier.h"
+#include "kit/render/winding.h"
 
 namespace dermis::cli {
 namespace {

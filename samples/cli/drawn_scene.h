@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "dermis/vulkan/skinning_system.h"
-#include "open_device.h"
-#include "render/appearances.h"
-#include "render/renderer.h"
+#include "kit/open_device.h"
+#include "kit/render/appearances.h"
+#include "kit/render/renderer.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

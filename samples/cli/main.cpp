@@ -9,7 +9,7 @@
 
 #include "commands.h"
 #include "dermis/version.h"
-#include "program/program.h"
+#include "kit/program.h"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include "dermis/centers_of_rotation.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
-#include "program/progress.h"
-#include "solve_centers.h"
+#include "kit/progress.h"
+#include "kit/solve_centers.h"
 
 namespace dermis::cli {
 namespace {

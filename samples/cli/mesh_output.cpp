@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "kit/file_name.h"
+#include "kit/output_file.h"
 #include "mesh_formats.h"
-#include "program/file_name.h"
-#include "program/output_file.h"
 
 namespace dermis::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "dermis/mesh.h"
-#include "program/exit_status.h"
+#include "kit/exit_status.h"
 
 namespace dermis::cli {
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "kit/plain_text.h"
 #include "mesh_formats.h"
-#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "render/picture.h"
+#include "kit/render/picture.h"
 
 namespace dermis::cli {
 

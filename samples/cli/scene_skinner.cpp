@@ -6,8 +6,8 @@
 #include <tuple>
 #include <utility>
 
-#include "batch_runner.h"
 #include "dermis/verify/reference.h"
+#include "kit/batch_runner.h"
 
 namespace dermis::cli {
 namespace {

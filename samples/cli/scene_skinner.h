@@ -4,9 +4,9 @@
 #include <functional>
 #include <vector>
 
-#include "batch_runner.h"
 #include "bind_pose.h"
 #include "dermis/method.h"
+#include "kit/batch_runner.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "kit/output_file.h"
+#include "kit/plain_text.h"
 #include "picture_sheet.h"
-#include "program/output_file.h"
-#include "program/plain_text.h"
 
 namespace dermis::cli {
 namespace {

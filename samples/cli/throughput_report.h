@@ -7,9 +7,9 @@
 #include <span>
 #include <string>
 
-#include "render/picture.h"
-#include "start_up.h"
-#include "throughput.h"
+#include "kit/bench/start_up.h"
+#include "kit/bench/throughput.h"
+#include "kit/render/picture.h"
 
 namespace dermis::cli {
 

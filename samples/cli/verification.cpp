@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "dermis/text.h"
-#include "method_rotation.h"
+#include "kit/method_rotation.h"
 
 namespace dermis::cli {
 namespace {

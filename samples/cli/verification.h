@@ -9,10 +9,10 @@
 
 #include "dermis/method.h"
 #include "dermis/verify/accuracy.h"
+#include "kit/target_pool.h"
+#include "kit/verification_product.h"
 #include "skinned_scene.h"
-#include "target_pool.h"
 #include "verification_cases.h"
-#include "verification_product.h"
 
 namespace dermis::cli {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dermis/method.h"
-#include "verification_product.h"
+#include "kit/verification_product.h"
 
 namespace dermis::cli {
 

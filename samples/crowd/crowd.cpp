@@ -5,9 +5,9 @@
 #include <cstring>
 #include <utility>
 
-#include "barrier.h"
 #include "frames.h"
 #include "in_parallel.h"
+#include "kit/barrier.h"
 
 using namespace dermis;
 

@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "buffer.h"
 #include "character.h"
 #include "crowd_system.h"
 #include "dermis/dermis.h"
 #include "dermis/vulkan/vulkan.h"
-#include "device.h"
 #include "figures.h"
+#include "kit/buffer.h"
+#include "kit/device.h"
 
 namespace crowd {
 

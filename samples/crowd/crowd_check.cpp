@@ -7,10 +7,10 @@
 #include <cmath>
 #include <utility>
 
-#include "barrier.h"
 #include "dermis/verify/accuracy.h"
 #include "frames.h"
 #include "in_parallel.h"
+#include "kit/barrier.h"
 
 using namespace dermis;
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "buffer.h"
 #include "crowd.h"
-#include "device.h"
+#include "kit/buffer.h"
+#include "kit/device.h"
 #include "references.h"
 #include "shown_poses.h"
 

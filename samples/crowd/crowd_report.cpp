@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "program/output_file.h"
+#include "kit/output_file.h"
 
 using namespace dermis;
 

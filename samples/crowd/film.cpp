@@ -8,12 +8,12 @@
 
 #include <glm/trigonometric.hpp>
 
-#include "barrier.h"
 #include "coarse_triangles.h"
 #include "dermis/vulkan/scope.h"
 #include "frames.h"
-#include "program/exit_status.h"
-#include "render/winding.h"
+#include "kit/barrier.h"
+#include "kit/exit_status.h"
+#include "kit/render/winding.h"
 
 using namespace dermis;
 

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "render/camera.h"
+#include "kit/render/camera.h"
 
 namespace crowd {
 

@@ -7,7 +7,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/result.h"
-#include "device.h"
+#include "kit/device.h"
 
 namespace crowd {
 

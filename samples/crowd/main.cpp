@@ -11,22 +11,22 @@
 #include <utility>
 #include <vector>
 
-#include "batch_runner.h"
 #include "crowd.h"
 #include "crowd_check.h"
 #include "crowd_report.h"
 #include "drill.h"
-#include "driver_version.h"
 #include "film.h"
 #include "frames.h"
 #include "gait.h"
-#include "open_device.h"
+#include "kit/batch_runner.h"
+#include "kit/driver_version.h"
+#include "kit/open_device.h"
+#include "kit/program.h"
+#include "kit/render/picture_writer.h"
+#include "kit/timestamps.h"
 #include "options.h"
-#include "program/program.h"
-#include "render/picture_writer.h"
 #include "shown_poses.h"
 #include "stroll.h"
-#include "timestamps.h"
 
 namespace {
 

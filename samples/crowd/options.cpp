@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "program/file_name.h"
-#include "program/program.h"
-#include "render/picture_writer.h"
+#include "kit/file_name.h"
+#include "kit/program.h"
+#include "kit/render/picture_writer.h"
 
 using namespace dermis;
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "crowd.h"
-#include "program/exit_status.h"
+#include "kit/exit_status.h"
 
 namespace crowd {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/picture.h"
+#include "kit/render/picture.h"
 
 namespace crowd {
 

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "batch_layout.h"
-#include "buffer.h"
 #include "dermis/vulkan/context.h"
-#include "open_device.h"
+#include "kit/batch_layout.h"
+#include "kit/buffer.h"
+#include "kit/open_device.h"
 
 namespace dermis::bench {
 

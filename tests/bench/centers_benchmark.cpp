@@ -1,40 +1,48 @@
-// MeshFinding centres of rotation, at import.
+// Finding centers of rotation, at import.
 
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
-#include "models.h"
-#include "random_rig.h"
-#include "solve_centers.h"
+#include "dermis/gltf.h"
+#include "kit/random_rig.h"
+#include "kit/solve_centers.h"
+#include "test_paths.h"
 
 namespace dermis::bench {
 namespace {
 
-/// A mesh to find centres of; triangles of three indices each.
+/// A mesh to find centers of; triangles of three indices each.
 struct Surface {
   samples::OwnedMesh mesh;
   std::uint32_t jointCount = 0;
   std::vector<std::uint32_t> triangles;
 };
 
+/// All primitives of the sample figure as one mesh.
 Surface figure() {
-  const models::Model model = models::figureModel();
+  const Result<gltf::Model> model = gltf::load(std::string(test::sampleModels) + "/figure.glb");
+  if (!model) throw std::runtime_error(model.error().message);
   Surface surface;
-  surface.triangles = model.mesh.indices;
-  for (const models::Vec3& position : model.mesh.positions) {
-    for (int axis = 0; axis < 3; ++axis)
-      surface.mesh.positions.push_back(static_cast<float>(position[axis]));
-  }
-  for (const models::Influences& influences : model.mesh.influences) {
-    for (std::size_t slot = 0; slot < 4; ++slot) {
-      surface.mesh.joints.push_back(influences.joints[slot]);
-      surface.mesh.weights.push_back(influences.weights[slot]);
-      surface.jointCount = std::max(surface.jointCount, influences.joints[slot] + 1u);
+  for (const gltf::SkinnedPrimitive& skinned : model->skinnedPrimitives) {
+    const gltf::Primitive& part = model->meshes[skinned.mesh].primitives[skinned.primitive];
+    const auto first = static_cast<std::uint32_t>(surface.mesh.positions.size() / 3);
+    for (const std::uint32_t index : part.triangles) surface.triangles.push_back(first + index);
+    surface.mesh.positions.insert(surface.mesh.positions.end(), part.positions.begin(),
+                                  part.positions.end());
+    const gltf::Influences& influences = part.influences.at(0);  // uint8, float32
+    for (const std::byte joint : influences.joints) {
+      surface.mesh.joints.push_back(std::to_integer<std::uint32_t>(joint));
+      surface.jointCount = std::max(surface.jointCount, surface.mesh.joints.back() + 1);
     }
+    const auto* weights = reinterpret_cast<const float*>(influences.weights.data());
+    surface.mesh.weights.insert(surface.mesh.weights.end(), weights,
+                                weights + influences.joints.size());
   }
   return surface;
 }

@@ -25,10 +25,10 @@
 #include <thread>
 #include <vector>
 
-#include "crowd.h"
 #include "dermis/cpu/skin.h"
 #include "dermis/pack.h"
-#include "random_rig.h"
+#include "kit/bench/crowd.h"
+#include "kit/random_rig.h"
 
 #ifdef DERMIS_BENCH_OZZ
 #include "ozz/base/maths/simd_math.h"

@@ -23,10 +23,10 @@
 #include <vector>
 
 #include "bench_scene.h"
-#include "crowd.h"
-#include "driver_version.h"
-#include "plain_batches.h"
-#include "timed_batches.h"
+#include "kit/bench/crowd.h"
+#include "kit/bench/plain_batches.h"
+#include "kit/driver_version.h"
+#include "kit/timed_batches.h"
 
 namespace dermis::bench {
 namespace {

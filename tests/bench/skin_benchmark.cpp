@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bench_scene.h"
-#include "random_rig.h"
+#include "kit/random_rig.h"
 #include "ratio_reporter.h"
 
 namespace dermis::bench {

@@ -14,8 +14,8 @@
 
 #include "bench_scene.h"
 #include "dermis/pack.h"
-#include "driver_version.h"
-#include "random_rig.h"
+#include "kit/driver_version.h"
+#include "kit/random_rig.h"
 #include "system_engine.h"
 
 namespace dermis::bench {

@@ -17,7 +17,6 @@
 #include <string>
 #include <vector>
 
-#include "batch_runner.h"
 #include "dermis/pack.h"
 #include "dermis/shader_compiler.h"
 #include "dermis/validate.h"
@@ -27,6 +26,7 @@
 #include "glb.h"
 #include "gltf_builder.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "mock_vulkan.h"
 #include "ply.h"
 #include "random_rig.h"

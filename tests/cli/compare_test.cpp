@@ -19,7 +19,7 @@
 
 #include "dermis/method.h"
 #include "dermis_command.h"
-#include "method_rotation.h"
+#include "kit/method_rotation.h"
 #include "ply.h"
 #include "test_paths.h"
 

@@ -15,9 +15,9 @@
 
 #include "dermis_command.h"
 #include "gltf_builder.h"
+#include "kit/file_name.h"
+#include "kit/output_file.h"
 #include "ply.h"
-#include "program/file_name.h"
-#include "program/output_file.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -367,15 +367,6 @@ TEST(FileOutputTest, EndingsAreTakenInAnyCase) {
     EXPECT_EQ(runCommand(skinCommand(folder + "/" + name)).status, 0) << name;
   EXPECT_TRUE(readPly(folder + "/A.PLY").has_value());
   EXPECT_EQ(textOf(folder + "/C.gLB").substr(0, 4), "glTF");
-}
-
-TEST(FileOutputTest, TheGeneratorOfModelsWritesWholeFiles) {
-  const std::string folder = emptyFolder();
-  const std::string model = writeText(folder + "/bar.glb");
-  expectUntouched(folder, {dermisModelsProgram, folder});
-  const CommandResult result = runCommand({dermisModelsProgram});
-  EXPECT_EQ(result.status, 2);
-  EXPECT_EQ(result.errors, "dermis-models: error: usage: dermis-models OUTDIR\n");
 }
 
 }  // namespace

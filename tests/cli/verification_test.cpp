@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "dermis_command.h"
-#include "target_pool.h"
-#include "verification_product.h"
+#include "kit/target_pool.h"
+#include "kit/verification_product.h"
 
 namespace dermis::test {
 namespace {

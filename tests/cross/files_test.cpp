@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string>
 
-#include "program/file_name.h"
-#include "program/output_file.h"
+#include "kit/file_name.h"
+#include "kit/output_file.h"
 
 namespace dermis::test {
 namespace {

@@ -19,11 +19,11 @@
 #include <utility>
 #include <vector>
 
-#include "buffer.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/verify/reference.h"
 #include "dermis/vulkan/scope.h"
+#include "kit/buffer.h"
 #include "random_rig.h"
 #include "ray_tracing.h"
 #include "test_device.h"

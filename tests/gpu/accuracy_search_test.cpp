@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "batch_runner.h"
 #include "dermis/pack.h"
 #include "dermis/verify/accuracy.h"
 #include "inexact_arithmetic.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "test_device.h"
 #include "worst_rig.h"
 

@@ -12,9 +12,9 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "batch_runner.h"
 #include "dermis/pack.h"
 #include "dermis/verify/accuracy.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

@@ -5,8 +5,8 @@
 
 #include <array>
 
+#include "kit/verification_product.h"
 #include "test_device.h"
-#include "verification_product.h"
 
 namespace dermis::test {
 namespace {

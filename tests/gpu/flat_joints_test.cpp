@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "batch_runner.h"
 #include "dermis/verify/accuracy.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "batch_runner.h"
 #include "dermis/runtime_compiler.h"
+#include "kit/batch_runner.h"
 #include "shader_folder.h"
 #include "system_test.h"
 

@@ -13,10 +13,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 
-#include "batch_runner.h"
 #include "dermis/glm.h"
 #include "dermis/verify/accuracy.h"
 #include "dual_quat.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 #include "verify/conditioning.h"

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "batch_runner.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "batch_runner.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "system_engine.h"
 #include "test_device.h"

@@ -5,8 +5,8 @@
 
 #include <cstdlib>
 
-#include "batch_runner.h"
 #include "device_profiles.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 #include "verify_product.h"

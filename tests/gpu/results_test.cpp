@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "batch_runner.h"
 #include "dermis/bounds.h"
 #include "dermis/verify/reference.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "batch_runner.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 #include "vertex_encoder.h"

@@ -8,9 +8,9 @@
 #include <variant>
 
 #include "abi.h"
-#include "buffer.h"
 #include "dermis/scene.h"
 #include "dermis/vulkan/kernels.h"
+#include "kit/buffer.h"
 #include "system_test.h"
 
 namespace dermis::test {

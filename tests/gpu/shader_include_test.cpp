@@ -13,14 +13,14 @@
 #include <utility>
 #include <vector>
 
-#include "batch_runner.h"
-#include "buffer.h"
 #include "dermis/verify/accuracy.h"
 #include "dermis/verify/reference.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis_test_shaders.h"
+#include "kit/batch_runner.h"
+#include "kit/buffer.h"
+#include "kit/render/owned.h"
 #include "random_rig.h"
-#include "render/owned.h"
 #include "test_device.h"
 
 namespace dermis::test {

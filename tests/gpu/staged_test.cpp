@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <initializer_list>
 
-#include "batch_runner.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

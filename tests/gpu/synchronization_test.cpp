@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "batch_runner.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "buffer.h"
 #include "command_log.h"
+#include "kit/buffer.h"
 #include "system_test.h"
 
 namespace dermis::test {

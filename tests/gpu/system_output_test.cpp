@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "buffer.h"
+#include "kit/buffer.h"
 #include "system_test.h"
 
 namespace dermis::test {

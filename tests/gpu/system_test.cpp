@@ -2,25 +2,13 @@
 
 #include <cstring>
 
-#include "batch_runner.h"
 #include "dermis/verify/accuracy.h"
 #include "dermis/verify/reference.h"
+#include "kit/batch_runner.h"
 #include "verify/joint.h"
 
 namespace dermis::test {
 namespace {
-
-using Blob = std::vector<std::byte>;
-
-Blob blobOf(const PackedMesh& mesh) {
-  return {mesh.bytes().begin(), mesh.bytes().end()};
-}
-
-/// What every packed mesh was packed from, by its bytes: the reference starts from there.
-std::map<Blob, OwnedMesh>& sources() {
-  static std::map<Blob, OwnedMesh> all;
-  return all;
-}
 
 /// A pose without the scale that its palette does not declare: each joint turned by the rotation of
 /// its polar decomposition.
@@ -42,13 +30,13 @@ Pose rotationsOf(std::span<const JointMatrix> pose) {
 
 /// The kernels of both tiers are the same: what the other one gives must be right, too.
 void expectReference(const samples::SkinnedVertices& skinned, const samples::SkinRequest& request) {
-  const auto source = sources().find(blobOf(*request.mesh));
-  ASSERT_NE(source, sources().end()) << "not a mesh of systemMesh";
+  OwnedMesh* const source = sourceOf(*request.mesh);
+  ASSERT_NE(source, nullptr) << "not a mesh of systemMesh";
   const bool isTurnedOnly = !request.mayScale && request.method != Method::linear;
   const Pose rotations = isTurnedOnly ? rotationsOf(request.pose) : Pose();
   const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.pose;
   const reference::SkinnedMesh expected =
-      must(reference::skin(source->second.view(), pose, request.method, request.morphs));
+      must(reference::skin(source->view(), pose, request.method, request.morphs));
   const Exemptions exemptions{exemptionsOf(expected).onlyFinite, 0};
   const Comparison comparison = must(compareWithReference(expected, skinned.view(), exemptions));
   EXPECT_TRUE(comparison.passed())
@@ -60,36 +48,6 @@ void expectReference(const samples::SkinnedVertices& skinned, const samples::Ski
 }
 
 }  // namespace
-
-PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
-                      std::uint32_t influences) {
-  OwnedMesh mesh = randomMesh(seed, vertexCount, jointCount, influences);
-  addTangents(mesh, seed + 1);
-  addMorphs(mesh, seed + 2, 3);
-  PackedMesh packed = must(pack(mesh.view(), jointCount));
-  sources().try_emplace(blobOf(packed), std::move(mesh));
-  return packed;
-}
-
-VertexLayout plainLayout() {
-  VertexLayout layout;
-  layout.normals = VertexFormat::float32x3;
-  return layout;
-}
-
-VertexLayout motionLayout() {
-  VertexLayout layout = plainLayout();
-  layout.motion = Motion::kept;
-  return layout;
-}
-
-std::set<std::uint32_t> indicesOf(std::span<const InstanceHandle> instances) {
-  std::set<std::uint32_t> indices;
-  for (const InstanceHandle instance : instances) {
-    EXPECT_TRUE(indices.insert(instance.index).second) << "an instance is listed twice";
-  }
-  return indices;
-}
 
 vulkan::SkinningSystemDescription SystemTest::description() {
   vulkan::SkinningSystemDescription description;

@@ -16,32 +16,11 @@
 #include "dermis/pack.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "random_rig.h"
+#include "scene_meshes.h"
 #include "system_engine.h"
 #include "test_device.h"
 
 namespace dermis::test {
-
-inline constexpr auto positionStream = static_cast<std::size_t>(Stream::positions);
-inline constexpr auto normalStream = static_cast<std::size_t>(Stream::normals);
-inline constexpr auto previousStream = static_cast<std::size_t>(Stream::previousPositions);
-
-using Pose = std::vector<JointMatrix>;
-
-/// A random mesh with everything that methods and layouts may want, for poses of so many joints.
-PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount = 8,
-                      std::uint32_t influences = 4);
-
-inline Pose systemPose(std::uint32_t seed, std::uint32_t jointCount = 8) {
-  return randomPose(seed, jointCount, seed % 5 == 4 ? Rigidity::shear : Rigidity::rigid);
-}
-
-/// Positions and normals in float32.
-VertexLayout plainLayout();
-/// The same with previous positions.
-VertexLayout motionLayout();
-
-/// Of instances that the last `record` skinned or settled, in an order that can be compared.
-std::set<std::uint32_t> indicesOf(std::span<const InstanceHandle> instances);
 
 class SystemTest : public DeviceTest {
  protected:

@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "batch_runner.h"
 #include "intercepted_device.h"
+#include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
 

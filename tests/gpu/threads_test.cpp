@@ -15,11 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "buffer.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "intercepted_device.h"
+#include "kit/buffer.h"
 #include "random_rig.h"
 #include "system_engine.h"
 #include "test_device.h"

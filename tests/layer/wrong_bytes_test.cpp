@@ -17,10 +17,10 @@
 
 #include "dermis/pack.h"
 #include "dermis/verify/reference.h"
-#include "open_device.h"
+#include "kit/open_device.h"
+#include "kit/verification_product.h"
 #include "random_rig.h"
 #include "test_device.h"
-#include "verification_product.h"
 
 namespace dermis::test {
 namespace {

@@ -99,18 +99,18 @@ cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross
   kernels=
   ./cmake/install-deps.sh "$system"
   ./tests/cross/unpack_highway.sh build/cross/highway
-  build ci dermis_cli dermis_sample_models dermis_gpu_poses_shaders
+  build ci dermis_cli dermis_gpu_poses_shaders
   if [ "$system" != arm64 ]; then
     kernels=$PWD/build/cross/kernels
     mkdir -p "$kernels"
-    for made in shaders/dermis_kernels samples/bench/plain_kernels samples/render/dermis_render_shaders \
+    for made in shaders/dermis_kernels samples/kit/bench/plain_kernels samples/kit/render/dermis_render_shaders \
       samples/gpu_poses/dermis_gpu_poses_shaders; do
       cp "build/ci/$made/"*.h "build/ci/$made/"*.cpp "$kernels"
     done
   fi
   cmake -S tests/cross -B "$folder" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$PWD/tests/cross/$system.cmake" \
     -DDERMIS_HIGHWAY_SOURCES="$PWD/build/cross/highway" -DDERMIS_EMBEDDED_SHADERS="$kernels"
-  cmake --build "$folder" --target cross_tests dermis_sample_models
+  cmake --build "$folder" --target cross_tests
   outcome=0
   ctest --test-dir "$folder" --output-on-failure --no-tests=error --timeout 900 -j "$(nproc)" >"$folder/tests.log" 2>&1 || outcome=$?
   tail -n 20 "$folder/tests.log"
@@ -118,11 +118,11 @@ cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross
     "$folder/Testing/Temporary/LastTest.log" | sort -u
   [ "$outcome" -eq 0 ] || { cat "$folder/tests.log"; return "$outcome"; }
 
-  figure=build/ci/samples/models/figure.glb
+  figure=samples/models/figure.glb
   build/ci/samples/cli/dermis skin "$figure" --device cpu -o "$folder/here.ply"
   $emulator "$(dermis_of "$system")" skin "$figure" --device cpu -o "$folder/there.ply"
   cmp "$folder/here.ply" "$folder/there.ply"
-  $emulator "$(dermis_of "$system")" verify "$folder/dermis/samples/models/bar.glb" --device cpu
+  $emulator "$(dermis_of "$system")" verify samples/models/bar.glb --device cpu
 }
 
 dermis_of() { # SYSTEM: the command
@@ -138,10 +138,10 @@ part_windows() {
   cross windows "$wine"
   PATH=/usr/lib/wine:$PATH wineserver -k || true # the one that began without a screen
   xvfb-run -a "$wine" "$(dermis_of windows)" devices
-  xvfb-run -a "$wine" "$(dermis_of windows)" verify build/ci/samples/models/bar.glb
+  xvfb-run -a "$wine" "$(dermis_of windows)" verify samples/models/bar.glb
   # File names are in UTF-8.
   name=$(printf 'build/cross/windows/gr\303\274n \346\227\245')
-  cp build/ci/samples/models/bar.glb "$name.glb"
+  cp samples/models/bar.glb "$name.glb"
   "$wine" "$(dermis_of windows)" skin "$name.glb" --device cpu -o "$name.ply"
   [ -s "$name.ply" ]
 }
@@ -156,7 +156,7 @@ part_arm64() {
 
 part_libcxx() {
   cross libcxx
-  "$(dermis_of libcxx)" verify build/ci/samples/models/bar.glb
+  "$(dermis_of libcxx)" verify samples/models/bar.glb
 }
 
 part_fuzz() {
@@ -180,7 +180,7 @@ part_mesa() {
   export DERMIS_REQUIRE_RAY_TRACING=1
   build/ci/samples/cli/dermis devices
   tests ci -LE nightly -R "$device_suites|Render|Crowd|Comparison"
-  build/ci/samples/cli/dermis verify build/ci/samples/models/*.glb
+  build/ci/samples/cli/dermis verify samples/models/*.glb
 }
 
 # Minimum ratios: about two thirds of those measured on a quiet machine (docs/performance.md).
@@ -231,8 +231,7 @@ same_numbers() { # EXPECTED MADE
 }
 
 part_golden() {
-  build ci dermis_sample_models
-  models=$PWD/build/ci/samples/models
+  models=$PWD/samples/models
   golden=$PWD/tests/golden
   made=build/nightly/golden
   rm -rf "$made"

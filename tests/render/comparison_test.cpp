@@ -16,10 +16,10 @@
 #include "comparison_picture.h"
 #include "dermis/verify/reference.h"
 #include "drawing_device.h"
+#include "kit/render/heat_colors.h"
+#include "kit/render/renderer.h"
 #include "picture_sheet.h"
 #include "pictures.h"
-#include "render/heat_colors.h"
-#include "render/renderer.h"
 
 namespace dermis::test {
 namespace {

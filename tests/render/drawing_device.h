@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "render/renderer.h"
+#include "kit/render/renderer.h"
 #include "test_device.h"
 
 namespace dermis::test {

@@ -15,8 +15,8 @@
 
 #include "drawing_device.h"
 #include "drawn_scene.h"
+#include "kit/render/renderer.h"
 #include "pictures.h"
-#include "render/renderer.h"
 #include "test_data.h"
 #include "test_paths.h"
 

@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "dermis/cpu/skinning_system.h"
-#include "system_engine.h"
+#include "scene_meshes.h"
 
 namespace dermis::test {
 
 class CpuEngine {
  public:
+  static constexpr bool hasGpu = false;
+
   explicit CpuEngine(const cpu::SkinningSystemDescription& description);
 
   cpu::SkinningSystem& system() { return system_; }

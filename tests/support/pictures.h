@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "render/picture.h"
+#include "kit/render/picture.h"
 
 namespace dermis::test {
 

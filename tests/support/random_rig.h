@@ -1,7 +1,7 @@
 // The samples' random meshes and poses, by the names of tests.
 #pragma once
 
-#include "../../samples/common/random_rig.h"
+#include "kit/random_rig.h"
 
 namespace dermis::test {
 

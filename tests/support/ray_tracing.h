@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "buffer.h"
-#include "device.h"
+#include "kit/buffer.h"
+#include "kit/device.h"
 
 #define DERMIS_TEST_RAY_TRACING_FUNCTIONS(X)  \
   X(AllocateDescriptorSets)                   \

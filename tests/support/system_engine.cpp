@@ -11,22 +11,6 @@ using vulkan::Consumer;
 using vulkan::Dependency;
 using vulkan::PreviousUse;
 
-std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output) {
-  return {output.positions, output.normals, output.tangents, output.previousPositions};
-}
-
-std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
-                                     const OutputAttribute& attribute, std::uint32_t vertexCount) {
-  const std::size_t size = formatSize(attribute.format);
-  std::vector<std::byte> copy(size * vertexCount);
-  for (std::size_t vertex = 0; size != 0 && vertex < vertexCount; ++vertex) {
-    const std::size_t place = attribute.offset + vertex * attribute.stride;
-    if (place + size > bytes.size()) throw std::runtime_error("an attribute leaves the output");
-    std::memcpy(copy.data() + vertex * size, bytes.data() + place, size);
-  }
-  return copy;
-}
-
 SystemEngine::SystemEngine(samples::Device& device,
                            const vulkan::SkinningSystemDescription& description)
     : device_(device),

@@ -13,36 +13,19 @@
 #include <utility>
 #include <vector>
 
-#include "buffer.h"
 #include "dermis/scene.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
-#include "device.h"
+#include "kit/buffer.h"
+#include "kit/device.h"
+#include "scene_meshes.h"
 
 namespace dermis::test {
 
-/// The value; where there is none the test fails with the error's message, and ends.
-template <typename T>
-T must(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
-}
-inline void must(const Result<void>& result) {
-  if (!result) throw std::runtime_error(result.error().message);
-}
-
-/// The attributes of an instance as they are stored, tightly packed, by `Stream`.
-using Streams = std::array<std::vector<std::byte>, streamCount>;
-
-/// The attributes of an output, by `Stream`.
-std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output);
-
-/// One attribute of so many vertices out of the bytes of an output buffer.
-std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
-                                     const OutputAttribute& attribute, std::uint32_t vertexCount);
-
 class SystemEngine {
  public:
+  static constexpr bool hasGpu = true;
+
   SystemEngine(samples::Device& device, const vulkan::SkinningSystemDescription& description);
   ~SystemEngine();
   SystemEngine(const SystemEngine&) = delete;

@@ -7,7 +7,7 @@
 
 #include <string>
 
-#include "open_device.h"
+#include "kit/open_device.h"
 
 namespace dermis::test {
 

@@ -8,7 +8,6 @@ const char* const kernelModules = DERMIS_KERNELS;
 const char* const kernelSources = DERMIS_KERNEL_SOURCES;
 const char* const dermisProgram = DERMIS_COMMAND;
 const char* const dermisCrowdProgram = DERMIS_CROWD;
-const char* const dermisModelsProgram = DERMIS_MODELS;
 const char* const dermisViewerProgram = DERMIS_VIEWER;
 
 }  // namespace dermis::test

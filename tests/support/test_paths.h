@@ -10,7 +10,6 @@ extern const char* const kernelModules;        ///< the folder of the kernels, N
 extern const char* const kernelSources;        ///< the folder of their GLSL, as it is installed
 extern const char* const dermisProgram;        ///< the command
 extern const char* const dermisCrowdProgram;   ///< dermis_crowd
-extern const char* const dermisModelsProgram;  ///< dermis-models
 extern const char* const dermisViewerProgram;  ///< dermis_viewer; empty where it is not built
 
 }  // namespace dermis::test

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "verification_product.h"
+#include "kit/verification_product.h"
 
 namespace dermis::test {
 

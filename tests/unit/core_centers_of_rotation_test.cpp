@@ -26,8 +26,8 @@
 #include "centers.h"
 #include "centers/pair_index.h"
 #include "dermis/types.h"
+#include "kit/solve_centers.h"
 #include "random_rig.h"
-#include "solve_centers.h"
 
 namespace dermis {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "child_process.h"
-#include "render/picture.h"
+#include "kit/render/picture.h"
 #include "run_command.h"
 
 namespace dermis::test {

@@ -1,0 +1,305 @@
+#include "kit/bench/plain_batches.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <string>
+#include <type_traits>
+
+#include "plain_kernels.h"
+
+namespace dermis::samples {
+namespace {
+
+constexpr std::uint32_t workgroupSize = 64;  // of all kernels
+constexpr std::uint64_t outputStride = 24;
+constexpr std::uint64_t copiedTogether = 24;  // instances per invocation of plain_copy.comp
+constexpr std::uint32_t bindingCount = 3;
+/// A dispatch skins whole instances, in multiples of this. With 24 bytes per vertex, their output
+/// then begins at a multiple of 256 bytes, the largest alignment that a device may require.
+constexpr std::uint64_t instanceStep = 32;
+
+Result<void> check(VkResult result, const char* function) {
+  if (result == VK_SUCCESS) return {};
+  return Error{ErrorCode::vulkanError,
+               std::string(function) + " failed with VkResult " + std::to_string(result), result};
+}
+
+std::uint32_t groupsOf(std::uint64_t invocations) {
+  return static_cast<std::uint32_t>((invocations + workgroupSize - 1) / workgroupSize);
+}
+
+/// The number of instances per dispatch.
+std::uint64_t instancesTogether(std::uint64_t maxRange, std::uint64_t instanceSize) {
+  const std::uint64_t most = maxRange / instanceSize;
+  return std::max(most - most % instanceStep, instanceStep);
+}
+
+}  // namespace
+
+PlainBatches::PlainBatches(OpenDevice& open)
+    : device_(*open.device), maxRange_(open.context.limits().maxStorageBufferRange) {
+  const auto load = [this](auto& function, const char* name) {
+    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(
+        device_.functions().GetDeviceProcAddr(device_.handle(), name));
+  };
+  load(functions_.createShaderModule, "vkCreateShaderModule");
+  load(functions_.destroyShaderModule, "vkDestroyShaderModule");
+  load(functions_.createDescriptorSetLayout, "vkCreateDescriptorSetLayout");
+  load(functions_.destroyDescriptorSetLayout, "vkDestroyDescriptorSetLayout");
+  load(functions_.createPipelineLayout, "vkCreatePipelineLayout");
+  load(functions_.destroyPipelineLayout, "vkDestroyPipelineLayout");
+  load(functions_.createComputePipelines, "vkCreateComputePipelines");
+  load(functions_.destroyPipeline, "vkDestroyPipeline");
+  load(functions_.createDescriptorPool, "vkCreateDescriptorPool");
+  load(functions_.destroyDescriptorPool, "vkDestroyDescriptorPool");
+  load(functions_.allocateDescriptorSets, "vkAllocateDescriptorSets");
+  load(functions_.updateDescriptorSets, "vkUpdateDescriptorSets");
+  load(functions_.cmdBindPipeline, "vkCmdBindPipeline");
+  load(functions_.cmdBindDescriptorSets, "vkCmdBindDescriptorSets");
+  load(functions_.cmdPushConstants, "vkCmdPushConstants");
+  load(functions_.cmdDispatch, "vkCmdDispatch");
+}
+
+PlainBatches::~PlainBatches() {
+  const VkDevice device = device_.handle();
+  for (const VkCommandBuffer commandBuffer : commandBuffers_) {
+    if (commandBuffer != VK_NULL_HANDLE) device_.freeCommandBuffer(commandBuffer);
+  }
+  for (const VkPipeline pipeline : pipelines_)
+    functions_.destroyPipeline(device, pipeline, nullptr);
+  functions_.destroyPipeline(device, palettePipeline_, nullptr);
+  functions_.destroyDescriptorPool(device, pool_, nullptr);
+  functions_.destroyPipelineLayout(device, layout_, nullptr);
+  functions_.destroyDescriptorSetLayout(device, setLayout_, nullptr);
+}
+
+Result<std::unique_ptr<PlainBatches>> PlainBatches::create(OpenDevice& open, const Crowd& crowd) {
+  std::unique_ptr<PlainBatches> batches(new PlainBatches(open));
+  if (Result<void> made = batches->make(crowd); !made) return made.error();
+  return batches;
+}
+
+Result<void> PlainBatches::make(const Crowd& crowd) {
+  Result<Timestamps> timestamps = Timestamps::create(device_);
+  if (!timestamps) return timestamps.error();
+  timestamps_ = std::move(*timestamps);
+  if (Result<void> made = makeBuffers(crowd); !made) return made;
+  const std::uint64_t step =
+      instancesTogether(maxRange_, std::uint64_t{crowd.vertexCount()} * outputStride);
+  const std::uint64_t dispatches = (crowd.instanceCount() + step - 1) / step;
+  if (Result<void> made = makeLayouts(static_cast<std::uint32_t>(dispatches)); !made) return made;
+  if (Result<void> made = makePipeline(palettePipeline_, plain_kernels::plain_palette_spirv); !made)
+    return made;
+  const std::array spirv{plain_kernels::plain_skin_spirv, plain_kernels::plain_linear_spirv,
+                         plain_kernels::plain_copy_spirv};
+  for (std::size_t kernel = 0; kernel < plainKernelCount; ++kernel) {
+    if (Result<void> made = makePipeline(pipelines_[kernel], spirv[kernel]); !made) return made;
+    if (Result<void> recorded = record(crowd, static_cast<PlainKernel>(kernel)); !recorded)
+      return recorded;
+    const Result<double> first = skin(static_cast<PlainKernel>(kernel));
+    if (!first) return first.error();
+  }
+  return {};
+}
+
+Result<void> PlainBatches::makeBuffers(const Crowd& crowd) {
+  const std::uint64_t joints = std::uint64_t{crowd.instanceCount()} * crowd.jointCount();
+  const std::uint64_t vertices = crowd.vertices.size();
+  const auto make = [this](auto& buffer, std::uint64_t size) -> Result<void> {
+    using Buffer = std::remove_reference_t<decltype(buffer)>;
+    Result<Buffer> made = Buffer::create(device_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    if (!made) return made.error();
+    buffer = std::move(*made);
+    return {};
+  };
+  for (const Result<void>& made :
+       {make(vertices_, vertices * sizeof(PlainVertex)),
+        make(matrices_, joints * sizeof(JointMatrix)), make(palettes_, joints * 32),
+        make(output_, crowd.instanceCount() * vertices * outputStride)}) {
+    if (!made) return made;
+  }
+  std::memcpy(vertices_.bytes().data(), crowd.vertices.data(),
+              crowd.vertices.size() * sizeof(PlainVertex));
+  std::byte* place = matrices_.bytes().data();
+  for (const std::vector<JointMatrix>& pose : crowd.poses) {
+    std::memcpy(place, pose.data(), pose.size() * sizeof(JointMatrix));
+    place += pose.size() * sizeof(JointMatrix);
+  }
+  return {};
+}
+
+Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
+  const VkDevice device = device_.handle();
+  std::array<VkDescriptorSetLayoutBinding, bindingCount> bindings{};
+  for (std::uint32_t binding = 0; binding < bindingCount; ++binding) {
+    bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
+                         nullptr};
+  }
+  VkDescriptorSetLayoutCreateInfo setInfo{};
+  setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+  setInfo.bindingCount = bindingCount;
+  setInfo.pBindings = bindings.data();
+  if (Result<void> good =
+          check(functions_.createDescriptorSetLayout(device, &setInfo, nullptr, &setLayout_),
+                "vkCreateDescriptorSetLayout");
+      !good)
+    return good;
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, 12};
+  VkPipelineLayoutCreateInfo layoutInfo{};
+  layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+  layoutInfo.setLayoutCount = 1;
+  layoutInfo.pSetLayouts = &setLayout_;
+  layoutInfo.pushConstantRangeCount = 1;
+  layoutInfo.pPushConstantRanges = &range;
+  if (Result<void> good =
+          check(functions_.createPipelineLayout(device, &layoutInfo, nullptr, &layout_),
+                "vkCreatePipelineLayout");
+      !good)
+    return good;
+  // The sets of the three kernels, and that of the palettes.
+  const std::uint32_t sets = dispatches * std::uint32_t{plainKernelCount} + 1;
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets * bindingCount};
+  VkDescriptorPoolCreateInfo poolInfo{};
+  poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  poolInfo.maxSets = sets;
+  poolInfo.poolSizeCount = 1;
+  poolInfo.pPoolSizes = &size;
+  return check(functions_.createDescriptorPool(device, &poolInfo, nullptr, &pool_),
+               "vkCreateDescriptorPool");
+}
+
+Result<void> PlainBatches::makePipeline(VkPipeline& pipeline,
+                                        std::span<const std::uint32_t> spirv) {
+  const VkDevice device = device_.handle();
+  VkShaderModuleCreateInfo moduleInfo{};
+  moduleInfo.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+  moduleInfo.codeSize = spirv.size_bytes();
+  moduleInfo.pCode = spirv.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  if (Result<void> good =
+          check(functions_.createShaderModule(device, &moduleInfo, nullptr, &module),
+                "vkCreateShaderModule");
+      !good)
+    return good;
+  VkComputePipelineCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module;
+  info.stage.pName = "main";
+  info.layout = layout_;
+  const VkResult result =
+      functions_.createComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  functions_.destroyShaderModule(device, module, nullptr);
+  return check(result, "vkCreateComputePipelines");
+}
+
+Result<void> PlainBatches::bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
+                                std::span<const vulkan::BufferRange> buffers) {
+  VkDescriptorSetAllocateInfo allocateInfo{};
+  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  allocateInfo.descriptorPool = pool_;
+  allocateInfo.descriptorSetCount = 1;
+  allocateInfo.pSetLayouts = &setLayout_;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  if (Result<void> good =
+          check(functions_.allocateDescriptorSets(device_.handle(), &allocateInfo, &set),
+                "vkAllocateDescriptorSets");
+      !good)
+    return good;
+  std::array<VkDescriptorBufferInfo, bindingCount> infos{};
+  std::array<VkWriteDescriptorSet, bindingCount> writes{};
+  for (std::uint32_t binding = 0; binding < buffers.size(); ++binding) {
+    const vulkan::BufferRange& range = buffers[binding];
+    infos[binding] = {range.buffer, range.offset, range.size};
+    writes[binding].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+    writes[binding].dstSet = set;
+    writes[binding].dstBinding = binding;
+    writes[binding].descriptorCount = 1;
+    writes[binding].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    writes[binding].pBufferInfo = &infos[binding];
+  }
+  functions_.updateDescriptorSets(device_.handle(), static_cast<std::uint32_t>(buffers.size()),
+                                  writes.data(), 0, nullptr);
+  functions_.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+  functions_.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1,
+                                   &set, 0, nullptr);
+  return {};
+}
+
+Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer) {
+  if (Result<void> bound =
+          bind(commandBuffer, palettePipeline_, std::array{matrices_.range(), palettes_.range()});
+      !bound)
+    return bound;
+  const std::uint32_t jointTotal = crowd.instanceCount() * crowd.jointCount();
+  functions_.cmdPushConstants(commandBuffer, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, 4,
+                              &jointTotal);
+  functions_.cmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
+  device_.functions().CmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                                         VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 1, &barrier, 0,
+                                         nullptr, 0, nullptr);
+  return {};
+}
+
+Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel,
+                                          VkCommandBuffer commandBuffer) {
+  const std::uint64_t instanceSize = std::uint64_t{crowd.vertexCount()} * outputStride;
+  const std::uint64_t step = instancesTogether(maxRange_, instanceSize);
+  const vulkan::BufferRange joints =
+      kernel == PlainKernel::dualQuaternion ? palettes_.range() : matrices_.range();
+  for (std::uint64_t first = 0; first < crowd.instanceCount(); first += step) {
+    const std::uint64_t count = std::min(step, crowd.instanceCount() - first);
+    const vulkan::BufferRange written{output_.range().buffer, first * instanceSize,
+                                      count * instanceSize};
+    if (Result<void> bound = bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)],
+                                  std::array{vertices_.range(), joints, written});
+        !bound)
+      return bound;
+    const bool copies = kernel == PlainKernel::copy;
+    const std::array<std::uint32_t, 3> push{
+        crowd.vertexCount(), copies ? static_cast<std::uint32_t>(count) : crowd.jointCount(),
+        static_cast<std::uint32_t>(first)};
+    const std::uint64_t rows = copies ? (count + copiedTogether - 1) / copiedTogether : count;
+    functions_.cmdPushConstants(commandBuffer, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                                sizeof(push), push.data());
+    functions_.cmdDispatch(commandBuffer, groupsOf(crowd.vertexCount()),
+                           static_cast<std::uint32_t>(rows), 1);
+  }
+  return {};
+}
+
+Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
+  VkCommandBuffer& commandBuffer = commandBuffers_[static_cast<std::size_t>(kernel)];
+  commandBuffer = device_.allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  if (Result<void> begun = check(device_.functions().BeginCommandBuffer(commandBuffer, &begin),
+                                 "vkBeginCommandBuffer");
+      !begun)
+    return begun;
+  timestamps_.recordBegin(commandBuffer);
+  if (kernel == PlainKernel::dualQuaternion) {
+    if (Result<void> recorded = recordPalettes(crowd, commandBuffer); !recorded) return recorded;
+  }
+  if (Result<void> recorded = recordSkinning(crowd, kernel, commandBuffer); !recorded)
+    return recorded;
+  timestamps_.recordEnd(commandBuffer);
+  return check(device_.functions().EndCommandBuffer(commandBuffer), "vkEndCommandBuffer");
+}
+
+Result<double> PlainBatches::skin(PlainKernel kernel) {
+  const auto begin = std::chrono::steady_clock::now();
+  if (Result<void> done = device_.submitAndWait(commandBuffers_[static_cast<std::size_t>(kernel)]);
+      !done)
+    return done.error();
+  if (timestamps_.has()) return timestamps_.seconds();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace dermis::samples

@@ -1,0 +1,88 @@
+// The baselines: a crowd skinned by plain kernels (plain_palette.comp with plain_skin.comp, or
+// plain_linear.comp), or only copied (plain_copy.comp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "kit/bench/crowd.h"
+#include "kit/buffer.h"
+#include "kit/device_buffer.h"
+#include "kit/open_device.h"
+#include "kit/timestamps.h"
+
+namespace dermis::samples {
+
+enum class PlainKernel : std::uint8_t { dualQuaternion, linear, copy };
+inline constexpr std::size_t plainKernelCount = 3;
+
+/// A crowd on a device. Each kernel skins it into the same memory. There is one dispatch for each
+/// storage buffer range that the output needs; each range holds whole instances.
+class PlainBatches {
+ public:
+  /// Skins the crowd once with each kernel, so that drivers have compiled and memory has been
+  /// touched. `open` must outlive this object. Fails with `vulkanError`.
+  static Result<std::unique_ptr<PlainBatches>> create(OpenDevice& open, const Crowd& crowd);
+  ~PlainBatches();
+  PlainBatches(const PlainBatches&) = delete;
+  PlainBatches& operator=(const PlainBatches&) = delete;
+
+  /// Skins the crowd, including the conversion of its poses, and returns the seconds that it took:
+  /// on the device if it has timestamps, otherwise from submission to the end of waiting.
+  Result<double> skin(PlainKernel kernel);
+
+  /// Position and normal of every vertex of every instance, interleaved.
+  Result<std::vector<std::byte>> output() const { return output_.read(); }
+
+ private:
+  /// The entry points that the baselines need in addition to those of `Device`.
+  struct Functions {
+    PFN_vkCreateShaderModule createShaderModule = nullptr;
+    PFN_vkDestroyShaderModule destroyShaderModule = nullptr;
+    PFN_vkCreateDescriptorSetLayout createDescriptorSetLayout = nullptr;
+    PFN_vkDestroyDescriptorSetLayout destroyDescriptorSetLayout = nullptr;
+    PFN_vkCreatePipelineLayout createPipelineLayout = nullptr;
+    PFN_vkDestroyPipelineLayout destroyPipelineLayout = nullptr;
+    PFN_vkCreateComputePipelines createComputePipelines = nullptr;
+    PFN_vkDestroyPipeline destroyPipeline = nullptr;
+    PFN_vkCreateDescriptorPool createDescriptorPool = nullptr;
+    PFN_vkDestroyDescriptorPool destroyDescriptorPool = nullptr;
+    PFN_vkAllocateDescriptorSets allocateDescriptorSets = nullptr;
+    PFN_vkUpdateDescriptorSets updateDescriptorSets = nullptr;
+    PFN_vkCmdBindPipeline cmdBindPipeline = nullptr;
+    PFN_vkCmdBindDescriptorSets cmdBindDescriptorSets = nullptr;
+    PFN_vkCmdPushConstants cmdPushConstants = nullptr;
+    PFN_vkCmdDispatch cmdDispatch = nullptr;
+  };
+
+  explicit PlainBatches(OpenDevice& open);
+  Result<void> make(const Crowd& crowd);
+  Result<void> makeBuffers(const Crowd& crowd);
+  Result<void> makeLayouts(std::uint32_t dispatches);
+  Result<void> makePipeline(VkPipeline& pipeline, std::span<const std::uint32_t> spirv);
+  Result<void> record(const Crowd& crowd, PlainKernel kernel);
+  Result<void> recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer);
+  Result<void> recordSkinning(const Crowd& crowd, PlainKernel kernel,
+                              VkCommandBuffer commandBuffer);
+  Result<void> bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
+                    std::span<const vulkan::BufferRange> buffers);
+
+  Device& device_;
+  std::uint64_t maxRange_;
+  Functions functions_;
+  Timestamps timestamps_;
+  MappedBuffer vertices_, matrices_;
+  DeviceBuffer palettes_, output_;
+  VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkDescriptorPool pool_ = VK_NULL_HANDLE;
+  VkPipeline palettePipeline_ = VK_NULL_HANDLE;
+  std::array<VkPipeline, plainKernelCount> pipelines_{};
+  std::array<VkCommandBuffer, plainKernelCount> commandBuffers_{};
+};
+
+}  // namespace dermis::samples

@@ -1,0 +1,124 @@
+// A Vulkan device without a window, for samples and tests. An engine has its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/result.h"
+#include "dermis/vulkan/context.h"
+#include "kit/ray_tracing_features.h"
+#include "kit/vulkan_functions.h"
+#include "kit/vulkan_loader.h"
+
+namespace dermis::samples {
+
+struct DeviceInfo {
+  std::string name;
+  std::string type;  ///< "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other"
+  std::uint32_t apiVersion = 0;
+  std::uint64_t maxStorageBufferRange = 0;
+  std::uint32_t maxWorkgroupCount = 0;
+  std::uint32_t storageBuffersPerStage = 0;
+  bool pushDescriptors = false;
+  bool storage16Bit = false;       ///< kernels can store 2 bytes
+  bool storage8Bit = false;        ///< kernels can store 1 byte
+  bool int64 = false;              ///< kernels can use 64-bit integers
+  bool scalarBlockLayout = false;  ///< kernels can store up to 32 bytes at once
+  bool accelerationStructures = false;
+  bool rayQueries = false;
+  bool pipelineStatistics = false;
+  std::string unusable;  ///< why Dermis cannot run on it; empty if it can
+};
+
+struct DeviceOptions {
+  /// "auto": the best usable device, GPUs before CPUs; a number: the index in `listDevices`;
+  /// otherwise a part of a name, in upper or lower case.
+  std::string device = "auto";
+  bool validation = false;      ///< enable the Khronos layer with core and synchronization checks;
+                                ///< fails if it is not installed
+  bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor if the device has it
+  bool smallStorage = true;     ///< enable stores of 1 and 2 bytes if the device has them
+  bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
+                                ///< queries if the device has them
+  bool graphics = false;        ///< requires a graphics queue
+  /// Enable queries that count invocations if the device has them.
+  bool pipelineStatistics = false;
+  vulkan::KernelSource kernels;  ///< of the context; empty: the library's
+  /// Instance extensions for the surface of a window. If there are any, VK_KHR_swapchain is
+  /// required and enabled.
+  std::vector<std::string> surfaceExtensions;
+};
+
+/// Fails with `missingFeature` if there is no loader, or if no instance can be created.
+Result<std::vector<DeviceInfo>> listDevices();
+
+class Device {
+ public:
+  /// Fails with `missingFeature` if there is no loader, no device of that name, no compute or
+  /// graphics queue, or no validation layer.
+  static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  /// The description for Dermis. Valid while this object lives.
+  vulkan::DeviceDescription description() const;
+
+  const DeviceInfo& info() const { return info_; }
+  const VulkanFunctions& functions() const { return functions_; }
+  VkDevice handle() const { return device_; }
+  VkPhysicalDevice physicalDevice() const { return physicalDevice_; }
+  VkQueue queue() const { return queue_; }
+  std::uint32_t queueFamily() const { return queueFamily_; }
+
+  /// A memory type with all flags of `required`, and with those of `preferred` if there is one.
+  Result<std::uint32_t> memoryType(std::uint32_t allowedTypes, VkMemoryPropertyFlags required,
+                                   VkMemoryPropertyFlags preferred) const;
+
+  VkCommandBuffer allocateCommandBuffer(
+      VkCommandBufferLevel level = VK_COMMAND_BUFFER_LEVEL_PRIMARY);
+  void freeCommandBuffer(VkCommandBuffer commandBuffer);
+
+  /// Submits and waits. Fails with `vulkanError`.
+  Result<void> submitAndWait(VkCommandBuffer commandBuffer);
+
+  /// Returns the messages of the validation layer so far, and clears them.
+  std::vector<std::string> takeValidationMessages();
+
+ private:
+  Device() = default;
+  Result<void> createInstance(bool validation, std::span<const std::string> extensions);
+  Result<void> choose(const std::string& wanted);
+  Result<void> createDevice(const DeviceOptions& options);
+
+  static VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
+                                                  VkDebugUtilsMessageTypeFlagsEXT types,
+                                                  const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                                  void* user);
+  friend Result<std::vector<DeviceInfo>> listDevices();
+
+  std::shared_ptr<VulkanLoader> loader_;
+  VulkanFunctions functions_;
+  DeviceInfo info_;
+  VkInstance instance_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkPhysicalDevice physicalDevice_ = VK_NULL_HANDLE;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  std::uint32_t queueFamily_ = 0;
+  VkCommandPool commandPool_ = VK_NULL_HANDLE;
+  std::vector<const char*> enabledExtensions_;
+  VkPhysicalDeviceFeatures2 features_{};
+  VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
+  VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
+  VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout_{};
+  RayTracingFeatures rayTracing_;
+  std::mutex messagesMutex_;
+  std::vector<std::string> messages_;
+};
+
+}  // namespace dermis::samples

@@ -1,0 +1,23 @@
+// Chooses which methods are verified with which output, because all combinations take too long.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/method.h"
+#include "kit/verification_product.h"
+
+namespace dermis::samples {
+
+/// Returns the methods to verify with each output: at least one. Together, every method is combined
+/// with every value of every parameter: the format of each attribute, arrangement, gap, motion,
+/// bounds and tuning. Deterministic.
+std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> outputs,
+                                                 std::span<const Method> methods = allMethods);
+
+/// The values of an output case's parameters. Different values of a parameter have different
+/// numbers.
+std::vector<std::uint32_t> parameterValues(const OutputCase& output);
+
+}  // namespace dermis::samples

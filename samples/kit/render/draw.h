@@ -1,0 +1,52 @@
+// One draw of a picture: skinned vertices in the buffer that Dermis wrote, and their surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <vulkan/vulkan_core.h>
+
+#include "dermis/types.h"
+#include "dermis/vertex_format.h"
+#include "kit/render/geometry.h"
+
+namespace dermis::samples::render {
+
+/// An attribute of the vertices: vertex v at `offset + v * stride` of a buffer with
+/// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT.
+struct VertexStream {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0;
+  std::uint32_t stride = 0;
+  VertexFormat format = VertexFormat::none;  ///< `none`: there is no such attribute
+};
+
+enum class Transparency : std::uint8_t { opaque, mask, blend };
+
+struct Surface {
+  std::array<float, 4> baseColor{1, 1, 1, 1};  ///< linear, and alpha
+  std::uint32_t texture = 0;                   ///< `Renderer::addTexture`; 0: white
+  float metallic = 0;
+  float roughness = 0.8f;
+  Transparency transparency = Transparency::opaque;
+  float alphaCutoff = 0.5f;
+  bool isDoubleSided = false;
+};
+
+struct Draw {
+  /// float32x3, float32x4 or float16x4. The caller must record the barrier between the writes and
+  /// the draw, `vulkan::outputScope(Consumer::vertexInput)`.
+  VertexStream positions;
+  /// Any format that `isNormalFormat` allows, except three components of 1 or 2 bytes; or none, for
+  /// flat shading.
+  VertexStream normals;
+  /// Heat map: one float32 per vertex, from 0 to 1, shown as a color instead of the base color. The
+  /// format is ignored. No buffer: no heat map.
+  VertexStream values;
+  const Geometry* geometry = nullptr;  ///< must have as many vertices as are skinned
+  Surface surface;
+  JointMatrix transform;    ///< to the world: rotation, translation and uniform scale
+  bool isMirrored = false;  ///< the pose has turned the triangles inside out
+};
+
+}  // namespace dermis::samples::render

@@ -1,0 +1,167 @@
+// Batches on a device.
+
+#include <algorithm>
+#include <cstring>
+
+#include "kit/barrier.h"
+#include "kit/batch_runner.h"
+
+namespace dermis::samples {
+namespace {
+
+constexpr std::array<BufferRole, streamCount> outputRoles{BufferRole::positions,
+                                                          BufferRole::normals, BufferRole::tangents,
+                                                          BufferRole::previousPositions};
+
+struct Buffers {
+  MappedBuffer meshes, poses, tables, palettes, results;
+};
+
+Result<Buffers> makeBuffers(Device& device, const Plan& plan) {
+  Buffers buffers;
+  for (const auto& [buffer, role] : {std::pair{&buffers.meshes, BufferRole::meshes},
+                                     {&buffers.poses, BufferRole::poses},
+                                     {&buffers.tables, BufferRole::tables},
+                                     {&buffers.palettes, BufferRole::palettes},
+                                     {&buffers.results, BufferRole::results}}) {
+    const BufferRequirement requirement = plan.buffer(role);
+    const bool readBack = role == BufferRole::results || role == BufferRole::palettes;
+    Result<MappedBuffer> made =
+        MappedBuffer::create(device, requirement.size, requirement.usage, readBack);
+    if (!made) return made.error();
+    *buffer = std::move(*made);
+  }
+  return buffers;
+}
+
+void fill(const BatchLayout& layout, const Buffers& buffers) {
+  for (const auto& [mesh, offset] : layout.meshOffsets) {
+    std::memcpy(buffers.meshes.bytes().data() + offset, mesh->bytes().data(), mesh->bytes().size());
+  }
+  for (std::size_t index = 0; index < layout.poses.size(); ++index) {
+    std::memcpy(buffers.poses.bytes().data() + layout.poseDescriptions[index].matrixOffset,
+                layout.poses[index].data(), layout.poses[index].size_bytes());
+  }
+}
+
+Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,
+                    const vulkan::Bindings& bindings) {
+  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  device.functions().BeginCommandBuffer(commandBuffer, &begin);
+  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+  Result<void> done = context.record(commandBuffer, plan, bindings);
+  recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+  device.functions().EndCommandBuffer(commandBuffer);
+  if (done) done = device.submitAndWait(commandBuffer);
+  device.freeCommandBuffer(commandBuffer);
+  return done;
+}
+
+class VulkanRunner : public BatchRunner {
+ public:
+  VulkanRunner(Device& device, vulkan::Context& context, const RunOptions& options)
+      : BatchRunner(options), device_(device), context_(context) {}
+
+ private:
+  Result<BatchResult> skin() override;
+  std::span<const std::byte> outputBytes(std::size_t stream) const override {
+    return outputs_[stream].bytes();
+  }
+  Result<void> makeOutputs(const Plan& plan);
+  vulkan::OutputBuffers outputRanges() const;
+
+  Device& device_;
+  vulkan::Context& context_;
+  std::array<MappedBuffer, streamCount> outputs_;
+};
+
+Result<void> VulkanRunner::makeOutputs(const Plan& plan) {
+  for (std::size_t stream = 0; stream < (layout_.oneOutput ? 1 : streamCount); ++stream) {
+    const BufferRequirement requirement = plan.buffer(outputRoles[stream]);
+    if (outputs_[stream].bytes().size() == requirement.size) continue;
+    Result<MappedBuffer> made =
+        MappedBuffer::create(device_, requirement.size, requirement.usage, true);
+    if (!made) return made.error();
+    outputs_[stream] = std::move(*made);
+    std::ranges::fill(outputs_[stream].bytes(), options_.poison);
+  }
+  return {};
+}
+
+vulkan::OutputBuffers VulkanRunner::outputRanges() const {
+  if (layout_.oneOutput) return vulkan::OutputBuffers::oneBuffer(outputs_[0].range());
+  return {outputs_[0].range(), outputs_[1].range(), outputs_[2].range(), outputs_[3].range()};
+}
+
+Result<BatchResult> VulkanRunner::skin() {
+  Plan plan;
+  if (Result<void> planned = makePlan(layout_.batch(), context_.limits(), options_.tuning, plan);
+      !planned)
+    return planned.error();
+  if (Result<void> ready = context_.prepare(plan.variants()); !ready) return ready.error();
+
+  Result<Buffers> buffers = makeBuffers(device_, plan);
+  if (!buffers) return buffers.error();
+  if (Result<void> made = makeOutputs(plan); !made) return made.error();
+  fill(layout_, *buffers);
+  if (Result<void> written = writeTables(plan, buffers->tables.bytes()); !written)
+    return written.error();
+  Result<vulkan::Bindings> bindings = context_.createBindings(
+      {buffers->meshes.range(), buffers->poses.range(), buffers->tables.range(),
+       buffers->palettes.range(), outputRanges(), buffers->results.range()});
+  if (!bindings) return bindings.error();
+  if (Result<void> done = submit(device_, context_, plan, *bindings); !done) return done.error();
+
+  BatchResult result;
+  result.dispatches = plan.dispatchCount();
+  for (std::uint32_t index = 0; index < layout_.jobs.size(); ++index) {
+    SkinnedVertices& skinned = result.instances.emplace_back();
+    const std::uint64_t status = plan.statusOffset(layout_.jobs[index].pose);
+    PoseStatus& known = skinned.status.emplace();
+    if (status != Plan::noStatus)
+      std::memcpy(&known, buffers->palettes.bytes().data() + status, sizeof(known));
+    const std::uint64_t place = plan.resultOffset(index);
+    if (place != Plan::noResult) {
+      std::memcpy(&skinned.result, buffers->results.bytes().data() + place, sizeof(skinned.result));
+    }
+  }
+  return result;
+}
+
+/// Results with the other tunings must have the same bits as results with the first.
+constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
+
+}  // namespace
+
+std::string VulkanTarget::name() const {
+  return device_.info().name;
+}
+DeviceLimits VulkanTarget::limits() const {
+  return context_.limits();
+}
+std::span<const Method> VulkanTarget::methods() const {
+  return allMethods;
+}
+std::vector<Division> VulkanTarget::divisions() const {
+  std::vector<Division> all;
+  for (const Tuning& tuning : tunings) {
+    all.push_back({std::to_string(tuning.workgroupSize) + " invocations, " +
+                       std::to_string(tuning.instancesPerInvocation) + " instances each",
+                   tuning,
+                   {}});
+  }
+  return all;
+}
+std::unique_ptr<BatchRunner> VulkanTarget::runner(const RunOptions& options) {
+  return std::make_unique<VulkanRunner>(device_, context_, options);
+}
+
+Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
+                             std::span<const SkinRequest> requests, const RunOptions& options) {
+  return VulkanTarget(device, context).run(requests, options);
+}
+
+}  // namespace dermis::samples

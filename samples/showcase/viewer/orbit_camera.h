@@ -1,0 +1,42 @@
+// A camera that the mouse moves around its target.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include "dermis/types.h"
+#include "kit/render/camera.h"
+
+namespace dermis::viewer {
+
+class OrbitCamera {
+ public:
+  /// Shows all of a box, from the current direction. `aspect`: width divided by height.
+  void frame(const Box& box, float aspect);
+  /// Whether the camera has not been moved since `frame`.
+  bool isFramed() const { return isFramed_; }
+  /// Resets the direction to 28° beside the front, slightly from above.
+  void resetDirection();
+
+  /// Turns the camera. Arguments are fractions of the picture's height, to the right and down.
+  void orbit(float right, float down);
+  void pan(float right, float down);
+  /// Zooms by steps of the wheel; positive: nearer.
+  void zoom(float steps);
+
+  /// `scene` is the box around everything visible, including the ground.
+  samples::render::Camera camera(const Box& scene, float aspect) const;
+
+  /// Equal cameras take the same picture.
+  bool operator==(const OrbitCamera&) const = default;
+
+ private:
+  glm::vec3 towardsEye() const;
+
+  glm::vec3 target_{0.0f};
+  float azimuth_ = 28, elevation_ = 10;  ///< degrees, as in `CameraOptions`
+  float distance_ = 4;
+  float radius_ = 1;  ///< of the framed box
+  bool isFramed_ = false;
+};
+
+}  // namespace dermis::viewer

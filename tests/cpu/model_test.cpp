@@ -1,0 +1,79 @@
+// Random steps on the CPU beside the model (model_steps.h).
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "cpu_engine.h"
+#include "dermis/cpu/skin.h"
+#include "model_steps.h"
+
+namespace dermis::test {
+namespace {
+
+class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public ModelSteps<CpuEngine> {
+ protected:
+  CpuModelTest() : ModelSteps(GetParam()) {}
+
+  void makeEngine() override {
+    cpu::SkinningSystemDescription small;
+    small.jointCapacity = {8, 8 * 40};
+    small.instanceCapacity = {4, 200};
+    small.boundsCapacity = {1};
+    small.outputCapacity = outputCapacity;
+    engine_.emplace(small);
+    engine_->verticesPerJob = GetParam() % 2 == 0 ? 1 << 16 : 24;
+    output_ = engine_->system().outputBytes().data();
+    generation_ = 0;
+  }
+  void prepare(const InstanceDescription&) override {}
+  void submit() override {
+    engine_->submit();
+    const std::byte* const now = system().outputBytes().data();
+    generation_ += std::exchange(output_, now) != now;
+  }
+  void abandon() override {
+    engine_->abandon([this] { changeMeanwhile(); });
+  }
+  std::uint64_t outputGeneration() override { return generation_; }
+  Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
+                    const InstanceDescription& description,
+                    std::span<const MorphWeight> morphs) override {
+    VertexLayout layout = description.layout;
+    const bool hasPrevious = std::exchange(layout.motion, Motion::none) != Motion::none;
+    const cpu::Mesh own = must(cpu::Mesh::create(mesh));
+    cpu::Instance instance;
+    instance.pose = pose;
+    instance.morphs = morphs;
+    cpu::Job job;
+    job.mesh = &own;
+    job.method = description.method;
+    job.places = must(placeVertices(layout, mesh.vertexCount()));
+    std::vector<std::byte> bytes(job.places.size);
+    instance.output = bytes.data();
+    job.instances = {&instance, 1};
+    must(cpu::skin(job));
+    const std::array<OutputAttribute, streamCount> attributes{
+        job.places.positions, job.places.normals, job.places.tangents, {}};
+    Streams streams;
+    for (std::size_t stream = 0; stream < previousStream; ++stream)
+      streams[stream] = readAttribute(bytes, attributes[stream], mesh.vertexCount());
+    if (hasPrevious) streams[previousStream] = streams[positionStream];
+    return streams;
+  }
+
+ private:
+  const std::byte* output_ = nullptr;
+  std::uint64_t generation_ = 0;
+};
+
+TEST_P(CpuModelTest, EveryStepGivesWhatTheModelSays) {
+  run();
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, CpuModelTest, ::testing::Values(1u, 2u, 3u));
+
+}  // namespace
+}  // namespace dermis::test
