@@ -24,7 +24,7 @@ option(DERMIS_BUILD_CPU "Build dermis::cpu, skinning by SIMD instructions of the
 option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy contract" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${dermisIsDeveloped})
-option(DERMIS_BUILD_VIEWER "Build the viewer, one of the samples; needs SDL 2 and Dear ImGui" ON)
+option(DERMIS_BUILD_SHOWCASE "Build the viewer, which needs SDL 2 and Dear ImGui, and the film of a crowd" OFF)
 # The tests use internal functions, which a shared library hides.
 set(dermisTestsByDefault ${dermisIsDeveloped})
 if(BUILD_SHARED_LIBS)
@@ -61,6 +61,9 @@ if(DERMIS_BUILD_TESTS AND NOT (DERMIS_BUILD_VERIFY AND DERMIS_BUILD_VULKAN AND D
   message(FATAL_ERROR "DERMIS_BUILD_TESTS needs DERMIS_BUILD_VERIFY, DERMIS_BUILD_VULKAN and DERMIS_BUILD_GLTF")
 endif()
 
+if(DERMIS_BUILD_SHOWCASE AND NOT DERMIS_BUILD_SAMPLES)
+  message(FATAL_ERROR "DERMIS_BUILD_SHOWCASE needs DERMIS_BUILD_SAMPLES")
+endif()
 if(DERMIS_BUILD_FUZZERS AND NOT (DERMIS_BUILD_VERIFY AND DERMIS_BUILD_GLTF AND CMAKE_CXX_COMPILER_ID MATCHES "Clang"))
   message(FATAL_ERROR "DERMIS_BUILD_FUZZERS needs Clang, DERMIS_BUILD_VERIFY and DERMIS_BUILD_GLTF")
 endif()

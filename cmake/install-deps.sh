@@ -2,9 +2,10 @@
 # Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). If everything is installed, it does
 # nothing and needs no privileges. On another system it lists the packages and ends with an error.
 #
-#   cmake/install-deps.sh [nightly|windows|x86|arm64|libcxx]
+#   cmake/install-deps.sh [showcase|nightly|windows|x86|arm64|libcxx]
 #
-# nightly: also what only tests/run.sh nightly needs. The others: also what its part of that name needs.
+# showcase: also what DERMIS_BUILD_SHOWCASE needs. nightly: also what only tests/run.sh nightly needs. The others: also what its part
+# of that name needs.
 set -eu
 
 packages="
@@ -16,7 +17,6 @@ libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
 pkg-config libvulkan-volk-dev dpkg-dev file
 libstb-dev fonts-dejavu-core
-libsdl2-dev libx11-dev libimgui-dev xvfb xdotool
 libgtest-dev libbenchmark-dev
 doxygen
 "
@@ -34,6 +34,7 @@ debootstrap lintian
 fi
 
 case ${1:-} in
+  showcase|nightly) packages="$packages libsdl2-dev libx11-dev libimgui-dev xvfb xdotool" ;;
   windows) packages="$packages googletest g++-mingw-w64-x86-64-posix wine wine64" ;;
   x86) packages="$packages googletest g++-i686-linux-gnu" ;;
   arm64) packages="$packages googletest g++-aarch64-linux-gnu qemu-user" ;;

@@ -17,7 +17,6 @@ fi
 
 dermis=build/release/samples/cli/dermis
 crowd=build/release/samples/crowd/dermis_crowd
-viewer=build/release/samples/showcase/viewer/dermis_viewer
 models=samples/models
 out=build/quickstart
 mkdir -p "$out"
@@ -45,5 +44,4 @@ echo "A crowd, a picture:                              $out/crowd.png"
 echo "The skinned figure (open it in any mesh viewer): $out/figure-00.ply ... figure-07.ply"
 echo "What was compared, and the errors:               $out/verify.json"
 echo "What the crowd cost:                             $out/crowd.json"
-echo "To turn the figure around in a window:           $viewer $models/figure.glb"
 echo "The command to try on models of your own:        $dermis --help"

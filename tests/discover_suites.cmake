@@ -1,4 +1,4 @@
-# ctest includes this file, with `program`, `cost`, `sanitized` and `nightly` set. Adds one test for each suite of a GoogleTest
+# ctest includes this file, with `program`, `cost` and `label` set. Adds one test for each suite of a GoogleTest
 # program.
 #
 # A process opens a device and compiles kernels, which takes longer than most of its tests. A suite with a skipped test exits with
@@ -7,6 +7,9 @@ execute_process(COMMAND ${program} --gtest_list_tests OUTPUT_VARIABLE suites RES
 if(NOT status EQUAL 0)
   cmake_path(GET program FILENAME name)
   add_test(${name}_NOT_BUILT ${program})
+  if(label)
+    set_tests_properties(${name}_NOT_BUILT PROPERTIES LABELS ${label})
+  endif()
   return()
 endif()
 # Suites begin at the start of a line; their tests are indented.
@@ -15,12 +18,10 @@ foreach(suite IN LISTS suites)
   string(STRIP "${suite}" suite)
   add_test("${suite}*" ${program} "--gtest_filter=${suite}*")
   set_tests_properties("${suite}*" PROPERTIES TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
-  string(REPLACE ":" "|" pattern "${sanitized}")
-  string(REPLACE "*" ".*" pattern "${pattern}")
-  if(sanitized AND suite MATCHES "^([A-Za-z0-9_]+/)?(${pattern})")
-    set_tests_properties("${suite}*" PROPERTIES LABELS sanitized)
+  if(label)
+    set_tests_properties("${suite}*" PROPERTIES LABELS ${label})
   endif()
-  if(nightly)
-    set_tests_properties("${suite}*" PROPERTIES LABELS nightly TIMEOUT 1700)
+  if(label STREQUAL "nightly")
+    set_tests_properties("${suite}*" PROPERTIES TIMEOUT 1700)
   endif()
 endforeach()

@@ -18,6 +18,7 @@
 #   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
 #   exhaustive   every combination of methods and formats, and every real model, on the device
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
+#   showcase     the viewer in a window, and the film of a crowd
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
 #
 # Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
@@ -26,9 +27,9 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden programs"
+parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden showcase programs"
 passed=tests/nightly/passed.tsv
-device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test|^bench'
+device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
 
 build() { # PRESET [TARGET...]: configures and builds
   preset=$1
@@ -192,7 +193,8 @@ check_speed() { # JSON PLAIN LINEAR COMPACT
 }
 
 part_speed() {
-  build ci dermis_cli
+  build ci dermis_cli benchmarks
+  tests ci -R '^bench\.'
   build/ci/samples/cli/dermis bench --json build/nightly/bench.json
   check_speed build/nightly/bench.json 2.1 2.1 0.5
   settings=$(./tests/nightly/unpack_mesa.sh build/nightly/mesa)
@@ -203,7 +205,7 @@ part_speed() {
 }
 
 part_gpu() {
-  build ci gpu_test
+  build ci gpu_test dermis_gpu_benchmark
   tests ci -R '^profile\.'
   ./tests/bench/gpu.sh build/nightly/gpu build/ci
   # Without the environment variables of this build.
@@ -242,6 +244,12 @@ part_golden() {
     { tail -n 20 "$made/blender.log"; return 1; }
   same_numbers "$golden/three.tsv" "$made/three.tsv"
   same_numbers "$golden/blender.tsv" "$made/blender.tsv"
+}
+
+part_showcase() {
+  cmake --preset ci -B build/showcase -DDERMIS_BUILD_SHOWCASE=ON
+  cmake --build build/showcase --target showcase_tests
+  ctest --test-dir build/showcase -L showcase --output-on-failure --no-tests=error --timeout 900
 }
 
 part_programs() {
