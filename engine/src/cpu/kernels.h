@@ -5,13 +5,13 @@
 
 #include "cpu/task.h"
 
-#if defined(__x86_64__) || defined(_M_X64)
+#if (defined(__x86_64__) || defined(_M_X64)) && !defined(DERMIS_CPU_NO_AVX)
 #define DERMIS_CPU_HAS_AVX2
 #if !defined(_MSC_VER) || defined(__clang__)  // Highway considers it broken with cl
 #define DERMIS_CPU_HAS_AVX3
 #endif
 #endif
-#if defined(DERMIS_CPU_HAS_AVX2) || defined(__i386__) || defined(_M_IX86)
+#if defined(__x86_64__) || defined(_M_X64) || defined(__i386__) || defined(_M_IX86)
 #define DERMIS_CPU_HAS_SSE4
 #endif
 
