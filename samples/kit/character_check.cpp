@@ -1,0 +1,152 @@
+#include "kit/character_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "dermis/verify/accuracy.h"
+#include "kit/in_parallel.h"
+
+namespace dermis::samples {
+
+void CharacterCheck::follow(std::uint64_t frame, std::span<const AskedInstance> instances,
+                            std::span<const InstanceHandle> skinned, bool culledOnGpu) {
+  std::set<std::uint32_t> skinnedIndices;
+  for (const InstanceHandle handle : skinned) skinnedIndices.insert(handle.index);
+  frame_ = frame;
+  for (const AskedInstance& asked : instances) {
+    if (followed_.size() <= asked.handle.index) followed_.resize(asked.handle.index + 1);
+    Followed& followed = followed_[asked.handle.index];
+    if (followed.handle != asked.handle) {
+      followed = {};
+      followed.handle = asked.handle;
+      followed.part = asked.part;
+    }
+    const bool isSkinned = skinnedIndices.contains(asked.handle.index);
+    follow(followed, asked, culledOnGpu || isSkinned, culledOnGpu || !isSkinned);
+  }
+}
+
+void CharacterCheck::follow(Followed& followed, const AskedInstance& asked, bool maySkin,
+                            bool mayRest) {
+  followed.frame = frame_;
+  if (asked.updateInterval != followed.interval) {
+    followed.interval = asked.updateInterval;
+    followed.intervalSince = frame_;
+  }
+  followed.restarts |= asked.teleports;
+  const bool wasVisible = std::exchange(followed.isVisible, asked.isVisible);
+  if (!asked.isVisible) return;
+
+  // After a return to the view or a jump, previous positions are the current ones.
+  const bool restartsMotion = followed.restarts || !wasVisible;
+  std::vector<Skinned> possible;
+  const auto add = [&possible](PoseKey current, PoseKey previous, std::uint64_t frame) {
+    const Skinned skinned{{current, previous}, frame};
+    if (std::ranges::find(possible, skinned) == possible.end()) possible.push_back(skinned);
+  };
+  if (followed.skinned.empty() && maySkin) add(asked.pose, asked.pose, frame_);
+  for (const Skinned& last : followed.skinned) {
+    const PoseKey shown = last.pose.current;
+    if (maySkin) add(asked.pose, restartsMotion ? asked.pose : shown, frame_);
+    // In each complete interval there is a frame in which it is skinned.
+    const std::uint64_t rested = std::min(frame_ - last.frame, frame_ - followed.intervalSince + 1);
+    if (mayRest && !followed.restarts && rested < followed.interval) add(shown, shown, last.frame);
+  }
+  if (possible.empty()) {
+    ++overdue_;
+    for (const Skinned& last : followed.skinned)
+      add(last.pose.current, last.pose.current, last.frame);
+  }
+  if (maySkin) followed.restarts = false;
+  followed.skinned = std::move(possible);
+}
+
+const reference::SkinnedMesh& CharacterCheck::expected(std::uint32_t part, PoseKey pose) {
+  Expected* kept = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    kept = &expected_[{part, pose}];
+  }
+  std::call_once(kept->once, [&] {
+    const Part& source = character_->parts()[part];
+    kept->mesh = must(
+        reference::skin(source.primitive.mesh(), character_->pose(pose, source.skin), method_));
+  });
+  return *kept->mesh;
+}
+
+CharacterCheck::Finding CharacterCheck::check(const ShownInstance& instance, const ShownPose& pose,
+                                              std::span<const std::byte> bytes) {
+  const auto attribute = [&](const OutputAttribute& output) -> SkinnedAttribute {
+    if (output.format == VertexFormat::none) return {};
+    const std::uint32_t vertexCount = character_->parts()[instance.part].packed.vertexCount();
+    return {bytes.data() + output.offset, vertexCount, output.stride, output.format};
+  };
+  SkinnedView current, previous;
+  current.positions = attribute(instance.output.positions);
+  current.normals = attribute(instance.output.normals);
+  previous.positions = attribute(instance.output.previousPositions);
+  const reference::SkinnedMesh& now = expected(instance.part, pose.current);
+  const reference::SkinnedMesh& before = expected(instance.part, pose.previous);
+  Finding finding;
+  for (const auto& [mesh, view] : {std::pair{&now, &current}, {&before, &previous}}) {
+    const Comparison comparison = must(compareWithReference(*mesh, *view));
+    if (view == &current) finding.compared = comparison.compared;
+    if (finding.failures == 0) finding.firstFailure = comparison.firstFailure;
+    // A vertex without a bound fails the comparison, and is not among its failures.
+    finding.failures += std::max<std::uint64_t>(comparison.failures, comparison.passed() ? 0 : 1);
+    finding.worst = std::max({finding.worst, comparison.worstPosition, comparison.worstNormal});
+    if (finding.failures != 0) break;
+  }
+  return finding;
+}
+
+/// Returns the finding for the pose that it shows, or else for the one with the fewest failures.
+CharacterCheck::Finding CharacterCheck::check(const ShownInstance& instance,
+                                              std::span<const std::byte> bytes) {
+  std::optional<Finding> best;
+  for (const ShownPose& pose : instance.poses) {
+    const Finding finding = check(instance, pose, bytes);
+    if (!best || finding.failures < best->failures) best = finding;
+    if (best->failures == 0) break;
+  }
+  return best.value_or(Finding{.failures = 1});
+}
+
+void CharacterCheck::compare(std::uint64_t frame, std::span<const ShownInstance> instances,
+                             std::span<const std::byte> bytes) {
+  std::vector<Finding> findings(instances.size());
+  inParallel(instances.size(),
+             [&](std::size_t index) { findings[index] = check(instances[index], bytes); });
+  ++totals_.frames;
+  totals_.instances += instances.size();
+  for (std::size_t index = 0; index < instances.size(); ++index) {
+    const Finding& finding = findings[index];
+    totals_.vertices += finding.compared;
+    if (finding.failures == 0) {
+      totals_.worst = std::max(totals_.worst, finding.worst);
+      continue;
+    }
+    if (totals_.failures++ != 0) continue;
+    const ShownInstance& instance = instances[index];
+    totals_.firstFailure = fmt::format(
+        "frame {}, instance {} of generation {}, part {}: vertex {} is the first outside its "
+        "bound; the largest error is {:.3g} times its bound",
+        frame, instance.handle.index, instance.handle.generation, instance.part,
+        finding.firstFailure, finding.worst);
+  }
+}
+
+std::string CharacterCheck::complaint() const {
+  if (totals_.failures != 0) {
+    return fmt::format("{} of {} instances are wrong; the first: {}", totals_.failures,
+                       totals_.instances, totals_.firstFailure);
+  }
+  if (overdue_ != 0)
+    return fmt::format("{} times an instance was due but was not skinned", overdue_);
+  return {};
+}
+
+}  // namespace dermis::samples

@@ -1,0 +1,39 @@
+// A parallel loop on all cores.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "kit/joining_threads.h"
+
+namespace dermis::samples {
+
+/// Calls `body(index)` for each index below `count`, in any order and from several threads. Returns
+/// when all calls are done. If calls throw, it throws one of the exceptions.
+template <typename Body>
+void inParallel(std::size_t count, const Body& body) {
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;
+  std::exception_ptr thrown;
+  const auto work = [&] {
+    try {
+      for (std::size_t index = next++; index < count; index = next++) body(index);
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      thrown = std::current_exception();
+    }
+  };
+  {
+    const std::size_t threads = std::min<std::size_t>(std::thread::hardware_concurrency(), count);
+    JoiningThreads others;
+    for (std::size_t thread = 1; thread < threads; ++thread) others.start([&work] { work(); });
+    work();
+  }
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+}  // namespace dermis::samples
