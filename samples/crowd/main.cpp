@@ -1,291 +1,634 @@
-// The engine around crowd.h. Figures appear, disappear, teleport and leave the view while frames
-// are in flight. Each figure consists of all skinned meshes of the model, and has its own clip and
-// phase.
+// What an engine does for a crowd: figures that come and go, each in a clip and phase of its own,
+// in front of a camera that moves. Figures in the distance are skinned less often, figures out of
+// view not at all, and several frames are in flight. Every N-th frame, each vertex of each
+// displayed figure, and its position in the frame before, are compared with the double-precision
+// reference.
+//
+//   dermis_crowd --figures 2200 --frames 60
+//   dermis_crowd --device cpu                 the same without Vulkan
+//
+// Read `createOnDevice`, `Crowd` and `skinFrame` first: they are what an engine adds. Figures are
+// skinned in the space of the character. The vertex shader that draws a figure applies its
+// transform. So a figure that moves without changing its pose is not skinned again, and float32 is
+// as exact far from the origin as near it.
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
-#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "crowd.h"
-#include "crowd_check.h"
-#include "crowd_report.h"
-#include "drill.h"
-#include "film.h"
-#include "frames.h"
-#include "gait.h"
+#include "dermis/cpu/skinning_system.h"
+#include "dermis/vulkan/skinning_system.h"
+#include "kit/barrier.h"
 #include "kit/batch_runner.h"
+#include "kit/buffer.h"
+#include "kit/character.h"
+#include "kit/character_check.h"
 #include "kit/driver_version.h"
+#include "kit/file_name.h"
+#include "kit/frame_loop.h"
+#include "kit/in_parallel.h"
+#include "kit/must.h"
 #include "kit/open_device.h"
+#include "kit/output_file.h"
 #include "kit/program.h"
-#include "kit/render/picture_writer.h"
 #include "kit/timestamps.h"
-#include "options.h"
-#include "shown_poses.h"
-#include "stroll.h"
 
 namespace {
 
 using namespace dermis;
-using namespace crowd;
-using samples::ExitStatus;
-using samples::reportDeviceError;
-using samples::reportError;
+using namespace dermis::samples;
+using Json = nlohmann::ordered_json;
 
-/// The loop is the last member, so it is destroyed first: its destructor waits for frames that use
-/// the others.
-struct Show {
-  Crowd crowd;
-  ShownPoses shown;
-  CrowdCheck check;
-  CrowdReport report;
-  std::unique_ptr<Film> film;  ///< null: there is none
-  FrameLoop loop;
+struct Options {
+  std::uint32_t figures = 200, frames = 120;
+  std::string model = DERMIS_SAMPLE_FIGURE;
+  std::string device = "auto";
+  std::uint32_t framesInFlight = 3;
+  std::uint32_t outputBudget = 0;  ///< MiB; 0: enough for all figures
+  bool culledOnGpu = false;        ///< the GPU decides which instances are visible
+  bool verifies = true;
+  std::uint32_t checkInterval = 10;  ///< every N-th frame is compared
+  bool validates = false;            ///< with the validation layer
+  std::string json;
+
+  bool checks(std::uint64_t frame) const {
+    return verifies && (frame % checkInterval == 0 || frame == frames);
+  }
 };
 
-Result<void> playFrame(Show& show, const Options& options) {
-  const Result<VkCommandBuffer> commandBuffer = show.loop.begin();
-  if (!commandBuffer) return commandBuffer.error();
-  const std::uint64_t frame = show.loop.frame();
-  if (Result<void> done = show.check.compareUpTo(show.loop.completed()); !done) return done;
-  if (Result<void> done = show.crowd.skinFrame(frame, show.loop.completed(), *commandBuffer); !done)
-    return done;
-  show.shown.follow(show.crowd, frame);
-  show.report.add(show.crowd, show.shown.counts());
-  if (show.film != nullptr) {
-    if (Result<void> done = show.film->writeUpTo(show.loop.completed(), show.report); !done)
-      return done;
-    if (Result<void> done = show.film->record(show.crowd, frame, *commandBuffer); !done)
-      return done;
-  }
-  if (options.verifies && (frame % options.checkInterval == 0 || frame == options.frames)) {
-    if (Result<void> done = show.check.capture(show.crowd, show.shown, frame, *commandBuffer);
-        !done)
-      return done;
-  }
-  if (Result<void> done = show.loop.submit(); !done) return done;
-  return show.film != nullptr ? show.film->watch(show.loop.fence()) : Result<void>();
-}
+// -- The game: what each figure does. Everything that can happen to a figure happens often.
 
-/// Writes the pictures that were in flight when the last frame was submitted.
-Result<void> finishFilm(Show& show, const Options& options) {
-  const std::uint64_t last = show.loop.frame(), inFlight = options.crowd.framesInFlight;
-  for (std::uint64_t ahead = inFlight; ahead-- > 0;) {
-    if (ahead >= last) continue;
-    const std::uint64_t completed = last - ahead;
-    if (Result<void> done = show.crowd.complete(completed + inFlight, completed); !done)
-      return done;
-    show.report.addCompleted(show.crowd);
-    if (Result<void> done = show.film->writeUpTo(completed, show.report); !done) return done;
-  }
-  return show.film->finish();
-}
-
-Result<void> play(Show& show, const Options& options) {
-  if (show.film != nullptr)
-    show.report.printLater();
-  else
-    show.report.printTitle();
-  for (std::uint32_t frame = 0; frame < options.frames; ++frame) {
-    if (Result<void> done = playFrame(show, options); !done) return done;
-  }
-  if (Result<void> done = show.loop.finish(); !done) return done;
-  if (Result<void> done = show.check.compareUpTo(show.loop.completed()); !done) return done;
-  if (show.film != nullptr) {
-    if (Result<void> done = finishFilm(show, options); !done) return done;
-  }
-  show.report.finish(show.crowd);
-  return {};
-}
-
-ReportTitle titleOf(const Character& character, const Options& options) {
-  ReportTitle title;
-  title.model = std::filesystem::path(options.model).filename().string();
-  title.meshes = character.parts().size();
-  title.verticesOfFigure = character.vertexCount();
-  title.framesInFlight = options.crowd.framesInFlight;
-  title.culledOnGpu = options.crowd.culledOnGpu;
-  return title;
-}
-
-Result<std::unique_ptr<Show>> makeShow(samples::OpenDevice& open, const Character& character,
-                                       const Figures& script, const Options& options) {
-  CrowdOptions crowdOptions = options.crowd;
-  const Result<samples::Timestamps> timestamps = samples::Timestamps::create(*open.device);
-  if (!timestamps) return timestamps.error();
-  crowdOptions.measuresGpuTime = timestamps->has();
-  Result<Crowd> crowd = Crowd::create(*open.device, open.context, character, script, crowdOptions);
-  if (!crowd) return crowd.error();
-  Result<FrameLoop> loop = FrameLoop::create(*open.device, options.crowd.framesInFlight);
-  if (!loop) return loop.error();
-  ReportTitle title = titleOf(character, options);
-  title.device = open.device->info().name;
-  title.driver = samples::driverVersion(*open.device);
-  return std::make_unique<Show>(Show{std::move(*crowd), ShownPoses(character),
-                                     CrowdCheck(open.device.get(), character),
-                                     CrowdReport(std::move(title)), nullptr, std::move(*loop)});
-}
-
-/// What is wrong with the result; empty if nothing is.
-std::string verdict(const CrowdCheck& check, const ShownPoses& shown) {
-  const CheckTotals& totals = check.totals();
-  if (totals.failures != 0) {
-    return fmt::format("{} of {} instances are wrong; the first: {}", totals.failures,
-                       totals.instances, totals.firstFailure);
-  }
-  if (shown.overdue() != 0) {
-    return fmt::format("{} times an instance was due but was not skinned", shown.overdue());
-  }
-  return {};
-}
-
-/// Ticks are the frames of the film, so that feet do not slide on the ground.
-CharacterOptions characterOptions(const Options& options) {
-  CharacterOptions character;
-  if (options.film.output.empty()) return character;
-  constexpr double mostSeconds = 20;
-  character.ticksPerSecond = options.film.framesPerSecond;
-  character.mostTicks = static_cast<std::uint32_t>(mostSeconds * character.ticksPerSecond);
-  character.images = true;
-  return character;
-}
-
-/// What the figures do: a drill for the check, or a stroll for the film.
-struct Script {
-  Gait gait;
-  std::unique_ptr<Figures> figures;
-  const Stroll* stroll = nullptr;  ///< `figures`, if there is a film
+struct FigureState {
+  bool isPresent = false;  ///< figures come and go
+  PoseKey pose;
+  bool teleports = false;  ///< its pose is unrelated to the pose of the last frame
+  bool isInView = false;   ///< neither behind the camera nor too far away
+  std::uint32_t updateInterval = 1;
 };
 
-Result<std::unique_ptr<Script>> makeScript(const Character& character, const Options& options) {
-  auto script = std::make_unique<Script>();
-  if (options.film.output.empty()) {
-    script->figures = std::make_unique<Drill>(character, options.figures);
-    return script;
+/// The clock of an event that happens to each figure once in every period, in different frames for
+/// different figures.
+std::uint64_t clockOf(std::uint32_t figure, std::uint64_t frame, std::uint32_t spread) {
+  return frame + std::uint64_t{figure} * spread;
+}
+
+FigureState stateOf(const Character& character, std::uint32_t figure, std::uint32_t figures,
+                    std::uint64_t frame) {
+  constexpr std::uint32_t awayPeriod = 90, awayFrames = 5, awaySpread = 37;
+  constexpr std::uint32_t jumpPeriod = 131, jumpSpread = 53;
+  FigureState state;
+  const std::uint64_t away = clockOf(figure, frame, awaySpread);
+  const std::uint64_t jumps = clockOf(figure, frame, jumpSpread);
+  state.isPresent = away % awayPeriod >= awayFrames;
+  state.teleports = jumps % jumpPeriod == 0;
+  // A figure that returns plays the next clip. After a jump, it is at another time of its clip.
+  state.pose.clip =
+      static_cast<std::uint32_t>((figure + away / awayPeriod) % character.clipCount());
+  const std::uint32_t ticks = character.tickCount(state.pose.clip);
+  const std::uint64_t phase = std::uint64_t{figure} * 7 + jumps / jumpPeriod * (ticks / 3);
+  state.pose.tick = static_cast<std::uint32_t>((frame + phase) % ticks);
+
+  // Figures stand in a sunflower spiral (Vogel 1979) of radius 1. The camera turns in the middle
+  // and moves from side to side.
+  const auto time = static_cast<double>(frame);
+  const double angle = std::numbers::pi * (3 - std::sqrt(5.0)) * figure;
+  const double radius = std::sqrt((figure + 0.5) / figures);
+  const double turn = 2 * std::numbers::pi * time / 160;
+  const double x = radius * std::cos(angle) - 0.5 * std::sin(2 * std::numbers::pi * time / 240);
+  const double z = radius * std::sin(angle);
+  const double distance = std::hypot(x, z), ahead = x * std::cos(turn) + z * std::sin(turn);
+  state.updateInterval = distance < 0.3 ? 1 : distance < 0.6 ? 2 : distance < 0.9 ? 4 : 8;
+  // A figure just behind the camera may still cast a shadow into the picture.
+  state.isInView = distance < 1.3 && ahead > -2 / std::sqrt(figures);
+  return state;
+}
+
+// -- The crowd: what an engine adds.
+
+/// The handles of a figure.
+struct Figure {
+  std::vector<PoseHandle> poses;          ///< by skin
+  std::vector<InstanceHandle> instances;  ///< by part; empty: it is not there
+  FigureState now;
+
+  bool isThere() const { return !instances.empty(); }
+};
+
+InstanceDescription describe(const Part& part, const Options& options) {
+  InstanceDescription description;
+  description.layout.positions = VertexFormat::float32x3;
+  if (part.packed.info().hasNormals) description.layout.normals = VertexFormat::octahedral16x2;
+  description.layout.motion = Motion::kept;  // for motion vectors
+  description.culledOnGpu = options.culledOnGpu;
+  return description;
+}
+
+/// Sets the capacities, so that nothing has to grow later: in bytes, joints and instances.
+template <typename Description>
+void setCapacities(Description& description, const Character& character, const Options& options) {
+  std::uint64_t joints = 0, outputBytes = 0;
+  for (const std::uint32_t count : character.jointCounts()) joints += count;
+  for (const Part& part : character.parts()) {
+    const VertexLayout layout = describe(part, options).layout;
+    outputBytes += must(placeVertices(layout, part.packed.vertexCount())).size;
   }
-  Result<Gait> gait = measureGait(character);
-  if (!gait) return gait.error();
-  script->gait = std::move(*gait);
-  StrollOptions stroll;
-  stroll.figures = options.figures;
-  stroll.framesPerSecond = options.film.framesPerSecond;
-  stroll.start = options.film.start;
-  stroll.width = options.film.width;
-  stroll.height = options.film.height;
-  auto strolling = std::make_unique<Stroll>(character, script->gait, stroll);
-  script->stroll = strolling.get();
-  script->figures = std::move(strolling);
-  return script;
+  // Memory of removed objects is reused once the GPU has finished the current frame, so there is
+  // room for a quarter more.
+  const auto withSlack = [](std::uint64_t count) { return count + count / 4 + 64; };
+  const std::uint64_t parts = character.parts().size();
+  description.jointCapacity.initial = withSlack((options.figures + 1) * joints);
+  description.instanceCapacity.initial = withSlack((options.figures + 1) * parts);
+  description.outputCapacity.initial = withSlack((options.figures + 1) * outputBytes);
+  if (options.outputBudget != 0)
+    description.outputCapacity = Capacity::fixed(std::uint64_t{options.outputBudget} << 20);
 }
 
-Result<std::unique_ptr<samples::PictureWriter>> openWriter(const FilmRequest& film) {
-  const samples::PictureKind kind = *samples::pictureKind(film.output);
-  if (kind == samples::PictureKind::png) return samples::writePngs(film.output);
-  return samples::writeFilm(film.output, kind, film.width, film.height, film.framesPerSecond);
+// [crowd-set-up]
+/// Builds pipelines, so call it from a loading thread.
+vulkan::SkinningSystem createOnDevice(vulkan::Context& context, const Character& character,
+                                      const Options& options, bool measuresGpuTime) {
+  vulkan::SkinningSystemDescription description;
+  description.context = &context;
+  description.framesInFlight = options.framesInFlight;
+  description.measuresGpuTime = measuresGpuTime;
+  description.meshCapacity.initial = 0;
+  for (const Part& part : character.parts())
+    description.meshCapacity.initial += part.packed.info().byteSize;
+  setCapacities(description, character, options);
+  vulkan::SkinningSystem system = must(vulkan::SkinningSystem::create(description));
+  for (const Part& part : character.parts())
+    must(system.prepare(pipelineNeeds(describe(part, options))));
+  return system;
 }
+// [/crowd-set-up]
 
-ExitStatus addFilm(Show& show, samples::OpenDevice& open, const Character& character,
-                   const Stroll& stroll, const Options& options) {
-  Result<std::unique_ptr<samples::PictureWriter>> writer = openWriter(options.film);
-  if (!writer) return reportError(ExitStatus::stopped, writer.error().message);
-  const FilmOptions filmOptions{options.film.width, options.film.height, options.frames,
-                                options.crowd.framesInFlight};
-  Result<std::unique_ptr<Film>> film =
-      Film::create(open, character, stroll, filmOptions, std::move(*writer));
-  if (!film) return reportDeviceError(film.error());
-  show.film = std::move(*film);
-  return ExitStatus::done;
-}
-
-/// Reports the result of the check, as text and in a file. `complaint` is empty if there is no
-/// error.
-ExitStatus reportOn(const CrowdReport& report, const CheckTotals& check, const Options& options,
-                    const std::string& complaint) {
-  const CheckTotals* totals = options.verifies ? &check : nullptr;
-  if (totals != nullptr) report.printCheck(*totals);
-  if (!options.json.empty()) {
-    if (Result<void> written = report.writeJson(options.json, totals); !written)
-      return reportError(ExitStatus::stopped, written.error().message);
+/// `System` is vulkan::SkinningSystem or cpu::SkinningSystem.
+template <typename System>
+class Crowd {
+ public:
+  Crowd(System system, const Character& character, const Options& options)
+      : system_(std::move(system)),
+        character_(&character),
+        options_(&options),
+        figures_(options.figures) {
+    for (const Part& part : character.parts())
+      meshes_.push_back(must(system_.addMesh(part.packed)));
   }
-  return complaint.empty() ? ExitStatus::done
-                           : reportError(ExitStatus::verificationFailed, complaint);
+
+  /// Call it in each frame, before the system records or plans it.
+  void update(std::uint64_t frame) {
+    comeAndGo(frame);
+    for (const Figure& figure : figures_) {
+      if (figure.isThere()) move(figure);
+    }
+  }
+
+  System& system() { return system_; }
+  std::span<const Figure> figures() const { return figures_; }
+  /// How often there was no room for a figure.
+  std::uint64_t refusals() const { return refusals_; }
+
+ private:
+  // [crowd-add]
+  /// A figure has a pose for each skin, and an instance of each mesh: body, hair, clothes.
+  Result<void> add(Figure& figure) {
+    for (const std::uint32_t jointCount : character_->jointCounts()) {
+      const Result<PoseHandle> pose = system_.addPose(jointCount);
+      if (!pose) return pose.error();
+      figure.poses.push_back(*pose);
+    }
+    for (std::size_t index = 0; index < meshes_.size(); ++index) {
+      const Part& part = character_->parts()[index];
+      InstanceDescription description = describe(part, *options_);
+      description.mesh = meshes_[index];
+      description.pose = figure.poses[part.skin];
+      const Result<InstanceHandle> instance = system_.addInstance(description);
+      if (!instance) return instance.error();
+      figure.instances.push_back(*instance);
+    }
+    return {};
+  }
+
+  /// May be called at any time: vertices of frames in flight stay valid until those frames
+  /// complete.
+  void remove(Figure& figure) {
+    for (const InstanceHandle instance : std::exchange(figure.instances, {}))
+      must(system_.removeInstance(instance));
+    for (const PoseHandle pose : std::exchange(figure.poses, {})) must(system_.removePose(pose));
+  }
+
+  void comeAndGo(std::uint64_t frame) {
+    constexpr std::uint64_t maxMovedBytes = 1 << 20;  // so that no frame moves many
+    bool hasGaps = false;
+    for (std::uint32_t index = 0; index < figures_.size(); ++index) {
+      Figure& figure = figures_[index];
+      figure.now = stateOf(*character_, index, options_->figures, frame);
+      if (!figure.isThere() || figure.now.isPresent) continue;
+      remove(figure);
+      hasGaps = true;
+    }
+    for (Figure& figure : figures_) {
+      if (figure.isThere() || !figure.now.isPresent) continue;
+      const Result<void> added = add(figure);
+      if (added) continue;
+      remove(figure);
+      if (added.error().code != ErrorCode::limitExceeded) must(added);
+      ++refusals_;  // it is added when others have been removed
+      break;
+    }
+    if (hasGaps) system_.compact(maxMovedBytes);
+  }
+  // [/crowd-add]
+
+  // [crowd-move]
+  void move(const Figure& figure) {
+    for (const InstanceHandle instance : figure.instances) {
+      InstanceChange change;
+      change.instance = instance;
+      change.updateInterval = figure.now.updateInterval;
+      if (!options_->culledOnGpu) change.visible = figure.now.isInView;
+      change.teleports = figure.now.teleports;
+      must(system_.change(change));
+    }
+    // All instances of a figure are due in the same frames. If the GPU culls, it may skin any
+    // figure.
+    if (!options_->culledOnGpu && !must(system_.isDue(figure.instances.front()))) return;
+    for (std::uint32_t skin = 0; skin < figure.poses.size(); ++skin) {
+      const std::span<JointMatrix> pose = must(system_.writePose(figure.poses[skin]));
+      std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
+    }
+  }
+  // [/crowd-move]
+
+  System system_;
+  const Character* character_;
+  const Options* options_;
+  std::vector<MeshHandle> meshes_;  ///< by part
+  std::vector<Figure> figures_;
+  std::uint64_t refusals_ = 0;
+};
+
+/// Writes a word for each instance: its figure is visible or not. An engine's culling does it on
+/// the GPU. Here the CPU writes mapped memory before the submission, which needs no barrier.
+VkBuffer writeVisibility(Crowd<vulkan::SkinningSystem>& crowd, Device& device,
+                         MappedBuffer& buffer) {
+  const std::uint64_t size = std::uint64_t{crowd.system().visibilityCount()} * 4;
+  if (buffer.bytes().size() < size)
+    buffer = must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+  for (const Figure& figure : crowd.figures()) {
+    const std::uint32_t word = figure.now.isInView ? 1 : 0;
+    for (const InstanceHandle instance : figure.instances) {
+      const std::size_t index = must(crowd.system().visibilityIndex(instance));
+      std::memcpy(buffer.bytes().data() + index * 4, &word, 4);
+    }
+  }
+  return buffer.handle();
 }
 
-/// Runs the whole program without Vulkan.
-ExitStatus runOnCpu(const Character& character, const Figures& script, const Options& options) {
-  Result<Crowd> crowd = Crowd::createOnCpu(character, script, options.crowd);
-  if (!crowd) return reportDeviceError(crowd.error());
-  ReportTitle title = titleOf(character, options);
-  title.device = samples::CpuTarget().name();
-  title.isOnCpu = true;
-  ShownPoses shown(character);
-  CrowdCheck check(nullptr, character);
-  CrowdReport report(std::move(title));
-  report.printTitle();
-  const auto play = [&](std::uint64_t frame) -> Result<void> {
-    if (Result<void> done = crowd->skinOnCpu(frame); !done) return done;
-    shown.follow(*crowd, frame);
-    report.add(*crowd, shown.counts());
-    if (!options.verifies || (frame % options.checkInterval != 0 && frame != options.frames))
-      return {};
-    if (Result<void> done = check.captureOnCpu(*crowd, shown, frame); !done) return done;
-    return check.compareUpTo(frame);
+// [crowd-frame]
+/// Call it in each frame, outside a render pass. `completedFrame` is the newest frame that the GPU
+/// has completed. `visibility` is a buffer that no frame in flight uses.
+void skinFrame(Crowd<vulkan::SkinningSystem>& crowd, std::uint64_t frame,
+               std::uint64_t completedFrame, Device& device, VkCommandBuffer commandBuffer,
+               MappedBuffer& visibility, const Options& options) {
+  must(crowd.system().beginFrame(frame, completedFrame));
+  crowd.update(frame);
+  vulkan::FrameDescription description;
+  if (options.culledOnGpu) description.visibility = writeVisibility(crowd, device, visibility);
+
+  // The check copies the vertices. To draw them, use vertexInput in both barriers.
+  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
+  must(crowd.system().record(commandBuffer, description));
+  recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+}
+// [/crowd-frame]
+
+// -- The report: what the crowd costs.
+
+class Report {
+ public:
+  /// `driver` is empty without Vulkan.
+  Report(const Character& character, const Options& options, const std::string& device,
+         const std::string& driver)
+      : options_(&options) {
+    json_ = {{"device", device},
+             {"driver", driver},
+             {"model", pathOf(options.model).filename().string()},
+             {"meshes", character.parts().size()},
+             {"verticesOfFigure", character.vertexCount()},
+             {"framesInFlight", driver.empty() ? 0 : options.framesInFlight},
+             {"culledOnGpu", options.culledOnGpu},
+             {"frames", options.frames},
+             {"rows", Json::array()}};
+    fmt::print("device    {}{}\n", device, driver.empty() ? "" : ", driver " + driver);
+    fmt::print("model     {} vertices in {} skinned meshes\n", character.vertexCount(),
+               character.parts().size());
+  }
+
+  /// Call it after each record.
+  void add(std::span<const Figure> figures, const vulkan::FrameStatistics& work,
+           const vulkan::GpuStatistics& completed) {
+    std::uint32_t present = 0, inView = 0;
+    for (const Figure& figure : figures) {
+      if (figure.isThere()) ++present;
+      if (figure.now.isInView) inView += static_cast<std::uint32_t>(figure.instances.size());
+    }
+    ++frames_;
+    instances_ += work.instances;
+    outOfView_ += work.instances - inView;
+    skinned_ += work.skinnedInstances;
+    vertices_ += work.skinnedVertices;
+    cpuSeconds_ += work.planSeconds + work.recordSeconds;
+    complete(completed);
+    if (frames_ % 20 == 0 || frames_ == options_->frames) addRow(present, work, completed);
+  }
+
+  /// Call it for each frame that the GPU has completed.
+  void complete(const vulkan::GpuStatistics& completed) {
+    if (completed.frame <= std::exchange(completedFrame_, completed.frame)) return;
+    skinned_ += completed.skinnedInstances;
+    gpuSeconds_ += completed.seconds.value_or(0);
+  }
+
+  /// Prints and writes the totals. `validation` has the messages of the validation layer.
+  ExitStatus finish(const vulkan::SystemStatistics& memory, std::uint64_t refusals,
+                    const CharacterCheck& check, std::span<const std::string> validation = {}) {
+    const std::uint64_t withinInterval = instances_ - outOfView_ - skinned_;
+    Json verticesPerSecond;
+    if (gpuSeconds_ > 0 && !options_->culledOnGpu)
+      verticesPerSecond = static_cast<double>(vertices_) / gpuSeconds_;
+    const auto store = [](const StoreStatistics& bytes) -> Json {
+      return {
+          {"capacity", bytes.capacity}, {"used", bytes.used}, {"largestFree", bytes.largestFree}};
+    };
+    json_["totals"] = {{"instances", instances_},
+                       {"skinned", skinned_},
+                       {"outOfView", outOfView_},
+                       {"withinInterval", withinInterval},
+                       {"refusals", refusals},
+                       {"vertices", options_->culledOnGpu ? Json() : Json(vertices_)},
+                       {"verticesPerSecond", verticesPerSecond},
+                       {"cpuSeconds", cpuSeconds_}};
+    json_["memory"] = {{"meshes", store(memory.meshes)},
+                       {"palettes", store(memory.palettes)},
+                       {"outputs", store(memory.outputs)},
+                       {"device", memory.deviceMemory}};
+    fmt::print("instances {}: {} skinned, {} out of view, {} not due\n", instances_, skinned_,
+               outOfView_, withinInterval);
+    if (refusals != 0) fmt::print("refused   {} times: there was no room for a figure\n", refusals);
+    fmt::print("memory    {:.1f} MiB of outputs; {:.1f} MiB of device memory in total\n",
+               static_cast<double>(memory.outputs.used) / (1 << 20),
+               static_cast<double>(memory.deviceMemory) / (1 << 20));
+    const CharacterCheck::Totals& checked = check.totals();
+    json_["check"] = nullptr;
+    if (options_->verifies) {
+      json_["check"] = {{"frames", checked.frames},     {"instances", checked.instances},
+                        {"vertices", checked.vertices}, {"failures", checked.failures},
+                        {"worst", checked.worst},       {"firstFailure", checked.firstFailure}};
+      if (checked.failures == 0)
+        fmt::print(
+            "checked   in {} frames: all {} vertices of {} instances are inside their bounds; the "
+            "largest error is {:.0f} % of its bound\n",
+            checked.frames, checked.vertices, checked.instances, 100 * checked.worst);
+    }
+    if (!options_->json.empty()) {
+      const std::string text = json_.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+      const Result<void> written = writeFile(pathOf(options_->json), text);
+      if (!written) return reportError(ExitStatus::stopped, written.error().message);
+    }
+    const std::string complaint =
+        validation.empty() ? check.complaint() : "the validation layer says: " + validation.front();
+    return complaint.empty() ? ExitStatus::done
+                             : reportError(ExitStatus::verificationFailed, complaint);
+  }
+
+ private:
+  void addRow(std::uint32_t present, const vulkan::FrameStatistics& work,
+              const vulkan::GpuStatistics& completed) {
+    // If the GPU culls, the CPU learns what it skinned when the frame is complete.
+    const bool culledOnGpu = options_->culledOnGpu;
+    const auto skinned = culledOnGpu ? completed.skinnedInstances : work.skinnedInstances;
+    const auto settled = culledOnGpu ? completed.settledInstances : work.settledInstances;
+    const double cpuSeconds = work.planSeconds + work.recordSeconds;
+    const double nanoseconds = work.instances == 0 ? 0 : cpuSeconds * 1e9 / work.instances;
+    json_["rows"].push_back(
+        {{"frame", frames_},
+         {"figures", present},
+         {"instances", work.instances},
+         {"skinned", skinned},
+         {"settled", settled},
+         {"vertices", culledOnGpu ? Json() : Json(work.skinnedVertices)},
+         {"dispatches", work.dispatches},
+         {"uploadedBytes", work.uploadedBytes},
+         {"cpuNanosecondsPerInstance", nanoseconds},
+         {"gpuSeconds", completed.seconds ? Json(*completed.seconds) : Json()}});
+    fmt::print(
+        "frame {:3} {} figures, {} instances: {} skinned, {} settled; {} dispatches, {} KiB "
+        "uploaded, {:.0f} ns an instance to plan and record{}\n",
+        frames_, present, work.instances, skinned, settled, work.dispatches,
+        work.uploadedBytes / 1024, nanoseconds,
+        completed.seconds ? fmt::format("; {:.1f} ms to skin", 1e3 * *completed.seconds) : "");
+    std::fflush(stdout);
+  }
+
+  const Options* options_;
+  Json json_;
+  std::uint32_t frames_ = 0;
+  std::uint64_t completedFrame_ = 0;
+  std::uint64_t instances_ = 0, outOfView_ = 0, skinned_ = 0, vertices_ = 0;
+  double cpuSeconds_ = 0, gpuSeconds_ = 0;
+};
+
+// -- The program: the frame loop, with the check.
+
+/// Tells the check what the system was asked to show.
+template <typename System>
+void follow(CharacterCheck& check, Crowd<System>& crowd, std::uint64_t frame, bool culledOnGpu) {
+  std::vector<AskedInstance> asked;
+  for (const Figure& figure : crowd.figures()) {
+    const FigureState& now = figure.now;
+    for (std::uint32_t part = 0; part < figure.instances.size(); ++part)
+      asked.push_back({figure.instances[part], part, now.pose, now.isInView, now.teleports,
+                       now.updateInterval});
+  }
+  check.follow(frame, asked, crowd.system().skinnedInstances(), culledOnGpu);
+}
+
+/// A copy of the output of a frame in flight. No instances: there is nothing to compare.
+struct ReadBack {
+  std::vector<ShownInstance> instances;
+  MappedBuffer buffer;
+};
+
+/// Records a copy of the output from its beginning to its last visible instance.
+void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
+                    const vulkan::SkinningSystem& system, ReadBack& readBack) {
+  std::uint64_t size = 0;
+  for (const ShownInstance& instance : readBack.instances)
+    size = std::max(size, instance.output.offset + instance.output.size);
+  if (size == 0) return;
+  if (readBack.buffer.bytes().size() < size) {
+    readBack.buffer =
+        must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
+  }
+  const VkBufferCopy region{0, 0, size};
+  device.functions().CmdCopyBuffer(commandBuffer, system.outputBuffer(), readBack.buffer.handle(),
+                                   1, &region);
+  recordBarrier(device, commandBuffer,
+                {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
+                 {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+}
+
+ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Options& options) {
+  Device& device = *open.device;
+  const bool hasTimestamps = must(Timestamps::create(device)).has();
+  Crowd crowd(createOnDevice(open.context, character, options, hasTimestamps), character, options);
+  CharacterCheck check(character, InstanceDescription().method);
+  Report report(character, options, device.info().name, driverVersion(device));
+  const std::uint64_t inFlight = options.framesInFlight;
+  std::vector<MappedBuffer> visibility(inFlight);
+  std::vector<ReadBack> readBacks(inFlight);
+  const auto compare = [&](std::uint64_t completedFrame) {
+    ReadBack& readBack = readBacks[completedFrame % inFlight];
+    check.compare(completedFrame, readBack.instances, readBack.buffer.bytes());
   };
+
+  FrameLoop loop(device, options.framesInFlight);  // destroyed first: it waits
   for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
-    if (Result<void> played = play(frame); !played) return reportDeviceError(played.error());
+    const VkCommandBuffer commandBuffer = must(loop.begin());
+    const std::size_t slot = frame % inFlight;
+    if (frame > inFlight && options.checks(loop.completed())) compare(loop.completed());
+    skinFrame(crowd, frame, loop.completed(), device, commandBuffer, visibility[slot], options);
+    const vulkan::SystemStatistics statistics = crowd.system().statistics();
+    report.add(crowd.figures(), statistics.lastFrame, statistics.lastCompletedFrame);
+    follow(check, crowd, frame, options.culledOnGpu);
+    if (options.checks(frame)) {
+      readBacks[slot].instances = check.shown(crowd.system());
+      recordReadBack(device, commandBuffer, crowd.system(), readBacks[slot]);
+    }
+    must(loop.submit());
   }
-  report.finish(*crowd);
-  return reportOn(report, check.totals(), options, verdict(check, shown));
+  const std::uint64_t compared = loop.completed();
+  must(loop.finish());
+  for (std::uint64_t frame = compared + 1; frame <= options.frames; ++frame) {
+    if (options.checks(frame)) compare(frame);
+    must(crowd.system().beginFrame(frame + inFlight, frame));
+    report.complete(crowd.system().statistics().lastCompletedFrame);
+  }
+  return report.finish(crowd.system().statistics(), crowd.refusals(), check,
+                       device.takeValidationMessages());
 }
 
-ExitStatus run(const Options& options) {
-  const bool isFilm = !options.film.output.empty() &&
-                      samples::pictureKind(options.film.output) != samples::PictureKind::png;
-  if (isFilm) {
-    if (Result<void> program = samples::checkFilmProgram(options.film.output); !program)
-      return reportError(ExitStatus::stopped, program.error().message);
-  }
-  const Result<Character> character = Character::load(options.model, characterOptions(options));
-  if (!character) return reportError(ExitStatus::badInput, character.error().message);
-  if (Result<void> kept = checkOutputFiles(options, character->model().sideFiles); !kept)
-    return samples::reportWrongUsage(kept.error().message);
-  const Result<std::unique_ptr<Script>> script = makeScript(*character, options);
-  if (!script) return reportError(ExitStatus::badInput, script.error().message);
-  if (options.device == "cpu") return runOnCpu(*character, *(*script)->figures, options);
-  samples::DeviceOptions deviceOptions;
-  deviceOptions.device = options.device;
-  deviceOptions.validation = options.validates;
-  deviceOptions.graphics = (*script)->stroll != nullptr;
-  Result<samples::OpenDevice> open = samples::openDevice(deviceOptions);
-  if (!open) return reportDeviceError(open.error());
+/// Without Vulkan. All cores skin; the result is there when the jobs are done.
+ExitStatus playOnCpu(const Character& character, const Options& options) {
+  cpu::SkinningSystemDescription description;
+  setCapacities(description, character, options);
+  Crowd crowd(must(cpu::SkinningSystem::create(description)), character, options);
+  cpu::SkinningSystem& system = crowd.system();
+  CharacterCheck check(character, InstanceDescription().method);
+  Report report(character, options, CpuTarget().name(), "");
+  vulkan::SystemStatistics statistics;
+  for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
+    using Clock = std::chrono::steady_clock;
+    system.beginFrame();
+    crowd.update(frame);
+    const auto begin = Clock::now();
+    const std::span<const cpu::PlannedJob> jobs = must(system.jobs());
+    const auto planned = Clock::now();
+    inParallel(jobs.size(), [&](std::size_t index) { cpu::skin(jobs[index]); });
+    const std::chrono::duration<double> planning = planned - begin,
+                                        skinning = Clock::now() - planned;
 
-  Result<std::unique_ptr<Show>> show = makeShow(*open, *character, *(*script)->figures, options);
-  if (!show) return reportDeviceError(show.error());
-  if ((*script)->stroll != nullptr) {
-    const ExitStatus added = addFilm(**show, *open, *character, *(*script)->stroll, options);
-    if (added != ExitStatus::done) return added;
+    const SceneStatistics scene = system.statistics();
+    static_cast<FrameWorkStatistics&>(statistics.lastFrame) = scene.lastFrame;
+    statistics.lastCompletedFrame.frame = frame;
+    statistics.lastFrame.planSeconds = planning.count();
+    statistics.lastCompletedFrame.seconds = skinning.count();
+    statistics.outputs = scene.outputs;
+    report.add(crowd.figures(), statistics.lastFrame, statistics.lastCompletedFrame);
+    follow(check, crowd, frame, false);
+    if (options.checks(frame)) check.compare(frame, check.shown(system), system.outputBytes());
   }
-  if (Result<void> played = play(**show, options); !played)
-    return reportDeviceError(played.error());
+  return report.finish(statistics, crowd.refusals(), check);
+}
 
-  const std::vector<std::string> messages = open->device->takeValidationMessages();
-  const std::string complaint = !messages.empty() ? "the validation layer says: " + messages.front()
-                                                  : verdict((*show)->check, (*show)->shown);
-  return reportOn((*show)->report, (*show)->check.totals(), options, complaint);
+/// Empty if the program should continue.
+std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
+  CLI::App app("Skins a crowd with a SkinningSystem, and compares its vertices with the reference.",
+               "dermis_crowd");
+  app.footer(exitStatusHelp);
+  app.add_option("--figures", options.figures, "Number of figures [200]")
+      ->check(CLI::Range(1u, 100'000u));
+  app.add_option("--frames", options.frames, "Number of frames [120]")
+      ->check(CLI::Range(1u, 1'000'000u));
+  app.add_option("--model", options.model, "A .gltf or .glb file [the sample figure]");
+  app.add_option("--device", options.device,
+                 "auto, cpu (without Vulkan), a number from 'dermis devices', or part of a name");
+  const CLI::Option* inFlight =
+      app.add_option("--frames-in-flight", options.framesInFlight, "Maximum frames in flight [3]")
+          ->check(CLI::Range(1u, 16u));
+  app.add_option("--output-budget", options.outputBudget,
+                 "Memory for skinned vertices in MiB; figures that do not fit are added later "
+                 "[enough for all]")
+      ->check(CLI::Range(1u, 1u << 20));
+  app.add_option("--json", options.json, "Write the results to a file as JSON");
+  app.add_option("--check-every", options.checkInterval,
+                 "Compare all vertices of every N-th frame and of the last frame [10]")
+      ->check(CLI::Range(1u, 1'000'000u));
+  app.add_flag_callback(
+      "--no-verify", [&options] { options.verifies = false; }, "Do not compare; for measurements");
+  app.add_flag("--gpu-culling", options.culledOnGpu,
+               "Let the GPU decide which instances are visible");
+  app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
+  if (const auto ended = parseOptions(app, argc, argv)) return ended;
+  if (options.device != "cpu") return std::nullopt;
+  for (const auto& [isAsked, name] : {std::pair{options.culledOnGpu, "--gpu-culling"},
+                                      {inFlight->count() != 0, "--frames-in-flight"},
+                                      {options.validates, "--validate"}}) {
+    if (!isAsked) continue;
+    return reportWrongUsage(fmt::format("{} needs a Vulkan device; --device cpu is not one", name));
+  }
+  return std::nullopt;
 }
 
 ExitStatus run(int argc, char** argv) {
   Options options;
-  const std::optional<ExitStatus> ended = readOptions(argc, argv, options);
-  return ended ? *ended : run(options);
+  if (const auto ended = readOptions(argc, argv, options)) return *ended;
+  const Result<Character> character = Character::load(pathOf(options.model));
+  if (!character) return reportModelError(character.error());
+  std::vector<std::filesystem::path> inputs = character->model().sideFiles;
+  inputs.push_back(pathOf(options.model));
+  const std::array<RequestedOutput, 1> outputs{{{"--json", options.json}}};
+  if (const Result<void> kept = checkOutputFiles(outputs, inputs); !kept)
+    return reportWrongUsage(kept.error().message);
+  try {
+    if (options.device == "cpu") return playOnCpu(*character, options);
+    DeviceOptions wanted;
+    wanted.device = options.device;
+    wanted.validation = options.validates;
+    OpenDevice open = must(openDevice(wanted));
+    return playOnDevice(open, *character, options);
+  } catch (const Failure& failure) {
+    return reportDeviceError(failure.error());
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  return samples::runProgram("dermis_crowd", argc, argv, run);
+  return runProgram("dermis_crowd", argc, argv, run);
 }

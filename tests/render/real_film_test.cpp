@@ -54,15 +54,5 @@ TEST(RealFilmTest, RenderWritesAFilmThatPlays) {
   EXPECT_GT(comparePictures(*shown, *other).worstColor, 30);
 }
 
-TEST(RealFilmTest, TheCrowdWritesAFilmThatPlays) {
-  REQUIRE_DEVICE();
-  const std::string film = outFile("crowd.mp4");
-  const CommandResult result =
-      runCommand({dermisCrowdProgram, "--film", film, "--figures", "6", "--frames", "4", "--fps",
-                  "12", "--width", "320", "--height", "180"});
-  ASSERT_EQ(result.status, 0) << result.errors;
-  EXPECT_EQ(probe(film), "h264,320,180,12/1,4");
-}
-
 }  // namespace
 }  // namespace dermis::test

@@ -8,6 +8,7 @@ const char* const kernelModules = DERMIS_KERNELS;
 const char* const kernelSources = DERMIS_KERNEL_SOURCES;
 const char* const dermisProgram = DERMIS_COMMAND;
 const char* const dermisCrowdProgram = DERMIS_CROWD;
+const char* const dermisCrowdFilmProgram = DERMIS_CROWD_FILM;
 const char* const dermisViewerProgram = DERMIS_VIEWER;
 
 }  // namespace dermis::test

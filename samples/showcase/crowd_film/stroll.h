@@ -5,13 +5,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "character.h"
 #include "dermis/types.h"
-#include "figures.h"
 #include "flight.h"
 #include "gait.h"
+#include "kit/character.h"
 
-namespace crowd {
+namespace crowd_film {
 
 struct StrollOptions {
   std::uint32_t figures = 1000;
@@ -20,14 +19,25 @@ struct StrollOptions {
   std::uint32_t width = 1280, height = 720;
 };
 
-class Stroll final : public Figures {
+/// The state of a figure in one frame.
+struct FigureState {
+  dermis::samples::PoseKey pose;
+  bool isInView = false;
+  std::uint32_t updateInterval = 1;  ///< by the distance from the camera
+  double distance = 0;
+  /// From the character's space to the world; the ground is at height 0.
+  dermis::JointMatrix place;
+};
+
+class Stroll {
  public:
   /// `character` and `gait` must outlive it.
-  Stroll(const Character& character, const Gait& gait, const StrollOptions& options);
+  Stroll(const dermis::samples::Character& character, const Gait& gait,
+         const StrollOptions& options);
 
-  FigureFrame at(std::uint32_t figure, std::uint64_t frame) const override;
-  /// From the character's space to the world; the ground is at height 0.
-  dermis::JointMatrix place(std::uint32_t figure, std::uint64_t frame) const;
+  std::uint32_t count() const { return static_cast<std::uint32_t>(roles_.size()); }
+  /// Frames are numbered from 1.
+  FigureState at(std::uint32_t figure, std::uint64_t frame) const;
 
   const Flight& flight() const { return flight_; }
   Eye eye(std::uint64_t frame) const;
@@ -41,12 +51,13 @@ class Stroll final : public Figures {
     double scale = 1;
   };
 
-  void cast(std::uint32_t figures);
-  void castStanding(std::uint32_t first, std::uint32_t count);
-  void castWalking(std::uint32_t first, std::uint32_t count);
+  void castStanding(std::uint32_t figures);
+  void castWalking(std::uint32_t figures);
+  Flight planFlight(const StrollOptions& options) const;
+  dermis::JointMatrix placeAt(const Role& role, double angle) const;
   std::uint64_t clock(std::uint64_t frame) const { return frame - 1 + startFrame_; }
 
-  const Character* character_;
+  const dermis::samples::Character* character_;
   const Gait* gait_;
   double framesPerSecond_;
   std::uint64_t startFrame_;
@@ -56,4 +67,4 @@ class Stroll final : public Figures {
   Flight flight_{FlightPlan{}};
 };
 
-}  // namespace crowd
+}  // namespace crowd_film

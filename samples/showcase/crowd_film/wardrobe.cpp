@@ -2,21 +2,20 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <span>
 #include <string_view>
+
+#include <glm/common.hpp>
 
 #include "chance.h"
 
 using namespace dermis;
 
-namespace crowd {
+namespace crowd_film {
 namespace {
-
-using Color = std::array<double, 3>;  // linear
 
 struct Colors {
   std::string_view material;
-  std::vector<Color> colors;
+  std::vector<glm::vec3> colors;  ///< linear
 };
 
 const std::vector<Colors>& allColors() {
@@ -59,47 +58,42 @@ const std::vector<Colors>& allColors() {
 }
 
 /// The median color of the part, by channel, which ignores small areas such as eyes and soles.
-Color ownColor(const gltf::Primitive& primitive) {
+glm::vec3 ownColor(const gltf::Primitive& primitive) {
   const std::size_t count = primitive.colors.size() / 4;
-  if (count == 0) return {1, 1, 1};
-  Color own{};
-  for (std::size_t channel = 0; channel < 3; ++channel) {
+  if (count == 0) return glm::vec3(1.0f);
+  glm::vec3 own(0.0f);
+  for (int channel = 0; channel < 3; ++channel) {
     std::vector<float> values;
     for (std::size_t vertex = 0; vertex < count; ++vertex)
-      values.push_back(primitive.colors[vertex * 4 + channel]);
+      values.push_back(primitive.colors[vertex * 4 + static_cast<std::size_t>(channel)]);
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::ranges::nth_element(values, middle);
-    own[channel] = static_cast<double>(*middle);
+    own[channel] = *middle;
   }
   return own;
 }
 
 }  // namespace
 
-Wardrobe::Wardrobe(const Character& character) {
-  for (const Part& part : character.parts()) {
-    Rack& rack = racks_.emplace_back();
+Wardrobe::Wardrobe(const samples::Character& character) {
+  for (const samples::Part& part : character.parts()) {
+    std::vector<glm::vec3>& tints = tints_.emplace_back();
     if (part.source->material == gltf::none) continue;
     const gltf::Material& material = character.model().materials[part.source->material];
     const auto found = std::ranges::find(allColors(), material.name, &Colors::material);
     if (found == allColors().end()) continue;
-    const Color own = ownColor(*part.source);
-    for (const Color& color : found->colors) {
-      Color& tint = rack.tints.emplace_back();
-      for (std::size_t i = 0; i < 3; ++i) tint[i] = color[i] / std::max(own[i], 1e-3);
-    }
+    const glm::vec3 own = glm::max(ownColor(*part.source), glm::vec3(1e-3f));
+    for (const glm::vec3& color : found->colors) tints.push_back(color / own);
   }
 }
 
-std::array<float, 3> Wardrobe::tint(std::uint32_t figure, std::uint32_t part) const {
-  const std::vector<Color>& tints = racks_[part].tints;
-  if (tints.empty()) return {1, 1, 1};
+glm::vec3 Wardrobe::tint(std::uint32_t figure, std::uint32_t part) const {
+  const std::vector<glm::vec3>& tints = tints_[part];
+  if (tints.empty()) return glm::vec3(1.0f);
   const double choice = chance(figure, 100 + part) * static_cast<double>(tints.size());
-  const Color& color = tints[static_cast<std::size_t>(choice)];
   // Each figure has a slightly different shade.
   const double light = 1 + 0.15 * deviation(figure, 200 + part);
-  return {static_cast<float>(color[0] * light), static_cast<float>(color[1] * light),
-          static_cast<float>(color[2] * light)};
+  return tints[static_cast<std::size_t>(choice)] * static_cast<float>(light);
 }
 
-}  // namespace crowd
+}  // namespace crowd_film

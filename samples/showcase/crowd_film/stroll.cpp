@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
+
+#include <glm/geometric.hpp>
 
 #include "chance.h"
 
 using namespace dermis;
 
-namespace crowd {
+namespace crowd_film {
 namespace {
 
 /// Purposes of `chance`.
@@ -27,47 +30,35 @@ constexpr double reach = 2.3;
 /// An update may be late as long as the feet move less than this number of pixels.
 constexpr double unseenPixels = 2;
 
+std::uint32_t choose(std::span<const std::uint32_t> clips, std::uint32_t number) {
+  return clips[static_cast<std::size_t>(chance(number, clipChoice) *
+                                        static_cast<double>(clips.size()))];
+}
+
 }  // namespace
 
-Stroll::Stroll(const Character& character, const Gait& gait, const StrollOptions& options)
-    : Figures(options.figures),
-      character_(&character),
+Stroll::Stroll(const samples::Character& character, const Gait& gait, const StrollOptions& options)
+    : character_(&character),
       gait_(&gait),
       framesPerSecond_(options.framesPerSecond),
       startFrame_(static_cast<std::uint64_t>(std::llround(options.start * framesPerSecond_))),
       unit_(std::max(gait.height / 1.75, gait.length / 1.3)) {
   for (std::uint32_t clip = 0; clip < gait.clips.size(); ++clip)
     (gait.clips[clip].walks() ? walkingClips_ : standingClips_).push_back(clip);
-  FlightPlan plan;
-  plan.unit = unit_;
-  plan.aspect = static_cast<double>(options.width) / options.height;
-  plan.height = options.height;
-  cast(options.figures);
-  double inside = 0;
-  for (const Role& role : roles_) {
-    plan.crowdRadius = std::max(plan.crowdRadius, role.radius + unit_);
-    if (role.step == 0) inside = std::max(inside, role.radius);
-  }
-  plan.aisleRadius = inside + (aisleInside + 0.5 * aisleWidth - 0.8) * unit_;
-  plan.crowdRadius = std::max(plan.crowdRadius, plan.aisleRadius + 3 * unit_);
-  flight_ = Flight(plan);
-}
-
-/// If no clip walks, all figures stand; if no clip stands, all walk.
-void Stroll::cast(std::uint32_t figures) {
-  std::uint32_t standing = walkingClips_.empty() ? figures : (figures + 8) / 12;
+  // If no clip walks, all figures stand; if no clip stands, all walk.
+  std::uint32_t standing = walkingClips_.empty() ? options.figures : (options.figures + 8) / 12;
   if (standingClips_.empty()) standing = 0;
-  castStanding(0, standing);
-  castWalking(standing, figures - standing);
+  castStanding(standing);
+  castWalking(options.figures - standing);
+  flight_ = planFlight(options);
 }
 
 /// Sunflower spiral: any number of figures, equally dense everywhere (Vogel 1979).
-void Stroll::castStanding(std::uint32_t first, std::uint32_t count) {
+void Stroll::castStanding(std::uint32_t figures) {
   const double goldenAngle = std::numbers::pi * (3 - std::sqrt(5.0));
-  for (std::uint32_t figure = first; figure < first + count; ++figure) {
+  for (std::uint32_t figure = 0; figure < figures; ++figure) {
     Role role;
-    const double choice = chance(figure, clipChoice) * static_cast<double>(standingClips_.size());
-    role.clip = standingClips_[static_cast<std::size_t>(choice)];
+    role.clip = choose(standingClips_, figure);
     role.phase =
         static_cast<std::uint32_t>(chance(figure, phaseChoice) * character_->tickCount(role.clip));
     role.radius = standingSpacing * unit_ * std::sqrt(figure + 0.5);
@@ -79,43 +70,54 @@ void Stroll::castStanding(std::uint32_t first, std::uint32_t count) {
 }
 
 /// All figures of a ring have the same height, so the same speed, and do not collide.
-void Stroll::castWalking(std::uint32_t first, std::uint32_t count) {
+void Stroll::castWalking(std::uint32_t figures) {
   double radius = aisleInside + aisleWidth;
   if (!roles_.empty()) radius += roles_.back().radius / unit_;
-  std::uint32_t figure = first;
-  for (std::uint32_t ring = 0; figure < first + count; ++ring, radius += ringSpacing) {
+  std::uint32_t figure = count();
+  const std::uint32_t end = figure + figures;
+  for (std::uint32_t ring = 0; figure < end; ++ring, radius += ringSpacing) {
     const auto room = static_cast<std::uint32_t>(2 * std::numbers::pi * radius / walkingSpacing);
-    const std::uint32_t here = std::min(room, first + count - figure);
+    const std::uint32_t here = std::min(room, end - figure);
     const double direction = ring / ringsOneWay % 2 == 0 ? -1 : 1;
-    const double scale = 1 + 0.05 * deviation(ring, size);
-    const std::uint32_t clip = walkingClips_[static_cast<std::size_t>(
-        chance(ring, clipChoice) * static_cast<double>(walkingClips_.size()))];
-    const ClipGait& gait = gait_->clips[clip];
+    Role role;
+    role.clip = choose(walkingClips_, ring);
+    role.scale = 1 + 0.05 * deviation(ring, size);
+    role.yaw = direction * std::numbers::pi / 2;
+    const ClipGait& gait = gait_->clips[role.clip];
+    role.step = direction * role.scale * std::hypot(gait.stepX, gait.stepZ) / (radius * unit_);
     for (std::uint32_t place = 0; place < here; ++place, ++figure) {
-      Role role;
-      role.clip = clip;
-      role.phase =
-          static_cast<std::uint32_t>(chance(figure, phaseChoice) * character_->tickCount(clip));
+      role.phase = static_cast<std::uint32_t>(chance(figure, phaseChoice) *
+                                              character_->tickCount(role.clip));
       role.radius = (radius + 0.2 * deviation(figure, across)) * unit_;
       role.angle = 2 * std::numbers::pi * (place + 0.2 * deviation(figure, along)) / room + ring;
-      role.step = direction * scale * std::hypot(gait.stepX, gait.stepZ) / (radius * unit_);
-      role.yaw = direction * std::numbers::pi / 2;
-      role.scale = scale;
       roles_.push_back(role);
     }
   }
+}
+
+Flight Stroll::planFlight(const StrollOptions& options) const {
+  FlightPlan plan;
+  plan.unit = unit_;
+  plan.aspect = static_cast<double>(options.width) / options.height;
+  plan.height = options.height;
+  double inside = 0;
+  for (const Role& role : roles_) {
+    plan.crowdRadius = std::max(plan.crowdRadius, role.radius + unit_);
+    if (role.step == 0) inside = std::max(inside, role.radius);
+  }
+  plan.aisleRadius = inside + (aisleInside + 0.5 * aisleWidth - 0.8) * unit_;
+  plan.crowdRadius = std::max(plan.crowdRadius, plan.aisleRadius + 3 * unit_);
+  return Flight(plan);
 }
 
 Eye Stroll::eye(std::uint64_t frame) const {
   return flight_.at(static_cast<double>(clock(frame)) / framesPerSecond_);
 }
 
-JointMatrix Stroll::place(std::uint32_t figure, std::uint64_t frame) const {
-  const Role& role = roles_[figure];
+/// Rotates from the direction in which the clip walks to the direction in which the figure should
+/// walk.
+JointMatrix Stroll::placeAt(const Role& role, double angle) const {
   const ClipGait& gait = gait_->clips[role.clip];
-  const double angle = role.angle + role.step * static_cast<double>(clock(frame));
-  // Rotates from the direction in which the clip walks to the direction in which the figure should
-  // walk.
   const double own = gait.walks() ? std::atan2(gait.stepX, gait.stepZ) : 0;
   const double heading = angle + role.yaw;
   const double turn = std::atan2(std::cos(heading), std::sin(heading)) - own;
@@ -134,24 +136,23 @@ JointMatrix Stroll::place(std::uint32_t figure, std::uint64_t frame) const {
   return matrix;
 }
 
-FigureFrame Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
+FigureState Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
   const Role& role = roles_[figure];
-  FigureFrame now;
-  now.isPresent = true;
-  now.pose = {role.clip, static_cast<std::uint32_t>((clock(frame) + role.phase) %
-                                                    character_->tickCount(role.clip))};
   const double angle = role.angle + role.step * static_cast<double>(clock(frame));
-  const std::array<double, 3> middle{role.radius * std::cos(angle), 0.5 * gait_->height,
-                                     role.radius * std::sin(angle)};
-  const Eye seen = eye(frame);
-  now.isInView = flight_.sees(seen, middle, reach * unit_);
-  const double distance =
-      std::hypot(middle[0] - seen.place[0], middle[1] - seen.place[1], middle[2] - seen.place[2]);
+  const glm::dvec3 middle(role.radius * std::cos(angle), 0.5 * gait_->height,
+                          role.radius * std::sin(angle));
+  const Eye seenFrom = eye(frame);
+  FigureState state;
+  state.pose = {role.clip, static_cast<std::uint32_t>((clock(frame) + role.phase) %
+                                                      character_->tickCount(role.clip))};
+  state.place = placeAt(role, angle);
+  state.isInView = flight_.sees(seenFrom, middle, reach * unit_);
+  state.distance = glm::distance(middle, seenFrom.place);
   // Approximate distance that a hand or foot moves in a frame.
   const double moved = 1.3 * unit_ / framesPerSecond_;
-  const double late = unseenPixels * flight_.pixelSize(seen, distance) / moved;
-  now.updateInterval = late < 1 ? 1 : late < 3 ? 2 : late < 7 ? 4 : 8;
-  return now;
+  const double late = unseenPixels * flight_.pixelSize(state.distance) / moved;
+  state.updateInterval = late < 1 ? 1 : late < 3 ? 2 : late < 7 ? 4 : 8;
+  return state;
 }
 
-}  // namespace crowd
+}  // namespace crowd_film

@@ -1,20 +1,21 @@
 #include "flight.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 
 #include <glm/ext/matrix_clip_space.hpp>
 #include <glm/ext/matrix_transform.hpp>
-#include <glm/vec3.hpp>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 using namespace dermis;
 
-namespace crowd {
+namespace crowd_film {
 namespace {
 
-using Vector = std::array<double, 3>;
+constexpr double fieldOfView = 42;  ///< degrees, vertical
 
 /// A key of the camera flight in cylindrical coordinates: degrees about the middle, and the
 /// distance from it (0 the middle, 1 the aisle, 2 the outermost ring). Heights are in meters, for a
@@ -35,22 +36,6 @@ constexpr std::array keys{
     Key{280, 2.12, 13.0, 288, 0.45, 0.0}, Key{336, 2.18, 9.0, 340, 0.65, 0.0},
 };
 
-Vector plus(const Vector& a, const Vector& b, double share) {
-  return {a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]};
-}
-
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-Vector cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-Vector normalized(const Vector& a) {
-  return plus({}, a, 1 / std::sqrt(dot(a, a)));
-}
-
 /// Catmull and Rom 1974: a smooth curve through all points.
 double spline(const std::array<double, 4>& p, double t) {
   return p[1] +
@@ -59,23 +44,23 @@ double spline(const std::array<double, 4>& p, double t) {
               t * (2 * p[0] - 5 * p[1] + 4 * p[2] - p[3] + t * (3 * (p[1] - p[2]) + p[3] - p[0])));
 }
 
-/// Interpolates a member of the keys at a time. `turn` is its increase over a whole flight.
+/// Interpolates a member of the keys at a time, which is not negative. `turn` is its increase over
+/// a whole flight.
 double along(double Key::*member, double time, double turn = 0) {
   const double place = time / Flight::seconds * static_cast<double>(keys.size());
   const double first = std::floor(place);
   std::array<double, 4> points{};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto index = static_cast<std::ptrdiff_t>(first) + static_cast<std::ptrdiff_t>(i) - 1;
-    const auto count = static_cast<std::ptrdiff_t>(keys.size());
-    const std::ptrdiff_t lap = index < 0 ? (index + 1) / count - 1 : index / count;
-    points[i] = keys[static_cast<std::size_t>(index - lap * count)].*member +
-                turn * static_cast<double>(lap);
+    // One flight later, so that no index is negative.
+    const std::size_t index = static_cast<std::size_t>(first) + i + keys.size() - 1;
+    const double lap = static_cast<double>(index / keys.size()) - 1;
+    points[i] = keys[index % keys.size()].*member + turn * lap;
   }
   return spline(points, place - first);
 }
 
-Vector onCylinder(double degrees, double radius, double height) {
-  const double angle = degrees * std::numbers::pi / 180;
+glm::dvec3 onCylinder(double degrees, double radius, double height) {
+  const double angle = glm::radians(degrees);
   return {radius * std::cos(angle), height, radius * std::sin(angle)};
 }
 
@@ -107,44 +92,43 @@ Eye Flight::at(double time) const {
   Eye eye;
   eye.place = onCylinder(along(&Key::angle, time, 360), radius,
                          smoothMax(height, clearance(radius), 0.5 * plan_.unit));
-  const Vector target =
+  const glm::dvec3 target =
       onCylinder(along(&Key::lookAngle, time, 360), radiusOf(along(&Key::lookRadius, time)),
                  along(&Key::lookHeight, time) * plan_.unit);
-  eye.forward = normalized(plus(target, eye.place, -1));
-  eye.right = normalized(cross(eye.forward, {0, 1, 0}));
-  eye.up = cross(eye.right, eye.forward);
-  eye.slope = std::tan(21 * std::numbers::pi / 180);
+  eye.forward = glm::normalize(target - eye.place);
+  eye.right = glm::normalize(glm::cross(eye.forward, {0, 1, 0}));
+  eye.up = glm::cross(eye.right, eye.forward);
   return eye;
 }
 
 samples::render::Camera Flight::camera(const Eye& eye) const {
-  const auto vector = [](const Vector& from) { return glm::vec3(from[0], from[1], from[2]); };
   samples::render::Camera camera;
-  camera.eye = vector(eye.place);
-  camera.towardsEye = -vector(eye.forward);
-  camera.right = vector(eye.right);
+  camera.eye = glm::vec3(eye.place);
+  camera.towardsEye = glm::vec3(-eye.forward);
+  camera.right = glm::vec3(eye.right);
   const auto nearest = static_cast<float>(0.15 * plan_.unit);
   const auto farthest = static_cast<float>(8 * plan_.crowdRadius + 50 * plan_.unit);
-  glm::mat4 projection = glm::perspectiveRH_ZO(2 * std::atan(static_cast<float>(eye.slope)),
+  glm::mat4 projection = glm::perspectiveRH_ZO(static_cast<float>(glm::radians(fieldOfView)),
                                                static_cast<float>(plan_.aspect), nearest, farthest);
   projection[1][1] *= -1;  // Vulkan's y goes down.
   camera.viewProjection =
-      projection * glm::lookAtRH(camera.eye, camera.eye - camera.towardsEye, vector(eye.up));
+      projection * glm::lookAtRH(camera.eye, camera.eye - camera.towardsEye, glm::vec3(eye.up));
   return camera;
 }
 
-bool Flight::sees(const Eye& eye, const Vector& center, double radius) const {
-  const Vector from = plus(center, eye.place, -1);
-  const double ahead = dot(from, eye.forward);
+bool Flight::sees(const Eye& eye, const glm::dvec3& center, double radius) const {
+  const glm::dvec3 from = center - eye.place;
+  const double ahead = glm::dot(from, eye.forward);
   if (ahead < -radius) return false;
-  const auto isWithin = [&](const Vector& axis, double slope) {
-    return std::abs(dot(from, axis)) <= ahead * slope + radius * std::sqrt(1 + slope * slope);
+  const auto isWithin = [&](const glm::dvec3& axis, double slope) {
+    return std::abs(glm::dot(from, axis)) <= ahead * slope + radius * std::sqrt(1 + slope * slope);
   };
-  return isWithin(eye.right, eye.slope * plan_.aspect) && isWithin(eye.up, eye.slope);
+  const double slope = std::tan(glm::radians(fieldOfView / 2));
+  return isWithin(eye.right, slope * plan_.aspect) && isWithin(eye.up, slope);
 }
 
-double Flight::pixelSize(const Eye& eye, double distance) const {
-  return 2 * eye.slope * distance / plan_.height;
+double Flight::pixelSize(double distance) const {
+  return 2 * std::tan(glm::radians(fieldOfView / 2)) * distance / plan_.height;
 }
 
-}  // namespace crowd
+}  // namespace crowd_film

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace crowd {
+namespace crowd_film {
 
 /// A number in [0, 1) that depends only on the figure and the purpose (Wellons 2018, "Prospecting
 /// for hash functions").
@@ -19,4 +19,4 @@ inline double deviation(std::uint32_t figure, std::uint32_t purpose) {
   return 2 * chance(figure, purpose) - 1;
 }
 
-}  // namespace crowd
+}  // namespace crowd_film

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "character.h"
+#include "kit/character.h"
 
-namespace crowd {
+namespace crowd_film {
 
 struct ClipGait {
   /// Distance that the character moves in a tick, in the units of the file. {0, 0}: it stands.
@@ -23,7 +23,7 @@ struct Gait {
   std::vector<ClipGait> clips;
 };
 
-/// Fails as `reference::skin` does.
-dermis::Result<Gait> measureGait(const Character& character);
+/// Throws `Failure` if `reference::skin` fails.
+Gait measureGait(const dermis::samples::Character& character);
 
-}  // namespace crowd
+}  // namespace crowd_film

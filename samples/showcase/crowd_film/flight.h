@@ -2,11 +2,13 @@
 // walking figures, and up again.
 #pragma once
 
-#include <array>
+#include <cstdint>
+
+#include <glm/vec3.hpp>
 
 #include "kit/render/camera.h"
 
-namespace crowd {
+namespace crowd_film {
 
 /// Where the camera flies. Lengths are in world units.
 struct FlightPlan {
@@ -18,8 +20,7 @@ struct FlightPlan {
 };
 
 struct Eye {
-  std::array<double, 3> place, forward, right, up;
-  double slope = 0;  ///< tangent of half the vertical field of view
+  glm::dvec3 place, forward, right, up;
 };
 
 class Flight {
@@ -32,9 +33,9 @@ class Flight {
   dermis::samples::render::Camera camera(const Eye& eye) const;
 
   /// Whether a sphere is in the picture or near it.
-  bool sees(const Eye& eye, const std::array<double, 3>& center, double radius) const;
+  bool sees(const Eye& eye, const glm::dvec3& center, double radius) const;
   /// Size of a pixel at this distance.
-  double pixelSize(const Eye& eye, double distance) const;
+  double pixelSize(double distance) const;
 
   const FlightPlan& plan() const { return plan_; }
 
@@ -44,4 +45,4 @@ class Flight {
   FlightPlan plan_;
 };
 
-}  // namespace crowd
+}  // namespace crowd_film
