@@ -92,20 +92,15 @@ Result<Surface> Appearances::surface(const gltf::Primitive& primitive) {
 Result<const Geometry*> Appearances::geometry(const gltf::Primitive& primitive) {
   if (const auto made = geometries_.find(&primitive); made != geometries_.end())
     return &made->second;
-  Result<Geometry> made = geometry(primitive, primitive.triangles);
-  if (!made) return made.error();
-  return &geometries_.emplace(&primitive, std::move(*made)).first->second;
-}
-
-Result<Geometry> Appearances::geometry(const gltf::Primitive& primitive,
-                                       std::span<const std::uint32_t> triangles) const {
   render::GeometryData data;
   data.vertexCount = primitive.vertexCount;
-  data.triangles = triangles;
+  data.triangles = primitive.triangles;
   const std::uint32_t set = textureUse(primitive).texcoord;
   if (set < primitive.texcoords.size()) data.texcoords = primitive.texcoords[set];
   data.colors = primitive.colors;
-  return Geometry::create(*device_, data);
+  Result<Geometry> made = Geometry::create(*device_, data);
+  if (!made) return made.error();
+  return &geometries_.emplace(&primitive, std::move(*made)).first->second;
 }
 
 }  // namespace dermis::samples

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <map>
-#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -24,9 +23,6 @@ class Appearances {
   Result<render::Surface> surface(const gltf::Primitive& primitive);
   /// Created by the first call. Valid while this object lives. Fails with `vulkanError`.
   Result<const render::Geometry*> geometry(const gltf::Primitive& primitive);
-  /// The same vertices with other triangles, for a level of detail. Fails with `vulkanError`.
-  Result<render::Geometry> geometry(const gltf::Primitive& primitive,
-                                    std::span<const std::uint32_t> triangles) const;
 
   const std::vector<std::string>& notes() const { return notes_; }
 

@@ -17,14 +17,14 @@ class PassCounter {
   /// Record this between two passes: it marks one more pass as done.
   void record(VkCommandBuffer commandBuffer);
 
-  /// Waits for the fence of the submission, and calls `onPass` for each completed pass, at about
-  /// the time when it completes. Fails with `vulkanError`.
-  Result<void> wait(VkFence fence, const std::function<void()>& onPass) const;
-  /// The same, with its own fence.
+  /// Submits and waits. Calls `onPass` for each completed pass, at about the time when it
+  /// completes. Fails with `vulkanError`.
   Result<void> submitAndWait(VkCommandBuffer commandBuffer,
                              const std::function<void()>& onPass) const;
 
  private:
+  Result<void> wait(VkFence fence, const std::function<void()>& onPass) const;
+
   Device* device_ = nullptr;
   MappedBuffer words_;  ///< one per pass; not 0 when it is done
   std::uint32_t passes_ = 0, recorded_ = 0;

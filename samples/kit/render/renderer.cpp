@@ -298,8 +298,7 @@ Result<void> Renderer::recordShadows(VkCommandBuffer commandBuffer,
                                      const RenderFrame::ViewResources& frame, const View& view,
                                      const std::function<void()>& afterPass) {
   const VulkanFunctions& functions = device_->functions();
-  const std::vector<const Draw*> draws =
-      inOrder(view.shadowDraws.empty() ? view.draws : view.shadowDraws);
+  const std::vector<const Draw*> draws = inOrder(view.draws);
   const ShadowSizes& sizes = frame.maps.sizes();
   Result<void> done;
   for (int index = -1; index < static_cast<int>(sizes.skyLights) && done; ++index) {

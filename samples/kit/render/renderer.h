@@ -32,8 +32,6 @@ struct View {
   Camera camera;
   LightingStyle style;
   std::span<const Draw> draws;
-  /// Draws that cast shadows, if they differ (coarser triangles); empty: `draws`.
-  std::span<const Draw> shadowDraws;
   Box casters;  ///< box around everything that is drawn
   /// The height of the ground, and its radius around the center; nothing: no ground.
   std::optional<float> groundHeight;
