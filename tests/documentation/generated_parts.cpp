@@ -115,7 +115,7 @@ std::string shapes() {
 
 /// Those that the viewer's help shows.
 std::string viewerKeys() {
-  const std::string keys = readText("samples/showcase/viewer/keys.cpp");
+  const std::string keys = readText("samples/showcase/viewer/interface.cpp");
   const std::regex key(R"re(KeyHelp\{"([^"]+)", "([^"]+)"\})re");
   std::string table = "| key | |\n| --- | --- |\n";
   for (auto found = std::sregex_iterator(keys.begin(), keys.end(), key);

@@ -2,13 +2,31 @@
 
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 namespace dermis::test {
 namespace {
+
+/// Long enough for a busy machine and a sanitizer; nothing waits longer than it has to.
+constexpr std::chrono::seconds patience{240};
+
+[[noreturn]] void execute(std::vector<char*>& arguments, const std::string& folder,
+                          const std::string& output, const std::string& errors) {
+  const int flags = O_WRONLY | O_CREAT | O_TRUNC;
+  dup2(open(output.c_str(), flags, 0600), STDOUT_FILENO);
+  dup2(open(errors.c_str(), flags, 0600), STDERR_FILENO);
+  if (chdir(folder.c_str()) == 0) execvp(arguments[0], arguments.data());
+  _exit(127);
+}
 
 bool isInstalled(const std::string& program) {
   const char* path = std::getenv("PATH");
@@ -32,6 +50,44 @@ std::uint8_t channel(unsigned long pixel, unsigned long mask) {
 }
 
 }  // namespace
+
+bool waitUntil(const std::function<bool()>& isSo) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!isSo()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
+}
+
+ChildProcess::ChildProcess(const std::vector<std::string>& command, const std::string& folder,
+                           const std::string& output, const std::string& errors) {
+  std::vector<char*> arguments;
+  for (const std::string& argument : command)
+    arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.push_back(nullptr);
+  child_ = fork();
+  if (child_ == 0) execute(arguments, folder, output, errors);
+}
+
+ChildProcess::~ChildProcess() {
+  if (!isRunning()) return;
+  kill(child_, SIGKILL);
+  waitpid(child_, nullptr, 0);
+}
+
+bool ChildProcess::isRunning() {
+  if (status_) return false;
+  int status = 0;
+  if (waitpid(child_, &status, WNOHANG) == 0) return true;
+  status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return false;
+}
+
+int ChildProcess::wait() {
+  waitUntil([this] { return !isRunning(); });
+  return status_.value_or(-1);
+}
 
 std::unique_ptr<Display> Display::open(const std::string& folder, int width, int height,
                                        std::string& reason) {
@@ -75,10 +131,6 @@ void Display::press(const std::vector<std::string>& keys) const {
   std::vector<std::string> arguments{"key", "--delay", "20"};
   arguments.insert(arguments.end(), keys.begin(), keys.end());
   user(arguments);
-}
-
-void Display::type(const std::string& text) const {
-  user({"type", "--delay", "20", text});
 }
 
 std::optional<samples::render::Picture> Display::picture() const {

@@ -3,19 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
+#include <set>
 #include <string>
-#include <thread>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
 
 #include "dermis/verify/reference.h"
-#include "error_check.h"
-#include "joint_overlay.h"
-#include "keys.h"
-#include "orbit_camera.h"
-#include "pace.h"
-#include "playback.h"
-#include "scene_loader.h"
-#include "skeleton.h"
+#include "interface.h"
+#include "scene_view.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -30,36 +27,12 @@ cli::Scene figure() {
   return std::move(*scene);
 }
 
-TEST(PlaybackTest, BeginsAnewAtTheEnd) {
-  Playback playback;
-  playback.begin(2);
-  playback.advance(1.5);
-  EXPECT_DOUBLE_EQ(playback.time(), 1.5);
-  playback.advance(1);
-  EXPECT_DOUBLE_EQ(playback.time(), 0.5);
-  playback.setPlaying(false);
-  playback.advance(1);
-  EXPECT_DOUBLE_EQ(playback.time(), 0.5);
-}
-
-TEST(PlaybackTest, AStepStopsAndTheEndCanBeSeen) {
-  Playback playback;
-  playback.begin(1);
-  playback.step(-0.25);
-  EXPECT_FALSE(playback.isPlaying());
-  EXPECT_DOUBLE_EQ(playback.time(), 0.75);
-  playback.seek(7);
-  EXPECT_DOUBLE_EQ(playback.time(), 1);
-}
-
-TEST(PlaybackTest, ARestPoseDoesNotPlay) {
-  Playback playback;
-  playback.begin(0);
-  playback.setPlaying(true);
-  playback.advance(1);
-  playback.step(1);
-  EXPECT_FALSE(playback.isPlaying());
-  EXPECT_DOUBLE_EQ(playback.time(), 0);
+TEST(RepeatedTimeTest, BeginsAnewAfterTheEndAndBeforeTheBeginning) {
+  EXPECT_DOUBLE_EQ(repeatedTime(1.5, 2), 1.5);
+  EXPECT_DOUBLE_EQ(repeatedTime(2.5, 2), 0.5);
+  EXPECT_DOUBLE_EQ(repeatedTime(-0.25, 1), 0.75);
+  EXPECT_DOUBLE_EQ(repeatedTime(1, 1), 1) << "the end can be seen";
+  EXPECT_DOUBLE_EQ(repeatedTime(1, 0), 0) << "a rest pose";
 }
 
 const Box box{{-1, 0, -0.5f}, {1, 4, 0.5f}};
@@ -92,17 +65,18 @@ TEST(OrbitCameraTest, FramesABoxFromAllAround) {
 TEST(OrbitCameraTest, MovesAsItIsTold) {
   OrbitCamera camera;
   camera.frame(box, 1);
-  EXPECT_TRUE(camera.isFramed());
-  const Area area{0, 0, 100, 100};
-  const glm::vec3 middle(0, 2, 0);
-  const auto before = project(camera.camera(box, 1), area, middle);
+  EXPECT_FALSE(camera.isMoved());
+  const auto place = [&] {
+    const glm::vec4 clip = camera.camera(box, 1).viewProjection * glm::vec4(0, 2, 0, 1);
+    return glm::vec2(clip) / clip.w * 0.5f;  // in parts of the picture
+  };
+  const glm::vec2 before = place();
   camera.pan(0.25f, 0.125f);
-  EXPECT_FALSE(camera.isFramed());
-  const auto after = project(camera.camera(box, 1), area, middle);
-  ASSERT_TRUE(before && after);
+  EXPECT_TRUE(camera.isMoved());
+  const glm::vec2 moved = place() - before;
   // What is farther away than what it looks at moves less.
-  EXPECT_NEAR((*after)[0] - (*before)[0], 25, 2);
-  EXPECT_NEAR((*after)[1] - (*before)[1], 12.5, 2);
+  EXPECT_NEAR(moved.x, 0.25, 0.02);
+  EXPECT_NEAR(moved.y, 0.125, 0.02);
   const float distance = camera.camera(box, 1).distance;
   camera.zoom(3);
   EXPECT_LT(camera.camera(box, 1).distance, distance);
@@ -112,161 +86,65 @@ TEST(OrbitCameraTest, MovesAsItIsTold) {
   EXPECT_LT(camera.camera(box, 1).towardsEye.y, 1);
 }
 
-TEST(SkeletonTest, HasEveryJointOnceAndParentsFirst) {
+TEST(JointsTest, HasEveryJointOnceBelowOneRoot) {
   const cli::Scene scene = figure();
   const std::vector<Joint> joints = jointsOf(scene);
   EXPECT_EQ(joints.size(), scene.model->skins[0].joints.size());
+  std::set<std::uint32_t> nodes;
   std::size_t roots = 0;
-  for (std::uint32_t index = 0; index < joints.size(); ++index) {
-    EXPECT_FALSE(joints[index].name.empty());
-    if (joints[index].parent == gltf::none) {
-      ++roots;
-    } else {
-      EXPECT_LT(joints[index].parent, index);
-    }
+  for (const Joint& joint : joints) {
+    EXPECT_FALSE(joint.name.empty());
+    nodes.insert(joint.node);
+    roots += joint.parent == gltf::none;
+    if (joint.parent == gltf::none) continue;
+    EXPECT_EQ(joints[joint.parent].node, scene.model->nodes[joint.node].parent);
   }
+  EXPECT_EQ(nodes.size(), joints.size());
   EXPECT_EQ(roots, 1u);
 }
 
-TEST(SkeletonTest, TheWeightsOfAllJointsAreOne) {
+TEST(JointsTest, TheWeightsOfAllJointsAreOne) {
   const cli::Scene scene = figure();
   const std::vector<Joint> joints = jointsOf(scene);
   for (const cli::ScenePart& part : scene.parts) {
     std::vector<float> sums(part.primitive->vertexCount, 0.0f);
     for (const Joint& joint : joints) {
-      const std::vector<float> weights = jointWeights(scene, part, joint.node);
-      for (std::size_t vertex = 0; vertex < sums.size(); ++vertex) sums[vertex] += weights[vertex];
+      const Result<std::vector<float>> weights = jointWeights(scene, part, joint.node);
+      ASSERT_TRUE(weights);
+      for (std::size_t vertex = 0; vertex < sums.size(); ++vertex)
+        sums[vertex] += (*weights)[vertex];
     }
     for (const float sum : sums) ASSERT_NEAR(sum, 1, 1e-5);
   }
 }
 
-TEST(JointOverlayTest, FindsTheJointUnderTheMouse) {
+/// The errors if the device has skinned like the reference, but moved one vertex by a distance.
+Result<PositionErrors> errorsOfMoved(float distance) {
   const cli::Scene scene = figure();
-  const std::vector<Joint> joints = jointsOf(scene);
-  const std::vector<glm::vec3> positions = jointPositions(scene, joints, 0, 0.3);
-  OrbitCamera orbit;
-  orbit.frame(Box{{-1, 0, -1}, {1, 2, 1}}, 1);
-  const samples::render::Camera camera = orbit.camera(Box{{-1, 0, -1}, {1, 2, 1}}, 1);
-  const Area area{100, 0, 2000, 2000};
-  for (std::uint32_t index = 0; index < positions.size(); ++index) {
-    const auto place = project(camera, area, positions[index]);
-    ASSERT_TRUE(place);
-    const auto found = jointAt(positions, camera, area, (*place)[0], (*place)[1]);
-    ASSERT_TRUE(found);
-    EXPECT_LT(glm::distance(positions[*found], positions[index]), 0.01f);
-  }
-  EXPECT_FALSE(jointAt(positions, camera, area, 101, 1));
-}
-
-/// What the reference itself has, one vertex of it moved.
-CheckRequest movedBy(const cli::Scene& scene, float distance) {
-  CheckRequest request;
-  request.clip = 0;
-  request.time = 0.3;
-  request.pose = cli::scenePose(scene, 0, 0.3);
-  SkinnedFigure& skinned = request.figures.emplace_back();
-  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
-    const cli::ScenePart& part = scene.parts[index];
+  const cli::ScenePose pose = cli::scenePose(scene, 0, 0.3);
+  std::vector<std::vector<float>> positions;
+  for (const cli::ScenePart& part : scene.parts) {
     const Result<reference::SkinnedMesh> expected =
-        reference::skin(part.mesh->view(), request.pose.pose(part), skinned.method);
+        reference::skin(part.mesh->view(), pose.pose(part), Method::dualQuaternion);
     EXPECT_TRUE(expected);
-    std::vector<float>& positions = skinned.positions.emplace_back();
+    std::vector<float>& own = positions.emplace_back();
     for (const reference::Double3& position : expected->positions) {
-      for (const double value : position) positions.push_back(static_cast<float>(value));
+      for (const double value : position) own.push_back(static_cast<float>(value));
     }
   }
-  skinned.positions[1][3 * 7] += distance;
-  return request;
+  positions[1][3 * 7] += distance;
+  return positionErrors(scene, pose, Method::dualQuaternion, positions);
 }
 
-TEST(ErrorCheckTest, FindsTheVertexThatIsOff) {
-  const cli::Scene scene = figure();
-  const Result<CheckResult> right = checkErrors(scene, movedBy(scene, 0));
-  const Result<CheckResult> wrong = checkErrors(scene, movedBy(scene, 0.5f));
+TEST(PositionErrorsTest, FindsTheVertexThatIsOff) {
+  const Result<PositionErrors> right = errorsOfMoved(0), wrong = errorsOfMoved(0.5f);
   ASSERT_TRUE(right && wrong);
-  EXPECT_LT(right->figures[0].greatest, 2e-7);
-  EXPECT_LT(right->figures[0].greatestPartOfBound, 1);
-  EXPECT_NEAR(wrong->figures[0].greatest, 0.5, 1e-6);
-  EXPECT_GT(wrong->figures[0].greatestPartOfBound, 1000);
-  EXPECT_NEAR(wrong->figures[0].errors[1][7], 0.5, 1e-6);
-  EXPECT_LT(wrong->figures[0].errors[1][8], 2e-7);
-}
-
-TEST(ErrorCheckTest, WorksOnAThreadOfItsOwn) {
-  const cli::Scene scene = figure();
-  ErrorCheck check(scene);
-  check.begin(movedBy(scene, 0.5f));
-  EXPECT_TRUE(check.isBusy());
-  std::optional<Result<CheckResult>> result;
-  while (!(result = check.poll())) std::this_thread::yield();
-  EXPECT_FALSE(check.isBusy());
-  ASSERT_TRUE(*result);
-  EXPECT_NEAR((**result).figures[0].greatest, 0.5, 1e-6);
-  EXPECT_FALSE(check.poll());
-}
-
-TEST(SceneLoaderTest, ForgetsWhatIsNoLongerWanted) {
-  SceneLoader loader;
-  const std::string folder = sampleModels;
-  for (const char* name : {"/figure.glb", "/bar.glb", "/arm.glb"}) loader.load({folder + name});
-  std::optional<LoadedScene> loaded;
-  while (!(loaded = loader.poll())) std::this_thread::yield();
-  EXPECT_TRUE(loaded->request.path.ends_with("arm.glb"));
-  EXPECT_TRUE(loaded->scene);
-  EXPECT_EQ(loader.current(), nullptr);
-}
-
-TEST(SceneLoaderTest, SaysWhatIsWrong) {
-  SceneLoader loader;
-  loader.load({"nowhere.glb"});
-  std::optional<LoadedScene> loaded;
-  while (!(loaded = loader.poll())) std::this_thread::yield();
-  ASSERT_FALSE(loaded->scene);
-  EXPECT_NE(loaded->scene.error().message.find("nowhere.glb"), std::string::npos);
-}
-
-TEST(PaceTest, KeepsUpAndGetsBetterAgain) {
-  Pace pace(false);
-  EXPECT_FALSE(pace.hasTwo());
-  EXPECT_EQ(pace.moving().scale, 1);
-  for (int picture = 0; picture < 20; ++picture) pace.measured(0.5);
-  EXPECT_LT(pace.moving().scale, 1);
-  EXPECT_EQ(pace.still().scale, 1);
-  EXPECT_TRUE(pace.hasTwo());
-  for (int picture = 0; picture < 20; ++picture) pace.measured(0.001);
-  EXPECT_FALSE(pace.hasTwo());
-}
-
-void press(State& state, SDL_Keycode key, Uint16 modifiers = KMOD_NONE) {
-  SDL_KeyboardEvent event{};
-  event.type = SDL_KEYDOWN;
-  event.keysym.sym = key;
-  event.keysym.mod = modifiers;
-  handleKey(event, nullptr, state);
-}
-
-TEST(KeysTest, EscapeClosesWhatIsOpenFirst) {
-  State state;
-  state.error = "broken";
-  press(state, SDLK_F1);
-  EXPECT_TRUE(state.showsHelp);
-  press(state, SDLK_ESCAPE);
-  EXPECT_FALSE(state.showsHelp);
-  EXPECT_FALSE(state.error.empty());
-  press(state, SDLK_ESCAPE);
-  EXPECT_TRUE(state.error.empty());
-  EXPECT_FALSE(state.quits);
-  press(state, SDLK_ESCAPE);
-  EXPECT_TRUE(state.quits);
-}
-
-TEST(KeysTest, LeavesOtherPeoplesKeysAlone) {
-  State state;
-  press(state, SDLK_q, KMOD_LCTRL);
-  EXPECT_FALSE(state.quits);
-  press(state, SDLK_q);
-  EXPECT_TRUE(state.quits);
+  EXPECT_LT(right->greatest, 2e-7);
+  EXPECT_LT(right->greatestPartOfBound, 1);
+  EXPECT_NEAR(wrong->greatest, 0.5, 1e-6);
+  EXPECT_GT(wrong->greatestPartOfBound, 1000);
+  EXPECT_NEAR(wrong->errors[1][7], 0.5, 1e-6);
+  EXPECT_LT(wrong->errors[1][8], 2e-7);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "shader_folder.h"
 #include "test_device.h"
 #include "test_paths.h"
+#include "viewer.h"
 
 namespace dermis::test {
 namespace {
@@ -30,11 +32,12 @@ struct Part {
   std::uint32_t left = 0, top = 0, right = 0, bottom = 0;
 };
 
-// Beside the panel, below the methods' names, above the clip.
-constexpr Part scene{300, 60, width, height - 70};
+// Beside the panel, below the methods' names.
+constexpr Part scene{300, 60, width, height};
 // Without the line between them.
-constexpr Part leftScene{304, 60, 626, height - 70}, rightScene{634, 60, 956, height - 70};
+constexpr Part leftScene{304, 60, 626, height}, rightScene{634, 60, 956, height};
 constexpr Part wholePanel{0, 0, 300, height};
+constexpr Part message{340, 60, 920, 90}, belowMessage{300, 200, width, height};
 
 const std::uint8_t* pixelOf(const Picture& picture, std::uint32_t x, std::uint32_t y) {
   return &picture.pixels[(std::size_t{y} * picture.width + x) * 4];
@@ -124,30 +127,26 @@ class ViewerTest : public ::testing::Test {
   void press(const std::vector<std::string>& keys) { display_->press(keys); }
 
   /// By the viewer's own key, once its picture is at rest.
-  Picture screenshot() {
-    const std::string name = folder_ + "/dermis-viewer-1.png";
+  Picture screenshot(std::uint32_t expectedWidth = width, std::uint32_t expectedHeight = height) {
+    const std::string name = folder_ + "/dermis-viewer.png";
     press({"p"});
-    waitUntil([&] { return std::filesystem::exists(name) || !viewer_->isRunning(); });
+    waitUntil([&] {
+      return std::filesystem::exists(name) || (viewer_ != nullptr && !viewer_->isRunning());
+    });
     std::optional<Picture> picture = readPng(name);
     std::filesystem::remove(name);
     if (!picture) {
       ADD_FAILURE() << "no screenshot; " << errors();
       return Picture{width, height, std::vector<std::uint8_t>(std::size_t{4} * width * height)};
     }
-    EXPECT_EQ(picture->width, static_cast<std::uint32_t>(width));
-    EXPECT_EQ(picture->height, static_cast<std::uint32_t>(height));
+    EXPECT_EQ(picture->width, expectedWidth);
+    EXPECT_EQ(picture->height, expectedHeight);
     return *picture;
   }
 
   Picture screenshotAfter(const std::vector<std::string>& keys) {
     press(keys);
     return screenshot();
-  }
-
-  void typePath(const std::string& path) {
-    press({"o"});
-    display_->type(path);
-    press({"Return"});
   }
 
   std::string errorFile() const { return folder_ + "/errors"; }
@@ -193,10 +192,8 @@ TEST_F(ViewerTest, PlaysAndShowsWhatKeysAskFor) {
   EXPECT_GT(changes(first, screenshotAfter({"h"}), scene), 50'000) << "help";
   EXPECT_LT(changes(first, screenshotAfter({"Escape"}), scene), 50);
 
-  const Picture otherClip = screenshotAfter({"bracketright"});
+  const Picture otherClip = screenshotAfter({"ctrl+q", "Down"});
   EXPECT_GT(changes(first, otherClip, scene), 1000);
-  const Picture withoutPanel = screenshotAfter({"u"});
-  EXPECT_GT(changes(otherClip, withoutPanel, wholePanel), 50'000);
   press({"q"});
   expectGoodEnd();
 }
@@ -230,7 +227,7 @@ TEST_F(ViewerTest, ShowsTwoMethodsSideBySide) {
   const Picture centres = screenshotAfter({"8"});
   EXPECT_GT(changes(different, centres, leftScene), 60);
   EXPECT_LT(changes(different, centres, rightScene), 50);
-  const Picture both = screenshotAfter({"shift+2", "m"});
+  const Picture both = screenshotAfter({"shift+3"});
   EXPECT_GT(changes(centres, both, rightScene), 200);
   press({"q"});
   expectGoodEnd();
@@ -251,39 +248,61 @@ TEST_F(ViewerTest, TheMouseMovesTheCamera) {
   EXPECT_GT(changes(turned, panned, scene), 3000);
   display_->user({"click", "4"});
   EXPECT_GT(changes(panned, screenshot(), scene), 1000) << "the wheel";
-  EXPECT_LT(changes(first, screenshotAfter({"shift+f"}), scene), 50) << "as at first";
+  EXPECT_LT(changes(first, screenshotAfter({"f"}), scene), 50) << "as at first";
   press({"q"});
   expectGoodEnd();
 }
 
-TEST_F(ViewerTest, SaysWhatIsWrongWithAFileAndGoesOn) {
+void drop(const std::string& path) {
+  SDL_Event event{};
+  event.drop.type = SDL_DROPFILE;
+  event.drop.file = SDL_strdup(path.c_str());
+  SDL_PushEvent(&event);
+}
+
+// In this process, because xdotool cannot drop files.
+TEST_F(ViewerTest, OpensFilesThatAreDroppedAndSaysWhatIsWrongWithOne) {
   const std::string broken = folder_ + "/broken.gltf";
   std::ofstream(broken) << R"({"asset": {"version": "2.0"}, "scene": 7})";
-  open({sampleModel("figure"), "--paused"});
-  const Picture before = screenshot();
-  typePath(broken);
-  ASSERT_TRUE(waitUntil([&] { return errors().find("broken.gltf") != std::string::npos; }));
-  EXPECT_EQ(errors().find('o' + broken), std::string::npos) << "the key's own letter";
-  const Picture told = screenshot();
-  EXPECT_GT(changes(before, told, {340, 50, 920, 120}), 5000) << "a message over the picture";
-  EXPECT_LT(changes(before, told, {300, 200, width, 500}), 50) << "of what was there before";
-  EXPECT_LT(changes(before, screenshotAfter({"Escape"}), scene), 50) << "the message is closed";
-
-  typePath(sampleModel("bar"));
-  EXPECT_TRUE(display_->focusWindow("bar.glb").has_value());
-  EXPECT_GT(changes(before, screenshot(), scene), 10'000) << "another model";
-  press({"q"});
-  EXPECT_EQ(viewer_->wait(), 0);
-  EXPECT_EQ(errors().find("Validation"), std::string::npos) << errors();
+  setenv("DISPLAY", display_->name().c_str(), 1);
+  setenv("SDL_VIDEODRIVER", "x11", 1);
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_);
+  {
+    const auto window = viewer::Window::open(width, height, testDeviceOptions());
+    ASSERT_TRUE(window) << window.error().message;
+    viewer::ViewerOptions options;
+    options.isPaused = true;
+    viewer::Viewer program(options, **window);
+    std::jthread user([&] {
+      drop(sampleModel("figure"));
+      EXPECT_TRUE(display_->focusWindow("figure.glb").has_value());
+      const Picture shown = screenshot();
+      drop(broken);
+      const Picture told = screenshot();
+      EXPECT_GT(changes(shown, told, message), 5000) << "a message over the picture";
+      EXPECT_LT(changes(shown, told, belowMessage), 50) << "of what was there before";
+      EXPECT_LT(changes(shown, screenshotAfter({"Escape"}), scene), 50) << "the message is closed";
+      drop(sampleModel("bar"));
+      EXPECT_TRUE(display_->focusWindow("bar.glb").has_value());
+      EXPECT_GT(changes(shown, screenshot(), scene), 10'000) << "another model";
+      press({"q"});
+    });
+    const Result<samples::ExitStatus> status = program.run();
+    user.join();
+    ASSERT_TRUE(status);
+    EXPECT_EQ(*status, samples::ExitStatus::done);
+    for (const std::string& text : (*window)->device().device->takeValidationMessages())
+      ADD_FAILURE() << text;
+  }
+  std::filesystem::current_path(before);
 }
 
 #ifdef DERMIS_RUNTIME_COMPILER
 TEST_F(ViewerTest, ReloadsKernelsThatAreEdited) {
   const ShaderFolder shaders("viewer");
-  open({sampleModel("figure"), "--paused", "--time", "0.3", "--shaders", shaders.path().string(),
-        "--shader-cache", folder_ + "/cache"});
+  open({sampleModel("figure"), "--paused", "--time", "0.3", "--shaders", shaders.path().string()});
   const Picture first = screenshot();
-  EXPECT_FALSE(std::filesystem::is_empty(folder_ + "/cache"));
   shaders.edit("skin.comp", ShaderFolder::storedPosition, ShaderFolder::movedPosition);
   ASSERT_TRUE(waitUntil([&] { return changes(first, screenshot(), scene) > 3000; }));
   const Picture moved = screenshot();
@@ -294,8 +313,8 @@ TEST_F(ViewerTest, ReloadsKernelsThatAreEdited) {
   ASSERT_TRUE(
       waitUntil([&] { return errors().find("skin.comp:" + line + ": ") != std::string::npos; }));
   const Picture told = screenshot();
-  EXPECT_GT(changes(moved, told, {340, 50, 920, 120}), 5000) << "a message over the picture";
-  EXPECT_LT(changes(moved, told, {300, 200, width, 500}), 50) << "of the old kernels";
+  EXPECT_GT(changes(moved, told, message), 5000) << "a message over the picture";
+  EXPECT_LT(changes(moved, told, belowMessage), 50) << "of the old kernels";
 
   shaders.edit("skin.comp", ShaderFolder::brokenPosition, ShaderFolder::storedPosition);
   EXPECT_TRUE(waitUntil([&] { return changes(first, screenshot(), scene) < 50; }));
@@ -305,29 +324,13 @@ TEST_F(ViewerTest, ReloadsKernelsThatAreEdited) {
 }
 #endif
 
-// However many keys come within one frame.
-TEST_F(ViewerTest, ReadsHastyFingers) {
-  open({sampleModel("figure"), "--paused"});
-  const Picture before = screenshot();
-  const auto hurry = [&](const char* end) {
-    display_->user({"key", "--delay", "0", "o", "a", "slash", "B", end, "j"});
-  };
-  hurry("Escape");
-  const Picture joints = screenshot();
-  EXPECT_GT(changes(before, joints, scene), 1000) << "j is no letter of the path any more";
-  hurry("Return");
-  EXPECT_TRUE(waitUntil([&] { return errors().find("'a/B'") != std::string::npos; })) << errors();
-  EXPECT_LT(changes(before, screenshotAfter({"Escape"}), scene), 50) << "j once more";
-  press({"q"});
-  EXPECT_EQ(viewer_->wait(), 0);
-}
-
 TEST_F(ViewerTest, BeginsWithoutAModel) {
-  open({"--empty"});
+  open({});
   const Picture empty = screenshot();
-  EXPECT_GT(changes(empty, {400, 200, 860, 400}, empty, {401, 200, 861, 400}), 100)
+  EXPECT_GT(changes(empty, {500, 280, 760, 320}, empty, {501, 280, 761, 320}), 100)
       << "an invitation";
-  EXPECT_EQ(changes(empty, screenshotAfter({"c", "j", "e", "space", "Tab", "1"}), scene), 0);
+  EXPECT_EQ(changes(empty, screenshotAfter({"c", "j", "e", "space", "Tab", "1", "Down"}), scene),
+            0);
   press({"q"});
   expectGoodEnd();
 }
@@ -351,14 +354,8 @@ TEST_F(ViewerTest, FollowsTheSizeOfItsWindow) {
   open({sampleModel("figure"), "--paused"});
   screenshot();
   display_->user({"windowsize", "--sync", window_, "700", "500"});
-  const std::string name = folder_ + "/dermis-viewer-1.png";
-  press({"p"});
-  EXPECT_TRUE(waitUntil([&] { return std::filesystem::exists(name); }));
-  const std::optional<Picture> picture = readPng(name);
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->width, 700u);
-  EXPECT_EQ(picture->height, 500u);
-  EXPECT_GT(changes(*picture, {400, 60, 600, 430}, *picture, {401, 60, 601, 430}), 500);
+  const Picture picture = screenshot(700, 500);
+  EXPECT_GT(changes(picture, {400, 60, 600, 430}, picture, {401, 60, 601, 430}), 500);
   press({"q"});
   expectGoodEnd();
 }
@@ -383,8 +380,6 @@ TEST_F(ViewerTest, SaysWhatIsWrongWithItsOptions) {
       {{"--bogus"}, "there is no option --bogus"},
       {{"--screenshot", "x.jpg"}, "--screenshot must end in .png; it is 'x.jpg'"},
       {{model, "--screenshot", model}, "--screenshot " + model + " would overwrite"},
-      {{"--empty", "--animation", "walk"}, "--empty excludes --animation"},
-      {{sampleModel("bar"), "--animation", "zzz"}, "--animation: there is no clip 'zzz'"},
   };
   for (const auto& [arguments, sentence] : wrong) {
     start(arguments);

@@ -2,297 +2,398 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
 #include <imgui.h>
-#include <imgui_stdlib.h>
+#include <glm/vec4.hpp>
 
 #include "dermis/text.h"
-#include "gui_style.h"
-#include "keys.h"
-#include "legend.h"
-#include "overlay.h"
+#include "kit/render/heat_colors.h"
 
 namespace dermis::viewer {
 namespace {
 
-constexpr float panelWidth = 300;
+constexpr double stepSeconds = 1.0 / 30;
+constexpr float sceneLeft = panelWidth;
+constexpr ImU32 white = IM_COL32(232, 236, 240, 255), dark = IM_COL32(23, 28, 34, 220),
+                orange = IM_COL32(255, 180, 84, 255), red = IM_COL32(255, 160, 148, 255);
+constexpr ImGuiWindowFlags fixedWindow = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                                         ImGuiWindowFlags_NoNav |
+                                         ImGuiWindowFlags_NoFocusOnAppearing;
 
-/// Draws text literally; `Text` would treat it as a format string.
-void say(const std::string& text) {
-  ImGui::TextUnformatted(text.c_str());
+// -- Keys ---------------------------------------------------------------------------------------
+
+struct KeyHelp {
+  const char* keys;
+  const char* what;
+};
+constexpr std::array keyHelp{
+    KeyHelp{"Space", "play or pause"},
+    KeyHelp{"←  →", "one step back or forward; with Shift, ten"},
+    KeyHelp{"↑  ↓", "previous clip, next clip"},
+    KeyHelp{"1 – 9", "choose the method; with Shift, of the second view"},
+    KeyHelp{"C", "show two methods side by side"},
+    KeyHelp{"J", "show or hide the joints"},
+    KeyHelp{"W", "show the weights of a joint as colors"},
+    KeyHelp{"Tab", "next joint; with Shift, the previous one"},
+    KeyHelp{"E", "show the error against the reference as colors"},
+    KeyHelp{"Left drag", "orbit"},
+    KeyHelp{"Right drag", "pan; also the middle button"},
+    KeyHelp{"Wheel", "zoom in or out"},
+    KeyHelp{"F", "frame the whole model from the initial direction"},
+    KeyHelp{"P", "write a screenshot, dermis-viewer.png in the current folder"},
+    KeyHelp{"H", "show or hide this help"},
+    KeyHelp{"Esc", "close the help or a message"},
+    KeyHelp{"Q", "quit"},
+};
+
+void toggle(State& state, Coloring coloring) {
+  Coloring& now = state.shot.coloring;
+  now = now == coloring ? Coloring::surface : coloring;
 }
 
-void sayDim(const std::string& text) {
-  ImGui::PushStyleColor(ImGuiCol_Text, color(dimColor));
+void chooseClip(std::uint32_t clip, State& state) {
+  state.shot.clip = clip;
+  state.shot.time = 0;
+}
+
+/// The rest pose counts as a clip before the first.
+void stepClip(int step, const SceneView& view, State& state) {
+  const int count = static_cast<int>(view.scene().model->clips.size()) + 1;
+  const int now = state.shot.clip == gltf::none ? 0 : static_cast<int>(state.shot.clip) + 1;
+  const int next = (now + step + count) % count;
+  chooseClip(next == 0 ? gltf::none : static_cast<std::uint32_t>(next - 1), state);
+}
+
+void stepJoint(bool isBack, const SceneView& view, State& state) {
+  const std::size_t count = view.joints().size();
+  if (count == 0) return;
+  state.shot.joint =
+      static_cast<std::uint32_t>((state.shot.joint + (isBack ? count - 1 : 1)) % count);
+  if (state.shot.coloring != Coloring::weights) state.showsJoints = true;
+}
+
+/// Keys that may be held down.
+void handleStep(SDL_Keycode key, bool isShifted, const SceneView& view, State& state) {
+  const double seconds = isShifted ? 10 * stepSeconds : stepSeconds;
+  if (key == SDLK_LEFT || key == SDLK_RIGHT) {
+    const double time = state.shot.time + (key == SDLK_LEFT ? -seconds : seconds);
+    state.shot.time = repeatedTime(time, view.duration(state.shot.clip));
+    state.isPlaying = false;
+  }
+  if (key == SDLK_UP) stepClip(-1, view, state);
+  if (key == SDLK_DOWN) stepClip(1, view, state);
+  if (key == SDLK_TAB) stepJoint(isShifted, view, state);
+}
+
+void handlePress(SDL_Keycode key, State& state) {
+  if (key == SDLK_SPACE) state.isPlaying = !state.isPlaying;
+  if (key == SDLK_c) state.shot.views = 3 - state.shot.views;
+  if (key == SDLK_j) state.showsJoints = !state.showsJoints;
+  if (key == SDLK_w) toggle(state, Coloring::weights);
+  if (key == SDLK_e) toggle(state, Coloring::error);
+  if (key == SDLK_f) state.shot.camera = {};
+  if (key == SDLK_p) state.takesScreenshot = true;
+  if (key == SDLK_h) state.showsHelp = !state.showsHelp;
+  if (key == SDLK_q) state.quits = true;
+  if (key != SDLK_ESCAPE) return;
+  state.showsHelp = false;
+  state.error.clear();
+}
+
+// -- Panel --------------------------------------------------------------------------------------
+
+/// Draws text literally; `Text` would treat it as a format string.
+void say(const std::string& text, ImU32 color = white) {
+  ImGui::PushStyleColor(ImGuiCol_Text, color);
   ImGui::PushTextWrapPos(0);
-  say(text);
+  ImGui::TextUnformatted(text.c_str());
   ImGui::PopTextWrapPos();
   ImGui::PopStyleColor();
 }
 
 void heading(const char* text) {
   ImGui::Dummy({0, 6});
-  ImGui::PushStyleColor(ImGuiCol_Text, color(accentColor));
-  ImGui::TextUnformatted(text);
-  ImGui::PopStyleColor();
+  ImGui::TextDisabled("%s", text);
   ImGui::Separator();
-  ImGui::Dummy({0, 1});
 }
 
 /// A line with a name on the left and a value on the right.
 void fact(const char* name, const std::string& value) {
-  ImGui::TextDisabled("%s", name);
+  ImGui::TextUnformatted(name);
   const float width = ImGui::CalcTextSize(value.c_str()).x;
-  ImGui::SameLine(std::max(ImGui::GetWindowContentRegionMax().x - width, 110.0f));
-  say(value);
+  ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - width);
+  ImGui::TextUnformatted(value.c_str());
 }
 
-std::string milliseconds(double seconds) {
-  return seconds > 0 ? fmt::format("{:.2f} ms", seconds * 1e3) : "–";
-}
-
-void drawFile(const Facts& facts, State& state) {
+void drawFile(const SceneView* view, const State& state) {
   heading("File");
-  if (facts.view != nullptr) {
-    say(facts.file);
-    sayDim(fmt::format("{} vertices, {} joints", facts.view->vertexCount(),
-                       facts.view->joints().size()));
-  } else {
-    sayDim("none");
-  }
-  if (!facts.notes.empty()) {
-    sayDim(facts.notes.size() == 1 ? "1 note" : fmt::format("{} notes", facts.notes.size()));
-    if (ImGui::IsItemHovered()) {
-      ImGui::BeginTooltip();
-      ImGui::PushTextWrapPos(420);
-      for (const std::string& note : facts.notes) say(note);
-      ImGui::PopTextWrapPos();
-      ImGui::EndTooltip();
-    }
-  }
-  const float button = ImGui::CalcTextSize("Open").x + 2 * ImGui::GetStyle().FramePadding.x;
-  ImGui::SetNextItemWidth(-button - ImGui::GetStyle().ItemSpacing.x);
-  if (state.editsPath) {
-    ImGui::SetWindowFocus();  // ImGui 1.90 needs this: it sets the focus within the focused window
-    ImGui::SetKeyboardFocusHere();
-  }
-  state.editsPath = false;
-  const bool isEntered = ImGui::InputTextWithHint(
-      "##path", "path of a .gltf or .glb", &state.path,
-      ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
-  ImGui::SameLine();
-  const bool isPressed = ImGui::Button("Open");
-  if ((isEntered || isPressed) && !state.path.empty()) state.opens = state.path;
+  if (view == nullptr) return say("none");
+  say(state.file);
+  say(fmt::format("{} vertices, {} joints", view->vertexCount(), view->joints().size()));
 }
 
-void drawMethodChoice(const char* label, Method& method) {
+/// A list to choose from. Returns the index of a new choice.
+template <typename Name>
+std::optional<std::uint32_t> choose(const char* label, std::uint32_t count, std::uint32_t chosen,
+                                    const Name& name) {
+  std::optional<std::uint32_t> choice;
   ImGui::SetNextItemWidth(-1);
-  if (!ImGui::BeginCombo(label, std::string(methodName(method)).c_str(),
-                         ImGuiComboFlags_HeightLargest))
-    return;
-  for (const Method choice : allMethods) {
-    if (ImGui::Selectable(std::string(methodName(choice)).c_str(), choice == method))
-      method = choice;
+  if (!ImGui::BeginCombo(label, name(chosen).c_str(), ImGuiComboFlags_HeightLarge)) return choice;
+  for (std::uint32_t index = 0; index < count; ++index) {
+    ImGui::PushID(static_cast<int>(index));
+    if (ImGui::Selectable(name(index).c_str(), index == chosen)) choice = index;
+    ImGui::PopID();
   }
   ImGui::EndCombo();
+  return choice;
+}
+
+void drawClip(const SceneView& view, State& state) {
+  heading("Clip");
+  const std::vector<gltf::Clip>& clips = view.scene().model->clips;
+  const auto count = static_cast<std::uint32_t>(clips.size());
+  const auto name = [&](std::uint32_t index) {
+    if (index >= count) return std::string("rest pose");
+    const std::string& own = clips[index].name;
+    return own.empty() ? fmt::format("clip {}", index) : shortName(own);
+  };
+  if (const auto clip = choose("##clip", count + 1, std::min(state.shot.clip, count), name); clip)
+    chooseClip(*clip < count ? *clip : gltf::none, state);
+  if (ImGui::Button(state.isPlaying ? "Pause" : "Play", {58, 0}))
+    state.isPlaying = !state.isPlaying;
+  ImGui::SameLine();
+  auto time = static_cast<float>(state.shot.time);
+  const auto end = static_cast<float>(view.duration(state.shot.clip));
+  ImGui::SetNextItemWidth(-1);
+  const std::string format = fmt::format("%.2f / {:.2f} s", end);
+  if (!ImGui::SliderFloat("##time", &time, 0, end, format.c_str(), ImGuiSliderFlags_NoInput))
+    return;
+  state.isPlaying = false;
+  state.shot.time = std::min(static_cast<double>(time), view.duration(state.shot.clip));
 }
 
 void drawMethods(State& state) {
   heading("Method");
-  drawMethodChoice("##method", state.methods[0]);
-  ImGui::Checkbox("side by side with", &state.isSideBySide);
-  if (state.isSideBySide) drawMethodChoice("##beside", state.methods[1]);
-}
-
-void drawJointChoice(const SceneView& view, State& state) {
-  ImGui::SetNextItemWidth(-1);
-  const std::string chosen = view.joints()[state.joint].name;
-  if (!ImGui::BeginCombo("##joint", chosen.c_str(), ImGuiComboFlags_HeightLarge)) return;
-  for (std::uint32_t index = 0; index < view.joints().size(); ++index) {
-    ImGui::PushID(static_cast<int>(index));
-    if (ImGui::Selectable(view.joints()[index].name.c_str(), index == state.joint))
-      state.joint = index;
-    ImGui::PopID();
+  const auto name = [](std::uint32_t index) { return std::string(methodName(allMethods[index])); };
+  for (std::uint32_t view = 0; view < 2; ++view) {
+    if (view == 1) {
+      bool isSideBySide = state.shot.views == 2;
+      ImGui::Checkbox("side by side with", &isSideBySide);
+      state.shot.views = isSideBySide ? 2 : 1;
+      if (!isSideBySide) return;
+    }
+    Method& method = state.shot.methods[view];
+    const auto chosen =
+        choose(view == 0 ? "##method" : "##beside", static_cast<std::uint32_t>(allMethods.size()),
+               static_cast<std::uint32_t>(method), name);
+    if (chosen) method = allMethods[*chosen];
   }
-  ImGui::EndCombo();
 }
 
-void drawLooks(const Facts& facts, State& state) {
-  const SceneView& view = *facts.view;
-  heading("Show");
-  ImGui::Checkbox("joints", &state.showsJoints);
-  bool showsWeights = state.coloring == Coloring::weights;
-  if (ImGui::Checkbox("weights of a joint", &showsWeights))
-    state.coloring = showsWeights ? Coloring::weights : Coloring::surface;
-  bool showsError = state.coloring == Coloring::error;
-  if (ImGui::Checkbox("error against the reference", &showsError))
-    state.coloring = showsError ? Coloring::error : Coloring::surface;
-  if ((state.showsJoints || showsWeights) && !view.joints().empty()) drawJointChoice(view, state);
-  if (state.coloring == Coloring::surface) return;
-  ImGui::Dummy({0, 4});
+/// The colors of a heat map, and the value of the last.
+void drawColors(const std::string& greatest) {
   const ImVec2 corner = ImGui::GetCursorScreenPos();
-  const float width = ImGui::GetContentRegionAvail().x;
-  drawLegend(facts, state, *ImGui::GetWindowDrawList(), corner.x, corner.y, width);
-  ImGui::Dummy({width, legendHeight(facts, state)});
-}
-
-void drawTimes(const Facts& facts) {
-  heading("Times");
-  const SceneTimes& times = facts.view->times();
-  fact("GPU, skinning", milliseconds(times.skinningSeconds));
-  fact("GPU, drawing", milliseconds(times.drawingSeconds));
-  fact("CPU, plan + record", milliseconds(times.planSeconds));
-  fact("frames per second",
-       facts.framesPerSecond > 0 ? fmt::format("{:.1f}", facts.framesPerSecond) : "–");
-  if (facts.scale < 1) sayDim(fmt::format("while moving: {:.0f} % resolution", 100 * facts.scale));
-  ImGui::Dummy({0, 2});
-  sayDim(facts.device);
-}
-
-void drawKernels(const Facts& facts) {
-  heading("Kernels");
-  sayDim(facts.kernels);
-  sayDim(facts.kernelsSummary);
-  if (facts.kernelsUpdate.empty()) return;
-  ImGui::PushStyleColor(ImGuiCol_Text, color(facts.kernelsAreBroken ? errorColor : textColor));
-  ImGui::PushTextWrapPos(0);
-  say(facts.kernelsUpdate);
-  ImGui::PopTextWrapPos();
-  ImGui::PopStyleColor();
-}
-
-void drawPanel(const Facts& facts, float height, State& state) {
-  ImGui::SetNextWindowPos({0, 0});
-  ImGui::SetNextWindowSize({panelWidth, height});
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
-  ImGui::Begin("panel", nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
-                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
-                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
-  ImGui::PopStyleVar();
-  drawFile(facts, state);
-  if (facts.view != nullptr) {
-    drawMethods(state);
-    drawLooks(facts, state);
-    drawTimes(facts);
+  const float width = ImGui::GetContentRegionAvail().x, height = 12;
+  constexpr int steps = 32;
+  for (int step = 0; step < steps; ++step) {
+    const auto rgb = samples::render::heatColor((static_cast<float>(step) + 0.5f) / steps);
+    const float left = corner.x + width * static_cast<float>(step) / steps;
+    ImGui::GetWindowDrawList()->AddRectFilled({left, corner.y},
+                                              {left + width / steps, corner.y + height},
+                                              IM_COL32(rgb[0], rgb[1], rgb[2], 255));
   }
-  if (!facts.kernels.empty()) drawKernels(facts);
-  const float line = ImGui::GetTextLineHeight();
-  ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), height - line - 16));
+  ImGui::Dummy({width, height});
+  fact("0", greatest);
+}
+
+void drawErrors(const SceneView& view, const Shot& shot) {
+  double greatest = 0;
+  for (const PositionErrors& error : view.errors()) greatest = std::max(greatest, error.greatest);
+  drawColors(fmt::format("{:.2g}", greatest));  // Only the author of the model knows the unit.
+  for (std::size_t index = 0; index < view.errors().size(); ++index) {
+    const PositionErrors& error = view.errors()[index];
+    say(std::string(methodName(shot.methods[index])));
+    fact("   largest", fmt::format("{:.2g}", error.greatest));
+    fact("   of its bound", fmt::format("{:.0f} %", 100 * error.greatestPartOfBound));
+  }
+}
+
+void drawLooks(const SceneView& view, State& state) {
+  heading("Show");
+  Shot& shot = state.shot;
+  ImGui::Checkbox("joints", &state.showsJoints);
+  bool showsWeights = shot.coloring == Coloring::weights;
+  if (ImGui::Checkbox("weights of a joint", &showsWeights)) toggle(state, Coloring::weights);
+  bool showsErrors = shot.coloring == Coloring::error;
+  if (ImGui::Checkbox("error against the reference", &showsErrors)) toggle(state, Coloring::error);
+  const std::vector<Joint>& joints = view.joints();
+  if ((state.showsJoints || shot.coloring == Coloring::weights) && shot.joint < joints.size()) {
+    const auto chosen = choose("##joint", static_cast<std::uint32_t>(joints.size()), shot.joint,
+                               [&](std::uint32_t index) { return joints[index].name; });
+    shot.joint = chosen.value_or(shot.joint);
+  }
+  if (shot.coloring == Coloring::weights) drawColors("1");
+  if (shot.coloring == Coloring::error) drawErrors(view, shot);
+}
+
+void drawTimes(const SceneView& view, const State& state) {
+  heading("Times");
+  const auto milliseconds = [](double seconds) {
+    return seconds > 0 ? fmt::format("{:.2f} ms", seconds * 1e3) : "–";
+  };
+  fact("GPU, skinning", milliseconds(view.times().skinningSeconds));
+  fact("GPU, drawing", milliseconds(view.times().drawingSeconds));
+  fact("CPU, plan + record", milliseconds(view.times().planSeconds));
+  ImGui::TextDisabled("%s", state.device.c_str());
+}
+
+void drawPanel(const SceneView* view, State& state) {
+  const float height = ImGui::GetIO().DisplaySize.y;
+  ImGui::SetNextWindowPos({0, 0});
+  ImGui::SetNextWindowSize({sceneLeft, height});
+  ImGui::Begin(
+      "panel", nullptr,
+      (fixedWindow & ~ImGuiWindowFlags_NoScrollbar) | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  drawFile(view, state);
+  if (view != nullptr) {
+    drawClip(*view, state);
+    drawMethods(state);
+    drawLooks(*view, state);
+    drawTimes(*view, state);
+  }
+  ImGui::Dummy({0, 6});
+  say(state.notice, orange);
   ImGui::TextDisabled("H shows the keys");
   ImGui::End();
 }
 
-std::string clipName(const SceneView& view, std::uint32_t clip) {
-  if (clip == gltf::none) return "rest pose";
-  const std::string& name = view.scene().model->clips[clip].name;
-  return name.empty() ? fmt::format("clip {}", clip) : shortName(name);
+// -- Overlay ------------------------------------------------------------------------------------
+
+/// A line of text on a dark background.
+void drawLabel(const std::string& text, float centerX, float y, ImU32 color = white) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+  const float left = centerX - size.x / 2;
+  list.AddRectFilled({left - 10, y}, {left + size.x + 10, y + size.y + 10}, dark, 6);
+  list.AddText({left, y + 5}, color, text.c_str());
 }
 
-void drawClipChoice(const SceneView& view, State& state) {
-  const auto count = static_cast<std::uint32_t>(view.scene().model->clips.size());
-  ImGui::SetNextItemWidth(150);
-  if (!ImGui::BeginCombo("##clip", clipName(view, state.clip).c_str())) return;
-  for (std::uint32_t index = 0; index <= count; ++index) {
-    const std::uint32_t clip = index == count ? gltf::none : index;
-    ImGui::PushID(static_cast<int>(index));
-    if (ImGui::Selectable(clipName(view, clip).c_str(), clip == state.clip))
-      chooseClip(view, clip, state);
-    ImGui::PopID();
-  }
-  ImGui::EndCombo();
-}
-
-void drawScrubber(State& state) {
-  const std::string text =
-      fmt::format("{:.2f} / {:.2f} s", state.playback.time(), state.playback.duration());
-  const float width = ImGui::CalcTextSize("00.00 / 00.00 s").x;
-  const float gap = ImGui::GetStyle().ItemSpacing.x;
-  auto time = static_cast<float>(state.playback.time());
-  const auto end = static_cast<float>(state.playback.duration());
-  ImGui::SetNextItemWidth(std::max(ImGui::GetContentRegionAvail().x - width - gap, 60.0f));
-  if (ImGui::SliderFloat("##time", &time, 0, end > 0 ? end : 1, "")) {
-    state.playback.setPlaying(false);
-    state.playback.seek(static_cast<double>(time));
-  }
-  ImGui::SameLine();
-  say(text);
-}
-
-/// Below the picture: the play button, the time in the clip, and the choice of a clip.
-void drawTransport(const SceneView& view, const Area& picture, State& state) {
-  const float height = 48, margin = 16;
-  ImGui::SetNextWindowPos({picture.x + margin, picture.y + picture.height - height - margin});
-  ImGui::SetNextWindowSize({std::max(picture.width - 2 * margin, 320.0f), height});
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(10, 9));
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, color(panelColor, 0.86f));
-  ImGui::Begin("transport", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav);
-  ImGui::PopStyleColor();
-  ImGui::PopStyleVar();
-  if (ImGui::Button(state.playback.isPlaying() ? "Pause" : "Play", {58, 0}))
-    state.playback.setPlaying(!state.playback.isPlaying());
-  ImGui::SameLine();
-  drawClipChoice(view, state);
-  ImGui::SameLine();
-  drawScrubber(state);
-  ImGui::End();
-}
-
-void drawHelp(const Area& picture, State& state) {
-  ImGui::SetNextWindowPos({picture.x + picture.width / 2, picture.y + picture.height / 2},
-                          ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::Begin("help", &state.showsHelp,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                   ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoNav);
-  for (const KeyHelp& line : keyHelp()) {
-    if (line.keys == nullptr) {
-      ImGui::Dummy({0, 3});
-      ImGui::Separator();
-      ImGui::Dummy({0, 3});
-      continue;
+void drawJoints(const SceneView& view, const Shot& shot, const ImVec2& corner, const ImVec2& size) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  list.PushClipRect(corner, {corner.x + size.x, corner.y + size.y}, true);
+  const samples::render::Camera camera = shot.camera.camera({}, size.x / size.y);
+  std::vector<std::optional<ImVec2>> places;  // nothing: behind the eye
+  for (const glm::vec3& position :
+       jointPositions(view.scene(), view.joints(), shot.clip, shot.time)) {
+    const glm::vec4 clip = camera.viewProjection * glm::vec4(position, 1);
+    std::optional<ImVec2>& place = places.emplace_back();
+    if (clip.w > 0) {
+      place.emplace(corner.x + (clip.x / clip.w * 0.5f + 0.5f) * size.x,
+                    corner.y + (clip.y / clip.w * 0.5f + 0.5f) * size.y);
     }
-    ImGui::PushStyleColor(ImGuiCol_Text, color(accentColor));
-    ImGui::TextUnformatted(line.keys);
-    ImGui::PopStyleColor();
-    ImGui::SameLine(130);
+  }
+  for (std::uint32_t index = 0; index < places.size(); ++index) {
+    const std::uint32_t parent = view.joints()[index].parent;
+    if (!places[index]) continue;
+    const ImU32 color = index == shot.joint ? orange : white;
+    if (parent != gltf::none && places[parent]) {
+      list.AddLine(*places[parent], *places[index], dark, 4);
+      list.AddLine(*places[parent], *places[index], white, 1.5f);
+    }
+    list.AddCircleFilled(*places[index], 5, dark);
+    list.AddCircleFilled(*places[index], 3.5f, color);
+  }
+  if (shot.joint < places.size() && places[shot.joint]) {
+    const ImVec2 place = *places[shot.joint];
+    const std::string& name = view.joints()[shot.joint].name;
+    drawLabel(name, place.x + 20 + ImGui::CalcTextSize(name.c_str()).x / 2, place.y - 12, orange);
+  }
+  list.PopClipRect();
+}
+
+void drawOverlay(const SceneView* view, const State& state) {
+  const ImVec2 window = ImGui::GetIO().DisplaySize;
+  const float width = window.x - sceneLeft, center = sceneLeft + width / 2;
+  if (!state.loading.empty()) {
+    drawLabel(state.loading, center, window.y / 2, orange);
+  } else if (view == nullptr) {
+    drawLabel("drop a .gltf or .glb file here", center, window.y / 2);
+  }
+  if (view == nullptr) return;
+  const auto views = static_cast<float>(state.shot.views);
+  for (std::uint32_t index = 0; index < state.shot.views; ++index) {
+    const float left = sceneLeft + width * static_cast<float>(index) / views;
+    if (state.showsJoints) drawJoints(*view, state.shot, {left, 0}, {width / views, window.y});
+    if (index > 0) ImGui::GetBackgroundDrawList()->AddLine({left, 0}, {left, window.y}, dark, 2);
+    drawLabel(std::string(methodName(state.shot.methods[index])), left + width / views / 2, 16);
+  }
+}
+
+void drawHelp() {
+  const ImVec2 window = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({(sceneLeft + window.x) / 2, window.y / 2}, ImGuiCond_Always,
+                          {0.5f, 0.5f});
+  ImGui::Begin("help", nullptr, fixedWindow | ImGuiWindowFlags_AlwaysAutoResize);
+  for (const KeyHelp& line : keyHelp) {
+    ImGui::TextDisabled("%s", line.keys);
+    ImGui::SameLine(110);
     ImGui::TextUnformatted(line.what);
   }
   ImGui::End();
 }
 
-/// The last error, until it is closed or something else succeeds.
-void drawError(const Area& picture, State& state) {
-  const float width = std::min(picture.width - 32, 620.0f);
-  ImGui::SetNextWindowPos({picture.x + picture.width / 2, picture.y + 56}, ImGuiCond_Always,
-                          {0.5f, 0});
-  ImGui::SetNextWindowSize({width, 0});
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, color(0x3A1713, 0.96f));
-  ImGui::Begin("error", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav |
-                   ImGuiWindowFlags_NoFocusOnAppearing);
-  ImGui::PopStyleColor();
-  ImGui::PushTextWrapPos(0);
-  ImGui::PushStyleColor(ImGuiCol_Text, color(errorColor));
-  say(state.error);
-  ImGui::PopStyleColor();
-  ImGui::PopTextWrapPos();
+void drawError(State& state) {
+  const ImVec2 window = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({(sceneLeft + window.x) / 2, 56}, ImGuiCond_Always, {0.5f, 0});
+  ImGui::SetNextWindowSize({std::min(window.x - sceneLeft - 32, 620.0f), 0});
+  ImGui::Begin("error", nullptr, fixedWindow);
+  say(state.error, red);
   if (ImGui::SmallButton("Close")) state.error.clear();
   ImGui::End();
 }
 
 }  // namespace
 
-Area pictureArea(const State& state, float windowWidth, float windowHeight) {
-  const float left = state.showsPanel && windowWidth > panelWidth + 64 ? panelWidth : 0;
-  return {left, 0, windowWidth - left, windowHeight};
+double repeatedTime(double time, double duration) {
+  if (!(duration > 0)) return 0;
+  if (time >= 0 && time <= duration) return time;
+  const double rest = std::fmod(time, duration);
+  return rest < 0 ? rest + duration : rest;
 }
 
-void drawInterface(const Facts& facts, const Area& picture, State& state) {
-  drawOverlay(facts, picture, state);
-  if (state.showsPanel) drawPanel(facts, picture.height, state);
-  if (facts.view != nullptr) drawTransport(*facts.view, picture, state);
-  if (!state.error.empty()) drawError(picture, state);
-  if (state.showsHelp) drawHelp(picture, state);
+void handleKey(const SDL_KeyboardEvent& key, const SceneView* view, State& state) {
+  // Combinations with Ctrl, Alt and the like belong to the window manager.
+  if ((key.keysym.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI)) != 0) return;
+  const bool isShifted = (key.keysym.mod & KMOD_SHIFT) != 0;
+  if (view != nullptr) handleStep(key.keysym.sym, isShifted, *view, state);
+  if (key.repeat != 0) return;
+  handlePress(key.keysym.sym, state);
+  // The position of the key, because Shift changes the characters of digits.
+  const int digit = key.keysym.scancode - SDL_SCANCODE_1;
+  if (digit < 0 || digit >= static_cast<int>(allMethods.size())) return;
+  state.shot.methods[isShifted] = allMethods[static_cast<std::size_t>(digit)];
+  if (isShifted) state.shot.views = 2;
+}
+
+void styleInterface() {
+  ImGui::StyleColorsDark();
+  ImGuiStyle& style = ImGui::GetStyle();
+  style.WindowRounding = style.FrameRounding = style.GrabRounding = 4;
+  style.WindowBorderSize = 0;
+  style.WindowPadding = {14, 10};
+  style.FramePadding = {8, 4};
+  style.Colors[ImGuiCol_WindowBg] = ImGui::ColorConvertU32ToFloat4(dark | IM_COL32_A_MASK);
+}
+
+void drawInterface(const SceneView* view, State& state) {
+  drawOverlay(view, state);
+  drawPanel(view, state);
+  if (!state.error.empty()) drawError(state);
+  if (state.showsHelp) drawHelp();
 }
 
 }  // namespace dermis::viewer

@@ -17,16 +17,6 @@ constexpr float fieldOfView = 28;     // degrees, vertical
 constexpr float turnPerHeight = 220;  // degrees
 constexpr float zoomPerStep = 0.88f;
 
-const render::CameraOptions& framing() {
-  static const render::CameraOptions options = [] {
-    render::CameraOptions made;
-    made.fieldOfView = static_cast<double>(fieldOfView);
-    made.margin = 0.1;
-    return made;
-  }();
-  return options;
-}
-
 glm::vec3 rightOf(const glm::vec3& back) {
   return glm::normalize(glm::cross(glm::vec3(0, 1, 0), back));
 }
@@ -34,37 +24,33 @@ glm::vec3 rightOf(const glm::vec3& back) {
 }  // namespace
 
 void OrbitCamera::frame(const Box& box, float aspect) {
-  render::CameraOptions options = framing();
+  render::CameraOptions options;
+  options.fieldOfView = static_cast<double>(fieldOfView);
+  options.margin = 0.1;
   options.azimuth = static_cast<double>(azimuth_);
   options.elevation = static_cast<double>(elevation_);
   const render::Camera fitted = render::frameBoxes({&box, 1}, box, options, aspect);
   target_ = fitted.eye - fitted.towardsEye * fitted.distance;
   distance_ = fitted.distance;
   radius_ = render::radiusOf(box);
-  isFramed_ = true;
-}
-
-void OrbitCamera::resetDirection() {
-  azimuth_ = OrbitCamera().azimuth_;
-  elevation_ = OrbitCamera().elevation_;
 }
 
 void OrbitCamera::orbit(float right, float down) {
   azimuth_ = std::remainder(azimuth_ - right * turnPerHeight, 360.0f);
   elevation_ = std::clamp(elevation_ + down * turnPerHeight, -89.0f, 89.0f);
-  isFramed_ = false;
+  isMoved_ = true;
 }
 
 void OrbitCamera::pan(float right, float down) {
   const float height = 2 * distance_ * std::tan(glm::radians(fieldOfView) / 2);
   const glm::vec3 back = towardsEye(), across = rightOf(back);
   target_ += (glm::cross(back, across) * down - across * right) * height;
-  isFramed_ = false;
+  isMoved_ = true;
 }
 
 void OrbitCamera::zoom(float steps) {
   distance_ = std::clamp(distance_ * std::pow(zoomPerStep, steps), radius_ * 0.05f, radius_ * 60);
-  isFramed_ = false;
+  isMoved_ = true;
 }
 
 glm::vec3 OrbitCamera::towardsEye() const {
@@ -73,13 +59,14 @@ glm::vec3 OrbitCamera::towardsEye() const {
           std::cos(azimuth) * std::cos(elevation)};
 }
 
-render::Camera OrbitCamera::camera(const Box& scene, float aspect) const {
+render::Camera OrbitCamera::camera(const Box& box, float aspect) const {
   render::Camera camera;
   camera.towardsEye = towardsEye();
   camera.right = rightOf(camera.towardsEye);
   camera.distance = distance_;
   camera.eye = target_ + camera.towardsEye * distance_;
-  const float reach = glm::length(render::centerOf(scene) - target_) + render::radiusOf(scene);
+  const float reach =
+      glm::length(render::centerOf(box) - target_) + groundRadius * render::radiusOf(box);
   const float farthest = distance_ + reach;
   const float nearest = std::max(distance_ - 2 * radius_, std::min(distance_, radius_) * 0.02f);
   const glm::mat4 view = glm::lookAtRH(camera.eye, target_, glm::vec3(0, 1, 0));

@@ -8,14 +8,14 @@
 
 namespace dermis::viewer {
 
+inline constexpr float groundRadius = 5;  ///< in radii of the box around a model
+
 class OrbitCamera {
  public:
   /// Shows all of a box, from the current direction. `aspect`: width divided by height.
   void frame(const Box& box, float aspect);
-  /// Whether the camera has not been moved since `frame`.
-  bool isFramed() const { return isFramed_; }
-  /// Resets the direction to 28° beside the front, slightly from above.
-  void resetDirection();
+  /// Whether the camera has been moved since it was made. If not, it frames what is shown.
+  bool isMoved() const { return isMoved_; }
 
   /// Turns the camera. Arguments are fractions of the picture's height, to the right and down.
   void orbit(float right, float down);
@@ -23,8 +23,8 @@ class OrbitCamera {
   /// Zooms by steps of the wheel; positive: nearer.
   void zoom(float steps);
 
-  /// `scene` is the box around everything visible, including the ground.
-  samples::render::Camera camera(const Box& scene, float aspect) const;
+  /// A camera that sees a box and the ground around it.
+  samples::render::Camera camera(const Box& box, float aspect) const;
 
   /// Equal cameras take the same picture.
   bool operator==(const OrbitCamera&) const = default;
@@ -36,7 +36,7 @@ class OrbitCamera {
   float azimuth_ = 28, elevation_ = 10;  ///< degrees, as in `CameraOptions`
   float distance_ = 4;
   float radius_ = 1;  ///< of the framed box
-  bool isFramed_ = false;
+  bool isMoved_ = false;
 };
 
 }  // namespace dermis::viewer

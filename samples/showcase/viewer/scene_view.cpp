@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
+
+#include "commands.h"
+#include "dermis/text.h"
+#include "dermis/verify/reference.h"
 
 namespace dermis::viewer {
 namespace {
@@ -12,28 +17,13 @@ namespace render = samples::render;
 
 constexpr std::uint32_t posesOfAClip = 16;
 
-double durationOf(const gltf::Model& model, std::uint32_t clip) {
-  return clip < model.clips.size() ? model.clips[clip].duration : 0;
+/// Software Vulkan is too slow for the defaults of the renderer.
+bool isSoftware(const samples::Device& device) {
+  return device.info().type == "CPU";
 }
 
-/// Software Vulkan is too slow for more.
-render::FilterTaps tapsOf(const samples::Device& device) {
-  if (device.info().type != "CPU") return {};
-  return {10, 16, 2};
-}
-
-VkCommandBuffer begin(samples::Device& device) {
-  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
-  VkCommandBufferBeginInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  device.functions().BeginCommandBuffer(commandBuffer, &info);
-  return commandBuffer;
-}
-
-VkRect2D areaOf(std::uint32_t view, std::uint32_t views, std::uint32_t width,
-                std::uint32_t height) {
-  const std::uint32_t left = width * view / views, right = width * (view + 1) / views;
-  return {{static_cast<std::int32_t>(left), 0}, {right - left, height}};
+bool haveSamePose(const Shot& a, const Shot& b) {
+  return a.clip == b.clip && a.time == b.time && a.methods == b.methods && a.views == b.views;
 }
 
 void write(const samples::MappedBuffer& buffer, std::span<const float> values, float factor) {
@@ -44,14 +34,95 @@ void write(const samples::MappedBuffer& buffer, std::span<const float> values, f
   }
 }
 
+double distance(const reference::Double3& expected, const float* actual) {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double difference = expected[axis] - static_cast<double>(actual[axis]);
+    sum += difference * difference;
+  }
+  return std::sqrt(sum);
+}
+
 }  // namespace
 
-bool Shot::operator==(const Shot& other) const {
-  return clip == other.clip && time == other.time && methods[0] == other.methods[0] &&
-         views == other.views && (views == 1 || methods[1] == other.methods[1]) &&
-         camera == other.camera && coloring == other.coloring &&
-         (coloring != Coloring::weights || joint == other.joint) &&
-         pixels.width == other.pixels.width && pixels.height == other.pixels.height;
+std::vector<Joint> jointsOf(const cli::Scene& scene) {
+  const gltf::Model& model = *scene.model;
+  std::vector<std::uint32_t> place(model.nodes.size(), gltf::none);
+  std::vector<Joint> joints;
+  for (const cli::ScenePart& part : scene.parts) {
+    for (const std::uint32_t node : model.skins[part.source.skin].joints) {
+      if (place[node] != gltf::none) continue;
+      place[node] = static_cast<std::uint32_t>(joints.size());
+      std::string name = shortName(model.nodes[node].name);
+      if (name.empty()) name = "node " + std::to_string(node);
+      joints.push_back({std::move(name), node, gltf::none});
+    }
+  }
+  for (Joint& joint : joints) {
+    std::uint32_t above = model.nodes[joint.node].parent;
+    while (above != gltf::none && place[above] == gltf::none) above = model.nodes[above].parent;
+    if (above != gltf::none) joint.parent = place[above];
+  }
+  return joints;
+}
+
+std::vector<glm::vec3> jointPositions(const cli::Scene& scene, const std::vector<Joint>& joints,
+                                      std::uint32_t clip, double time) {
+  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
+  std::vector<glm::vec3> positions;
+  for (const Joint& joint : joints) {
+    const gltf::GlobalTransform& global = globals[joint.node];
+    positions.emplace_back(global[0][3], global[1][3], global[2][3]);
+  }
+  return positions;
+}
+
+Result<std::vector<float>> jointWeights(const cli::Scene& scene, const cli::ScenePart& part,
+                                        std::uint32_t node) {
+  std::vector<float> weights(part.primitive->vertexCount, 0.0f);
+  if (part.mesh == nullptr) return weights;
+  // Linear blending moves a vertex by the weight of the joint if that joint alone is moved by 1.
+  const std::vector<std::uint32_t>& joints = scene.model->skins[part.source.skin].joints;
+  std::vector<JointMatrix> pose(joints.size());
+  const auto rest = reference::skin(part.mesh->view(), pose, Method::linear);
+  if (!rest) return rest.error();
+  for (std::size_t index = 0; index < joints.size(); ++index) {
+    if (joints[index] == node) pose[index].m[0][3] = 1;
+  }
+  const auto moved = reference::skin(part.mesh->view(), pose, Method::linear);
+  if (!moved) return moved.error();
+  for (std::size_t vertex = 0; vertex < weights.size(); ++vertex) {
+    weights[vertex] = static_cast<float>(moved->positions[vertex][0] - rest->positions[vertex][0]);
+  }
+  return weights;
+}
+
+Result<PositionErrors> positionErrors(const cli::Scene& scene, const cli::ScenePose& pose,
+                                      Method method,
+                                      std::span<const std::vector<float>> positions) {
+  PositionErrors result;
+  for (std::size_t index = 0; index < scene.parts.size(); ++index) {
+    const cli::ScenePart& part = scene.parts[index];
+    std::vector<float>& errors = result.errors.emplace_back(part.primitive->vertexCount, 0.0f);
+    if (part.mesh == nullptr || positions[index].empty()) continue;
+    const Result<reference::SkinnedMesh> expected =
+        reference::skin(part.mesh->view(), pose.pose(part), method, pose.morphs[index]);
+    if (!expected) return expected.error();
+    for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
+      const reference::VertexBounds& bounds = expected->bounds[vertex];
+      if (bounds.onlyFinite || bounds.undefined) continue;
+      // A value that is not finite counts as the largest possible error.
+      constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
+      const double apart = distance(expected->positions[vertex], &positions[index][3 * vertex]);
+      const double error = apart < most ? apart : most;
+      errors[vertex] = static_cast<float>(error);
+      result.greatest = std::max(result.greatest, error);
+      if (bounds.position > 0) {
+        result.greatestPartOfBound = std::max(result.greatestPartOfBound, error / bounds.position);
+      }
+    }
+  }
+  return result;
 }
 
 Result<std::unique_ptr<SceneView>> SceneView::create(samples::OpenDevice& device,
@@ -63,9 +134,11 @@ Result<std::unique_ptr<SceneView>> SceneView::create(samples::OpenDevice& device
 }
 
 Result<void> SceneView::prepare() {
+  samples::Device& device = *device_->device;
   joints_ = jointsOf(scene_);
-  Result<render::Renderer> renderer =
-      render::Renderer::create(*device_->device, tapsOf(*device_->device));
+  const render::FilterTaps taps =
+      isSoftware(device) ? render::FilterTaps{10, 16, 2} : render::FilterTaps{};
+  Result<render::Renderer> renderer = render::Renderer::create(device, taps);
   if (!renderer) return renderer.error();
   renderer_.emplace(std::move(*renderer));
   Result<cli::DrawnScene> drawn =
@@ -73,25 +146,20 @@ Result<void> SceneView::prepare() {
   if (!drawn) return drawn.error();
   drawn_.emplace(std::move(*drawn));
   for (samples::Timestamps* timestamps : {&skinning_, &drawing_}) {
-    Result<samples::Timestamps> made = samples::Timestamps::create(*device_->device);
+    Result<samples::Timestamps> made = samples::Timestamps::create(device);
     if (!made) return made.error();
     *timestamps = std::move(*made);
   }
-  return makeValues();
-}
-
-Result<void> SceneView::makeValues() {
-  for (const cli::ScenePart& part : scene_.parts) {
-    PartValues& values = values_.emplace_back();
-    for (samples::MappedBuffer& buffer : values.figures) {
+  for (FigureBuffers& figure : values_) {
+    for (const cli::ScenePart& part : scene_.parts) {
+      const std::uint64_t count = std::max<std::uint64_t>(part.primitive->vertexCount, 1);
       Result<samples::MappedBuffer> made = samples::MappedBuffer::create(
-          *device_->device, std::max<std::uint64_t>(part.primitive->vertexCount, 1) * sizeof(float),
-          VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
+          device, count * sizeof(float), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
       if (!made) return made.error();
-      buffer = std::move(*made);
+      std::ranges::fill(made->bytes(), std::byte{0});
+      figure.push_back(std::move(*made));
     }
   }
-  clearValues();
   return {};
 }
 
@@ -101,26 +169,20 @@ std::uint64_t SceneView::vertexCount() const {
   return count;
 }
 
-Result<void> SceneView::skin(std::uint32_t clip, double time) {
-  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
-  if (Result<void> posed = drawn_->setPose(0, cli::scenePose(scene_, clip, time)); !posed)
-    return posed;
-  posed_.reset();
-  const VkCommandBuffer commandBuffer = begin(*device_->device);
-  Result<void> done = drawn_->recordSkinning(commandBuffer);
-  device_->device->functions().EndCommandBuffer(commandBuffer);
-  if (done) done = device_->device->submitAndWait(commandBuffer);
-  device_->device->freeCommandBuffer(commandBuffer);
-  return done;
+double SceneView::duration(std::uint32_t clip) const {
+  return clip < scene_.model->clips.size() ? scene_.model->clips[clip].duration : 0;
 }
 
 Result<Box> SceneView::extent(std::uint32_t clip) {
   if (const auto found = extents_.find(clip); found != extents_.end()) return found->second;
-  const double duration = durationOf(*scene_.model, clip);
-  const std::uint32_t count = duration > 0 ? posesOfAClip : 1;
+  const std::uint32_t count = duration(clip) > 0 ? posesOfAClip : 1;
   std::vector<Box> boxes;
   for (std::uint32_t index = 0; index < count; ++index) {
-    if (Result<void> done = skin(clip, duration * index / count); !done) return done.error();
+    Shot shot;
+    shot.clip = clip;
+    shot.time = duration(clip) * index / count;
+    shot.methods = methods_;
+    if (Result<void> done = skin(shot); !done) return done.error();
     if (Result<void> begun = drawn_->beginFrame(); !begun) return begun.error();
     const Result<std::optional<Box>> box = drawn_->bounds(0);
     if (!box) return box.error();
@@ -131,245 +193,173 @@ Result<Box> SceneView::extent(std::uint32_t clip) {
   return extents_[clip] = render::unite(boxes);
 }
 
-Box SceneView::withGround(const Box& extent) {
-  Box ground = extent;
-  for (const std::size_t axis : {0u, 2u}) {
-    ground.min[axis] -= 4 * render::radiusOf(extent);
-    ground.max[axis] += 4 * render::radiusOf(extent);
+Result<void> SceneView::recordSkinning(VkCommandBuffer commandBuffer, const Shot& shot) {
+  const bool isNew = !posed_ || !haveSamePose(*posed_, shot);
+  posed_.reset();
+  for (std::uint32_t figure = 0; figure < shot.views; ++figure) {
+    if (std::exchange(methods_[figure], shot.methods[figure]) == shot.methods[figure]) continue;
+    if (Result<void> set = drawn_->setMethod(figure, shot.methods[figure]); !set) return set;
   }
-  return ground;
+  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun;
+  if (isNew) {
+    pose_ = cli::scenePose(scene_, shot.clip, shot.time);
+    for (std::uint32_t figure = 0; figure < shot.views; ++figure) {
+      if (Result<void> posed = drawn_->setPose(figure, pose_); !posed) return posed;
+    }
+    skinning_.recordBegin(commandBuffer);
+  }
+  if (Result<void> done = drawn_->recordSkinning(commandBuffer); !done) return done;
+  posed_ = shot;
+  if (!isNew) return {};
+  skinning_.recordEnd(commandBuffer);
+  hasSkinned_ = true;
+  const vulkan::FrameStatistics last = drawn_->statistics().lastFrame;
+  times_.planSeconds = last.planSeconds + last.recordSeconds;
+  return {};
 }
 
-void SceneView::clearValues() {
-  weightsOf_.reset();
-  for (const PartValues& part : values_) {
-    for (const samples::MappedBuffer& buffer : part.figures)
-      std::ranges::fill(buffer.bytes(), std::byte{0});
-  }
+/// Skins in a submission of its own.
+Result<void> SceneView::skin(const Shot& shot) {
+  const VkCommandBuffer commandBuffer = beginCommands(*device_->device);
+  return endCommands(*device_->device, commandBuffer, recordSkinning(commandBuffer, shot));
 }
 
-void SceneView::writeWeights(std::uint32_t joint) {
-  if (weightsOf_ == joint || joint >= joints_.size()) return;
-  for (std::size_t index = 0; index < values_.size(); ++index) {
-    const std::vector<float> weights =
+/// Writes what is shown as colors, unless it is there.
+Result<void> SceneView::writeValues(const Shot& shot) {
+  const bool isWritten = valued_ && valued_->coloring == shot.coloring &&
+                         (shot.coloring == Coloring::weights ? valued_->joint == shot.joint
+                                                             : haveSamePose(*valued_, shot));
+  if (shot.coloring == Coloring::surface || isWritten) return {};
+  valued_.reset();
+  const Result<void> done =
+      shot.coloring == Coloring::weights ? writeWeights(shot.joint) : writeErrors(shot);
+  if (done) valued_ = shot;
+  return done;
+}
+
+Result<void> SceneView::writeWeights(std::uint32_t joint) {
+  for (std::size_t index = 0; index < scene_.parts.size() && joint < joints_.size(); ++index) {
+    const Result<std::vector<float>> weights =
         jointWeights(scene_, scene_.parts[index], joints_[joint].node);
-    for (const samples::MappedBuffer& buffer : values_[index].figures) write(buffer, weights, 1);
+    if (!weights) return weights.error();
+    for (const FigureBuffers& figure : values_) write(figure[index], *weights, 1);
   }
-  weightsOf_ = joint;
-}
-
-void SceneView::setErrors(CheckResult result) {
-  errors_ = std::move(result);
-  writeErrors();
+  return {};
 }
 
 /// The color scale ends at the greatest error of all parts shown.
-void SceneView::writeErrors() {
-  clearValues();
-  if (!errors_) return;
-  const CheckResult& result = *errors_;
+Result<void> SceneView::writeErrors(const Shot& shot) {
+  if (Result<void> done = skin(shot); !done) return done;
+  errors_.clear();
   double greatest = 0;
-  for (const FigureError& figure : result.figures) greatest = std::max(greatest, figure.greatest);
+  for (std::uint32_t figure = 0; figure < shot.views; ++figure) {
+    const Result<std::vector<std::vector<float>>> positions = readPositions(figure);
+    if (!positions) return positions.error();
+    Result<PositionErrors> errors = positionErrors(scene_, pose_, shot.methods[figure], *positions);
+    if (!errors) return errors.error();
+    greatest = std::max(greatest, errors->greatest);
+    errors_.push_back(std::move(*errors));
+  }
   const float factor = greatest > 0 ? static_cast<float>(1 / greatest) : 0;
-  for (std::size_t figure = 0; figure < result.figures.size() && figure < 2; ++figure) {
-    for (std::size_t part = 0; part < values_.size(); ++part)
-      write(values_[part].figures[figure], result.figures[figure].errors[part], factor);
+  for (std::size_t figure = 0; figure < errors_.size(); ++figure) {
+    for (std::size_t part = 0; part < scene_.parts.size(); ++part)
+      write(values_[figure][part], errors_[figure].errors[part], factor);
   }
-}
-
-/// Returns whether there is something to skin.
-Result<bool> SceneView::pose(const Shot& shot) {
-  bool isNew = !posed_ || posed_->clip != shot.clip || posed_->time != shot.time ||
-               posed_->views < shot.views;
-  for (std::uint32_t figure = 0; figure < shot.views; ++figure) {
-    if (methods_[figure] == shot.methods[figure]) continue;
-    if (!cli::allows(scene_, shot.methods[figure])) {
-      return Error{ErrorCode::invalidArgument,
-                   std::string(methodName(shot.methods[figure])) +
-                       " needs centers of rotation, but this model has none"};
-    }
-    if (Result<void> set = drawn_->setMethod(figure, shot.methods[figure]); !set)
-      return set.error();
-    methods_[figure] = shot.methods[figure];
-    isNew = true;
-  }
-  if (Result<void> begun = drawn_->beginFrame(); !begun) return begun.error();
-  if (!isNew) return false;
-  pose_ = cli::scenePose(scene_, shot.clip, shot.time);
-  for (std::uint32_t figure = 0; figure < shot.views; ++figure) {
-    if (Result<void> posed = drawn_->setPose(figure, pose_); !posed) return posed.error();
-  }
-  return true;
-}
-
-Result<void> SceneView::recordSkinning(VkCommandBuffer commandBuffer, const Shot& shot) {
-  const Result<bool> isNew = pose(shot);
-  posed_.reset();
-  if (!isNew) return isNew.error();
-  hasSkinned_ = *isNew;
-  if (hasSkinned_) skinning_.recordBegin(commandBuffer);
-  if (Result<void> done = drawn_->recordSkinning(commandBuffer); !done) return done;
-  if (hasSkinned_) skinning_.recordEnd(commandBuffer);
   return {};
 }
 
-Result<render::RenderFrame*> SceneView::frameOf(const Shot& shot, const Quality& quality,
-                                                bool isStill) {
-  const auto scaled = [&](std::uint32_t side) {
-    return std::max(
-        static_cast<std::uint32_t>(std::lround(static_cast<float>(side) * quality.scale)), 1u);
-  };
-  PictureSlot& slot = slots_[isStill ? 1 : 0];
-  render::FrameDescription description;
-  description.width = scaled(shot.pixels.width);
-  description.height = scaled(shot.pixels.height);
-  description.views = 2;
-  description.shadows = quality.shadows;
-  shown_ = &slot;
-  if (slot.frame && slot.width == description.width && slot.height == description.height &&
-      slot.skyLights == quality.shadows.skyLights) {
-    return &*slot.frame;
+/// What the device has skinned, for `positionErrors`.
+Result<std::vector<std::vector<float>>> SceneView::readPositions(std::uint32_t figure) {
+  samples::Device& device = *device_->device;
+  std::vector<render::Draw> draws;
+  if (Result<void> done = drawn_->addDraws(figure, JointMatrix(), draws); !done)
+    return done.error();
+  std::vector<std::vector<float>> positions(draws.size());
+  for (std::size_t part = 0; part < draws.size(); ++part) {
+    const std::uint32_t count = scene_.parts[part].primitive->vertexCount;
+    if (scene_.parts[part].mesh == nullptr || count == 0) continue;
+    const render::VertexStream& stream = draws[part].positions;
+    const VkBufferCopy copy{stream.offset, 0,
+                            std::uint64_t{stream.stride} * (count - 1) + 3 * sizeof(float)};
+    Result<samples::MappedBuffer> copied =
+        samples::MappedBuffer::create(device, copy.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
+    if (!copied) return copied.error();
+    const VkCommandBuffer commandBuffer = beginCommands(device);
+    device.functions().CmdCopyBuffer(commandBuffer, stream.buffer, copied->handle(), 1, &copy);
+    recordHostBarrier(device, commandBuffer);
+    if (Result<void> done = endCommands(device, commandBuffer, {}); !done) return done.error();
+    positions[part].resize(std::size_t{3} * count);
+    for (std::size_t vertex = 0; vertex < count; ++vertex) {
+      std::memcpy(&positions[part][3 * vertex], &copied->bytes()[stream.stride * vertex],
+                  3 * sizeof(float));
+    }
   }
-  slot.frame.reset();
+  return positions;
+}
+
+Result<void> SceneView::fitFrame(std::uint32_t width, std::uint32_t height) {
+  if (frame_ && frame_->target().width() == width && frame_->target().height() == height) return {};
+  render::FrameDescription description;
+  description.width = width;
+  description.height = height;
+  description.views = 2;
+  if (isSoftware(*device_->device)) description.shadows = {1024, 256, 6};
+  frame_.reset();
   Result<render::RenderFrame> made = renderer_->createFrame(description);
   if (!made) return made.error();
-  slot.frame.emplace(std::move(*made));
-  slot.width = description.width;
-  slot.height = description.height;
-  slot.skyLights = quality.shadows.skyLights;
-  return &*slot.frame;
+  frame_.emplace(std::move(*made));
+  return {};
 }
 
-Result<void> SceneView::record(VkCommandBuffer commandBuffer, const Shot& shot,
-                               const Quality& quality, bool isStill, bool copiesPositions) {
+Result<const render::RenderTarget*> SceneView::record(VkCommandBuffer commandBuffer,
+                                                      const Shot& shot) {
   const Result<Box> extent = this->extent(shot.clip);
   if (!extent) return extent.error();
-  const Result<render::RenderFrame*> frame = frameOf(shot, quality, isStill);
-  if (!frame) return frame.error();
-  if (shot.coloring == Coloring::weights) writeWeights(shot.joint);
-  if (shot.coloring == Coloring::error && weightsOf_) writeErrors();
-  if (Result<void> done = recordSkinning(commandBuffer, shot); !done) return done;
+  if (Result<void> done = fitFrame(shot.width, shot.height); !done) return done.error();
+  if (Result<void> done = writeValues(shot); !done) return done.error();
+  if (Result<void> done = recordSkinning(commandBuffer, shot); !done) return done.error();
   drawing_.recordBegin(commandBuffer);
-  if (Result<void> done = draw(commandBuffer, shot, **frame, *extent); !done) return done;
+  if (Result<void> done = draw(commandBuffer, shot, *extent); !done) return done.error();
   drawing_.recordEnd(commandBuffer);
-  if (copiesPositions) {
-    if (Result<void> done = copyPositions(commandBuffer, shot.views); !done) return done;
-  }
-  posed_ = shot;
-  return {};
+  return picture();
 }
 
-Result<void> SceneView::addDraws(std::uint32_t figure, Coloring coloring,
-                                 std::vector<render::Draw>& draws) const {
-  if (Result<void> done = drawn_->addDraws(figure, JointMatrix(), draws); !done) return done;
-  if (coloring == Coloring::surface) return {};
-  for (std::size_t part = 0; part < draws.size(); ++part) {
-    draws[part].values = {values_[part].figures[figure].handle(), 0, sizeof(float),
-                          VertexFormat::none};
-  }
-  return {};
-}
-
-Result<void> SceneView::draw(VkCommandBuffer commandBuffer, const Shot& shot,
-                             render::RenderFrame& frame, const Box& extent) {
-  const std::uint32_t width = frame.target().width(), height = frame.target().height();
+Result<void> SceneView::draw(VkCommandBuffer commandBuffer, const Shot& shot, const Box& extent) {
   const float radius = render::radiusOf(extent);
   std::array<std::vector<render::Draw>, 2> draws;
   std::vector<render::View> views(shot.views);
   for (std::uint32_t index = 0; index < shot.views; ++index) {
-    if (Result<void> done = addDraws(index, shot.coloring, draws[index]); !done) return done;
+    if (Result<void> done = drawn_->addDraws(index, JointMatrix(), draws[index]); !done)
+      return done;
+    for (std::size_t part = 0; shot.coloring != Coloring::surface && part < draws[index].size();
+         ++part) {
+      draws[index][part].values.buffer = values_[index][part].handle();
+      draws[index][part].values.stride = sizeof(float);
+    }
     render::View& view = views[index];
-    view.area = areaOf(index, shot.views, width, height);
+    const std::uint32_t left = shot.width * index / shot.views;
+    const std::uint32_t right = shot.width * (index + 1) / shot.views;
+    view.area = {{static_cast<std::int32_t>(left), 0}, {right - left, shot.height}};
     view.draws = draws[index];
     view.casters = extent;
     view.groundHeight = extent.min[1] - 1e-3f * radius;
-    view.groundRadius = 5 * radius;
-    view.camera =
-        shot.camera.camera(withGround(extent), static_cast<float>(view.area.extent.width) /
-                                                   static_cast<float>(view.area.extent.height));
+    view.groundRadius = groundRadius * radius;
+    view.camera = shot.camera.camera(
+        extent, static_cast<float>(right - left) / static_cast<float>(shot.height));
   }
-  return renderer_->record(commandBuffer, frame, views);
-}
-
-Result<void> SceneView::copyPositions(VkCommandBuffer commandBuffer, std::uint32_t figures) {
-  std::uint64_t size = 0;
-  std::vector<std::pair<VkBuffer, VkBufferCopy>> copies;
-  for (std::uint32_t figure = 0; figure < 2; ++figure) {
-    copied_[figure].clear();
-    if (figure >= figures) continue;
-    std::vector<render::Draw> draws;
-    if (Result<void> done = addDraws(figure, Coloring::surface, draws); !done) return done;
-    for (std::size_t part = 0; part < draws.size(); ++part) {
-      CopiedPart& copied = copied_[figure].emplace_back();
-      const std::uint32_t count = scene_.parts[part].primitive->vertexCount;
-      if (scene_.parts[part].mesh == nullptr || count == 0) continue;
-      const render::VertexStream& stream = draws[part].positions;
-      copied = {size, stream.stride};
-      const VkDeviceSize bytes = std::uint64_t{stream.stride} * (count - 1) + 3 * sizeof(float);
-      copies.push_back({stream.buffer, {stream.offset, size, bytes}});
-      size += bytes;
-    }
-  }
-  if (positions_.bytes().size() < size) {
-    Result<samples::MappedBuffer> made = samples::MappedBuffer::create(
-        *device_->device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
-    if (!made) return made.error();
-    positions_ = std::move(*made);
-  }
-  const samples::VulkanFunctions& functions = device_->device->functions();
-  for (const auto& [buffer, copy] : copies)
-    functions.CmdCopyBuffer(commandBuffer, buffer, positions_.handle(), 1, &copy);
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
-  functions.CmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                               VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
-  return {};
-}
-
-CheckRequest SceneView::skinned() const {
-  CheckRequest request;
-  request.clip = posed_->clip;
-  request.time = posed_->time;
-  request.pose = pose_;
-  for (std::uint32_t figure = 0; figure < posed_->views; ++figure) {
-    SkinnedFigure& skinned = request.figures.emplace_back();
-    skinned.method = methods_[figure];
-    for (std::size_t part = 0; part < copied_[figure].size(); ++part) {
-      std::vector<float>& positions = skinned.positions.emplace_back();
-      const CopiedPart& copied = copied_[figure][part];
-      if (copied.stride == 0) continue;
-      const std::uint32_t count = scene_.parts[part].primitive->vertexCount;
-      positions.resize(std::size_t{3} * count);
-      for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
-        std::memcpy(&positions[std::size_t{3} * vertex],
-                    &positions_.bytes()[copied.offset + std::uint64_t{copied.stride} * vertex],
-                    3 * sizeof(float));
-      }
-    }
-  }
-  return request;
+  return renderer_->record(commandBuffer, *frame_, views);
 }
 
 Result<void> SceneView::finish() {
-  if (drawing_.has()) {
-    const Result<double> seconds = drawing_.seconds();
-    if (!seconds) return seconds.error();
-    times_.drawingSeconds = *seconds;
-  }
-  if (!hasSkinned_) return {};
-  const vulkan::FrameStatistics& last = drawn_->statistics().lastFrame;
-  times_.planSeconds = last.planSeconds + last.recordSeconds;
-  if (!skinning_.has()) return {};
-  const Result<double> seconds = skinning_.seconds();
-  if (!seconds) return seconds.error();
-  times_.skinningSeconds = *seconds;
+  if (!drawing_.has()) return {};
+  const Result<double> drawing = drawing_.seconds();
+  if (!drawing) return drawing.error();
+  times_.drawingSeconds = *drawing;
+  if (!std::exchange(hasSkinned_, false)) return {};
+  const Result<double> skinning = skinning_.seconds();
+  if (!skinning) return skinning.error();
+  times_.skinningSeconds = *skinning;
   return {};
-}
-
-const render::RenderTarget* SceneView::picture() const {
-  return shown_ != nullptr && shown_->frame ? &shown_->frame->target() : nullptr;
 }
 
 }  // namespace dermis::viewer

@@ -6,39 +6,64 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include "drawn_scene.h"
-#include "error_check.h"
 #include "kit/render/renderer.h"
 #include "kit/timestamps.h"
 #include "orbit_camera.h"
-#include "skeleton.h"
 
 namespace dermis::viewer {
 
 enum class Coloring : std::uint8_t { surface, weights, error };
 
-/// Everything that determines a picture. Equal shots look the same, as long as errors do not
-/// change.
+/// Everything that determines a picture: equal shots look the same.
 struct Shot {
-  std::uint32_t clip = gltf::none;
-  double time = 0;
+  std::uint32_t clip = gltf::none;  ///< `none`: the rest pose
+  double time = 0;                  ///< seconds
   std::array<Method, 2> methods{Method::dualQuaternion, Method::linear};
   std::uint32_t views = 1;  ///< 2: side by side
   OrbitCamera camera;
   Coloring coloring = Coloring::surface;
-  std::uint32_t joint = 0;  ///< joint whose weights are shown, in `SceneView::joints`
-  VkExtent2D pixels{};      ///< of both views together
+  std::uint32_t joint = 0;              ///< the chosen one, in `SceneView::joints`
+  std::uint32_t width = 0, height = 0;  ///< pixels of both views together
 
-  bool operator==(const Shot& other) const;
+  bool operator==(const Shot&) const = default;
 };
 
-/// The quality of drawing, which determines how long it takes.
-struct Quality {
-  float scale = 1;  ///< drawn pixels per shown pixel, along each side
-  samples::render::ShadowSizes shadows;
+struct Joint {
+  std::string name;
+  std::uint32_t node = gltf::none;
+  std::uint32_t parent = gltf::none;  ///< nearest ancestor that is a joint, in the same list
 };
+
+/// The joints of all skins that are drawn, without duplicates.
+std::vector<Joint> jointsOf(const cli::Scene& scene);
+
+/// The positions of joints in a pose, in the scene's space.
+std::vector<glm::vec3> jointPositions(const cli::Scene& scene, const std::vector<Joint>& joints,
+                                      std::uint32_t clip, double time);
+
+/// The share of a joint in the weights of each vertex of a part, 0 to 1. Fails like
+/// `reference::skin`.
+Result<std::vector<float>> jointWeights(const cli::Scene& scene, const cli::ScenePart& part,
+                                        std::uint32_t node);
+
+/// The distances of skinned vertices from the reference in double precision.
+struct PositionErrors {
+  std::vector<std::vector<float>> errors;  ///< by part and vertex, in the model's unit
+  double greatest = 0;                     ///< of all of them
+  double greatestPartOfBound = 0;          ///< the largest error ÷ its bound
+};
+
+/// `positions` are what the device skinned: by part, 3 per vertex; empty for a part without joints.
+/// Fails like `reference::skin`.
+Result<PositionErrors> positionErrors(const cli::Scene& scene, const cli::ScenePose& pose,
+                                      Method method, std::span<const std::vector<float>> positions);
 
 /// The cost of the last picture; 0 if unknown.
 struct SceneTimes {
@@ -56,65 +81,47 @@ class SceneView {
 
   const cli::Scene& scene() const { return scene_; }
   const std::vector<Joint>& joints() const { return joints_; }
-  /// Problems of materials that could not be loaded.
-  const std::vector<std::string>& notes() const { return drawn_->notes(); }
   std::uint64_t vertexCount() const;
+  /// The duration of a clip in seconds; 0 for the rest pose.
+  double duration(std::uint32_t clip) const;
 
-  /// `extent` returns the box around some poses of a clip. Its first call for a clip skins them,
-  /// and waits. `withGround` extends that box by the ground.
+  /// The box around some poses of a clip. The first call for a clip skins them, and waits. Fails
+  /// with `invalidData` if there is nothing to draw.
   Result<Box> extent(std::uint32_t clip);
-  static Box withGround(const Box& extent);
-
-  /// Shows these errors from now on, if errors are shown.
-  void setErrors(CheckResult result);
 
   /// The next picture skins everything, because the kernels have changed.
-  void skinAgain() { posed_.reset(); }
+  void skinAgain() { posed_.reset(), valued_.reset(); }
 
-  /// Skins what has changed and draws it, in one command buffer. With `copiesPositions`, `skinned`
-  /// returns the positions afterwards. Fails with `invalidArgument` if the scene does not allow a
-  /// method.
-  Result<void> record(VkCommandBuffer commandBuffer, const Shot& shot, const Quality& quality,
-                      bool isStill, bool copiesPositions);
+  /// Skins what has changed, draws it, and returns the picture. The scene must allow the methods.
+  /// To show errors, it first skins in a submission of its own, and waits for the reference, which
+  /// is slow.
+  Result<const samples::render::RenderTarget*> record(VkCommandBuffer commandBuffer,
+                                                      const Shot& shot);
   /// Call this when the GPU is done with the picture.
   Result<void> finish();
 
   /// The last picture; null before the first.
-  const samples::render::RenderTarget* picture() const;
+  const samples::render::RenderTarget* picture() const {
+    return frame_ ? &frame_->target() : nullptr;
+  }
   const SceneTimes& times() const { return times_; }
-  CheckRequest skinned() const;
+  /// By view, if the last picture shows errors.
+  std::span<const PositionErrors> errors() const { return errors_; }
 
  private:
-  struct PartValues {
-    std::array<samples::MappedBuffer, 2> figures;
-  };
-  struct PictureSlot {
-    std::uint32_t width = 0, height = 0, skyLights = 0;
-    std::optional<samples::render::RenderFrame> frame;
-  };
-  /// The place of a part's positions in the copied data.
-  struct CopiedPart {
-    std::uint64_t offset = 0;
-    std::uint32_t stride = 0;  ///< 0: the part is fixed
-  };
+  using FigureBuffers = std::vector<samples::MappedBuffer>;  ///< by part
 
   SceneView(samples::OpenDevice& device, cli::Scene scene)
       : device_(&device), scene_(std::move(scene)) {}
   Result<void> prepare();
-  Result<void> skin(std::uint32_t clip, double time);
-  Result<void> makeValues();
-  void writeWeights(std::uint32_t joint);
-  void writeErrors();
-  void clearValues();
-  Result<bool> pose(const Shot& shot);
+  Result<void> fitFrame(std::uint32_t width, std::uint32_t height);
   Result<void> recordSkinning(VkCommandBuffer commandBuffer, const Shot& shot);
-  Result<void> draw(VkCommandBuffer commandBuffer, const Shot& shot,
-                    samples::render::RenderFrame& frame, const Box& extent);
-  Result<void> addDraws(std::uint32_t figure, Coloring coloring,
-                        std::vector<samples::render::Draw>& draws) const;
-  Result<samples::render::RenderFrame*> frameOf(const Shot& shot, const Quality& quality,
-                                                bool isStill);
-  Result<void> copyPositions(VkCommandBuffer commandBuffer, std::uint32_t figures);
+  Result<void> skin(const Shot& shot);
+  Result<void> writeValues(const Shot& shot);
+  Result<void> writeWeights(std::uint32_t joint);
+  Result<void> writeErrors(const Shot& shot);
+  Result<std::vector<std::vector<float>>> readPositions(std::uint32_t figure);
+  Result<void> draw(VkCommandBuffer commandBuffer, const Shot& shot, const Box& extent);
 
   samples::OpenDevice* device_;
   cli::Scene scene_;
@@ -122,20 +129,17 @@ class SceneView {
   // Members are destroyed in reverse order of declaration: frames before the renderer.
   std::optional<samples::render::Renderer> renderer_;
   std::optional<cli::DrawnScene> drawn_;
+  std::optional<samples::render::RenderFrame> frame_;
   std::array<Method, 2> methods_{Method::dualQuaternion, Method::dualQuaternion};
-  std::map<std::uint32_t, Box> extents_;    ///< by clip
-  std::vector<PartValues> values_;          ///< by part
-  std::optional<std::uint32_t> weightsOf_;  ///< the joint whose weights are shown
-  std::optional<CheckResult> errors_;
-  std::array<PictureSlot, 2> slots_;
-  const PictureSlot* shown_ = nullptr;
-  samples::Timestamps skinning_, drawing_;
-  bool hasSkinned_ = false;
-  SceneTimes times_;
-  std::optional<Shot> posed_;
+  std::map<std::uint32_t, Box> extents_;  ///< by clip
+  std::optional<Shot> posed_;             ///< what is skinned
   cli::ScenePose pose_;
-  std::array<std::vector<CopiedPart>, 2> copied_;
-  samples::MappedBuffer positions_;
+  std::array<FigureBuffers, 2> values_;  ///< of vertices, shown as colors
+  std::optional<Shot> valued_;           ///< whose values these are
+  std::vector<PositionErrors> errors_;
+  samples::Timestamps skinning_, drawing_;
+  bool hasSkinned_ = false;  ///< since `finish`
+  SceneTimes times_;
 };
 
 }  // namespace dermis::viewer

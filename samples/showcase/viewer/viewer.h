@@ -2,21 +2,38 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "options.h"
-#include "pace.h"
-#include "presenter.h"
-#include "scene_loader.h"
-#include "state.h"
+#include "dermis/method.h"
+#include "interface.h"
+#include "kit/exit_status.h"
+#include "window.h"
+
+namespace dermis {
+class RuntimeCompiler;
+}
 
 namespace dermis::viewer {
 
+struct ViewerOptions {
+  std::string model;  ///< empty: no model
+  Method method = Method::dualQuaternion;
+  std::optional<Method> comparison;  ///< shown next to `method`
+  double time = 0;                   ///< seconds
+  bool isPaused = false;
+  std::optional<std::uint32_t> frames;  ///< end after this number of frames
+  std::string screenshot;               ///< written at the end; empty: none
+  RuntimeCompiler* compiler = nullptr;  ///< of the device's kernels, if they can change
+};
+
 class Viewer {
  public:
-  Viewer(const Options& options, Presenter& presenter);
+  /// `options` and `window` must outlive it.
+  Viewer(const ViewerOptions& options, Window& window);
 
   /// Runs until the user quits, or until the requested number of frames has been shown. With a
   /// number of frames, the run is unattended and ends at the first error. Returns the exit status:
@@ -27,72 +44,42 @@ class Viewer {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Input
-  void waitForEvents();
-  bool waitsForTextField();
-  bool isOpeningLetter(const SDL_TextInputEvent& text);
+  void handleEvents();
   void handle(const SDL_Event& event);
-  void handleMouseMotion(const SDL_MouseMotionEvent& motion);
-  void handleMouseButton(const SDL_MouseButtonEvent& button);
-
-  // Reactions
+  void handleMotion(const SDL_MouseMotionEvent& motion);
   void update();
-  void openFiles();
-  void reloadKernels();
-  void adopt(LoadedScene loaded);
-  Result<void> adoptScene(const std::string& path, cli::Scene scene);
-  void beginWith(const std::string& path);
-  void chooseMethods();
+  void load(const std::string& path);
+  void adopt(Result<cli::Scene> scene);
+  Result<void> showScene(cli::Scene scene);
+  void checkMethods();
   void placeCamera();
-  void takeErrors();
-
-  // Pictures
+  void reloadKernels();
+  bool isMoving() const {
+    return view_ != nullptr && state_.isPlaying && view_->duration(state_.shot.clip) > 0;
+  }
+  bool isLoading() const { return opens_ || loading_.valid(); }
   Result<void> draw();
-  Shot shot() const;
-  bool isChecked(const Shot& shot) const;
-  bool isSettled() const;
-  Facts facts() const;
-  Area area() const;
-  VkRect2D pixelArea() const;
-  Result<void> afterPicture(bool isStill, bool wasCopied);
-  void countPicture();
-  void keepScreenshot();
+  void takeScreenshot();
   void tell(std::string notice);
   void fail(samples::ExitStatus status, std::string error);
-  float aspect() const;
 
-  const Options& options_;
-  Presenter* presenter_;
+  const ViewerOptions& options_;
+  Window& window_;
   State state_;
-  SceneLoader loader_;
   std::unique_ptr<SceneView> view_;
-  std::unique_ptr<ErrorCheck> check_;  // declared after the view, whose scene it reads
-  std::optional<CheckResult> errors_;
-  std::string path_;  ///< of the view's file
-  std::vector<std::string> notes_;
-  bool hasSoughtCenters_ = false;    ///< in the view's file
-  std::array<Method, 2> methods_{};  ///< methods that are shown
-  std::string kernelsUpdate_, kernelError_;
-  bool hasBegun_ = false;  ///< the first model has been read, or reading it has failed
-
-  Pace pace_;
-  std::optional<Shot> drawn_;
-  bool hasNewColors_ = false, isStillDrawn_ = false, wasScaled_ = false;
-  Clock::time_point lastChange_ = Clock::now(), lastUpdate_ = Clock::now(), noticeEnd_;
+  std::optional<std::string> opens_;       ///< the file to load next
+  std::string path_;                       ///< of the file that is being loaded
+  std::optional<Shot> drawn_;              ///< the last picture of the view
+  std::uint32_t framedClip_ = gltf::none;  ///< the last clip that could be shown
+  Clock::time_point lastUpdate_ = Clock::now();
   int framesToDraw_ = 3;  ///< of the interface, which needs some to settle
-  int framesToTextField_ = 0;
-  bool opensTextField_ = false;
   std::uint32_t shownFrames_ = 0;
-  std::string screenshotName_;  ///< of the next screenshot; empty: none
+  std::uint64_t frame_ = 0;
+  std::string screenshot_;  ///< name of the next screenshot; empty: none
+  bool isFirst_ = true;     ///< the model of the command line is not there yet
   bool isEnding_ = false;
   samples::ExitStatus status_ = samples::ExitStatus::done;
-  float framedAspect_ = 0;
-  std::uint32_t framedClip_ = gltf::none;  ///< the last clip that could be shown
-  int pressedX_ = 0, pressedY_ = 0;
-  bool isDragging_ = false, hasDragged_ = false;
-  Clock::time_point countedSince_ = Clock::now();
-  int counted_ = 0;
-  double framesPerSecond_ = 0;
+  std::future<Result<cli::Scene>> loading_;  ///< last: its destructor waits
 };
 
 }  // namespace dermis::viewer

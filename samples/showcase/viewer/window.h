@@ -1,58 +1,100 @@
-// A window, its Vulkan surface, and its size in pixels.
+// A window on a Vulkan device: what is drawn in it, and the interface on top, by Dear ImGui.
+//
+// Picture and interface are drawn on a canvas, an image of the window's size, which is copied to
+// the window. Screenshots read the canvas, because images of a swapchain need not be readable. The
+// CPU waits for each picture, so that no semaphores are needed.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <SDL.h>
-#include <vulkan/vulkan_core.h>
 
-#include "dermis/result.h"
-#include "kit/device.h"
+#include "kit/buffer.h"
+#include "kit/open_device.h"
+#include "kit/render/image.h"
+#include "kit/render/owned.h"
+#include "kit/render/picture.h"
+#include "kit/render/target.h"
 
 namespace dermis::viewer {
 
-/// SDL and its only window. There can only be one at a time.
+/// There can only be one at a time. One picture is drawn at a time.
 class Window {
  public:
-  /// Fails with `missingFeature` if there is no display, or none with Vulkan.
-  static Result<Window> create(std::uint32_t width, std::uint32_t height);
-  Window() = default;
+  /// Records the picture of the scene, outside a render pass. Returns null if there is none.
+  using RecordPicture =
+      std::function<Result<const samples::render::RenderTarget*>(VkCommandBuffer)>;
+
+  /// Opens a window, and a device for it: the options need not say what a window requires. Fails
+  /// with `missingFeature` if there is no display or no device.
+  static Result<std::unique_ptr<Window>> open(std::uint32_t width, std::uint32_t height,
+                                              samples::DeviceOptions options);
   ~Window();
-  Window(Window&& other) noexcept { *this = std::move(other); }
-  Window& operator=(Window&& other) noexcept;
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
 
-  SDL_Window* handle() const { return window_; }
-  /// For `DeviceOptions`.
-  Result<std::vector<std::string>> surfaceExtensions() const;
+  samples::OpenDevice& device() { return *device_; }
   void setTitle(const std::string& title) const;
+  VkExtent2D size() const;
 
-  /// The size of the drawable area. It may have more pixels than mouse units.
-  VkExtent2D pixels() const;
-  /// Pixels per mouse unit.
-  float pixelsPerUnit() const;
-  bool isMinimized() const;
-
- private:
-  SDL_Window* window_ = nullptr;
-};
-
-/// The Vulkan surface of the window. The device and the window must outlive it.
-class Surface {
- public:
-  /// Fails with `missingFeature` if the device cannot show anything in the window.
-  static Result<Surface> create(const Window& window, const samples::Device& device);
-  Surface() = default;
-  ~Surface();
-  Surface(Surface&& other) noexcept { *this = std::move(other); }
-  Surface& operator=(Surface&& other) noexcept;
-
-  VkSurfaceKHR handle() const { return surface_; }
+  /// Gives an event to the interface.
+  static void handle(const SDL_Event& event);
+  /// Begins a frame of the interface. Returns false if there is nothing to draw on, as in a
+  /// minimized window.
+  Result<bool> begin();
+  /// Ends the frame of the interface, draws, shows and waits. The picture begins at the column
+  /// `left`. Returns false if there was no image to draw on this time. Fails with `vulkanError`, or
+  /// like `recordPicture`.
+  Result<bool> show(const RecordPicture& recordPicture, std::uint32_t left, bool isReadBack);
+  /// The contents of the window in the last frame, which must have been read back.
+  samples::render::Picture picture() const;
 
  private:
-  VkInstance instance_ = VK_NULL_HANDLE;
-  VkSurfaceKHR surface_ = VK_NULL_HANDLE;
+  struct Sdl {
+    SDL_Window* window = nullptr;
+    ~Sdl();
+  };
+  struct Surface {
+    VkInstance instance = VK_NULL_HANDLE;
+    VkSurfaceKHR handle = VK_NULL_HANDLE;
+    ~Surface();
+  };
+
+  Window() = default;
+  Result<void> openWindow(std::uint32_t width, std::uint32_t height);
+  Result<void> openDevice(samples::DeviceOptions options);
+  Result<void> chooseFormat();
+  Result<void> makePass();
+  Result<void> startInterface();
+  Result<void> makeSwapchain();
+  Result<void> makeCanvas(VkExtent2D extent);
+  Result<std::optional<std::uint32_t>> acquire();
+  Result<void> present(std::uint32_t image);
+  void copyPicture(VkCommandBuffer commandBuffer, const samples::render::RenderTarget* picture,
+                   std::uint32_t left) const;
+  void recordInterface(VkCommandBuffer commandBuffer) const;
+  void recordCopy(VkCommandBuffer commandBuffer, VkImage image) const;
+  Result<void> recordReadBack(VkCommandBuffer commandBuffer);
+
+  // Members are destroyed in reverse order of declaration.
+  Sdl sdl_;
+  std::optional<samples::OpenDevice> device_;
+  Surface surface_;
+  VkFormat format_ = VK_FORMAT_UNDEFINED;  ///< of the window's images, without the sRGB curve
+  samples::render::Owned<VkSwapchainKHR> swapchain_;
+  std::vector<VkImage> images_;
+  bool isStale_ = true;  ///< the swapchain does not fit the window
+  samples::render::Owned<VkFence> acquired_;
+  samples::render::Owned<VkRenderPass> pass_;  ///< of the interface
+  samples::render::Owned<VkDescriptorPool> pool_;
+  samples::render::Image canvas_;
+  samples::render::Owned<VkFramebuffer> framebuffer_;
+  samples::MappedBuffer readBack_;
 };
 
 }  // namespace dermis::viewer
