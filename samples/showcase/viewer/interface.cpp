@@ -16,7 +16,6 @@
 namespace dermis::viewer {
 namespace {
 
-constexpr double stepSeconds = 1.0 / 30;
 constexpr float sceneLeft = panelWidth;
 constexpr ImU32 white = IM_COL32(232, 236, 240, 255), dark = IM_COL32(23, 28, 34, 220),
                 orange = IM_COL32(255, 180, 84, 255), red = IM_COL32(255, 160, 148, 255);
@@ -60,12 +59,10 @@ void chooseClip(std::uint32_t clip, State& state) {
   state.shot.time = 0;
 }
 
-/// The rest pose counts as a clip before the first.
-void stepClip(int step, const SceneView& view, State& state) {
-  const int count = static_cast<int>(view.scene().model->clips.size()) + 1;
-  const int now = state.shot.clip == gltf::none ? 0 : static_cast<int>(state.shot.clip) + 1;
-  const int next = (now + step + count) % count;
-  chooseClip(next == 0 ? gltf::none : static_cast<std::uint32_t>(next - 1), state);
+void stepClip(std::uint32_t step, const SceneView& view, State& state) {
+  // The rest pose counts as a clip before the first: `gltf::none` + 1 is 0.
+  const auto count = static_cast<std::uint32_t>(view.scene().model->clips.size() + 1);
+  chooseClip((state.shot.clip + 1 + step) % count - 1, state);
 }
 
 void stepJoint(bool isBack, const SceneView& view, State& state) {
@@ -78,13 +75,14 @@ void stepJoint(bool isBack, const SceneView& view, State& state) {
 
 /// Keys that may be held down.
 void handleStep(SDL_Keycode key, bool isShifted, const SceneView& view, State& state) {
-  const double seconds = isShifted ? 10 * stepSeconds : stepSeconds;
+  const double seconds = (isShifted ? 10.0 : 1.0) / 30;
   if (key == SDLK_LEFT || key == SDLK_RIGHT) {
     const double time = state.shot.time + (key == SDLK_LEFT ? -seconds : seconds);
     state.shot.time = repeatedTime(time, view.duration(state.shot.clip));
     state.isPlaying = false;
   }
-  if (key == SDLK_UP) stepClip(-1, view, state);
+  if (key == SDLK_UP)
+    stepClip(static_cast<std::uint32_t>(view.scene().model->clips.size()), view, state);
   if (key == SDLK_DOWN) stepClip(1, view, state);
   if (key == SDLK_TAB) stepJoint(isShifted, view, state);
 }
@@ -176,22 +174,20 @@ void drawClip(const SceneView& view, State& state) {
   state.shot.time = std::min(static_cast<double>(time), view.duration(state.shot.clip));
 }
 
-void drawMethods(State& state) {
-  heading("Method");
+void drawMethod(const char* label, Method& method) {
   const auto name = [](std::uint32_t index) { return std::string(methodName(allMethods[index])); };
-  for (std::uint32_t view = 0; view < 2; ++view) {
-    if (view == 1) {
-      bool isSideBySide = state.shot.views == 2;
-      ImGui::Checkbox("side by side with", &isSideBySide);
-      state.shot.views = isSideBySide ? 2 : 1;
-      if (!isSideBySide) return;
-    }
-    Method& method = state.shot.methods[view];
-    const auto chosen =
-        choose(view == 0 ? "##method" : "##beside", static_cast<std::uint32_t>(allMethods.size()),
-               static_cast<std::uint32_t>(method), name);
-    if (chosen) method = allMethods[*chosen];
-  }
+  const auto count = static_cast<std::uint32_t>(allMethods.size());
+  const auto chosen = choose(label, count, static_cast<std::uint32_t>(method), name);
+  if (chosen) method = allMethods[*chosen];
+}
+
+void drawMethods(Shot& shot) {
+  heading("Method");
+  drawMethod("##method", shot.methods[0]);
+  bool isSideBySide = shot.views == 2;
+  ImGui::Checkbox("side by side with", &isSideBySide);
+  shot.views = isSideBySide ? 2 : 1;
+  if (isSideBySide) drawMethod("##beside", shot.methods[1]);
 }
 
 /// The colors of a heat map, and the value of the last.
@@ -261,7 +257,7 @@ void drawPanel(const SceneView* view, State& state) {
   drawFile(view, state);
   if (view != nullptr) {
     drawClip(*view, state);
-    drawMethods(state);
+    drawMethods(state.shot);
     drawLooks(*view, state);
     drawTimes(*view, state);
   }
@@ -346,13 +342,13 @@ void drawHelp() {
   ImGui::End();
 }
 
-void drawError(State& state) {
+void drawError(const State& state) {
   const ImVec2 window = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({(sceneLeft + window.x) / 2, 56}, ImGuiCond_Always, {0.5f, 0});
   ImGui::SetNextWindowSize({std::min(window.x - sceneLeft - 32, 620.0f), 0});
   ImGui::Begin("error", nullptr, fixedWindow);
   say(state.error, red);
-  if (ImGui::SmallButton("Close")) state.error.clear();
+  ImGui::TextDisabled("Esc closes this message");
   ImGui::End();
 }
 

@@ -6,16 +6,14 @@
 #include <limits>
 #include <utility>
 
-#include "commands.h"
 #include "dermis/text.h"
 #include "dermis/verify/reference.h"
+#include "vulkan_helpers.h"
 
 namespace dermis::viewer {
 namespace {
 
 namespace render = samples::render;
-
-constexpr std::uint32_t posesOfAClip = 16;
 
 /// Software Vulkan is too slow for the defaults of the renderer.
 bool isSoftware(const samples::Device& device) {
@@ -32,15 +30,6 @@ void write(const samples::MappedBuffer& buffer, std::span<const float> values, f
     const float value = values[i] * factor;
     std::memcpy(&bytes[i * sizeof(float)], &value, sizeof(float));
   }
-}
-
-double distance(const reference::Double3& expected, const float* actual) {
-  double sum = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double difference = expected[axis] - static_cast<double>(actual[axis]);
-    sum += difference * difference;
-  }
-  return std::sqrt(sum);
 }
 
 }  // namespace
@@ -113,7 +102,10 @@ Result<PositionErrors> positionErrors(const cli::Scene& scene, const cli::SceneP
       if (bounds.onlyFinite || bounds.undefined) continue;
       // A value that is not finite counts as the largest possible error.
       constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
-      const double apart = distance(expected->positions[vertex], &positions[index][3 * vertex]);
+      const reference::Double3& right = expected->positions[vertex];
+      const float* skinned = &positions[index][3 * vertex];
+      const double apart =
+          std::hypot(right[0] - skinned[0], right[1] - skinned[1], right[2] - skinned[2]);
       const double error = apart < most ? apart : most;
       errors[vertex] = static_cast<float>(error);
       result.greatest = std::max(result.greatest, error);
@@ -138,18 +130,12 @@ Result<void> SceneView::prepare() {
   joints_ = jointsOf(scene_);
   const render::FilterTaps taps =
       isSoftware(device) ? render::FilterTaps{10, 16, 2} : render::FilterTaps{};
-  Result<render::Renderer> renderer = render::Renderer::create(device, taps);
-  if (!renderer) return renderer.error();
-  renderer_.emplace(std::move(*renderer));
-  Result<cli::DrawnScene> drawn =
-      cli::DrawnScene::create(*device_, *renderer_, scene_, 2, methods_[0]);
-  if (!drawn) return drawn.error();
-  drawn_.emplace(std::move(*drawn));
-  for (samples::Timestamps* timestamps : {&skinning_, &drawing_}) {
-    Result<samples::Timestamps> made = samples::Timestamps::create(device);
-    if (!made) return made.error();
-    *timestamps = std::move(*made);
-  }
+  Result<void> done = keep(render::Renderer::create(device, taps), renderer_);
+  if (done)
+    done = keep(cli::DrawnScene::create(*device_, *renderer_, scene_, 2, methods_[0]), drawn_);
+  if (done) done = keep(samples::Timestamps::create(device), skinning_);
+  if (done) done = keep(samples::Timestamps::create(device), drawing_);
+  if (!done) return done;
   for (FigureBuffers& figure : values_) {
     for (const cli::ScenePart& part : scene_.parts) {
       const std::uint64_t count = std::max<std::uint64_t>(part.primitive->vertexCount, 1);
@@ -175,7 +161,7 @@ double SceneView::duration(std::uint32_t clip) const {
 
 Result<Box> SceneView::extent(std::uint32_t clip) {
   if (const auto found = extents_.find(clip); found != extents_.end()) return found->second;
-  const std::uint32_t count = duration(clip) > 0 ? posesOfAClip : 1;
+  const std::uint32_t count = duration(clip) > 0 ? 16 : 1;  // poses
   std::vector<Box> boxes;
   for (std::uint32_t index = 0; index < count; ++index) {
     Shot shot;
@@ -305,10 +291,7 @@ Result<void> SceneView::fitFrame(std::uint32_t width, std::uint32_t height) {
   description.views = 2;
   if (isSoftware(*device_->device)) description.shadows = {1024, 256, 6};
   frame_.reset();
-  Result<render::RenderFrame> made = renderer_->createFrame(description);
-  if (!made) return made.error();
-  frame_.emplace(std::move(*made));
-  return {};
+  return keep(renderer_->createFrame(description), frame_);
 }
 
 Result<const render::RenderTarget*> SceneView::record(VkCommandBuffer commandBuffer,
@@ -331,10 +314,9 @@ Result<void> SceneView::draw(VkCommandBuffer commandBuffer, const Shot& shot, co
   for (std::uint32_t index = 0; index < shot.views; ++index) {
     if (Result<void> done = drawn_->addDraws(index, JointMatrix(), draws[index]); !done)
       return done;
-    for (std::size_t part = 0; shot.coloring != Coloring::surface && part < draws[index].size();
-         ++part) {
-      draws[index][part].values.buffer = values_[index][part].handle();
-      draws[index][part].values.stride = sizeof(float);
+    for (std::size_t part = 0; part < draws[index].size(); ++part) {
+      if (shot.coloring == Coloring::surface) continue;
+      draws[index][part].values = {values_[index][part].handle(), 0, sizeof(float)};
     }
     render::View& view = views[index];
     const std::uint32_t left = shot.width * index / shot.views;

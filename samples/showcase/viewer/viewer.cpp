@@ -19,7 +19,6 @@
 namespace dermis::viewer {
 namespace {
 
-using namespace std::chrono_literals;
 using samples::ExitStatus;
 
 constexpr double longestStep = 0.25;  // seconds; longer pauses do not count
@@ -57,8 +56,6 @@ Result<ExitStatus> Viewer::run() {
     if (Result<void> done = draw(); !done) return done.error();
   }
 }
-
-// -- Input --------------------------------------------------------------------------------------
 
 void Viewer::handleEvents() {
   const bool isHurried = isMoving() || options_.frames || framesToDraw_ > 0 || isEnding_;
@@ -103,8 +100,6 @@ void Viewer::handleMotion(const SDL_MouseMotionEvent& motion) {
   }
 }
 
-// -- Files --------------------------------------------------------------------------------------
-
 /// Reads a model on another thread, so that the window stays responsive.
 void Viewer::load(const std::string& path) {
   path_ = path;
@@ -148,24 +143,24 @@ Result<void> Viewer::showScene(cli::Scene scene) {
   return {};
 }
 
-// -- Before each picture ------------------------------------------------------------------------
-
 void Viewer::update() {
   const Clock::time_point now = Clock::now();
   const double passed = std::chrono::duration<double>(now - lastUpdate_).count();
   lastUpdate_ = now;
-  if (loading_.valid() && loading_.wait_for(0s) == std::future_status::ready) adopt(loading_.get());
+  if (loading_.valid() && loading_.wait_for(Clock::duration(0)) == std::future_status::ready)
+    adopt(loading_.get());
   if (opens_ && !loading_.valid()) load(*std::exchange(opens_, std::nullopt));
   reloadKernels();
   if (view_ == nullptr) return;
-  Shot& shot = state_.shot;
   if (isMoving()) {
-    shot.time = repeatedTime(shot.time + std::min(passed, longestStep), view_->duration(shot.clip));
+    double& time = state_.shot.time;
+    time = repeatedTime(time + std::min(passed, longestStep), view_->duration(state_.shot.clip));
   }
   checkMethods();
   placeCamera();
 }
 
+/// Some methods need data that a large model may lack.
 void Viewer::checkMethods() {
   for (std::uint32_t index = 0; index < state_.shot.views; ++index) {
     Method& method = state_.shot.methods[index];
@@ -198,10 +193,10 @@ void Viewer::reloadKernels() {
 #ifdef DERMIS_RUNTIME_COMPILER
   if (options_.compiler == nullptr) return;
   const vulkan::Context& context = window_.device().context;
-  ++frame_;
   // [reload]
   // Called between two frames, with the next frame and the newest complete one.
-  const Result<KernelReload> done = options_.compiler->reload(context, frame_, frame_ - 1);
+  const Result<KernelReload> done =
+      options_.compiler->reload(context, shownFrames_ + 1, shownFrames_);
   if (!done) return fail(ExitStatus::badInput, done.error().message);  // glslang's message
   // [/reload]
   if (done->replaced.empty()) return;
@@ -211,8 +206,6 @@ void Viewer::reloadKernels() {
   if (view_ != nullptr) view_->skinAgain();
 #endif
 }
-
-// -- Pictures -----------------------------------------------------------------------------------
 
 Result<void> Viewer::draw() {
   if (std::exchange(state_.takesScreenshot, false)) screenshot_ = "dermis-viewer.png";
@@ -253,8 +246,8 @@ void Viewer::takeScreenshot() {
     if (!kept) return fail(ExitStatus::stopped, kept.error().message);
   }
   const Result<std::vector<std::byte>> bytes = samples::render::encodePng(window_.picture());
-  if (!bytes) return fail(ExitStatus::stopped, bytes.error().message);
-  const Result<void> written = samples::writeFile(samples::pathOf(name), *bytes);
+  const Result<void> written =
+      bytes ? samples::writeFile(samples::pathOf(name), *bytes) : Result<void>(bytes.error());
   if (!written) return fail(ExitStatus::stopped, written.error().message);
   fmt::print("wrote {}\n", name);
   std::fflush(stdout);

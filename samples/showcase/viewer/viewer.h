@@ -74,7 +74,6 @@ class Viewer {
   Clock::time_point lastUpdate_ = Clock::now();
   int framesToDraw_ = 3;  ///< of the interface, which needs some to settle
   std::uint32_t shownFrames_ = 0;
-  std::uint64_t frame_ = 0;
   std::string screenshot_;  ///< name of the next screenshot; empty: none
   bool isFirst_ = true;     ///< the model of the command line is not there yet
   bool isEnding_ = false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -15,7 +16,7 @@
 #include <backends/imgui_impl_vulkan.h>
 #include <vulkan/vulkan.h>  // the functions of the loader that Dear ImGui is linked to
 
-#include "commands.h"
+#include "vulkan_helpers.h"
 
 namespace dermis::viewer {
 namespace {
@@ -28,6 +29,10 @@ constexpr VkClearColorValue background{{0.03f, 0.035f, 0.04f, 1}};  // linear
 
 // Long enough for any picture, but short enough that the window closes if the display is gone.
 constexpr std::uint64_t patience = 2'000'000'000;  // nanoseconds
+
+// Every desktop has this format. The colors of the interface are sRGB bytes, those of the picture
+// are linear light.
+constexpr VkFormat imageFormat = VK_FORMAT_B8G8R8A8_UNORM, srgbFormat = VK_FORMAT_B8G8R8A8_SRGB;
 constexpr VkColorSpaceKHR colorSpace = VK_COLOR_SPACE_SRGB_NONLINEAR_KHR;
 
 Error missing(const std::string& what) {
@@ -39,10 +44,6 @@ Error failed(const char* function, VkResult result) {
       ErrorCode::vulkanError,
       std::string(function) + " failed with VkResult " + std::to_string(static_cast<int>(result)),
       static_cast<std::int32_t>(result)};
-}
-
-VkFormat srgbFormat(VkFormat format) {
-  return format == VK_FORMAT_B8G8R8A8_UNORM ? VK_FORMAT_B8G8R8A8_SRGB : VK_FORMAT_R8G8B8A8_SRGB;
 }
 
 VkExtent2D extentOf(const VkSurfaceCapabilitiesKHR& capabilities, VkExtent2D wanted) {
@@ -72,14 +73,6 @@ void recordWritable(const samples::Device& device, VkCommandBuffer commandBuffer
       VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
-/// Moves what was made to its place.
-template <typename T>
-Result<void> keep(Result<T> made, T& place) {
-  if (!made) return made.error();
-  place = std::move(*made);
-  return {};
-}
-
 #if IMGUI_VERSION_NUM >= 19000  // Debian 13; Debian 12 has 1.86
 Result<void> uploadFonts(samples::Device&) {
   if (ImGui_ImplVulkan_CreateFontsTexture()) return {};
@@ -97,15 +90,6 @@ Result<void> uploadFonts(samples::Device& device) {
 
 }  // namespace
 
-Window::Sdl::~Sdl() {
-  if (window != nullptr) SDL_DestroyWindow(window);
-  SDL_Quit();
-}
-
-Window::Surface::~Surface() {
-  if (handle != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance, handle, nullptr);
-}
-
 Result<std::unique_ptr<Window>> Window::open(std::uint32_t width, std::uint32_t height,
                                              samples::DeviceOptions options) {
   std::unique_ptr<Window> window(new Window);
@@ -118,21 +102,27 @@ Result<std::unique_ptr<Window>> Window::open(std::uint32_t width, std::uint32_t 
 
 Window::~Window() {
   if (device_) vkDeviceWaitIdle(device_->device->handle());
-  if (ImGui::GetCurrentContext() == nullptr) return;
-  if (ImGui::GetIO().BackendRendererUserData != nullptr) ImGui_ImplVulkan_Shutdown();
-  if (ImGui::GetIO().BackendPlatformUserData != nullptr) ImGui_ImplSDL2_Shutdown();
-  ImGui::DestroyContext();
+  if (ImGui::GetCurrentContext() != nullptr) {
+    if (ImGui::GetIO().BackendRendererUserData != nullptr) ImGui_ImplVulkan_Shutdown();
+    if (ImGui::GetIO().BackendPlatformUserData != nullptr) ImGui_ImplSDL2_Shutdown();
+    ImGui::DestroyContext();
+  }
+  swapchain_ = {};
+  if (surface_ != VK_NULL_HANDLE)
+    vkDestroySurfaceKHR(device_->device->description().instance, surface_, nullptr);
+  if (window_ != nullptr) SDL_DestroyWindow(window_);
+  SDL_Quit();
 }
 
 Result<void> Window::openWindow(std::uint32_t width, std::uint32_t height) {
   // Ctrl+C ends the program at once, as usual.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO) != 0) return missing("there is no display to open a window on");
-  sdl_.window = SDL_CreateWindow("Dermis", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
-                                 static_cast<int>(width), static_cast<int>(height),
-                                 SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE);
-  if (sdl_.window == nullptr) return missing("cannot open a window for Vulkan");
-  SDL_SetWindowMinimumSize(sdl_.window, 480, 320);
+  window_ = SDL_CreateWindow("Dermis", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
+                             static_cast<int>(width), static_cast<int>(height),
+                             SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE);
+  if (window_ == nullptr) return missing("cannot open a window for Vulkan");
+  SDL_SetWindowMinimumSize(window_, 480, 320);
   SDL_EventState(SDL_DROPFILE, SDL_ENABLE);
   return {};
 }
@@ -142,7 +132,7 @@ Result<void> Window::openDevice(samples::DeviceOptions options) {
   std::vector<const char*> names;
   for (int pass = 0; pass < 2; ++pass) {  // first only the number
     names.resize(count);
-    if (SDL_Vulkan_GetInstanceExtensions(sdl_.window, &count, pass == 0 ? nullptr : names.data()) ==
+    if (SDL_Vulkan_GetInstanceExtensions(window_, &count, pass == 0 ? nullptr : names.data()) ==
         SDL_FALSE)
       return missing("the window does not support Vulkan");
   }
@@ -152,12 +142,11 @@ Result<void> Window::openDevice(samples::DeviceOptions options) {
   if (!opened) return opened.error();
   device_.emplace(std::move(*opened));
   samples::Device& device = *device_->device;
-  surface_.instance = device.description().instance;
-  if (SDL_Vulkan_CreateSurface(sdl_.window, surface_.instance, &surface_.handle) == SDL_FALSE)
+  if (SDL_Vulkan_CreateSurface(window_, device.description().instance, &surface_) == SDL_FALSE)
     return missing("cannot create a Vulkan surface for the window");
   VkBool32 isSupported = VK_FALSE;
-  vkGetPhysicalDeviceSurfaceSupportKHR(device.physicalDevice(), device.queueFamily(),
-                                       surface_.handle, &isSupported);
+  vkGetPhysicalDeviceSurfaceSupportKHR(device.physicalDevice(), device.queueFamily(), surface_,
+                                       &isSupported);
   if (isSupported == VK_FALSE) {
     return Error{ErrorCode::missingFeature, "device '" + device.info().name +
                                                 "' cannot show pictures in this window; choose "
@@ -166,34 +155,27 @@ Result<void> Window::openDevice(samples::DeviceOptions options) {
   VkFenceCreateInfo fence{};
   fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
   if (Result<void> done = keep(DERMIS_MAKE(device, Fence, fence), acquired_); !done) return done;
-  return chooseFormat();
+  return checkFormat();
 }
 
-Result<void> Window::chooseFormat() {
+Result<void> Window::checkFormat() const {
   const VkPhysicalDevice device = device_->device->physicalDevice();
   std::uint32_t count = 0;
-  vkGetPhysicalDeviceSurfaceFormatsKHR(device, surface_.handle, &count, nullptr);
+  vkGetPhysicalDeviceSurfaceFormatsKHR(device, surface_, &count, nullptr);
   std::vector<VkSurfaceFormatKHR> formats(count);
-  vkGetPhysicalDeviceSurfaceFormatsKHR(device, surface_.handle, &count, formats.data());
+  vkGetPhysicalDeviceSurfaceFormatsKHR(device, surface_, &count, formats.data());
   for (const VkSurfaceFormatKHR& format : formats) {
-    if (format.colorSpace != colorSpace) continue;
-    if (format.format != VK_FORMAT_B8G8R8A8_UNORM && format.format != VK_FORMAT_R8G8B8A8_UNORM)
-      continue;
-    format_ = format.format;
-    return {};
+    if (format.format == imageFormat && format.colorSpace == colorSpace) return {};
   }
-  return Error{ErrorCode::missingFeature,
-               "the window has no format with 8 bits each for red, green and blue"};
+  return Error{ErrorCode::missingFeature, "the window has no images of format B8G8R8A8_UNORM"};
 }
 
 Result<void> Window::makePass() {
   VkAttachmentDescription attachment{};
-  attachment.format = format_;
+  attachment.format = imageFormat;
   attachment.samples = VK_SAMPLE_COUNT_1_BIT;
   attachment.loadOp = VK_ATTACHMENT_LOAD_OP_LOAD;
   attachment.storeOp = VK_ATTACHMENT_STORE_OP_STORE;
-  attachment.stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE;
-  attachment.stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
   attachment.initialLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
   attachment.finalLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
   const VkAttachmentReference color{0, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL};
@@ -237,10 +219,9 @@ Result<void> Window::startInterface() {
   io.IniFilename = nullptr;  // Do not leave a file in the folder.
   // Without the file, Dear ImGui's own font is used.
   static const std::array<ImWchar, 7> glyphs{0x20, 0xff, 0x2010, 0x2030, 0x2190, 0x2193, 0};
-  if (const Result<std::string> file = render::findFontFile(); file) {
+  if (const Result<std::string> file = render::findFontFile(); file)
     io.Fonts->AddFontFromFileTTF(file->c_str(), 15, nullptr, glyphs.data());
-  }
-  const bool hasInput = ImGui_ImplSDL2_InitForVulkan(sdl_.window);
+  const bool hasInput = ImGui_ImplSDL2_InitForVulkan(window_);
   ImGui_ImplVulkan_InitInfo info{};
   info.Instance = device.description().instance;
   info.PhysicalDevice = device.physicalDevice();
@@ -255,13 +236,9 @@ Result<void> Window::startInterface() {
   return uploadFonts(device);
 }
 
-void Window::setTitle(const std::string& title) const {
-  SDL_SetWindowTitle(sdl_.window, title.c_str());
-}
-
 VkExtent2D Window::size() const {
   int width = 0, height = 0;
-  SDL_GetWindowSize(sdl_.window, &width, &height);
+  SDL_GetWindowSize(window_, &width, &height);
   return {static_cast<std::uint32_t>(std::max(width, 0)),
           static_cast<std::uint32_t>(std::max(height, 0))};
 }
@@ -269,8 +246,8 @@ VkExtent2D Window::size() const {
 Result<void> Window::makeSwapchain() {
   samples::Device& device = *device_->device;
   VkSurfaceCapabilitiesKHR capabilities{};
-  if (const VkResult result = vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
-          device.physicalDevice(), surface_.handle, &capabilities);
+  if (const VkResult result = vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device.physicalDevice(),
+                                                                        surface_, &capabilities);
       result != VK_SUCCESS) {
     return failed("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", result);
   }
@@ -280,11 +257,11 @@ Result<void> Window::makeSwapchain() {
   if (extent.width == 0 || extent.height == 0) return {};  // It stays stale.
   VkSwapchainCreateInfoKHR info{};
   info.sType = VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR;
-  info.surface = surface_.handle;
+  info.surface = surface_;
   info.minImageCount = capabilities.minImageCount + 1;
   if (capabilities.maxImageCount != 0)
     info.minImageCount = std::min(info.minImageCount, capabilities.maxImageCount);
-  info.imageFormat = format_;
+  info.imageFormat = imageFormat;
   info.imageColorSpace = colorSpace;
   info.imageExtent = extent;
   info.imageArrayLayers = 1;
@@ -309,8 +286,8 @@ Result<void> Window::makeSwapchain() {
 
 Result<void> Window::makeCanvas(VkExtent2D extent) {
   render::ImageDescription description;
-  description.format = srgbFormat(format_);
-  description.viewFormat = format_;  // The colors of the interface are sRGB bytes.
+  description.format = srgbFormat;
+  description.viewFormat = imageFormat;
   description.width = extent.width;
   description.height = extent.height;
   description.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
@@ -337,7 +314,7 @@ void Window::handle(const SDL_Event& event) {
 Result<bool> Window::begin() {
   const VkExtent2D size = this->size();
   const render::ImageDescription& now = canvas_.description();
-  if ((SDL_GetWindowFlags(sdl_.window) & (SDL_WINDOW_MINIMIZED | SDL_WINDOW_HIDDEN)) != 0 ||
+  if ((SDL_GetWindowFlags(window_) & (SDL_WINDOW_MINIMIZED | SDL_WINDOW_HIDDEN)) != 0 ||
       size.width == 0 || size.height == 0)
     return false;
   if (isStale_ || size.width != now.width || size.height != now.height) {
@@ -353,17 +330,17 @@ Result<bool> Window::begin() {
   return true;
 }
 
-Result<bool> Window::show(const RecordPicture& recordPicture, std::uint32_t left, bool isReadBack) {
+Result<bool> Window::show(const RecordScene& recordScene, std::uint32_t left, bool isReadBack) {
   ImGui::Render();
   const Result<std::optional<std::uint32_t>> image = acquire();
   if (!image) return image.error();
   if (!*image) return false;
   samples::Device& device = *device_->device;
   const VkCommandBuffer commandBuffer = beginCommands(device);
-  const auto picture = recordPicture(commandBuffer);
+  const auto picture = recordScene(commandBuffer);
   Result<void> done = picture ? Result<void>() : Result<void>(picture.error());
   if (done) {
-    copyPicture(commandBuffer, *picture, left);
+    recordPicture(commandBuffer, *picture, left);
     recordInterface(commandBuffer);
     recordCopy(commandBuffer, images_[**image]);
     if (isReadBack) done = recordReadBack(commandBuffer);
@@ -404,8 +381,8 @@ Result<void> Window::present(std::uint32_t image) {
   return {};
 }
 
-void Window::copyPicture(VkCommandBuffer commandBuffer, const render::RenderTarget* picture,
-                         std::uint32_t left) const {
+void Window::recordPicture(VkCommandBuffer commandBuffer, const render::RenderTarget* picture,
+                           std::uint32_t left) const {
   samples::Device& device = *device_->device;
   recordWritable(device, commandBuffer, canvas_.handle(), false);
   vkCmdClearColorImage(commandBuffer, canvas_.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
@@ -417,7 +394,7 @@ void Window::copyPicture(VkCommandBuffer commandBuffer, const render::RenderTarg
   const auto begin = static_cast<std::int32_t>(left);
   const auto width = static_cast<std::int32_t>(std::min(picture->width(), size.width - left));
   const auto height = static_cast<std::int32_t>(std::min(picture->height(), size.height));
-  VkImageBlit blit{};  // not a copy, because the order of red and blue may differ
+  VkImageBlit blit{};  // not a copy, because the order of red and blue differs
   blit.srcSubresource = blit.dstSubresource = allLayers;
   blit.srcOffsets[1] = {width, height, 1};
   blit.dstOffsets[0] = {begin, 0, 0};
@@ -477,7 +454,6 @@ render::Picture Window::picture() const {
   picture.pixels.resize(readBack_.bytes().size());
   std::ranges::transform(readBack_.bytes(), picture.pixels.begin(),
                          [](std::byte byte) { return std::to_integer<std::uint8_t>(byte); });
-  if (format_ != VK_FORMAT_B8G8R8A8_UNORM) return picture;
   for (std::size_t pixel = 0; pixel < picture.pixels.size(); pixel += 4)
     std::swap(picture.pixels[pixel], picture.pixels[pixel + 2]);
   return picture;

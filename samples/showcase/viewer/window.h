@@ -27,8 +27,7 @@ namespace dermis::viewer {
 class Window {
  public:
   /// Records the picture of the scene, outside a render pass. Returns null if there is none.
-  using RecordPicture =
-      std::function<Result<const samples::render::RenderTarget*>(VkCommandBuffer)>;
+  using RecordScene = std::function<Result<const samples::render::RenderTarget*>(VkCommandBuffer)>;
 
   /// Opens a window, and a device for it: the options need not say what a window requires. Fails
   /// with `missingFeature` if there is no display or no device.
@@ -39,7 +38,7 @@ class Window {
   Window& operator=(const Window&) = delete;
 
   samples::OpenDevice& device() { return *device_; }
-  void setTitle(const std::string& title) const;
+  void setTitle(const std::string& title) { SDL_SetWindowTitle(window_, title.c_str()); }
   VkExtent2D size() const;
 
   /// Gives an event to the interface.
@@ -49,43 +48,32 @@ class Window {
   Result<bool> begin();
   /// Ends the frame of the interface, draws, shows and waits. The picture begins at the column
   /// `left`. Returns false if there was no image to draw on this time. Fails with `vulkanError`, or
-  /// like `recordPicture`.
-  Result<bool> show(const RecordPicture& recordPicture, std::uint32_t left, bool isReadBack);
+  /// like `recordScene`.
+  Result<bool> show(const RecordScene& recordScene, std::uint32_t left, bool isReadBack);
   /// The contents of the window in the last frame, which must have been read back.
   samples::render::Picture picture() const;
 
  private:
-  struct Sdl {
-    SDL_Window* window = nullptr;
-    ~Sdl();
-  };
-  struct Surface {
-    VkInstance instance = VK_NULL_HANDLE;
-    VkSurfaceKHR handle = VK_NULL_HANDLE;
-    ~Surface();
-  };
-
   Window() = default;
   Result<void> openWindow(std::uint32_t width, std::uint32_t height);
   Result<void> openDevice(samples::DeviceOptions options);
-  Result<void> chooseFormat();
+  Result<void> checkFormat() const;
   Result<void> makePass();
   Result<void> startInterface();
   Result<void> makeSwapchain();
   Result<void> makeCanvas(VkExtent2D extent);
   Result<std::optional<std::uint32_t>> acquire();
   Result<void> present(std::uint32_t image);
-  void copyPicture(VkCommandBuffer commandBuffer, const samples::render::RenderTarget* picture,
-                   std::uint32_t left) const;
+  void recordPicture(VkCommandBuffer commandBuffer, const samples::render::RenderTarget* picture,
+                     std::uint32_t left) const;
   void recordInterface(VkCommandBuffer commandBuffer) const;
   void recordCopy(VkCommandBuffer commandBuffer, VkImage image) const;
   Result<void> recordReadBack(VkCommandBuffer commandBuffer);
 
-  // Members are destroyed in reverse order of declaration.
-  Sdl sdl_;
+  SDL_Window* window_ = nullptr;
+  VkSurfaceKHR surface_ = VK_NULL_HANDLE;
+  // Members are destroyed in reverse order of declaration: all others before the device.
   std::optional<samples::OpenDevice> device_;
-  Surface surface_;
-  VkFormat format_ = VK_FORMAT_UNDEFINED;  ///< of the window's images, without the sRGB curve
   samples::render::Owned<VkSwapchainKHR> swapchain_;
   std::vector<VkImage> images_;
   bool isStale_ = true;  ///< the swapchain does not fit the window

@@ -1,10 +1,20 @@
-// Command buffers that are submitted once and waited for.
+// Helpers for Vulkan objects, and for command buffers that are submitted once and waited for.
 #pragma once
+
+#include <utility>
 
 #include "dermis/result.h"
 #include "kit/device.h"
 
 namespace dermis::viewer {
+
+/// Moves what was made to its place.
+template <typename Made, typename Place>
+Result<void> keep(Result<Made> made, Place& place) {
+  if (!made) return made.error();
+  place = std::move(*made);
+  return {};
+}
 
 inline VkCommandBuffer beginCommands(samples::Device& device) {
   const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
