@@ -34,7 +34,7 @@ debootstrap lintian
 fi
 
 case ${1:-} in
-  showcase|nightly) packages="$packages libsdl2-dev libx11-dev libimgui-dev xvfb xdotool" ;;
+  showcase|nightly) packages="$packages libsdl2-dev libimgui-dev xvfb xdotool" ;;
   windows) packages="$packages googletest g++-mingw-w64-x86-64-posix wine wine64" ;;
   x86) packages="$packages googletest g++-i686-linux-gnu" ;;
   arm64) packages="$packages googletest g++-aarch64-linux-gnu qemu-user" ;;

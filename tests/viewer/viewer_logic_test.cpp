@@ -37,27 +37,19 @@ TEST(RepeatedTimeTest, BeginsAnewAfterTheEndAndBeforeTheBeginning) {
 
 const Box box{{-1, 0, -0.5f}, {1, 4, 0.5f}};
 
-void expectAllSeen(const OrbitCamera& camera, float aspect) {
-  const samples::render::Camera seen = camera.camera(box, aspect);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::vec3 point((corner & 1) != 0 ? box.max[0] : box.min[0],
-                          (corner & 2) != 0 ? box.max[1] : box.min[1],
-                          (corner & 4) != 0 ? box.max[2] : box.min[2]);
-    const glm::vec4 clip = seen.viewProjection * glm::vec4(point, 1);
-    EXPECT_LT(std::abs(clip.x), clip.w);
-    EXPECT_LT(std::abs(clip.y), clip.w);
-    EXPECT_GT(clip.z, 0);
-    EXPECT_LT(clip.z, clip.w);
-  }
-}
-
 TEST(OrbitCameraTest, FramesABoxFromAllAround) {
-  for (const float aspect : {0.4f, 1.0f, 2.5f}) {
+  for (int place = 0; place < 36; ++place) {
     OrbitCamera camera;
-    for (int step = 0; step < 12; ++step) {
-      camera.frame(box, aspect);
-      expectAllSeen(camera, aspect);
-      camera.orbit(0.23f, step < 6 ? 0.05f : -0.15f);
+    camera.orbit(0.23f * static_cast<float>(place), 0.3f - 0.05f * static_cast<float>(place % 12));
+    const float aspect = place < 12 ? 0.4f : place < 24 ? 1.0f : 2.5f;
+    camera.frame(box, aspect);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::vec3 point((corner & 1) != 0 ? box.max[0] : box.min[0],
+                            (corner & 2) != 0 ? box.max[1] : box.min[1],
+                            (corner & 4) != 0 ? box.max[2] : box.min[2]);
+      const glm::vec4 clip = camera.camera(box, aspect).viewProjection * glm::vec4(point, 1);
+      EXPECT_TRUE(std::abs(clip.x) < clip.w && std::abs(clip.y) < clip.w) << place;
+      EXPECT_TRUE(clip.z > 0 && clip.z < clip.w) << place;
     }
   }
 }
@@ -91,16 +83,14 @@ TEST(JointsTest, HasEveryJointOnceBelowOneRoot) {
   const std::vector<Joint> joints = jointsOf(scene);
   EXPECT_EQ(joints.size(), scene.model->skins[0].joints.size());
   std::set<std::uint32_t> nodes;
-  std::size_t roots = 0;
   for (const Joint& joint : joints) {
     EXPECT_FALSE(joint.name.empty());
     nodes.insert(joint.node);
-    roots += joint.parent == gltf::none;
-    if (joint.parent == gltf::none) continue;
+    if (&joint == joints.data()) continue;  // the root
+    ASSERT_NE(joint.parent, gltf::none);
     EXPECT_EQ(joints[joint.parent].node, scene.model->nodes[joint.node].parent);
   }
   EXPECT_EQ(nodes.size(), joints.size());
-  EXPECT_EQ(roots, 1u);
 }
 
 TEST(JointsTest, TheWeightsOfAllJointsAreOne) {
