@@ -37,7 +37,7 @@ PoseHandle SystemEngine::addPose(std::span<const JointMatrix> pose, const PoseOp
 }
 
 InstanceHandle SystemEngine::addInstance(const InstanceDescription& description) {
-  must(system_.prepare(pipelineNeeds(description)));
+  must(system_.prepare(description));
   return must(system_.addInstance(description));
 }
 

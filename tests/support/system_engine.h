@@ -34,7 +34,8 @@ class SystemEngine {
   vulkan::SkinningSystem& system() { return system_; }
   vulkan::SkinningSystem* operator->() { return &system_; }
 
-  // -- What is in it. Vertices are counted, and pipelines prepared.
+  // -- What is in it. Vertices are counted, and pipelines prepared: those of an instance with its
+  // mesh, pose and method. A test that changes these to others prepares more.
   MeshHandle addMesh(const PackedMesh& mesh);
   PoseHandle addPose(std::span<const JointMatrix> pose, const PoseOptions& options = {});
   InstanceHandle addInstance(const InstanceDescription& description);
