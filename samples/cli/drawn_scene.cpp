@@ -7,7 +7,6 @@
 #include <cstring>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "bind_pose.h"
@@ -61,9 +60,6 @@ Result<DrawnScene> DrawnScene::create(samples::OpenDevice& device,
   if (Result<void> made = drawn.makeSystem(static_cast<std::uint32_t>(methods.size())); !made)
     return made.error();
   if (Result<void> added = drawn.addSharedParts(renderer); !added) return added.error();
-  for (const Method method : std::set<Method>(methods.begin(), methods.end())) {
-    if (Result<void> done = drawn.prepare(method); !done) return done.error();
-  }
   for (const Method method : methods) {
     if (Result<void> added = drawn.addFigure(method); !added) return added.error();
   }
@@ -128,9 +124,11 @@ Result<void> DrawnScene::addSharedParts(samples::render::Renderer& renderer) {
   return {};
 }
 
-InstanceDescription DrawnScene::instanceOf(std::size_t part, Method method) const {
+InstanceDescription DrawnScene::instanceOf(const Figure& figure, std::size_t part,
+                                           Method method) const {
   InstanceDescription description;
-  if (shared_[part].mesh) description.mesh = *shared_[part].mesh;
+  description.mesh = *shared_[part].mesh;
+  description.pose = figure.poses[scene_->parts[part].source.skin];
   description.method = method;
   description.layout.normals =
       scene_->parts[part].primitive->normals.empty() ? VertexFormat::none : VertexFormat::float32x3;
@@ -138,11 +136,10 @@ InstanceDescription DrawnScene::instanceOf(std::size_t part, Method method) cons
   return description;
 }
 
-Result<void> DrawnScene::prepare(Method method) {
+Result<void> DrawnScene::prepare(const Figure& figure, Method method) {
   for (std::size_t part = 0; part < shared_.size(); ++part) {
     if (!shared_[part].mesh) continue;
-    if (Result<void> done = system_->prepare(pipelineNeeds(instanceOf(part, method))); !done)
-      return done;
+    if (Result<void> done = system_->prepare(instanceOf(figure, part, method)); !done) return done;
   }
   return {};
 }
@@ -161,6 +158,7 @@ Result<void> DrawnScene::addFigure(Method method) {
     figure.poses[skin] = *palette;
     isUsed[skin] = true;
   }
+  if (Result<void> done = prepare(figure, method); !done) return done;
   if (Result<void> added = addInstances(figure, method); !added) return added;
   figures_.push_back(std::move(figure));
   return {};
@@ -169,9 +167,7 @@ Result<void> DrawnScene::addFigure(Method method) {
 Result<void> DrawnScene::addInstances(Figure& figure, Method method) {
   for (std::size_t index = 0; index < shared_.size(); ++index) {
     if (!shared_[index].mesh) continue;
-    InstanceDescription description = instanceOf(index, method);
-    description.pose = figure.poses[scene_->parts[index].source.skin];
-    Result<InstanceHandle> instance = system_->addInstance(description);
+    Result<InstanceHandle> instance = system_->addInstance(instanceOf(figure, index, method));
     if (!instance) return instance.error();
     figure.parts[index].instance = *instance;
   }
@@ -179,8 +175,8 @@ Result<void> DrawnScene::addInstances(Figure& figure, Method method) {
 }
 
 Result<void> DrawnScene::setMethod(std::uint32_t index, Method method) {
-  if (Result<void> done = prepare(method); !done) return done;
   Figure& figure = figures_[index];
+  if (Result<void> done = prepare(figure, method); !done) return done;
   for (FigurePart& part : figure.parts) {
     if (!part.instance) continue;
     if (Result<void> removed = system_->removeInstance(*part.instance); !removed) return removed;

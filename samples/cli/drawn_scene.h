@@ -75,8 +75,9 @@ class DrawnScene {
   Result<void> addSharedParts(samples::render::Renderer& renderer);
   Result<void> addFigure(Method method);
   Result<void> addInstances(Figure& figure, Method method);
-  Result<void> prepare(Method method);
-  InstanceDescription instanceOf(std::size_t part, Method method) const;
+  Result<void> prepare(const Figure& figure, Method method);
+  /// Of a part that is skinned.
+  InstanceDescription instanceOf(const Figure& figure, std::size_t part, Method method) const;
   Result<void> placeFixed(const ScenePart& part, std::span<const MorphWeight> morphs,
                           FixedPart& fixed) const;
 
