@@ -1,5 +1,6 @@
-# ctest includes this file, with `program`, `cost` and `label` set. Adds one test for each suite of a GoogleTest
-# program.
+# ctest includes this file, with `program`, `cost`, `label` and `apart` set. Adds one test for each suite of a GoogleTest
+# program, or for each test of the suites in the list `apart`. Nightly tests are named PROGRAM/SUITE, since other programs have suites of
+# the same name, and ctest sets the properties of all tests of a name.
 #
 # A process opens a device and compiles kernels, which takes longer than most of its tests. A suite with a skipped test exits with
 # 77, unless another test failed; tests/run.sh lists the skipped tests.
@@ -12,16 +13,34 @@ if(NOT status EQUAL 0)
   endif()
   return()
 endif()
-# Suites begin at the start of a line; their tests are indented.
-string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+\\." suites "${suites}")
-foreach(suite IN LISTS suites)
-  string(STRIP "${suite}" suite)
-  add_test("${suite}*" ${program} "--gtest_filter=${suite}*")
-  set_tests_properties("${suite}*" PROPERTIES TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
+# Suites begin at the start of a line; their tests are indented. What follows # may contain anything.
+string(REGEX REPLACE " *#[^\n]*" "" suites "${suites}")
+string(REGEX MATCHALL "[^\n]+" lines "${suites}")
+set(prefix)
+if(label STREQUAL "nightly")
+  cmake_path(GET program FILENAME prefix)
+  string(APPEND prefix "/")
+endif()
+foreach(line IN LISTS lines)
+  if(line MATCHES "^([A-Za-z0-9_]+/)?([A-Za-z0-9_]+)(/[A-Za-z0-9_]+)?\\.$")
+    set(suite ${line})
+    set(tests "${suite}*")
+    list(FIND apart "${CMAKE_MATCH_2}" isApart)
+    if(NOT isApart EQUAL -1)
+      continue()
+    endif()
+  elseif(line MATCHES "^  ([A-Za-z0-9_/]+)$" AND NOT isApart EQUAL -1)
+    set(tests "${suite}${CMAKE_MATCH_1}")
+  else()
+    continue()
+  endif()
+  set(name "${prefix}${tests}")
+  add_test("${name}" ${program} "--gtest_filter=${tests}")
+  set_tests_properties("${name}" PROPERTIES TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
   if(label)
-    set_tests_properties("${suite}*" PROPERTIES LABELS ${label})
+    set_tests_properties("${name}" PROPERTIES LABELS ${label})
   endif()
   if(label STREQUAL "nightly")
-    set_tests_properties("${suite}*" PROPERTIES TIMEOUT 1700)
+    set_tests_properties("${name}" PROPERTIES TIMEOUT 1700)
   endif()
 endforeach()

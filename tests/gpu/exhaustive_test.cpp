@@ -1,5 +1,6 @@
 // Every format with every other, and every method with the formats of positions and normals: what
-// ProductTest covers by pairs. Too long for every change; tests/run.sh nightly runs it.
+// ProductTest covers by pairs. Too long for every change; tests/run.sh nightly runs it, with the
+// files that are built for it with DERMIS_EXHAUSTIVE.
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,10 @@
-// The product of methods, inputs and outputs, by pairs, over random meshes with awkward counts:
-// what `dermis verify` runs, with the validation layer watching.
+// The product of methods, inputs and outputs, by pairs, over random meshes with awkward counts,
+// with the validation layer watching. Of common values, each of which meets every method, as in
+// `dermis verify --quick`; exhaustive_test has all values and more kinds of devices.
 
 #include <gtest/gtest.h>
 
+#include "exhaustive.h"
 #include "intercepted_device.h"
 #include "test_device.h"
 #include "verify_product.h"
@@ -15,17 +17,12 @@ class ProductTest : public DeviceTest {
   /// One case in every `step`.
   void verify(vulkan::Context& context, std::size_t step) {
     samples::VulkanTarget target(device(), context);
-    verifyProduct(target, step);
+    verifyProduct(target, step, isExhaustive ? samples::Coverage::full : samples::Coverage::quick);
   }
 };
 
 TEST_F(ProductTest, EveryCombinationIsInsideItsBounds) {
   verify(context(), 1);
-}
-
-TEST_F(ProductTest, WithoutPushDescriptors) {
-  useDevice(false);
-  verify(context(), 4);
 }
 
 TEST_F(ProductTest, WithoutStoresOfLessThanAWord) {
@@ -35,6 +32,23 @@ TEST_F(ProductTest, WithoutStoresOfLessThanAWord) {
   ASSERT_TRUE(words.ok()) << words.error().message;
   ASSERT_FALSE(words->limits().storage16Bit);
   verify(*words, 4);
+}
+
+TEST_F(ProductTest, WithTheFourStorageBuffersThatEveryDeviceHas) {
+  InterceptedDevice few(device().description());
+  few.changeLimits(
+      [](VkPhysicalDeviceLimits& limits) { limits.maxPerStageDescriptorStorageBuffers = 4; });
+  Result<vulkan::Context> four = vulkan::Context::create(few.description());
+  ASSERT_TRUE(four.ok()) << four.error().message;
+  ASSERT_EQ(four->limits().maxStorageBuffersPerStage, 4u);
+  verify(*four, 4);
+}
+
+#ifdef DERMIS_EXHAUSTIVE
+
+TEST_F(ProductTest, WithoutPushDescriptors) {
+  useDevice(false);
+  verify(context(), 4);
 }
 
 // As on discrete GPUs, of which vertices of every day go through workgroup memory.
@@ -47,15 +61,7 @@ TEST_F(ProductTest, WithStagedStores) {
   verify(*staged, 4);
 }
 
-TEST_F(ProductTest, WithTheFourStorageBuffersThatEveryDeviceHas) {
-  InterceptedDevice few(device().description());
-  few.changeLimits(
-      [](VkPhysicalDeviceLimits& limits) { limits.maxPerStageDescriptorStorageBuffers = 4; });
-  Result<vulkan::Context> four = vulkan::Context::create(few.description());
-  ASSERT_TRUE(four.ok()) << four.error().message;
-  ASSERT_EQ(four->limits().maxStorageBuffersPerStage, 4u);
-  verify(*four, 4);
-}
+#endif
 
 }  // namespace
 }  // namespace dermis::test

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "exhaustive.h"
 #include "intercepted_device.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
@@ -117,9 +118,11 @@ TEST_F(TexelTest, BothPathsGiveTheSameBits) {
   for (const Method method : allMethods) {
     SCOPED_TRACE(methodName(method));
     const Rigs rigs(method, {4, 7});
-    // Every method with the first layout and one of the others in turn.
-    for (const std::size_t layout : {std::size_t{0}, 1 + std::size_t(method) % 3})
-      expectSameOn(*storage, rigs, layouts()[layout]);
+    for (std::size_t layout = 0; layout < layouts().size(); ++layout) {
+      // Every method with one of the layouts in turn.
+      if (isExhaustive || layout == std::size_t(method) % layouts().size())
+        expectSameOn(*storage, rigs, layouts()[layout]);
+    }
   }
 }
 
@@ -130,7 +133,12 @@ TEST_F(TexelTest, BothPathsGiveTheSameBitsForEveryLayoutAndNumberOfInfluences) {
     Result<vulkan::Context> storage = contextWithoutTexels();
     ASSERT_TRUE(storage.ok());
     const Rigs rigs(Method::dualQuaternion, {1, 2, 4, 7});
-    for (const samples::OutputLayout& layout : layouts()) expectSameOn(*storage, rigs, layout);
+    for (const samples::OutputLayout& layout : layouts()) {
+      // Other descriptors make a difference only where there are more buffers.
+      if (isExhaustive || pushDescriptors || layout.bounds ||
+          layout.arrangement == samples::Arrangement::separate)
+        expectSameOn(*storage, rigs, layout);
+    }
   }
 }
 

@@ -215,7 +215,7 @@ part_gpu() {
 
 part_exhaustive() {
   build ci exhaustive_test real_models_test
-  tests ci -R 'ExhaustiveTest|RealModelsTest'
+  tests ci -R '^(exhaustive_test|real_models_test)/'
 }
 
 # Whether two tables of numbers are equal except for rounding.
