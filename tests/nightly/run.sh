@@ -17,6 +17,7 @@
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
 #   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
 #   exhaustive   every combination of methods and formats, and every real model, on the device
+#   packages     ways to use Dermis that compile it again: as a subproject, from its source package, with another compiler
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   showcase     the viewer in a window, and the film of a crowd
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
@@ -27,7 +28,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive golden showcase programs"
+parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive packages golden showcase programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
 
@@ -216,6 +217,11 @@ part_gpu() {
 part_exhaustive() {
   build ci exhaustive_test real_models_test
   tests ci -R '^(exhaustive_test|real_models_test)/'
+}
+
+part_packages() {
+  build ci
+  tests ci -L nightly -R '^package\.'
 }
 
 # Whether two tables of numbers are equal except for rounding.

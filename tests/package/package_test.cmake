@@ -25,6 +25,7 @@ endfunction()
 
 # build_consumer(SOURCE ARGUMENTS...): configures (from scratch) and builds a project with COMPILER. SOURCE is a path, or the name
 # of a folder in consumers/. A warning of CMake is an error. Sets BUILD to the build folder, and CONFIGURED to the output of CMake.
+# With CONFIGURE_ONLY it builds nothing.
 function(build_consumer source)
   cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${scriptFolder}/consumers")
   set(build "${testFolder}/${NAME}")
@@ -36,11 +37,14 @@ function(build_consumer source)
   if(configured MATCHES "CMake (Deprecation )?Warning")
     wrong("CMake warns:\n${configured}")
   endif()
+  set(BUILD "${build}" PARENT_SCOPE)
+  if(CONFIGURE_ONLY)
+    return()
+  endif()
   run(built "Build it" ${CMAKE_COMMAND} --build "${build}" --parallel 2)
   if(built MATCHES "warning: ")
     wrong("the compiler warns:\n${built}")
   endif()
-  set(BUILD "${build}" PARENT_SCOPE)
 endfunction()
 
 # list_compiler_symbols(OUTPUT PROGRAM): lists the symbols of glslang and SPIRV-Tools in a program.
