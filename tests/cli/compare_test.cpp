@@ -1,5 +1,6 @@
 // `dermis compare`: numbers that are known from theory stand in its columns. What a method costs is
-// the machine's affair: no test here asks for a time, other than that there is one.
+// the machine's affair: no test here asks for a time, other than that there is one. On a device:
+// ComparisonCommandTest.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -111,40 +111,6 @@ TEST(CompareTest, SharesOfTheWholeMeshMoveTheirMethodsOnly) {
               number(none, Method::linear, "difference", "largest"), 1e-12);
   EXPECT_GT(number(none, Method::linear, "difference", "largest"), 1e-3);
   EXPECT_NEAR(number(all, Method::blended, "difference", "largest"), 0, 1e-12);
-}
-
-TEST(CompareTest, EveryMethodHasARowAndLinearTakesAsLongAsLinear) {
-  REQUIRE_DEVICE();
-  const Compared compared =
-      compare({bar, "--time", "1.5", "--instances", "7", "--repetitions", "3"});
-  ASSERT_EQ(compared.result.status, 0) << compared.result.errors;
-  EXPECT_TRUE(compared.result.errors.empty()) << "no progress on a pipe";
-  EXPECT_EQ(compared.json["instances"], 7);
-  EXPECT_EQ(compared.json["repetitions"], 3);
-  EXPECT_EQ(compared.json["joints"], 2);
-  EXPECT_FALSE(compared.json["scales"].get<bool>());
-  EXPECT_FALSE(compared.json["driver"].get<std::string>().empty());
-  EXPECT_EQ(compared.methods.at("linear")["time"], 1.0);
-  EXPECT_EQ(compared.methods.at("linear")["bytesPerJoint"], 48);
-  EXPECT_EQ(compared.methods.at("dual_quaternion")["bytesPerJoint"], 32);
-  EXPECT_EQ(compared.methods.at("log_matrix")["bytesPerJoint"], 48);
-  EXPECT_EQ(compared.methods.at("dual_quaternion")["difference"]["largest"], 0.0);
-
-  std::map<std::string, std::string> timeOf;
-  std::istringstream lines(compared.result.output);
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream words(line);
-    std::string first, second;
-    words >> first >> second;
-    if (methodFromName(first)) timeOf[first] = second;
-  }
-  EXPECT_EQ(timeOf.size(), allMethods.size()) << compared.result.output;
-  EXPECT_EQ(timeOf["linear"], "1.00");
-  for (const auto& [name, method] : compared.methods) {
-    EXPECT_GT(method["seconds"].get<double>(), 0) << name;
-    EXPECT_GT(method["time"].get<double>(), 0) << name;
-    EXPECT_GT(method["instructions"].get<int>(), 20) << name;
-  }
 }
 
 TEST(CompareTest, TheReferenceIsNotTimed) {

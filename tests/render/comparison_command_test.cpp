@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "dermis/method.h"
 #include "dermis_command.h"
 #include "pictures.h"
 #include "test_paths.h"
@@ -17,33 +21,68 @@ namespace {
 const std::string bar = std::string(sampleModels) + "/bar.glb";
 
 CommandResult compare(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {"compare", "--repetitions", "1", "--instances", "1"});
+  arguments.insert(arguments.begin(), "compare");
   return dermis(arguments);
 }
 
-TEST(ComparisonCommandTest, WritesAPictureBesidesTheTable) {
+/// The figures of each method in a report, by its name.
+std::map<std::string, nlohmann::json> methodsIn(const nlohmann::json& report) {
+  std::map<std::string, nlohmann::json> methods;
+  for (const nlohmann::json& method : report.at("methods")) methods[method.at("method")] = method;
+  return methods;
+}
+
+/// The second word of each line that begins with the name of a method.
+std::map<std::string, std::string> timesIn(const std::string& output) {
+  std::map<std::string, std::string> times;
+  std::istringstream lines(output);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string first, second;
+    words >> first >> second;
+    if (methodFromName(first)) times[first] = second;
+  }
+  return times;
+}
+
+// Each comparison on a device builds pipelines for all methods, so one has all that is asked of it:
+// the table, the report and the picture.
+TEST(ComparisonCommandTest, EveryMethodHasARowAndThePictureTheColumnsThatAreNamed) {
   REQUIRE_DEVICE();
-  const std::string out = outFile("bar.png");
-  const CommandResult result = compare({"--time", "1", "-o", out, "--width", "500", "--methods",
-                                        "linear,dual_quaternion_iterative", bar});
+  const std::string out = outFile("bar.png"), json = outFile("bar.json");
+  const CommandResult result =
+      compare({"--time", "1", "--instances", "7", "--repetitions", "3", "-o", out, "--json", json,
+               "--width", "500", "--methods", "linear,dual_quaternion_iterative", bar});
   ASSERT_EQ(result.status, 0) << result.errors;
-  EXPECT_TRUE(result.errors.empty()) << result.errors;
-  // All methods, whatever the columns are.
+  EXPECT_TRUE(result.errors.empty()) << "no progress on a pipe: " << result.errors;
   for (const char* word : {"instructions", "bulge_controlled", "1.000 s"})
     EXPECT_NE(result.output.find(word), std::string::npos) << result.output;
+  std::map<std::string, std::string> times = timesIn(result.output);
+  EXPECT_EQ(times.size(), allMethods.size()) << result.output;
+  EXPECT_EQ(times["linear"], "1.00");
+
+  const nlohmann::json report = nlohmann::json::parse(std::ifstream(json));
+  EXPECT_EQ(report.at("instances"), 7);
+  EXPECT_EQ(report.at("repetitions"), 3);
+  EXPECT_EQ(report.at("joints"), 2);
+  EXPECT_FALSE(report.at("scales").get<bool>());
+  EXPECT_FALSE(report.at("driver").get<std::string>().empty());
+  const std::map<std::string, nlohmann::json> methods = methodsIn(report);
+  EXPECT_EQ(methods.at("linear").at("time"), 1.0);
+  EXPECT_EQ(methods.at("linear").at("bytesPerJoint"), 48);
+  EXPECT_EQ(methods.at("dual_quaternion").at("bytesPerJoint"), 32);
+  EXPECT_EQ(methods.at("log_matrix").at("bytesPerJoint"), 48);
+  EXPECT_EQ(methods.at("dual_quaternion").at("difference").at("largest"), 0.0);
+  for (const auto& [name, method] : methods) {
+    EXPECT_GT(method.at("seconds").get<double>(), 0) << name;
+    EXPECT_GT(method.at("time").get<double>(), 0) << name;
+    EXPECT_GT(method.at("instructions").get<int>(), 20) << name;
+  }
+
   const auto picture = readPng(out);
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->width, 500u);
   EXPECT_GT(picture->height, 500u);
-}
-
-TEST(ComparisonCommandTest, NeedsNoModel) {
-  REQUIRE_DEVICE();
-  const std::string out = outFile("built-in.png");
-  const CommandResult result = compare({"-o", out, "--width", "480", "--methods", "linear"});
-  ASSERT_EQ(result.status, 0) << result.errors;
-  EXPECT_NE(result.output.find("the built-in arm"), std::string::npos) << result.output;
-  EXPECT_TRUE(readPng(out));
 }
 
 TEST(ComparisonCommandTest, WhatIsWrongHasItsStatus) {
@@ -72,12 +111,16 @@ TEST(ComparisonCommandTest, WhatIsWrongHasItsStatus) {
   }
 }
 
-TEST(ComparisonCommandTest, AFileThatCannotBeWrittenEndsWithFive) {
+// The table comes before the picture.
+TEST(ComparisonCommandTest, NeedsNoModelAndEndsWithFiveIfTheFileCannotBeWritten) {
   REQUIRE_DEVICE();
   const CommandResult result =
-      compare({"-o", "/nonexistent/folder/a.png", "--width", "480", "--methods", "linear"});
+      compare({"--repetitions", "1", "--instances", "1", "-o", "/nonexistent/folder/a.png",
+               "--width", "480", "--methods", "linear"});
   EXPECT_EQ(result.status, 5);
   expectOneErrorLine(result);
+  EXPECT_NE(result.errors.find("/nonexistent/folder/a.png"), std::string::npos) << result.errors;
+  EXPECT_NE(result.output.find("the built-in arm"), std::string::npos) << result.output;
 }
 
 }  // namespace
