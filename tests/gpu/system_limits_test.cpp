@@ -210,6 +210,7 @@ TEST_F(SystemLimitsTest, WorkgroupsAreFoldedWhereADimensionIsShort) {
   vulkan::Context narrow = must(vulkan::Context::create(small.description()));
   vulkan::SkinningSystemDescription system = description();
   system.context = &narrow;
+  system.tuning = Tuning{32, 1};  // more than 13 workgroups in each dispatch
   SystemEngine engine(device(), system);
   engine.begin();
   addCrowd(engine, 30, motionLayout());
