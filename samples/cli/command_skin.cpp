@@ -16,7 +16,6 @@
 #include "method_options.h"
 #include "scene_skinner.h"
 #include "skinned_scene.h"
-#include "vertex_normals.h"
 
 namespace dermis::cli {
 namespace {

@@ -9,10 +9,10 @@
 #include <map>
 #include <utility>
 
-#include "bind_pose.h"
 #include "dermis/vulkan/scope.h"
 #include "kit/barrier.h"
 #include "kit/render/winding.h"
+#include "scene_skinner.h"
 
 namespace dermis::cli {
 namespace {

@@ -1,25 +1,137 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
-#include "glb_file.h"
-#include "mesh_formats.h"
+#include "mesh_output.h"
 
 namespace dermis::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using samples::GlbBuffer;
-using samples::GlbComponent;
-using samples::GlbTarget;
+
+enum class GlbComponent : int {
+  unsignedByte = 5121,
+  unsignedShort = 5123,
+  unsignedInt = 5125,
+  float32 = 5126
+};
+
+/// The use of a bufferView.
+enum class GlbTarget : int { none = 0, vertices = 34962, indices = 34963 };
+
+/// Builds the binary chunk of a file, and the bufferViews and accessors that describe it. Each
+/// accessor has its own bufferView, which begins at a multiple of 4 bytes.
+class GlbBuffer {
+ public:
+  /// Begins a bufferView. It contains all values that are put before `end`.
+  void begin();
+  /// Appends the 1 to 4 lowest bytes of the value.
+  void put(std::uint32_t value, int byteCount);
+  void putFloats(std::span<const float> values);
+  /// Ends the bufferView. Returns the index of an accessor for its `count` elements. `type` is
+  /// "SCALAR", "VEC3", …
+  int end(GlbComponent component, const char* type, std::size_t count, GlbTarget target);
+
+  /// An accessor, to which min, max or normalized can be added.
+  Json& accessor(int index) { return accessors_[static_cast<std::size_t>(index)]; }
+
+  const std::vector<std::byte>& bytes() const { return bytes_; }
+  const Json& views() const { return views_; }
+  const Json& accessors() const { return accessors_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::size_t start_ = 0;
+  Json views_ = Json::array();
+  Json accessors_ = Json::array();
+};
+
+static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
+
+constexpr std::size_t padded(std::size_t size) {
+  return (size + 3) / 4 * 4;
+}
+
+void putWord(std::vector<std::byte>& bytes, std::size_t value) {
+  for (unsigned byte = 0; byte < 4; ++byte) {
+    bytes.push_back(static_cast<std::byte>((value >> (8U * byte)) & 0xFFU));
+  }
+}
+
+void putChunk(std::vector<std::byte>& file, std::size_t type, std::span<const std::byte> content,
+              char padding) {
+  putWord(file, padded(content.size()));
+  putWord(file, type);
+  file.insert(file.end(), content.begin(), content.end());
+  while (file.size() % 4 != 0) file.push_back(static_cast<std::byte>(padding));
+}
+
+void GlbBuffer::begin() {
+  bytes_.resize(padded(bytes_.size()));
+  start_ = bytes_.size();
+}
+
+void GlbBuffer::put(std::uint32_t value, int byteCount) {
+  for (int byte = 0; byte < byteCount; ++byte) {
+    bytes_.push_back(static_cast<std::byte>((value >> (8 * byte)) & 0xFFU));
+  }
+}
+
+void GlbBuffer::putFloats(std::span<const float> values) {
+  const std::span<const std::byte> stored = std::as_bytes(values);
+  bytes_.insert(bytes_.end(), stored.begin(), stored.end());
+}
+
+int GlbBuffer::end(GlbComponent component, const char* type, std::size_t count, GlbTarget target) {
+  Json view = {{"buffer", 0}, {"byteOffset", start_}, {"byteLength", bytes_.size() - start_}};
+  if (target != GlbTarget::none) view["target"] = static_cast<int>(target);
+  views_.push_back(view);
+  accessors_.push_back({{"bufferView", views_.size() - 1},
+                        {"componentType", static_cast<int>(component)},
+                        {"count", count},
+                        {"type", type}});
+  return static_cast<int>(accessors_.size()) - 1;
+}
+
+/// Returns the bytes of the file. `document` has everything except accessors, bufferViews and
+/// buffers, which are added. Invalid UTF-8 in names is replaced. Empty if the file would be larger
+/// than 4 GiB, the maximum of the format.
+std::vector<std::byte> glbContainer(Json document, const GlbBuffer& buffer) {
+  document["accessors"] = buffer.accessors();
+  document["bufferViews"] = buffer.views();
+  document["buffers"] = Json::array({{{"byteLength", padded(buffer.bytes().size())}}});
+  const std::string text = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+
+  constexpr std::size_t magic = 0x46546C67U;        // "glTF"
+  constexpr std::size_t jsonChunk = 0x4E4F534AU;    // "JSON"
+  constexpr std::size_t binaryChunk = 0x004E4942U;  // "BIN\0"
+  constexpr std::size_t headerSize = 12;
+  constexpr std::size_t chunkHeaderSize = 8;
+  const std::size_t size =
+      headerSize + 2 * chunkHeaderSize + padded(text.size()) + padded(buffer.bytes().size());
+  if (size > std::numeric_limits<std::uint32_t>::max()) return {};
+
+  std::vector<std::byte> file;
+  file.reserve(size);
+  putWord(file, magic);
+  putWord(file, 2);
+  putWord(file, size);
+  putChunk(file, jsonChunk, std::as_bytes(std::span(text)), ' ');
+  putChunk(file, binaryChunk, buffer.bytes(), '\0');
+  return file;
+}
 
 constexpr int pointsMode = 0;
 constexpr int trianglesMode = 4;
@@ -219,7 +331,7 @@ std::vector<std::byte> glbFile(const OutputMesh& mesh) {
   document["nodes"] = nodes;
   document["meshes"] = meshes;
   if (!materials.list().empty()) document["materials"] = materials.list();
-  return samples::glbFile(std::move(document), buffer);
+  return glbContainer(std::move(document), buffer);
 }
 
 }  // namespace dermis::cli

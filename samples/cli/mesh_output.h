@@ -1,7 +1,9 @@
-// Writes skinned primitives to a file: the part that all formats share.
+// Writes skinned primitives to a file. Vertices are in the order of the accessors, part after part,
+// and are not welded.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -48,10 +50,24 @@ bool holdsNonFinite(OutputFormat format);
 /// Whether the format stores tangents. Only GLB does; for the others, tangents need not be skinned.
 bool holdsTangents(OutputFormat format);
 
+/// Binary glTF 2.0: for each part a node and a mesh of one primitive, with POSITION, NORMAL,
+/// TANGENT, every TEXCOORD_n, COLOR_0, and the factors of its material. A part without triangles
+/// becomes points without tangents, so that no vertex is lost. Values that glTF forbids are
+/// repaired: normals are normalized (a zero normal becomes 0 0 1). Tangents are normalized (one
+/// that is zero or not finite becomes perpendicular to the normal), with a handedness of 1 or -1.
+/// Colors and factors are clamped. A texture coordinate that is not finite becomes 0. Positions and
+/// normals must be finite. Empty if the file would be larger than 4 GiB.
+std::vector<std::byte> glbFile(const OutputMesh& mesh);
+
 /// Writes the file completely or not at all. Fails with `ioError`, or with `limitExceeded` if the
 /// format cannot store such a large mesh. Values that are not finite must have been refused before,
 /// unless the format holds them.
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh);
+
+/// Area-weighted normals of the triangles (3 indices each, all within `positions`, 3 floats per
+/// vertex). A vertex without triangles gets 0 0 1.
+std::vector<float> computeNormals(std::span<const float> positions,
+                                  std::span<const std::uint32_t> triangles);
 
 }  // namespace dermis::cli

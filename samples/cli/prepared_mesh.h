@@ -3,14 +3,17 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dermis/gltf.h"
 #include "dermis/method.h"
 #include "dermis/pack.h"
+#include "dermis/result.h"
 #include "dermis/validate.h"
 
 namespace dermis::cli {
@@ -77,6 +80,31 @@ class PreparedMesh {
   std::optional<RepairedMesh> repaired_;
   std::vector<float> centersOfRotation_;  ///< 3 per vertex, or empty
   std::optional<PackedMesh> packed_;
+};
+
+/// Computes the centers of rotation of the meshes of one file, once for each mesh.
+class MeshCenters {
+ public:
+  /// `mostTerms` limits the terms of the sums of all meshes together; each takes about 4 ns. The
+  /// budget is the file's, and must outlive this object.
+  MeshCenters(std::uint64_t mostTerms, gltf::MemoryBudget& budget)
+      : termsLeft_(mostTerms), budget_(budget) {}
+
+  /// The centers of a primitive, 3 floats per vertex. They depend on all primitives of the mesh, so
+  /// that primitives agree where they meet. `jointCount` is at most `namedJoints` of the mesh.
+  /// Shows progress. Fails with `limitExceeded` if there are too many terms: their number grows
+  /// with the square of a mesh's density.
+  Result<std::vector<float>> of(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
+                                std::uint32_t jointCount);
+
+ private:
+  using Centers = std::vector<std::vector<float>>;  ///< by primitive
+  Result<Centers> find(const gltf::Mesh& mesh, std::uint32_t jointCount);
+
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Result<Centers>>
+      found_;  ///< by mesh and joints
+  std::uint64_t termsLeft_;
+  gltf::MemoryBudget& budget_;
 };
 
 }  // namespace dermis::cli

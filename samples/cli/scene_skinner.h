@@ -2,14 +2,24 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <vector>
 
-#include "bind_pose.h"
 #include "dermis/method.h"
 #include "kit/batch_runner.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
+
+/// One part in one pose.
+struct SkinnedPart {
+  std::vector<float> positions;  ///< 3 per vertex
+  std::vector<float> normals;    ///< 3 per vertex, or empty
+  std::vector<float> tangents;   ///< 4 per vertex, or empty
+};
+
+/// A part without influences: morphed, but not skinned. Normals and tangents are not normalized.
+SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs);
 
 /// Skins every part of the scene in a pose. Includes tangents if they are requested and the mesh
 /// has them.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dermis/text.h"
-#include "mesh_centers.h"
+#include "prepared_mesh.h"
 
 namespace dermis::cli {
 namespace {
