@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "comparison_instructions.h"
+#include "kernel_instructions.h"
 #include "dermis/layout.h"
 
 namespace dermis::cli {

@@ -16,6 +16,7 @@
 
 #include "byte_model.h"
 #include "commands.h"
+#include "dermis/text.h"
 #include "kit/batch_runner.h"
 #include "kit/bench/start_up.h"
 #include "kit/bench/throughput.h"
@@ -23,7 +24,6 @@
 #include "kit/file_name.h"
 #include "kit/open_device.h"
 #include "kit/output_file.h"
-#include "kit/plain_text.h"
 #include "kit/progress.h"
 #include "kit/render/picture.h"
 #include "kit/render/picture_writer.h"
@@ -85,8 +85,8 @@ SheetColor colorOf(ThroughputSection section) {
 
 /// Prints a line for each row.
 void printThroughput(const ThroughputTitle& title, std::span<const ThroughputRow> rows) {
-  fmt::print("device   {}\n", samples::plainLine(whereItWasMeasured(title)));
-  fmt::print("model    {}\n", samples::plainLine(whatWasMeasured(title)));
+  fmt::print("device   {}\n", oneLine(whereItWasMeasured(title)));
+  fmt::print("model    {}\n", oneLine(whatWasMeasured(title)));
   if (title.startUp) {
     fmt::print(
         "start    {:.0f} ms from Context::create to the first frame, {:.0f} ms if no joint "

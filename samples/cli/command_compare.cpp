@@ -3,14 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "commands.h"
-#include "comparison_subject.h"
+#include "comparison.h"
+#include "comparison_picture.h"
 #include "dermis/text.h"
 #include "kit/batch_runner.h"
 #include "kit/driver_version.h"
@@ -19,9 +24,226 @@
 #include "kit/output_file.h"
 #include "kit/progress.h"
 #include "kit/render/picture_writer.h"
+#include "skinned_scene.h"
 
 namespace dermis::cli {
 namespace {
+
+/// What was compared, and on which device.
+struct ComparisonTitle {
+  std::string device;  ///< its name, or "reference"
+  std::string driver;  ///< empty for the reference
+  std::string model;
+  std::string pose;  ///< "rest pose", "clip 0 'walk' at 0.341 s"
+};
+
+using Json = nlohmann::ordered_json;
+
+/// A number, or a dash if there is none.
+template <typename Value>
+std::string cell(const std::optional<Value>& value, fmt::format_string<const Value&> format) {
+  return value ? fmt::format(format, *value) : "-";
+}
+
+std::string percent(const std::optional<double>& share) {
+  return share ? fmt::format("{:.3f} %", *share * 100) : "-";
+}
+
+std::string_view clockName(Clock clock) {
+  switch (clock) {
+    case Clock::timestamps:
+      return "the device's timestamps";
+    case Clock::submission:
+      return "from submission to the end of waiting: the device has no timestamps";
+    case Clock::oneThread:
+      return "one thread of the CPU";
+    case Clock::none:
+      break;
+  }
+  return "";
+}
+
+std::string_view sourceName(InstructionSource source) {
+  return source == InstructionSource::driver ? "driver" : "SPIR-V";
+}
+
+void printTitle(const ComparisonTitle& title, const MethodComparison& comparison) {
+  fmt::print(
+      "device   {}\n",
+      oneLine(title.driver.empty() ? title.device : title.device + ", driver " + title.driver));
+  fmt::print("model    {}, {}\n", oneLine(title.model), oneLine(title.pose));
+  fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
+             comparison.scales ? ", some of which scale or shear" : "");
+  if (comparison.clock == Clock::none) {
+    fmt::print("timed    nothing: the reference is not optimized for speed\n");
+    return;
+  }
+  fmt::print("timed    {} instances, {} vertices per run, positions and normals as float32\n",
+             comparison.instances, comparison.instances * comparison.vertices);
+  fmt::print("         medians of {} runs; methods take turns; {}\n", comparison.repetitions,
+             clockName(comparison.clock));
+  fmt::print("         linear takes {:.3f} ms\n",
+             comparison.methods.front().seconds.value_or(0) * 1e3);
+}
+
+void printExplanation(const MethodComparison& comparison) {
+  const bool byDriver = comparison.instructionSource == InstructionSource::driver;
+  fmt::print(
+      "\n"
+      "time          relative to linear; smaller is faster\n"
+      "instructions  of the skin kernel; loop bodies are counted once; {}\n"
+      "joint bytes   that the skin kernel reads for each joint of a palette\n"
+      "twist         a tube of two joints, twisted by {}°: smallest radius, and volume of the\n"
+      "              blend zone, relative to bind pose\n"
+      "bend          the tube, bent by {}°: smallest cross-section area and volume, relative to\n"
+      "              bind pose\n"
+      "reach         largest distance of a vertex of the bent tube from the bones, in tube\n"
+      "              radii; 1 means no bulge\n"
+      "difference    from dual_quaternion, on the model in this pose: largest and rms distance,\n"
+      "              in % of the diagonal of the model's box\n\n",
+      byDriver ? "machine instructions, counted by the driver"
+               : "SPIR-V that computes or accesses memory",
+      tubeTwistDegrees, tubeBendDegrees);
+}
+
+void printTable(const MethodComparison& comparison) {
+  fmt::print("{:25} {:>6} {:>12} {:>6} {:>15} {:>22} {:>21}\n", "", "", "instructions", "joint",
+             "twist", "bend", "difference");
+  fmt::print("{:25} {:>6} {:>12} {:>6} {:>7} {:>7} {:>8} {:>7} {:>5} {:>11} {:>9}\n", "method",
+             "time", fmt::format("({})", sourceName(comparison.instructionSource)), "bytes",
+             "radius", "volume", "section", "volume", "reach", "largest", "rms");
+  for (const ComparedMethod& compared : comparison.methods) {
+    const TubeShape &twisted = compared.tube.twisted, &bent = compared.tube.bent;
+    fmt::print(
+        "{:25} {:>6} {:>12} {:>6} {:>7.3f} {:>7.3f} {:>8.3f} {:>7.3f} {:>5.2f} {:>11} {:>9}\n",
+        methodName(compared.method), cell(compared.time, "{:.2f}"),
+        cell(compared.instructions, "{}"), compared.bytesPerJoint, twisted.leastRadius,
+        twisted.volume, bent.leastSection, bent.volume, bent.reach,
+        percent(compared.largestDifference), percent(compared.rootMeanSquareDifference));
+  }
+}
+
+template <typename Value>
+Json optionalNumber(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json describe(const ComparedMethod& compared) {
+  const TubeShape &twisted = compared.tube.twisted, &bent = compared.tube.bent;
+  Json json;
+  json["method"] = methodName(compared.method);
+  json["time"] = optionalNumber(compared.time);
+  json["seconds"] = optionalNumber(compared.seconds);
+  json["instructions"] = optionalNumber(compared.instructions);
+  json["bytesPerJoint"] = compared.bytesPerJoint;
+  json["twist"] = {
+      {"degrees", tubeTwistDegrees}, {"radius", twisted.leastRadius}, {"volume", twisted.volume}};
+  json["bend"] = {{"degrees", tubeBendDegrees},
+                  {"section", bent.leastSection},
+                  {"volume", bent.volume},
+                  {"reach", bent.reach}};
+  json["difference"] = {{"largest", optionalNumber(compared.largestDifference)},
+                        {"rootMeanSquare", optionalNumber(compared.rootMeanSquareDifference)}};
+  return json;
+}
+
+/// Prints lines that explain the comparison, and a table.
+void printComparison(const ComparisonTitle& title, const MethodComparison& comparison) {
+  printTitle(title, comparison);
+  printExplanation(comparison);
+  printTable(comparison);
+}
+
+/// Fails with `ioError`.
+Result<void> writeJsonComparison(const std::filesystem::path& path, const ComparisonTitle& title,
+                                 const MethodComparison& comparison) {
+  Json json;
+  json["device"] = title.device;
+  json["driver"] = title.driver;
+  json["model"] = title.model;
+  json["pose"] = title.pose;
+  json["vertices"] = comparison.vertices;
+  json["joints"] = comparison.joints;
+  json["scales"] = comparison.scales;
+  json["instances"] = comparison.instances;
+  json["repetitions"] = comparison.repetitions;
+  json["clock"] = comparison.clock == Clock::timestamps   ? Json("timestamps")
+                  : comparison.clock == Clock::submission ? Json("submission")
+                  : comparison.clock == Clock::oneThread  ? Json("oneThread")
+                                                          : Json();
+  json["instructionsOf"] = sourceName(comparison.instructionSource);
+  json["methods"] = Json::array();
+  for (const ComparedMethod& compared : comparison.methods)
+    json["methods"].push_back(describe(compared));
+  // Names come from a file: invalid UTF-8 in them is replaced.
+  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return samples::writeFile(path, text);
+}
+
+struct ComparisonSubject {
+  std::optional<BuiltInScenes> builtIn;  ///< if a picture is drawn
+  std::optional<Scene> model;            ///< empty: the built-in arm
+  std::string name;                      ///< of the model, as requested
+  std::string poseName;                  ///< "rest pose", "clip 0 'walk' at 0.341 s"
+  ScenePose pose;
+
+  const Scene& scene() const { return model ? *model : builtIn->arm; }
+};
+
+/// The methods that are compared by default. With all nine, the pictures would be too small.
+constexpr std::array usualMethods{Method::linear,         Method::quaternionTranslation,
+                                  Method::logMatrix,      Method::sphericalBlend,
+                                  Method::dualQuaternion, Method::centerOfRotation};
+
+std::string counted(std::uint32_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// Formats with three digits and no exponent.
+std::string nanoseconds(double value) {
+  return fmt::format("{:.{}f} ns per vertex", value, value < 10 ? 2 : value < 100 ? 1 : 0);
+}
+
+std::vector<std::string> costOf(const MethodComparison& comparison, Method method) {
+  const auto compared = std::ranges::find(comparison.methods, method, &ComparedMethod::method);
+  if (compared == comparison.methods.end() || !compared->time) return {};
+  const double vertices =
+      static_cast<double>(comparison.vertices) * static_cast<double>(comparison.instances);
+  return {fmt::format("{:.2f} × linear's time", *compared->time),
+          nanoseconds(*compared->seconds / vertices * 1e9)};
+}
+
+/// The default columns of a picture: those of the usual methods that the scene allows.
+std::vector<Method> usualColumns(const Scene& scene) {
+  std::vector<Method> columns;
+  std::ranges::copy_if(usualMethods, std::back_inserter(columns),
+                       [&scene](Method method) { return allows(scene, method); });
+  return columns;
+}
+
+/// Describes the picture of a subject with built-in scenes: these first, then the model with the
+/// cost of skinning it, and the heat map. Refers to the subject.
+ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vector<Method>& columns,
+                              const ComparisonTitle& title, const MethodComparison& comparison) {
+  ComparisonSheet sheet;
+  for (const Method method : columns) sheet.columns.push_back({method, costOf(comparison, method)});
+  sheet.strips = builtInStrips(*subject.builtIn);
+  if (subject.model) {
+    ComparisonStrip& strip = sheet.strips.emplace_back();
+    strip.scene = &*subject.model;
+    strip.pose = subject.pose;
+    strip.title = oneLine(std::filesystem::path(subject.name).filename().string());
+    strip.remark = oneLine(subject.poseName) + "; skinning time";
+  } else {
+    sheet.strips.back().remark += "; skinning time";
+  }
+  sheet.strips.back().showsCost = true;
+  sheet.strips.back().hasHeatMap = true;
+  sheet.footer = oneLine(fmt::format(
+      "Time: median of {}, {} of {} vertices, {}", counted(comparison.repetitions, "run"),
+      counted(comparison.instances, "instance"), comparison.vertices, title.device));
+  return sheet;
+}
 
 constexpr std::uint32_t mostRepetitions = 10'000;
 constexpr std::uint32_t leastWidth = 480, largestWidth = 4096;
@@ -134,8 +356,8 @@ ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject
   if (subject.model) return ExitStatus::done;
   const Scene& arm = subject.builtIn->arm;
   subject.name = "the built-in arm";
-  subject.poseName = poseName(*arm.model, 0, builtInArmTime(arm));
-  subject.pose = scenePose(arm, 0, builtInArmTime(arm));
+  subject.poseName = poseName(*arm.model, 0, middleOfClip(arm));
+  subject.pose = scenePose(arm, 0, middleOfClip(arm));
   return ExitStatus::done;
 }
 

@@ -5,7 +5,6 @@
 
 #include "commands.h"
 #include "dermis/text.h"
-#include "kit/plain_text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -66,7 +65,7 @@ Json describe(const Scene& scene) {
 }
 
 void printText(const Json& json) {
-  const auto text = [](const Json& value) { return samples::plainLine(value.get<std::string>()); };
+  const auto text = [](const Json& value) { return oneLine(value.get<std::string>()); };
   fmt::print("{} skinned primitives, {} skins, {} clips\n", json["meshes"].size(),
              json["skins"].size(), json["clips"].size());
   for (const Json& mesh : json["meshes"]) {

@@ -10,10 +10,9 @@
 #include <span>
 #include <utility>
 
-#include "comparison_instructions.h"
 #include "dermis/cpu/skin.h"
 #include "dermis/verify/reference.h"
-#include "kit/pipeline_statistics.h"
+#include "kernel_instructions.h"
 #include "kit/timed_batches.h"
 #include "scene_skinner.h"
 
@@ -240,7 +239,7 @@ class MethodComparer {
         !timed)
       return timed;
     countInstructions(variants, open.context.limits(),
-                      samples::PipelineStatistics::create(*open.device).get());
+                      PipelineStatistics::create(*open.device).get());
     return {};
   }
 
@@ -333,7 +332,7 @@ class MethodComparer {
 
   /// Counts from the driver, if it counts the instructions of every kernel.
   void countInstructions(const std::vector<Variant>& variants, const DeviceLimits& limits,
-                         const samples::PipelineStatistics* statistics) {
+                         const PipelineStatistics* statistics) {
     std::vector<std::optional<std::uint64_t>> counts;
     if (statistics != nullptr) {
       for (const Variant& variant : variants)

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cross_section.h"
+#include "compared_figures.h"
 #include "dermis/method.h"
 #include "kit/open_device.h"
 #include "kit/render/camera.h"
@@ -53,5 +53,18 @@ Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
                                                 const samples::render::Font* font,
                                                 std::vector<std::string>& notes,
                                                 const std::function<void()>& step);
+
+/// The sample models `bar` and `arm`. Each is twisted or bent most in the middle of its clip.
+struct BuiltInScenes {
+  Scene bar, arm;
+};
+
+Result<BuiltInScenes> loadBuiltInScenes(const MeshPreparation& preparation);
+
+/// The time in seconds at which the clip of a built-in scene twists or bends it most.
+double middleOfClip(const Scene& scene);
+
+/// The strips of both scenes: candy wrapper and elbow. They refer to the scenes.
+std::vector<ComparisonStrip> builtInStrips(const BuiltInScenes& scenes);
 
 }  // namespace dermis::cli

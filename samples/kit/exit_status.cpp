@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "kit/plain_text.h"
+#include "dermis/text.h"
 
 namespace dermis::samples {
 namespace {
@@ -19,7 +19,7 @@ std::string subcommand;
 void print(std::string_view kind, std::string_view message) {
   std::fflush(stdout);
   try {
-    const std::string line = fmt::format("{}: {}: {}\n", name, kind, plainLine(message));
+    const std::string line = fmt::format("{}: {}: {}\n", name, kind, oneLine(message));
     (void)std::fwrite(line.data(), 1, line.size(), stderr);
   } catch (const std::bad_alloc&) {
     (void)std::fputs("error: out of memory\n", stderr);

@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "built_in_scenes.h"
 #include "compared_figures.h"
 #include "comparison_picture.h"
 #include "dermis/verify/reference.h"

@@ -1,10 +1,15 @@
-#include "kit/pipeline_statistics.h"
+#include "kernel_instructions.h"
 
 #include <algorithm>
 #include <array>
 #include <span>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
+
+#ifndef DERMIS_NO_SPIRV_TOOLS
+#include <spirv-tools/optimizer.hpp>
+#endif
 
 #include "dermis/vulkan/kernels.h"
 
@@ -20,10 +25,84 @@
   X(DestroyPipeline)                   \
   X(GetPipelineExecutableStatisticsKHR)
 
-namespace dermis::samples {
+namespace dermis::cli {
+
+#ifndef DERMIS_NO_SPIRV_TOOLS
+
 namespace {
 
-bool hasStatistics(const VulkanFunctions& functions, VkPhysicalDevice physicalDevice) {
+// SPIR-V 1.3, section 3.32: first and last opcodes of the groups of instructions that are counted.
+constexpr std::uint32_t opFunction = 54, opFunctionEnd = 56;
+constexpr std::uint32_t opExtInst = 12;
+constexpr std::uint32_t opLoad = 61, opStore = 62;
+constexpr std::uint32_t opConvertFToU = 109, opQuantizeToF16 = 116;
+constexpr std::uint32_t opSNegate = 126, opSMulExtended = 152;
+constexpr std::uint32_t opAny = 154, opFUnordGreaterThanEqual = 191;
+constexpr std::uint32_t opShiftRightLogical = 194, opBitCount = 205;
+constexpr std::uint32_t opAtomicLoad = 227, opAtomicXor = 242;
+
+bool isCounted(std::uint32_t opcode) {
+  const auto within = [opcode](std::uint32_t first, std::uint32_t last) {
+    return opcode >= first && opcode <= last;
+  };
+  return opcode == opExtInst || within(opLoad, opStore) || within(opConvertFToU, opQuantizeToF16) ||
+         within(opSNegate, opSMulExtended) || within(opAny, opFUnordGreaterThanEqual) ||
+         within(opShiftRightLogical, opBitCount) || within(opAtomicLoad, opAtomicXor);
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits) {
+  const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
+  const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> values;
+  for (std::uint32_t id = 0; id < constants.count; ++id) values[id] = {constants.values[id]};
+
+  spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_1);
+  optimizer.RegisterPass(spvtools::CreateSetSpecConstantDefaultValuePass(values));
+  optimizer.RegisterPass(spvtools::CreateFreezeSpecConstantValuePass());
+  optimizer.RegisterPass(spvtools::CreateFoldSpecConstantOpAndCompositePass());
+  optimizer.RegisterPerformancePasses();
+  spvtools::OptimizerOptions options;
+  options.set_run_validator(false);
+  std::vector<std::uint32_t> specialized;
+  if (!optimizer.Run(spirv.data(), spirv.size(), &specialized, options)) return {};
+  return specialized;
+}
+
+std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
+                                                   const DeviceLimits& limits) {
+  const std::vector<std::uint32_t> words = specializedSpirv(variant, limits);
+  constexpr std::size_t headerWords = 5;
+  std::uint64_t count = 0;
+  bool inFunction = false;
+  for (std::size_t place = headerWords; place < words.size();) {
+    const std::uint32_t opcode = words[place] & 0xffffu, length = words[place] >> 16;
+    if (length == 0) return std::nullopt;
+    if (opcode == opFunction) inFunction = true;
+    if (opcode == opFunctionEnd) inFunction = false;
+    if (inFunction && isCounted(opcode)) ++count;
+    place += length;
+  }
+  if (count == 0) return std::nullopt;
+  return count;
+}
+
+#else
+
+std::vector<std::uint32_t> specializedSpirv(const Variant&, const DeviceLimits&) {
+  return {};
+}
+
+std::optional<std::uint64_t> spirvInstructionCount(const Variant&, const DeviceLimits&) {
+  return std::nullopt;
+}
+
+#endif
+
+namespace {
+
+bool hasStatistics(const samples::VulkanFunctions& functions, VkPhysicalDevice physicalDevice) {
   std::uint32_t count = 0;
   functions.EnumerateDeviceExtensionProperties(physicalDevice, nullptr, &count, nullptr);
   std::vector<VkExtensionProperties> extensions(count);
@@ -44,7 +123,7 @@ bool hasStatistics(const VulkanFunctions& functions, VkPhysicalDevice physicalDe
   return statistics.pipelineExecutableInfo == VK_TRUE;
 }
 
-VkDevice createDevice(const Device& device) {
+VkDevice createDevice(const samples::Device& device) {
   VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics{};
   statistics.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
   statistics.pipelineExecutableInfo = VK_TRUE;
@@ -90,7 +169,7 @@ struct PipelineStatistics::Functions {
 
 PipelineStatistics::PipelineStatistics() : functions_(std::make_unique<Functions>()) {}
 
-std::unique_ptr<PipelineStatistics> PipelineStatistics::create(const Device& device) {
+std::unique_ptr<PipelineStatistics> PipelineStatistics::create(const samples::Device& device) {
   if (!hasStatistics(device.functions(), device.description().physicalDevice)) return nullptr;
   std::unique_ptr<PipelineStatistics> statistics(new PipelineStatistics);
   const VkDevice made = createDevice(device);
@@ -199,4 +278,4 @@ std::optional<std::uint64_t> PipelineStatistics::instructionCount(
   return count;
 }
 
-}  // namespace dermis::samples
+}  // namespace dermis::cli

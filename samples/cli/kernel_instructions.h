@@ -1,21 +1,33 @@
-// The driver's statistics about the machine code of a kernel.
+// Counts the instructions of a kernel: machine instructions if the driver reports them, otherwise
+// those of SPIR-V.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "dermis/plan.h"
 #include "kit/device.h"
 
-namespace dermis::samples {
+namespace dermis::cli {
+
+/// A kernel with specialized constants, all functions inlined, and dead code removed. Empty if
+/// SPIRV-Tools fail, or if the command was built without them.
+std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
+
+/// The number of SPIR-V instructions of a kernel that calculate or access memory, after
+/// specialization and removal of dead code. A vector instruction counts once, and so do the
+/// instructions of a loop. Empty if SPIRV-Tools fail, or if the command was built without them.
+std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
+                                                   const DeviceLimits& limits);
 
 /// Uses a second VkDevice on the same hardware, because `Device` may lack the required extension
 /// VK_KHR_pipeline_executable_properties.
 class PipelineStatistics {
  public:
   /// Null if the driver lacks the extension, or if no device can be created with it.
-  static std::unique_ptr<PipelineStatistics> create(const Device& device);
+  static std::unique_ptr<PipelineStatistics> create(const samples::Device& device);
   ~PipelineStatistics();
   PipelineStatistics(const PipelineStatistics&) = delete;
   PipelineStatistics& operator=(const PipelineStatistics&) = delete;
@@ -39,4 +51,4 @@ class PipelineStatistics {
   VkPipelineLayout pipelineLayout_ = VK_NULL_HANDLE;
 };
 
-}  // namespace dermis::samples
+}  // namespace dermis::cli
