@@ -270,16 +270,8 @@ Result<void> Film::frameFigures() {
 
 /// Skins the figures that have been posed.
 Result<void> Film::skin() {
-  const samples::VulkanFunctions& functions = device_.device->functions();
-  const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
-  VkCommandBufferBeginInfo begin{};
-  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  functions.BeginCommandBuffer(commandBuffer, &begin);
-  Result<void> done = drawn_->recordSkinning(commandBuffer);
-  functions.EndCommandBuffer(commandBuffer);
-  if (done) done = device_.device->submitAndWait(commandBuffer);
-  device_.device->freeCommandBuffer(commandBuffer);
-  return done;
+  return device_.device->run(
+      [this](VkCommandBuffer commandBuffer) { return drawn_->recordSkinning(commandBuffer); });
 }
 
 /// Skins the posed figures and draws them, in one command buffer.

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "commands.h"
+#include "kit/device.h"
 #include "kit/file_name.h"
-#include "kit/open_device.h"
 #include "kit/progress.h"
 #include "mesh_output.h"
 #include "method_options.h"

@@ -17,7 +17,7 @@
 
 #include "commands.h"
 #include "dermis/text.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "kit/output_file.h"
 #include "kit/progress.h"
 #include "verification.h"

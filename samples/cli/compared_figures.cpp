@@ -11,28 +11,13 @@
 #include <glm/vec3.hpp>
 
 #include "dermis/vulkan/scope.h"
-#include "kit/barrier.h"
+#include "kit/device.h"
 
 namespace dermis::cli {
 namespace {
 
 using samples::MappedBuffer;
 using samples::render::Draw;
-
-/// Records, submits and waits.
-template <typename Record>
-Result<void> runOn(samples::Device& device, const Record& record) {
-  const samples::VulkanFunctions& functions = device.functions();
-  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
-  VkCommandBufferBeginInfo begin{};
-  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  functions.BeginCommandBuffer(commandBuffer, &begin);
-  Result<void> done = record(commandBuffer);
-  functions.EndCommandBuffer(commandBuffer);
-  if (done) done = device.submitAndWait(commandBuffer);
-  device.freeCommandBuffer(commandBuffer);
-  return done;
-}
 
 double diagonalOf(const Box& box) {
   double squares = 0;
@@ -66,9 +51,8 @@ Result<void> ComparedFigures::skin(const ScenePose& pose) {
   for (std::uint32_t figure = 0; figure < drawn_.figureCount(); ++figure) {
     if (Result<void> posed = drawn_.setPose(figure, pose); !posed) return posed;
   }
-  return runOn(*device_->device, [this](VkCommandBuffer commandBuffer) {
-    return drawn_.recordSkinning(commandBuffer);
-  });
+  return device_->device->run(
+      [this](VkCommandBuffer commandBuffer) { return drawn_.recordSkinning(commandBuffer); });
 }
 
 Result<void> ComparedFigures::readBack() {
@@ -92,7 +76,7 @@ Result<void> ComparedFigures::readBack() {
   Result<MappedBuffer> buffer =
       MappedBuffer::create(*device_->device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
   if (!buffer) return buffer.error();
-  const Result<void> copied = runOn(*device_->device, [&](VkCommandBuffer commandBuffer) {
+  const Result<void> copied = device_->device->run([&](VkCommandBuffer commandBuffer) {
     if (copies.empty()) return Result<void>();
     const samples::Device& device = *device_->device;
     recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));

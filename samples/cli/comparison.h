@@ -9,7 +9,7 @@
 
 #include "comparison_tube.h"
 #include "dermis/method.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "method_options.h"
 #include "skinned_scene.h"
 

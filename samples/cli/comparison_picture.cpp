@@ -294,17 +294,11 @@ class ComparisonDrawer {
   }
 
   Result<void> drawView(render::RenderFrame& frame, const render::View& view) {
-    const samples::VulkanFunctions& functions = device_.device->functions();
-    const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
-    VkCommandBufferBeginInfo begin{};
-    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    functions.BeginCommandBuffer(commandBuffer, &begin);
-    Result<void> done = renderer_->record(commandBuffer, frame, {&view, 1});
-    if (done) frame.target().recordReadBack(*device_.device, commandBuffer);
-    functions.EndCommandBuffer(commandBuffer);
-    if (done) done = device_.device->submitAndWait(commandBuffer);
-    device_.device->freeCommandBuffer(commandBuffer);
-    return done;
+    return device_.device->run([&](VkCommandBuffer commandBuffer) {
+      Result<void> done = renderer_->record(commandBuffer, frame, {&view, 1});
+      if (done) frame.target().recordReadBack(*device_.device, commandBuffer);
+      return done;
+    });
   }
 
   samples::OpenDevice& device_;

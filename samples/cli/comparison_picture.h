@@ -10,7 +10,7 @@
 
 #include "compared_figures.h"
 #include "dermis/method.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "kit/render/camera.h"
 #include "kit/render/picture.h"
 #include "skinned_scene.h"

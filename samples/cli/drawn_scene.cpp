@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "dermis/vulkan/scope.h"
-#include "kit/barrier.h"
+#include "kit/device.h"
 #include "kit/render/winding.h"
 #include "scene_skinner.h"
 

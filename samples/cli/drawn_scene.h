@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dermis/vulkan/skinning_system.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "kit/render/appearances.h"
 #include "kit/render/renderer.h"
 #include "skinned_scene.h"

@@ -1,6 +1,5 @@
 #include "kernel_instructions.h"
 
-#include <algorithm>
 #include <array>
 #include <span>
 #include <string_view>
@@ -102,24 +101,14 @@ std::optional<std::uint64_t> spirvInstructionCount(const Variant&, const DeviceL
 
 namespace {
 
-bool hasStatistics(const samples::VulkanFunctions& functions, VkPhysicalDevice physicalDevice) {
-  std::uint32_t count = 0;
-  functions.EnumerateDeviceExtensionProperties(physicalDevice, nullptr, &count, nullptr);
-  std::vector<VkExtensionProperties> extensions(count);
-  functions.EnumerateDeviceExtensionProperties(physicalDevice, nullptr, &count, extensions.data());
-  if (std::none_of(extensions.begin(), extensions.end(),
-                   [](const VkExtensionProperties& extension) {
-                     return std::string_view(extension.extensionName) ==
-                            VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
-                   })) {
-    return false;
-  }
+bool hasStatistics(const samples::Device& device) {
+  if (!device.hasExtension(VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME)) return false;
   VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics{};
   statistics.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
   VkPhysicalDeviceFeatures2 features{};
   features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features.pNext = &statistics;
-  functions.GetPhysicalDeviceFeatures2(physicalDevice, &features);
+  device.functions().GetPhysicalDeviceFeatures2(device.physicalDevice(), &features);
   return statistics.pipelineExecutableInfo == VK_TRUE;
 }
 
@@ -142,8 +131,7 @@ VkDevice createDevice(const samples::Device& device) {
   info.enabledExtensionCount = 1;
   info.ppEnabledExtensionNames = &extension;
   VkDevice made = VK_NULL_HANDLE;
-  if (device.functions().CreateDevice(device.description().physicalDevice, &info, nullptr, &made) !=
-      VK_SUCCESS)
+  if (device.functions().CreateDevice(device.physicalDevice(), &info, nullptr, &made) != VK_SUCCESS)
     return VK_NULL_HANDLE;
   return made;
 }
@@ -170,7 +158,7 @@ struct PipelineStatistics::Functions {
 PipelineStatistics::PipelineStatistics() : functions_(std::make_unique<Functions>()) {}
 
 std::unique_ptr<PipelineStatistics> PipelineStatistics::create(const samples::Device& device) {
-  if (!hasStatistics(device.functions(), device.description().physicalDevice)) return nullptr;
+  if (!hasStatistics(device)) return nullptr;
   std::unique_ptr<PipelineStatistics> statistics(new PipelineStatistics);
   const VkDevice made = createDevice(device);
   if (made == VK_NULL_HANDLE) return nullptr;

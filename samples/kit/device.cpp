@@ -18,13 +18,6 @@ Error unusable(std::string message) {
   return {ErrorCode::missingFeature, std::move(message)};
 }
 
-Error failed(const char* function, VkResult result) {
-  return {
-      ErrorCode::vulkanError,
-      std::string(function) + " failed with VkResult " + std::to_string(static_cast<int>(result)),
-      static_cast<std::int32_t>(result)};
-}
-
 std::string typeName(VkPhysicalDeviceType type) {
   switch (type) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
@@ -52,7 +45,7 @@ std::string lowerCase(std::string text) {
   return text;
 }
 
-bool hasExtension(const std::vector<VkExtensionProperties>& extensions, const char* name) {
+bool contains(const std::vector<VkExtensionProperties>& extensions, const char* name) {
   return std::any_of(extensions.begin(), extensions.end(),
                      [&](const VkExtensionProperties& extension) {
                        return std::strcmp(extension.extensionName, name) == 0;
@@ -102,17 +95,17 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
   info.maxWorkgroupCount = properties.limits.maxComputeWorkGroupCount[0];
   info.storageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   const std::vector<VkExtensionProperties> extensions = deviceExtensions(functions, device);
-  info.pushDescriptors = hasExtension(extensions, VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
+  info.pushDescriptors = contains(extensions, VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
   if (properties.apiVersion >= VK_API_VERSION_1_1) {
     VkPhysicalDevice8BitStorageFeatures storage8Bit{};
     storage8Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
     VkPhysicalDevice16BitStorageFeatures storage16Bit{};
     storage16Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    const bool has8Bit = hasExtension(extensions, VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
+    const bool has8Bit = contains(extensions, VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
     if (has8Bit) storage16Bit.pNext = &storage8Bit;
     VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout{};
     scalarBlockLayout.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
-    const bool hasScalar = hasExtension(extensions, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
+    const bool hasScalar = contains(extensions, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
     if (hasScalar) storage8Bit.pNext = &scalarBlockLayout;
     if (hasScalar && !has8Bit) storage16Bit.pNext = &scalarBlockLayout;
     VkPhysicalDeviceFeatures2 features{};
@@ -217,7 +210,7 @@ Result<void> Device::createInstance(bool validation, std::span<const std::string
     instance_ = VK_NULL_HANDLE;
     return unusable(result == VK_ERROR_INCOMPATIBLE_DRIVER
                         ? "there is no Vulkan driver on this machine"
-                        : failed("vkCreateInstance", result).message);
+                        : vulkanError("vkCreateInstance", result).message);
   }
 #define DERMIS_LOAD(name) \
   functions_.name =       \
@@ -229,7 +222,7 @@ Result<void> Device::createInstance(bool validation, std::span<const std::string
         loader_->getInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
     if (const VkResult result = create(instance_, &messengerInfo, nullptr, &messenger_);
         result != VK_SUCCESS) {
-      return failed("vkCreateDebugUtilsMessengerEXT", result);
+      return vulkanError("vkCreateDebugUtilsMessengerEXT", result);
     }
   }
   return {};
@@ -283,10 +276,8 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   if (options.pushDescriptors && info_.pushDescriptors)
     extensions.push_back(VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
   if (!options.surfaceExtensions.empty()) {
-    if (!hasExtension(deviceExtensions(functions_, physicalDevice_),
-                      VK_KHR_SWAPCHAIN_EXTENSION_NAME)) {
+    if (!hasExtension(VK_KHR_SWAPCHAIN_EXTENSION_NAME))
       return unusable("device '" + info_.name + "' cannot show pictures in a window");
-    }
     extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
   }
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
@@ -335,7 +326,7 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   if (const VkResult result = functions_.CreateDevice(physicalDevice_, &info, nullptr, &device_);
       result != VK_SUCCESS) {
     device_ = VK_NULL_HANDLE;
-    return failed("vkCreateDevice", result);
+    return vulkanError("vkCreateDevice", result);
   }
 #define DERMIS_LOAD(name) \
   functions_.name =       \
@@ -350,9 +341,13 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   if (const VkResult result =
           functions_.CreateCommandPool(device_, &poolInfo, nullptr, &commandPool_);
       result != VK_SUCCESS) {
-    return failed("vkCreateCommandPool", result);
+    return vulkanError("vkCreateCommandPool", result);
   }
   return {};
+}
+
+bool Device::hasExtension(const char* name) const {
+  return contains(deviceExtensions(functions_, physicalDevice_), name);
 }
 
 vulkan::DeviceDescription Device::description() const {
@@ -403,7 +398,7 @@ Result<void> Device::submitAndWait(VkCommandBuffer commandBuffer) {
   VkFence fence = VK_NULL_HANDLE;
   if (const VkResult result = functions_.CreateFence(device_, &fenceInfo, nullptr, &fence);
       result != VK_SUCCESS) {
-    return failed("vkCreateFence", result);
+    return vulkanError("vkCreateFence", result);
   }
   VkSubmitInfo submit{};
   submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
@@ -416,8 +411,20 @@ Result<void> Device::submitAndWait(VkCommandBuffer commandBuffer) {
     function = "vkWaitForFences";
   }
   functions_.DestroyFence(device_, fence, nullptr);
-  if (result != VK_SUCCESS) return failed(function, result);
+  if (result != VK_SUCCESS) return vulkanError(function, result);
   return {};
+}
+
+Result<void> Device::run(const std::function<Result<void>(VkCommandBuffer)>& record) {
+  const VkCommandBuffer commandBuffer = allocateCommandBuffer();
+  VkCommandBufferBeginInfo begin{};
+  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  functions_.BeginCommandBuffer(commandBuffer, &begin);
+  Result<void> done = record(commandBuffer);
+  functions_.EndCommandBuffer(commandBuffer);
+  if (done) done = submitAndWait(commandBuffer);
+  freeCommandBuffer(commandBuffer);
+  return done;
 }
 
 std::vector<std::string> Device::takeValidationMessages() {
@@ -435,6 +442,46 @@ VKAPI_ATTR VkBool32 VKAPI_CALL Device::onMessage(VkDebugUtilsMessageSeverityFlag
   const std::string identifier = data->pMessageIdName != nullptr ? data->pMessageIdName : "";
   device.messages_.push_back(identifier + ": " + data->pMessage);
   return VK_FALSE;
+}
+
+Result<OpenDevice> openDevice(const DeviceOptions& options) {
+  Result<std::unique_ptr<Device>> device = Device::create(options);
+  if (!device) return device.error();
+  vulkan::DeviceDescription description = (*device)->description();
+  description.kernelSource = options.kernels;
+  Result<vulkan::Context> context = vulkan::Context::create(description);
+  if (!context) return context.error();
+  return OpenDevice{std::move(*device), std::move(*context)};
+}
+
+std::string driverVersion(const Device& device) {
+  VkPhysicalDeviceDriverProperties driver{};
+  driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
+  VkPhysicalDeviceProperties2 properties{};
+  properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  if (device.hasExtension(VK_KHR_DRIVER_PROPERTIES_EXTENSION_NAME)) properties.pNext = &driver;
+  device.functions().GetPhysicalDeviceProperties2(device.physicalDevice(), &properties);
+  if (driver.driverName[0] == '\0')
+    return "version " + std::to_string(properties.properties.driverVersion);
+  return std::string(driver.driverName) + " " + driver.driverInfo;
+}
+
+void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency) {
+  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
+  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
+                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
+                                        0, nullptr);
+}
+
+Error vulkanError(const std::string& function, VkResult result) {
+  const auto code = static_cast<std::int32_t>(result);
+  return {ErrorCode::vulkanError, function + " failed with VkResult " + std::to_string(code), code};
+}
+
+Result<void> checkVulkan(const char* function, VkResult result) {
+  if (result == VK_SUCCESS) return {};
+  return vulkanError(function, result);
 }
 
 }  // namespace dermis::samples

@@ -1,7 +1,9 @@
-// A Vulkan device without a window, for samples and tests. An engine has its own.
+// A Vulkan device without a window, and Dermis' context on it, for samples and tests. An engine has
+// its own.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -10,8 +12,8 @@
 
 #include "dermis/result.h"
 #include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scope.h"
 #include "kit/ray_tracing_features.h"
-#include "kit/vulkan_functions.h"
 #include "kit/vulkan_loader.h"
 
 namespace dermis::samples {
@@ -72,6 +74,7 @@ class Device {
   const VulkanFunctions& functions() const { return functions_; }
   VkDevice handle() const { return device_; }
   VkPhysicalDevice physicalDevice() const { return physicalDevice_; }
+  bool hasExtension(const char* name) const;
   VkQueue queue() const { return queue_; }
   std::uint32_t queueFamily() const { return queueFamily_; }
 
@@ -85,6 +88,10 @@ class Device {
 
   /// Submits and waits. Fails with `vulkanError`.
   Result<void> submitAndWait(VkCommandBuffer commandBuffer);
+
+  /// Calls `record` between the begin and the end of a command buffer, submits it and waits. Fails
+  /// with `vulkanError`, and if `record` does; then nothing is submitted.
+  Result<void> run(const std::function<Result<void>(VkCommandBuffer)>& record);
 
   /// Returns the messages of the validation layer so far, and clears them.
   std::vector<std::string> takeValidationMessages();
@@ -120,5 +127,25 @@ class Device {
   std::mutex messagesMutex_;
   std::vector<std::string> messages_;
 };
+
+/// The context is declared last, so that it is destroyed before the device.
+struct OpenDevice {
+  std::unique_ptr<Device> device;
+  vulkan::Context context;
+};
+
+Result<OpenDevice> openDevice(const DeviceOptions& options);
+
+/// "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)", or only a number if the driver does not report more.
+std::string driverVersion(const Device& device);
+
+/// A global memory barrier.
+void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
+                   const vulkan::Dependency& dependency);
+
+/// The error of a Vulkan function.
+Error vulkanError(const std::string& function, VkResult result);
+/// The same if the result is not VK_SUCCESS.
+Result<void> checkVulkan(const char* function, VkResult result);
 
 }  // namespace dermis::samples

@@ -1,19 +1,6 @@
 #include "kit/frame_loop.h"
 
-#include <string>
-
 namespace dermis::samples {
-namespace {
-
-Result<void> checked(const char* function, VkResult result) {
-  if (result == VK_SUCCESS) return {};
-  return Error{
-      ErrorCode::vulkanError,
-      std::string(function) + " failed with VkResult " + std::to_string(static_cast<int>(result)),
-      static_cast<std::int32_t>(result)};
-}
-
-}  // namespace
 
 FrameLoop::~FrameLoop() {
   static_cast<void>(finish().ok());  // a lost device has nothing to wait for
@@ -28,7 +15,7 @@ Result<void> FrameLoop::waitFor(std::uint64_t frame) {
   if (slot.isSubmitted) {
     const VkResult waited =
         device_->functions().WaitForFences(device_->handle(), 1, &slot.fence, VK_TRUE, UINT64_MAX);
-    if (Result<void> done = checked("vkWaitForFences", waited); !done) return done;
+    if (Result<void> done = checkVulkan("vkWaitForFences", waited); !done) return done;
     slot.isSubmitted = false;
   }
   completed_ = frame;
@@ -46,7 +33,7 @@ Result<VkCommandBuffer> FrameLoop::begin() {
     VkFenceCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
     const VkResult made = functions.CreateFence(device_->handle(), &info, nullptr, &slot.fence);
-    if (Result<void> done = checked("vkCreateFence", made); !done) return done.error();
+    if (Result<void> done = checkVulkan("vkCreateFence", made); !done) return done.error();
   }
   if (slot.commandBuffer != VK_NULL_HANDLE) device_->freeCommandBuffer(slot.commandBuffer);
   slot.commandBuffer = device_->allocateCommandBuffer();
@@ -54,7 +41,7 @@ Result<VkCommandBuffer> FrameLoop::begin() {
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   const VkResult begun = functions.BeginCommandBuffer(slot.commandBuffer, &info);
-  if (Result<void> done = checked("vkBeginCommandBuffer", begun); !done) return done.error();
+  if (Result<void> done = checkVulkan("vkBeginCommandBuffer", begun); !done) return done.error();
   return slot.commandBuffer;
 }
 
@@ -62,16 +49,16 @@ Result<void> FrameLoop::submit() {
   const VulkanFunctions& functions = device_->functions();
   Slot& slot = slots_[frame_ % slots_.size()];
   const VkResult ended = functions.EndCommandBuffer(slot.commandBuffer);
-  if (Result<void> done = checked("vkEndCommandBuffer", ended); !done) return done;
+  if (Result<void> done = checkVulkan("vkEndCommandBuffer", ended); !done) return done;
   const VkResult reset = functions.ResetFences(device_->handle(), 1, &slot.fence);
-  if (Result<void> done = checked("vkResetFences", reset); !done) return done;
+  if (Result<void> done = checkVulkan("vkResetFences", reset); !done) return done;
   VkSubmitInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
   info.commandBufferCount = 1;
   info.pCommandBuffers = &slot.commandBuffer;
   const VkResult submitted = functions.QueueSubmit(device_->queue(), 1, &info, slot.fence);
   slot.isSubmitted = submitted == VK_SUCCESS;
-  return checked("vkQueueSubmit", submitted);
+  return checkVulkan("vkQueueSubmit", submitted);
 }
 
 Result<void> FrameLoop::finish() {

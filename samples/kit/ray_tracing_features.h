@@ -5,7 +5,7 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "kit/vulkan_functions.h"
+#include "kit/vulkan_loader.h"
 
 namespace dermis::samples {
 

@@ -54,17 +54,12 @@ Result<void> TimedBatches::record(TimedBatch& batch) {
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
-  const vulkan::Dependency edge = vulkan::inputScope(vulkan::PreviousUse::previousRecord);
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(edge);
-  functions.CmdPipelineBarrier(batch.commandBuffer, edge.source.stages, edge.destination.stages, 0,
-                               1, &barrier, 0, nullptr, 0, nullptr);
+  recordBarrier(*device_, batch.commandBuffer,
+                vulkan::inputScope(vulkan::PreviousUse::previousRecord));
   timestamps_.recordBegin(batch.commandBuffer);
   const Result<void> done = context_->record(batch.commandBuffer, batch.plan, *batch.bindings);
   timestamps_.recordEnd(batch.commandBuffer);
-  const vulkan::Dependency end = vulkan::outputScope(vulkan::Consumer::hostRead);
-  const VkMemoryBarrier endBarrier = vulkan::memoryBarrier(end);
-  functions.CmdPipelineBarrier(batch.commandBuffer, end.source.stages, end.destination.stages, 0, 1,
-                               &endBarrier, 0, nullptr, 0, nullptr);
+  recordBarrier(*device_, batch.commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
   functions.EndCommandBuffer(batch.commandBuffer);
   return done;
 }

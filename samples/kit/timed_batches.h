@@ -10,7 +10,6 @@
 #include "dermis/vulkan/context.h"
 #include "kit/batch_layout.h"
 #include "kit/buffer.h"
-#include "kit/device_buffer.h"
 #include "kit/timestamps.h"
 
 namespace dermis::samples {

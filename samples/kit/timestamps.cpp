@@ -1,19 +1,11 @@
 #include "kit/timestamps.h"
 
 #include <array>
-#include <string>
 #include <utility>
 #include <vector>
 
 namespace dermis::samples {
 namespace {
-
-Error failed(const char* function, VkResult result) {
-  return {
-      ErrorCode::vulkanError,
-      std::string(function) + " failed with VkResult " + std::to_string(static_cast<int>(result)),
-      static_cast<std::int32_t>(result)};
-}
 
 std::uint32_t timestampBits(const Device& device) {
   const VkPhysicalDevice physicalDevice = device.description().physicalDevice;
@@ -44,7 +36,7 @@ Result<Timestamps> Timestamps::create(Device& device) {
           device.functions().CreateQueryPool(device.handle(), &info, nullptr, &timestamps.pool_);
       result != VK_SUCCESS) {
     timestamps.pool_ = VK_NULL_HANDLE;
-    return failed("vkCreateQueryPool", result);
+    return vulkanError("vkCreateQueryPool", result);
   }
   return timestamps;
 }
@@ -81,7 +73,7 @@ Result<double> Timestamps::seconds() const {
           device_->handle(), pool_, 0, 2, sizeof(ticks), ticks.data(), sizeof(ticks[0]),
           VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
       result != VK_SUCCESS) {
-    return failed("vkGetQueryPoolResults", result);
+    return vulkanError("vkGetQueryPoolResults", result);
   }
   // The counter may have wrapped around.
   return static_cast<double>((ticks[1] - ticks[0]) & validBits_) * period_;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "kit/barrier.h"
 #include "kit/batch_runner.h"
+#include "kit/device.h"
 
 namespace dermis::samples {
 namespace {
@@ -46,18 +46,12 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
 
 Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,
                     const vulkan::Bindings& bindings) {
-  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
-  VkCommandBufferBeginInfo begin{};
-  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  device.functions().BeginCommandBuffer(commandBuffer, &begin);
-  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
-  Result<void> done = context.record(commandBuffer, plan, bindings);
-  recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
-  device.functions().EndCommandBuffer(commandBuffer);
-  if (done) done = device.submitAndWait(commandBuffer);
-  device.freeCommandBuffer(commandBuffer);
-  return done;
+  return device.run([&](VkCommandBuffer commandBuffer) {
+    recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+    Result<void> done = context.record(commandBuffer, plan, bindings);
+    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+    return done;
+  });
 }
 
 class VulkanRunner : public BatchRunner {

@@ -8,7 +8,7 @@
 #include "dermis/vulkan/context.h"
 #include "kit/batch_layout.h"
 #include "kit/buffer.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 
 namespace dermis::bench {
 

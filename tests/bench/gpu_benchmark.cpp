@@ -25,7 +25,7 @@
 #include "bench_scene.h"
 #include "kit/bench/crowd.h"
 #include "kit/bench/plain_batches.h"
-#include "kit/driver_version.h"
+#include "kit/device.h"
 #include "kit/timed_batches.h"
 
 namespace dermis::bench {

@@ -14,7 +14,7 @@
 
 #include "bench_scene.h"
 #include "dermis/pack.h"
-#include "kit/driver_version.h"
+#include "kit/device.h"
 #include "kit/random_rig.h"
 #include "system_engine.h"
 

@@ -9,7 +9,7 @@
 
 #include "dermis/cpu/skin.h"
 #include "dermis/cpu/skinning_system.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "system_test.h"
 
 namespace {

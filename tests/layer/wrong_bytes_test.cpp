@@ -17,7 +17,7 @@
 
 #include "dermis/pack.h"
 #include "dermis/verify/reference.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "kit/verification_product.h"
 #include "random_rig.h"
 #include "test_device.h"

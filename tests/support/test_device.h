@@ -7,7 +7,7 @@
 
 #include <string>
 
-#include "kit/open_device.h"
+#include "kit/device.h"
 
 namespace dermis::test {
 

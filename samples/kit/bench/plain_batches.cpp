@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <string>
 #include <type_traits>
+#include <utility>
 
 #include "plain_kernels.h"
 
@@ -19,12 +19,6 @@ constexpr std::uint32_t bindingCount = 3;
 /// then begins at a multiple of 256 bytes, the largest alignment that a device may require.
 constexpr std::uint64_t instanceStep = 32;
 
-Result<void> check(VkResult result, const char* function) {
-  if (result == VK_SUCCESS) return {};
-  return Error{ErrorCode::vulkanError,
-               std::string(function) + " failed with VkResult " + std::to_string(result), result};
-}
-
 std::uint32_t groupsOf(std::uint64_t invocations) {
   return static_cast<std::uint32_t>((invocations + workgroupSize - 1) / workgroupSize);
 }
@@ -37,41 +31,10 @@ std::uint64_t instancesTogether(std::uint64_t maxRange, std::uint64_t instanceSi
 
 }  // namespace
 
-PlainBatches::PlainBatches(OpenDevice& open)
-    : device_(*open.device), maxRange_(open.context.limits().maxStorageBufferRange) {
-  const auto load = [this](auto& function, const char* name) {
-    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(
-        device_.functions().GetDeviceProcAddr(device_.handle(), name));
-  };
-  load(functions_.createShaderModule, "vkCreateShaderModule");
-  load(functions_.destroyShaderModule, "vkDestroyShaderModule");
-  load(functions_.createDescriptorSetLayout, "vkCreateDescriptorSetLayout");
-  load(functions_.destroyDescriptorSetLayout, "vkDestroyDescriptorSetLayout");
-  load(functions_.createPipelineLayout, "vkCreatePipelineLayout");
-  load(functions_.destroyPipelineLayout, "vkDestroyPipelineLayout");
-  load(functions_.createComputePipelines, "vkCreateComputePipelines");
-  load(functions_.destroyPipeline, "vkDestroyPipeline");
-  load(functions_.createDescriptorPool, "vkCreateDescriptorPool");
-  load(functions_.destroyDescriptorPool, "vkDestroyDescriptorPool");
-  load(functions_.allocateDescriptorSets, "vkAllocateDescriptorSets");
-  load(functions_.updateDescriptorSets, "vkUpdateDescriptorSets");
-  load(functions_.cmdBindPipeline, "vkCmdBindPipeline");
-  load(functions_.cmdBindDescriptorSets, "vkCmdBindDescriptorSets");
-  load(functions_.cmdPushConstants, "vkCmdPushConstants");
-  load(functions_.cmdDispatch, "vkCmdDispatch");
-}
-
 PlainBatches::~PlainBatches() {
-  const VkDevice device = device_.handle();
   for (const VkCommandBuffer commandBuffer : commandBuffers_) {
     if (commandBuffer != VK_NULL_HANDLE) device_.freeCommandBuffer(commandBuffer);
   }
-  for (const VkPipeline pipeline : pipelines_)
-    functions_.destroyPipeline(device, pipeline, nullptr);
-  functions_.destroyPipeline(device, palettePipeline_, nullptr);
-  functions_.destroyDescriptorPool(device, pool_, nullptr);
-  functions_.destroyPipelineLayout(device, layout_, nullptr);
-  functions_.destroyDescriptorSetLayout(device, setLayout_, nullptr);
 }
 
 Result<std::unique_ptr<PlainBatches>> PlainBatches::create(OpenDevice& open, const Crowd& crowd) {
@@ -130,7 +93,6 @@ Result<void> PlainBatches::makeBuffers(const Crowd& crowd) {
 }
 
 Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
-  const VkDevice device = device_.handle();
   std::array<VkDescriptorSetLayoutBinding, bindingCount> bindings{};
   for (std::uint32_t binding = 0; binding < bindingCount; ++binding) {
     bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
@@ -140,23 +102,21 @@ Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
   setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   setInfo.bindingCount = bindingCount;
   setInfo.pBindings = bindings.data();
-  if (Result<void> good =
-          check(functions_.createDescriptorSetLayout(device, &setInfo, nullptr, &setLayout_),
-                "vkCreateDescriptorSetLayout");
-      !good)
-    return good;
+  Result<render::Owned<VkDescriptorSetLayout>> setLayout =
+      DERMIS_MAKE(device_, DescriptorSetLayout, setInfo);
+  if (!setLayout) return setLayout.error();
+  setLayout_ = std::move(*setLayout);
+  const VkDescriptorSetLayout set = setLayout_.get();
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, 12};
   VkPipelineLayoutCreateInfo layoutInfo{};
   layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   layoutInfo.setLayoutCount = 1;
-  layoutInfo.pSetLayouts = &setLayout_;
+  layoutInfo.pSetLayouts = &set;
   layoutInfo.pushConstantRangeCount = 1;
   layoutInfo.pPushConstantRanges = &range;
-  if (Result<void> good =
-          check(functions_.createPipelineLayout(device, &layoutInfo, nullptr, &layout_),
-                "vkCreatePipelineLayout");
-      !good)
-    return good;
+  Result<render::Owned<VkPipelineLayout>> layout = DERMIS_MAKE(device_, PipelineLayout, layoutInfo);
+  if (!layout) return layout.error();
+  layout_ = std::move(*layout);
   // The sets of the three kernels, and that of the palettes.
   const std::uint32_t sets = dispatches * std::uint32_t{plainKernelCount} + 1;
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets * bindingCount};
@@ -165,47 +125,48 @@ Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
   poolInfo.maxSets = sets;
   poolInfo.poolSizeCount = 1;
   poolInfo.pPoolSizes = &size;
-  return check(functions_.createDescriptorPool(device, &poolInfo, nullptr, &pool_),
-               "vkCreateDescriptorPool");
+  Result<render::Owned<VkDescriptorPool>> pool = DERMIS_MAKE(device_, DescriptorPool, poolInfo);
+  if (!pool) return pool.error();
+  pool_ = std::move(*pool);
+  return {};
 }
 
-Result<void> PlainBatches::makePipeline(VkPipeline& pipeline,
+Result<void> PlainBatches::makePipeline(render::Owned<VkPipeline>& pipeline,
                                         std::span<const std::uint32_t> spirv) {
-  const VkDevice device = device_.handle();
   VkShaderModuleCreateInfo moduleInfo{};
   moduleInfo.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
   moduleInfo.codeSize = spirv.size_bytes();
   moduleInfo.pCode = spirv.data();
-  VkShaderModule module = VK_NULL_HANDLE;
-  if (Result<void> good =
-          check(functions_.createShaderModule(device, &moduleInfo, nullptr, &module),
-                "vkCreateShaderModule");
-      !good)
-    return good;
+  const Result<render::Owned<VkShaderModule>> module =
+      DERMIS_MAKE(device_, ShaderModule, moduleInfo);
+  if (!module) return module.error();
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module;
+  info.stage.module = module->get();
   info.stage.pName = "main";
-  info.layout = layout_;
+  info.layout = layout_.get();
+  const VulkanFunctions& functions = device_.functions();
+  VkPipeline made = VK_NULL_HANDLE;
   const VkResult result =
-      functions_.createComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
-  functions_.destroyShaderModule(device, module, nullptr);
-  return check(result, "vkCreateComputePipelines");
+      functions.CreateComputePipelines(device_.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &made);
+  pipeline = {device_.handle(), made, functions.DestroyPipeline};
+  return checkVulkan("vkCreateComputePipelines", result);
 }
 
 Result<void> PlainBatches::bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
                                 std::span<const vulkan::BufferRange> buffers) {
   VkDescriptorSetAllocateInfo allocateInfo{};
   allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  allocateInfo.descriptorPool = pool_;
+  const VkDescriptorSetLayout layout = setLayout_.get();
+  allocateInfo.descriptorPool = pool_.get();
   allocateInfo.descriptorSetCount = 1;
-  allocateInfo.pSetLayouts = &setLayout_;
+  allocateInfo.pSetLayouts = &layout;
   VkDescriptorSet set = VK_NULL_HANDLE;
-  if (Result<void> good =
-          check(functions_.allocateDescriptorSets(device_.handle(), &allocateInfo, &set),
-                "vkAllocateDescriptorSets");
+  if (Result<void> good = checkVulkan(
+          "vkAllocateDescriptorSets",
+          device_.functions().AllocateDescriptorSets(device_.handle(), &allocateInfo, &set));
       !good)
     return good;
   std::array<VkDescriptorBufferInfo, bindingCount> infos{};
@@ -220,30 +181,26 @@ Result<void> PlainBatches::bind(VkCommandBuffer commandBuffer, VkPipeline pipeli
     writes[binding].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
     writes[binding].pBufferInfo = &infos[binding];
   }
-  functions_.updateDescriptorSets(device_.handle(), static_cast<std::uint32_t>(buffers.size()),
-                                  writes.data(), 0, nullptr);
-  functions_.cmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-  functions_.cmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1,
-                                   &set, 0, nullptr);
+  device_.functions().UpdateDescriptorSets(
+      device_.handle(), static_cast<std::uint32_t>(buffers.size()), writes.data(), 0, nullptr);
+  device_.functions().CmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+  device_.functions().CmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
+                                            layout_.get(), 0, 1, &set, 0, nullptr);
   return {};
 }
 
 Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer) {
-  if (Result<void> bound =
-          bind(commandBuffer, palettePipeline_, std::array{matrices_.range(), palettes_.range()});
+  if (Result<void> bound = bind(commandBuffer, palettePipeline_.get(),
+                                std::array{matrices_.range(), palettes_.range()});
       !bound)
     return bound;
   const std::uint32_t jointTotal = crowd.instanceCount() * crowd.jointCount();
-  functions_.cmdPushConstants(commandBuffer, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, 4,
-                              &jointTotal);
-  functions_.cmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
-  device_.functions().CmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-                                         VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0, 1, &barrier, 0,
-                                         nullptr, 0, nullptr);
+  device_.functions().CmdPushConstants(commandBuffer, layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                                       4, &jointTotal);
+  device_.functions().CmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
+  recordBarrier(device_, commandBuffer,
+                {{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT},
+                 {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT}});
   return {};
 }
 
@@ -257,7 +214,7 @@ Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel
     const std::uint64_t count = std::min(step, crowd.instanceCount() - first);
     const vulkan::BufferRange written{output_.range().buffer, first * instanceSize,
                                       count * instanceSize};
-    if (Result<void> bound = bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)],
+    if (Result<void> bound = bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)].get(),
                                   std::array{vertices_.range(), joints, written});
         !bound)
       return bound;
@@ -266,10 +223,10 @@ Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel
         crowd.vertexCount(), copies ? static_cast<std::uint32_t>(count) : crowd.jointCount(),
         static_cast<std::uint32_t>(first)};
     const std::uint64_t rows = copies ? (count + copiedTogether - 1) / copiedTogether : count;
-    functions_.cmdPushConstants(commandBuffer, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                                sizeof(push), push.data());
-    functions_.cmdDispatch(commandBuffer, groupsOf(crowd.vertexCount()),
-                           static_cast<std::uint32_t>(rows), 1);
+    device_.functions().CmdPushConstants(commandBuffer, layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT,
+                                         0, sizeof(push), push.data());
+    device_.functions().CmdDispatch(commandBuffer, groupsOf(crowd.vertexCount()),
+                                    static_cast<std::uint32_t>(rows), 1);
   }
   return {};
 }
@@ -279,8 +236,8 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
   commandBuffer = device_.allocateCommandBuffer();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  if (Result<void> begun = check(device_.functions().BeginCommandBuffer(commandBuffer, &begin),
-                                 "vkBeginCommandBuffer");
+  if (Result<void> begun = checkVulkan(
+          "vkBeginCommandBuffer", device_.functions().BeginCommandBuffer(commandBuffer, &begin));
       !begun)
     return begun;
   timestamps_.recordBegin(commandBuffer);
@@ -290,7 +247,7 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
   if (Result<void> recorded = recordSkinning(crowd, kernel, commandBuffer); !recorded)
     return recorded;
   timestamps_.recordEnd(commandBuffer);
-  return check(device_.functions().EndCommandBuffer(commandBuffer), "vkEndCommandBuffer");
+  return checkVulkan("vkEndCommandBuffer", device_.functions().EndCommandBuffer(commandBuffer));
 }
 
 Result<double> PlainBatches::skin(PlainKernel kernel) {

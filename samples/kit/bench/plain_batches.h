@@ -11,8 +11,8 @@
 
 #include "kit/bench/crowd.h"
 #include "kit/buffer.h"
-#include "kit/device_buffer.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
+#include "kit/render/owned.h"
 #include "kit/timestamps.h"
 
 namespace dermis::samples {
@@ -39,31 +39,13 @@ class PlainBatches {
   Result<std::vector<std::byte>> output() const { return output_.read(); }
 
  private:
-  /// The entry points that the baselines need in addition to those of `Device`.
-  struct Functions {
-    PFN_vkCreateShaderModule createShaderModule = nullptr;
-    PFN_vkDestroyShaderModule destroyShaderModule = nullptr;
-    PFN_vkCreateDescriptorSetLayout createDescriptorSetLayout = nullptr;
-    PFN_vkDestroyDescriptorSetLayout destroyDescriptorSetLayout = nullptr;
-    PFN_vkCreatePipelineLayout createPipelineLayout = nullptr;
-    PFN_vkDestroyPipelineLayout destroyPipelineLayout = nullptr;
-    PFN_vkCreateComputePipelines createComputePipelines = nullptr;
-    PFN_vkDestroyPipeline destroyPipeline = nullptr;
-    PFN_vkCreateDescriptorPool createDescriptorPool = nullptr;
-    PFN_vkDestroyDescriptorPool destroyDescriptorPool = nullptr;
-    PFN_vkAllocateDescriptorSets allocateDescriptorSets = nullptr;
-    PFN_vkUpdateDescriptorSets updateDescriptorSets = nullptr;
-    PFN_vkCmdBindPipeline cmdBindPipeline = nullptr;
-    PFN_vkCmdBindDescriptorSets cmdBindDescriptorSets = nullptr;
-    PFN_vkCmdPushConstants cmdPushConstants = nullptr;
-    PFN_vkCmdDispatch cmdDispatch = nullptr;
-  };
-
-  explicit PlainBatches(OpenDevice& open);
+  explicit PlainBatches(OpenDevice& open)
+      : device_(*open.device), maxRange_(open.context.limits().maxStorageBufferRange) {}
   Result<void> make(const Crowd& crowd);
   Result<void> makeBuffers(const Crowd& crowd);
   Result<void> makeLayouts(std::uint32_t dispatches);
-  Result<void> makePipeline(VkPipeline& pipeline, std::span<const std::uint32_t> spirv);
+  Result<void> makePipeline(render::Owned<VkPipeline>& pipeline,
+                            std::span<const std::uint32_t> spirv);
   Result<void> record(const Crowd& crowd, PlainKernel kernel);
   Result<void> recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer);
   Result<void> recordSkinning(const Crowd& crowd, PlainKernel kernel,
@@ -73,15 +55,14 @@ class PlainBatches {
 
   Device& device_;
   std::uint64_t maxRange_;
-  Functions functions_;
   Timestamps timestamps_;
   MappedBuffer vertices_, matrices_;
   DeviceBuffer palettes_, output_;
-  VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
-  VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkDescriptorPool pool_ = VK_NULL_HANDLE;
-  VkPipeline palettePipeline_ = VK_NULL_HANDLE;
-  std::array<VkPipeline, plainKernelCount> pipelines_{};
+  render::Owned<VkDescriptorSetLayout> setLayout_;
+  render::Owned<VkPipelineLayout> layout_;
+  render::Owned<VkDescriptorPool> pool_;
+  render::Owned<VkPipeline> palettePipeline_;
+  std::array<render::Owned<VkPipeline>, plainKernelCount> pipelines_;
   std::array<VkCommandBuffer, plainKernelCount> commandBuffers_{};
 };
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "kit/bench/crowd.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 
 namespace dermis::samples {
 

@@ -1,7 +1,6 @@
 // A Vulkan object that is destroyed with its owner.
 #pragma once
 
-#include <string>
 #include <utility>
 
 #include "kit/device.h"
@@ -43,12 +42,7 @@ Result<Owned<Handle>> make(const Device& device, const char* name,
                            typename Owned<Handle>::Destroy destroy, const Info& info) {
   Handle handle = VK_NULL_HANDLE;
   const VkResult result = create(device.handle(), &info, nullptr, &handle);
-  if (result != VK_SUCCESS) {
-    return Error{
-        ErrorCode::vulkanError,
-        std::string(name) + " failed with VkResult " + std::to_string(static_cast<int>(result)),
-        static_cast<std::int32_t>(result)};
-  }
+  if (result != VK_SUCCESS) return vulkanError(name, result);
   return Owned<Handle>(device.handle(), handle, destroy);
 }
 

@@ -2,22 +2,11 @@
 
 #include <algorithm>
 #include <cstring>
-#include <string>
 #include <utility>
 
 namespace dermis::samples::render {
-namespace {
 
 constexpr std::uint64_t pollInterval = 100'000'000;  // nanoseconds
-
-Result<void> checked(VkResult result) {
-  if (result == VK_SUCCESS) return {};
-  return Error{ErrorCode::vulkanError,
-               "drawing failed with VkResult " + std::to_string(static_cast<int>(result)),
-               static_cast<std::int32_t>(result)};
-}
-
-}  // namespace
 
 Result<PassCounter> PassCounter::create(Device& device, std::uint32_t passes) {
   PassCounter counter;
@@ -53,7 +42,7 @@ Result<void> PassCounter::wait(VkFence fence, const std::function<void()>& onPas
       onPass();
     }
   }
-  return checked(result);
+  return checkVulkan("drawing", result);
 }
 
 Result<void> PassCounter::submitAndWait(VkCommandBuffer commandBuffer,
@@ -62,13 +51,14 @@ Result<void> PassCounter::submitAndWait(VkCommandBuffer commandBuffer,
   VkFenceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
   VkFence fence = VK_NULL_HANDLE;
-  Result<void> done = checked(functions.CreateFence(device_->handle(), &info, nullptr, &fence));
+  Result<void> done =
+      checkVulkan("drawing", functions.CreateFence(device_->handle(), &info, nullptr, &fence));
   if (!done) return done;
   VkSubmitInfo submit{};
   submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
   submit.commandBufferCount = 1;
   submit.pCommandBuffers = &commandBuffer;
-  done = checked(functions.QueueSubmit(device_->queue(), 1, &submit, fence));
+  done = checkVulkan("drawing", functions.QueueSubmit(device_->queue(), 1, &submit, fence));
   if (done) done = wait(fence, onPass);
   functions.DestroyFence(device_->handle(), fence, nullptr);
   return done;

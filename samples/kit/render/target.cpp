@@ -212,13 +212,9 @@ void RenderTarget::recordReadBack(const Device& device, VkCommandBuffer commandB
   device.functions().CmdCopyImageToBuffer(commandBuffer, resolved_.handle(),
                                           VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readBack_.handle(),
                                           1, &copy);
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
-  device.functions().CmdPipelineBarrier(commandBuffer, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                                        VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0, nullptr, 0,
-                                        nullptr);
+  recordBarrier(device, commandBuffer,
+                {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
+                 {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
 }
 
 std::vector<std::uint8_t> RenderTarget::pixels() const {

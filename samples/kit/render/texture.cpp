@@ -90,27 +90,22 @@ Result<void> upload(Device& device, const TexturePixels& pixels, const Image& im
   std::memcpy(staging->bytes().data(), pixels.pixels.data(), pixels.pixels.size());
 
   const VulkanFunctions& functions = device.functions();
-  const VkCommandBuffer commandBuffer = device.allocateCommandBuffer();
-  VkCommandBufferBeginInfo begin{};
-  begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  functions.BeginCommandBuffer(commandBuffer, &begin);
-  recordTransition(device, commandBuffer, image, VK_IMAGE_LAYOUT_UNDEFINED,
-                   VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, 0,
-                   VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
-  VkBufferImageCopy copy{};
-  copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-  copy.imageExtent = {pixels.width, pixels.height, 1};
-  functions.CmdCopyBufferToImage(commandBuffer, staging->handle(), image.handle(),
-                                 VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
-  recordLevels(functions, commandBuffer, image);
-  recordTransition(device, commandBuffer, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
-                   VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                   VK_ACCESS_TRANSFER_READ_BIT, VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
-                   VK_ACCESS_SHADER_READ_BIT);
-  functions.EndCommandBuffer(commandBuffer);
-  Result<void> done = device.submitAndWait(commandBuffer);
-  device.freeCommandBuffer(commandBuffer);
-  return done;
+  return device.run([&](VkCommandBuffer commandBuffer) -> Result<void> {
+    recordTransition(device, commandBuffer, image, VK_IMAGE_LAYOUT_UNDEFINED,
+                     VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, 0,
+                     VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+    VkBufferImageCopy copy{};
+    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    copy.imageExtent = {pixels.width, pixels.height, 1};
+    functions.CmdCopyBufferToImage(commandBuffer, staging->handle(), image.handle(),
+                                   VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
+    recordLevels(functions, commandBuffer, image);
+    recordTransition(device, commandBuffer, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+                     VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                     VK_ACCESS_TRANSFER_READ_BIT, VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
+                     VK_ACCESS_SHADER_READ_BIT);
+    return {};
+  });
 }
 
 }  // namespace

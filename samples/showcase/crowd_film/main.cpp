@@ -24,12 +24,11 @@
 
 #include "dermis/vulkan/skinning_system.h"
 #include "gait.h"
-#include "kit/barrier.h"
 #include "kit/character.h"
+#include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/frame_loop.h"
 #include "kit/must.h"
-#include "kit/open_device.h"
 #include "kit/program.h"
 #include "kit/progress.h"
 #include "kit/render/appearances.h"
