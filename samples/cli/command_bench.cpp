@@ -25,9 +25,8 @@
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/output_file.h"
-#include "kit/progress.h"
+#include "kit/program.h"
 #include "kit/render/picture.h"
-#include "kit/render/picture_writer.h"
 #include "picture_sheet.h"
 
 namespace dermis::cli {
@@ -244,7 +243,7 @@ ExitStatus checkUsage(const BenchOptions& options) {
   if (options.device == "reference")
     return reportWrongUsage("--device reference cannot be timed: it is not optimized for speed");
   if (options.output.empty()) return ExitStatus::done;
-  if (samples::pictureKind(options.output) != samples::PictureKind::png)
+  if (samples::render::pictureKind(options.output) != samples::render::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png; it is '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");

@@ -21,8 +21,8 @@
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/output_file.h"
-#include "kit/progress.h"
-#include "kit/render/picture_writer.h"
+#include "kit/program.h"
+#include "kit/render/picture.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -179,6 +179,7 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
   return samples::writeFile(path, text);
 }
 
+/// The subject: a model in a pose, or the built-in arm.
 struct ComparisonSubject {
   std::optional<BuiltInScenes> builtIn;  ///< if a picture is drawn
   std::optional<Scene> model;            ///< empty: the built-in arm
@@ -270,7 +271,7 @@ ExitStatus checkPicture(const CompareOptions& options) {
   if (options.model.empty() && (options.animation || options.time != 0))
     return reportWrongUsage("--animation and --time need a MODEL");
   if (options.output.empty()) return ExitStatus::done;
-  if (samples::pictureKind(options.output) != samples::PictureKind::png)
+  if (samples::render::pictureKind(options.output) != samples::render::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png; it is '{}'", options.output));
   if (samples::hasWrongPattern(options.output) || samples::frameName(options.output, 0))
     return reportWrongUsage("-o OUT has a placeholder for a number, but there is only one picture");

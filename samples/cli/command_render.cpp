@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -13,20 +16,102 @@
 #include "crowd.h"
 #include "drawn_scene.h"
 #include "kit/batch_runner.h"
+#include "kit/buffer.h"
+#include "kit/device.h"
 #include "kit/file_name.h"
-#include "kit/progress.h"
-#include "kit/render/pass_counter.h"
-#include "kit/render/picture_writer.h"
+#include "kit/program.h"
+#include "kit/render/picture.h"
 #include "method_options.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
 namespace {
 
+/// Reports the progress of the device in one long submission.
+class PassCounter {
+ public:
+  /// `device` must outlive it.
+  static Result<PassCounter> create(samples::Device& device, std::uint32_t passes);
+
+  /// Record this between two passes: it marks one more pass as done.
+  void record(VkCommandBuffer commandBuffer);
+
+  /// Submits and waits. Calls `onPass` for each completed pass, at about the time when it
+  /// completes. Fails with `vulkanError`.
+  Result<void> submitAndWait(VkCommandBuffer commandBuffer,
+                             const std::function<void()>& onPass) const;
+
+ private:
+  Result<void> wait(VkFence fence, const std::function<void()>& onPass) const;
+
+  samples::Device* device_ = nullptr;
+  samples::MappedBuffer words_;  ///< one per pass; not 0 when it is done
+  std::uint32_t passes_ = 0, recorded_ = 0;
+};
+
+constexpr std::uint64_t pollInterval = 100'000'000;  // nanoseconds
+
+Result<PassCounter> PassCounter::create(samples::Device& device, std::uint32_t passes) {
+  PassCounter counter;
+  counter.device_ = &device;
+  counter.passes_ = passes;
+  Result<samples::MappedBuffer> words =
+      samples::MappedBuffer::create(device, std::uint64_t{passes} * sizeof(std::uint32_t),
+                                    VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
+  if (!words) return words.error();
+  counter.words_ = std::move(*words);
+  std::ranges::fill(counter.words_.bytes(), std::byte{0});
+  return counter;
+}
+
+void PassCounter::record(VkCommandBuffer commandBuffer) {
+  if (recorded_ == passes_) return;
+  const VkDeviceSize offset = std::uint64_t{recorded_++} * sizeof(std::uint32_t);
+  device_->functions().CmdFillBuffer(commandBuffer, words_.handle(), offset, sizeof(std::uint32_t),
+                                     1);
+}
+
+Result<void> PassCounter::wait(VkFence fence, const std::function<void()>& onPass) const {
+  std::uint32_t told = 0;
+  VkResult result = VK_TIMEOUT;
+  while (result == VK_TIMEOUT) {
+    result =
+        device_->functions().WaitForFences(device_->handle(), 1, &fence, VK_TRUE, pollInterval);
+    // A value read before the fence may be outdated; then a pass is only reported a moment later.
+    for (; told < recorded_; ++told) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, words_.bytes().data() + std::size_t{told} * sizeof(word), sizeof(word));
+      if (word == 0 && result != VK_SUCCESS) break;
+      onPass();
+    }
+  }
+  return samples::checkVulkan("drawing", result);
+}
+
+Result<void> PassCounter::submitAndWait(VkCommandBuffer commandBuffer,
+                                        const std::function<void()>& onPass) const {
+  const samples::VulkanFunctions& functions = device_->functions();
+  VkFenceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+  VkFence fence = VK_NULL_HANDLE;
+  Result<void> done = samples::checkVulkan(
+      "drawing", functions.CreateFence(device_->handle(), &info, nullptr, &fence));
+  if (!done) return done;
+  VkSubmitInfo submit{};
+  submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+  submit.commandBufferCount = 1;
+  submit.pCommandBuffers = &commandBuffer;
+  done =
+      samples::checkVulkan("drawing", functions.QueueSubmit(device_->queue(), 1, &submit, fence));
+  if (done) done = wait(fence, onPass);
+  functions.DestroyFence(device_->handle(), fence, nullptr);
+  return done;
+}
+
 namespace render = samples::render;
-using samples::PictureKind;
-using samples::PictureWriter;
 using samples::Progress;
+using samples::render::PictureKind;
+using samples::render::PictureWriter;
 
 struct RenderOptions {
   std::string model;
@@ -69,7 +154,7 @@ ExitStatus checkNumbers(const RenderOptions& options) {
 }
 
 ExitStatus checkUsage(const RenderOptions& options) {
-  const std::optional<PictureKind> kind = samples::pictureKind(options.output);
+  const std::optional<PictureKind> kind = samples::render::pictureKind(options.output);
   if (!kind) {
     return reportWrongUsage(
         fmt::format("-o OUT must end in .png, .mp4, .gif or .apng; it is '{}'", options.output));
@@ -277,7 +362,7 @@ Result<void> Film::skin() {
 /// Skins the posed figures and draws them, in one command buffer.
 Result<void> Film::skinAndDraw() {
   const std::uint32_t passes = 1 + render::Renderer::passCount(*frame_, 1);
-  Result<render::PassCounter> counter = render::PassCounter::create(*device_.device, passes);
+  Result<PassCounter> counter = PassCounter::create(*device_.device, passes);
   if (!counter) return counter.error();
   const samples::VulkanFunctions& functions = device_.device->functions();
   const VkCommandBuffer commandBuffer = device_.device->allocateCommandBuffer();
@@ -332,10 +417,10 @@ ExitStatus writePictures(const RenderOptions& options, Film& film, PictureWriter
 }
 
 Result<std::unique_ptr<PictureWriter>> openWriter(const RenderOptions& options) {
-  const PictureKind kind = *samples::pictureKind(options.output);
-  if (kind == PictureKind::png) return samples::writePngs(options.output);
-  return samples::writeFilm(options.output, kind, options.width, options.height,
-                            options.framesPerSecond);
+  const PictureKind kind = *samples::render::pictureKind(options.output);
+  if (kind == PictureKind::png) return samples::render::writePngs(options.output);
+  return samples::render::writeFilm(options.output, kind, options.width, options.height,
+                                    options.framesPerSecond);
 }
 
 ExitStatus checkScene(const RenderOptions& options, const Scene& scene) {
@@ -364,8 +449,8 @@ ExitStatus checkOutput(const RenderOptions& options) {
   const samples::RequestedOutput output = requestedOutput(options);
   if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
     return kept;
-  if (*samples::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
-  const Result<void> film = samples::checkFilmProgram(options.output);
+  if (*samples::render::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
+  const Result<void> film = samples::render::checkFilmProgram(options.output);
   return film ? ExitStatus::done : reportError(ExitStatus::stopped, film.error().message);
 }
 

@@ -11,7 +11,7 @@
 #include "commands.h"
 #include "kit/device.h"
 #include "kit/file_name.h"
-#include "kit/progress.h"
+#include "kit/program.h"
 #include "mesh_output.h"
 #include "method_options.h"
 #include "scene_skinner.h"

@@ -19,7 +19,7 @@
 #include "dermis/text.h"
 #include "kit/device.h"
 #include "kit/output_file.h"
-#include "kit/progress.h"
+#include "kit/program.h"
 #include "verification.h"
 
 namespace dermis::cli {

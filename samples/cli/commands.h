@@ -10,8 +10,8 @@
 #include <string>
 
 #include "dermis/gltf.h"
-#include "kit/exit_status.h"
 #include "kit/file_name.h"
+#include "kit/program.h"
 
 namespace dermis::cli {
 

@@ -12,7 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "compared_figures.h"
-#include "kit/render/heat_colors.h"
+#include "kit/render/draw.h"
 #include "kit/render/renderer.h"
 #include "picture_sheet.h"
 

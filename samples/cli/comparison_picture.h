@@ -54,7 +54,8 @@ Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
                                                 std::vector<std::string>& notes,
                                                 const std::function<void()>& step);
 
-/// The sample models `bar` and `arm`. Each is twisted or bent most in the middle of its clip.
+/// Built-in scenes that show what the methods do: the sample models `bar` and `arm`. Each is
+/// twisted or bent most in the middle of its clip.
 struct BuiltInScenes {
   Scene bar, arm;
 };

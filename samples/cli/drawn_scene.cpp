@@ -11,7 +11,7 @@
 
 #include "dermis/vulkan/scope.h"
 #include "kit/device.h"
-#include "kit/render/winding.h"
+#include "kit/render/draw.h"
 #include "scene_skinner.h"
 
 namespace dermis::cli {
@@ -204,7 +204,7 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
       continue;
     }
     const std::vector<JointMatrix>& palette = pose.pose(part);
-    posed.isMirrored = samples::isMirrored(palette);
+    posed.isMirrored = samples::render::isMirrored(palette);
     if (!isWritten[part.source.skin]) {
       isWritten[part.source.skin] = true;
       Result<std::span<JointMatrix>> place = system_->writePose(figure.poses[part.source.skin]);

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "dermis/mesh.h"
-#include "kit/exit_status.h"
+#include "kit/program.h"
 
 namespace dermis::cli {
 

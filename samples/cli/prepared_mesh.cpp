@@ -11,7 +11,7 @@
 #include "dermis/centers_of_rotation.h"
 #include "dermis/text.h"
 #include "dermis/validate.h"
-#include "kit/progress.h"
+#include "kit/program.h"
 #include "kit/solve_centers.h"
 
 namespace dermis::cli {

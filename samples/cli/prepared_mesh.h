@@ -1,4 +1,5 @@
-// Prepares a glTF primitive for skinning: validates, repairs and packs it.
+// Prepares a glTF primitive for skinning: validates, repairs and packs it, and computes its centers
+// of rotation.
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@
 
 namespace dermis::cli {
 
-/// One part in one pose.
+/// One part of a scene in one pose.
 struct SkinnedPart {
   std::vector<float> positions;  ///< 3 per vertex
   std::vector<float> normals;    ///< 3 per vertex, or empty

@@ -10,7 +10,7 @@
 
 #include "dermis/method.h"
 #include "dermis/verify/accuracy.h"
-#include "kit/target_pool.h"
+#include "kit/batch_runner.h"
 #include "kit/verification_product.h"
 #include "skinned_scene.h"
 

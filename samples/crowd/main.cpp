@@ -40,7 +40,6 @@
 #include "kit/file_name.h"
 #include "kit/frame_loop.h"
 #include "kit/in_parallel.h"
-#include "kit/must.h"
 #include "kit/output_file.h"
 #include "kit/program.h"
 #include "kit/timestamps.h"

@@ -4,6 +4,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,13 +16,64 @@
 
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/types.h"
 #include "dermis/verify/accuracy.h"
 #include "dermis/vulkan/context.h"
-#include "kit/batch_layout.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
 
 namespace dermis::samples {
+
+/// One instance: its mesh, pose and method. Spans refer to the caller's memory.
+struct SkinRequest {
+  const PackedMesh* mesh = nullptr;
+  std::span<const JointMatrix> pose;
+  bool mayScale = true;
+  Method method = Method::dualQuaternion;
+  std::span<const MorphWeight> morphs = {};
+  Box box = {};  ///< for snorm16 positions
+  // For motion.
+  std::span<const JointMatrix> previousPose = {};  ///< empty: the same pose
+  std::span<const MorphWeight> previousMorphs = {};
+  bool restartsMotion = false;
+  bool settles = false;
+};
+
+enum class Arrangement : std::uint8_t {
+  interleaved,  ///< one buffer; the attributes of a vertex are adjacent
+  planar,       ///< one buffer; each attribute of an instance is a separate array
+  separate,     ///< a buffer for each attribute
+};
+
+/// How skinned vertices are stored. Normals and tangents are written if the mesh has them.
+struct OutputLayout {
+  VertexFormat positions = VertexFormat::float32x3;
+  VertexFormat normals = VertexFormat::float32x3;
+  VertexFormat tangents = VertexFormat::none;
+  Motion motion = Motion::none;
+  bool bounds = false;
+  Arrangement arrangement = Arrangement::interleaved;
+  std::uint32_t gap = 0;  ///< bytes after each vertex (interleaved) or element; never written
+};
+
+/// The buffers of a batch.
+struct BatchLayout {
+  std::map<const PackedMesh*, std::uint64_t>
+      meshOffsets;  ///< a mesh that several requests share is stored once
+  std::vector<PoseDescription> poseDescriptions;
+  std::vector<std::span<const JointMatrix>> poses;  ///< in the same order
+  std::vector<Job> jobs;                            ///< of the requests
+  std::uint64_t meshesSize = 0, posesSize = 0;
+  OutputSizes outputs;
+  bool oneOutput = true;
+
+  Batch batch() const { return {poseDescriptions, jobs, meshesSize, posesSize, outputs}; }
+};
+
+BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output);
+
+/// An attribute of a job, by `Stream`; `none` if it is not written.
+OutputAttribute attributeOf(const Job& job, std::size_t stream);
 
 /// The result of one request.
 struct SkinnedVertices {
@@ -142,5 +196,41 @@ class CpuTarget : public BatchTarget {
 /// Runs a single batch on a device.
 Result<BatchResult> runBatch(Device& device, vulkan::Context& context,
                              std::span<const SkinRequest> requests, const RunOptions& options = {});
+
+/// Skins many batches in parallel: a thread for each target, all targets of the same kind.
+///
+/// Mesa's lavapipe compiles a kernel in the thread of the queue that first executes it. To compile
+/// on all cores, each thread needs its own device.
+class TargetPool {
+ public:
+  /// Creates another target that gives the same results as the first.
+  using MakeTarget = std::function<Result<std::shared_ptr<BatchTarget>>()>;
+  /// The pool uses at most `threads` targets, including `first`. More targets are created when
+  /// there is work for them. If one cannot be created, the pool uses fewer.
+  TargetPool(std::shared_ptr<BatchTarget> first, MakeTarget makeTarget, std::size_t threads);
+
+  BatchTarget& first() { return *targets_.front(); }
+
+  using Task = std::function<Result<void>(std::size_t index, BatchTarget& target)>;
+  struct Work {
+    std::size_t tasks = 0;
+    /// The first `pinnedTasks` tasks run on the same targets in every call, as long as the pool has
+    /// the same number of targets, because those targets have the pipelines already.
+    std::size_t pinnedTasks = 0;
+    /// Called after each task that succeeds, by one thread at a time.
+    std::function<void()> done = [] {};
+  };
+  /// Calls `task` for each index below `work.tasks`, and returns when all tasks have ended. If
+  /// tasks fail, it returns the error of the lowest index and starts no task above that index.
+  /// Exceptions of a task are rethrown.
+  Result<void> run(const Work& work, const Task& task);
+
+ private:
+  void makeTargets(std::size_t count);
+
+  std::vector<std::shared_ptr<BatchTarget>> targets_;
+  MakeTarget makeTarget_;
+  std::size_t threads_;
+};
 
 }  // namespace dermis::samples

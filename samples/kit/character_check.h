@@ -17,7 +17,7 @@
 #include "dermis/scene.h"
 #include "dermis/verify/reference.h"
 #include "kit/character.h"
-#include "kit/must.h"
+#include "kit/program.h"
 
 namespace dermis::samples {
 

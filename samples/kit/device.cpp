@@ -7,7 +7,7 @@
 #include <cstring>
 #include <utility>
 
-#include "kit/validation.h"
+#include "kit/device_extensions.h"
 
 namespace dermis::samples {
 namespace {

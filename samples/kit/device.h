@@ -13,7 +13,7 @@
 #include "dermis/result.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/scope.h"
-#include "kit/ray_tracing_features.h"
+#include "kit/device_extensions.h"
 #include "kit/vulkan_loader.h"
 
 namespace dermis::samples {
@@ -136,7 +136,8 @@ struct OpenDevice {
 
 Result<OpenDevice> openDevice(const DeviceOptions& options);
 
-/// "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)", or only a number if the driver does not report more.
+/// The driver, so that measurements can be compared: "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)", or only
+/// a number if the driver does not report more.
 std::string driverVersion(const Device& device);
 
 /// A global memory barrier.

@@ -1,4 +1,4 @@
-// A parallel loop on all cores.
+// Threads that end with a scope, and a parallel loop on all cores.
 #pragma once
 
 #include <algorithm>
@@ -7,10 +7,30 @@
 #include <exception>
 #include <mutex>
 #include <thread>
-
-#include "kit/joining_threads.h"
+#include <vector>
 
 namespace dermis::samples {
+
+/// Threads that are joined when a scope ends, for standard libraries without std::jthread (libc++
+/// 16).
+class JoiningThreads {
+ public:
+  JoiningThreads() = default;
+  JoiningThreads(const JoiningThreads&) = delete;
+  JoiningThreads& operator=(const JoiningThreads&) = delete;
+  ~JoiningThreads() {
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  /// Starts a thread that calls copies of `function` and `arguments`.
+  template <typename Function, typename... Arguments>
+  void start(const Function& function, const Arguments&... arguments) {
+    threads_.emplace_back(function, arguments...);
+  }
+
+ private:
+  std::vector<std::thread> threads_;
+};
 
 /// Calls `body(index)` for each index below `count`, in any order and from several threads. Returns
 /// when all calls are done. If calls throw, it throws one of the exceptions.

@@ -1,4 +1,4 @@
-// Chooses which methods are verified with which output, because all combinations take too long.
+// Chooses what is verified with what, because all combinations take too long.
 #pragma once
 
 #include <cstdint>
@@ -19,5 +19,11 @@ std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> out
 /// The values of an output case's parameters. Different values of a parameter have different
 /// numbers.
 std::vector<std::uint32_t> parameterValues(const OutputCase& output);
+
+/// Pairwise testing. For parameters with these numbers of values: combinations in which every two
+/// values of two parameters occur together at least once. A combination has the index of a value
+/// for each parameter. Deterministic.
+std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
+    std::span<const std::uint32_t> valueCounts);
 
 }  // namespace dermis::samples

@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <random>
 
-#include "kit/output_file_system.h"
-
 namespace dermis::samples {
 
 std::string temporaryNameIn(const std::filesystem::path& folder) {

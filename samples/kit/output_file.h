@@ -8,6 +8,10 @@
 // permissions of a new one, and a link is replaced.
 #pragma once
 
+#ifndef _WIN32
+#include <sys/types.h>
+#endif
+
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -16,9 +20,32 @@
 #include <string>
 
 #include "dermis/result.h"
-#include "kit/unfinished.h"
 
 namespace dermis::samples {
+
+/// SIGINT, SIGTERM and SIGHUP, unless they are ignored already, remove what is registered below and
+/// then end the program as usual. On Windows, Ctrl+C, Ctrl+Break and closing the console do so.
+/// SIGPIPE and SIGXFSZ are ignored: writing then fails as on a full disk. Call it once, when the
+/// program begins.
+void handleSignals();
+
+/// A signal removes this file as long as the object lives. At most eight files are removed.
+class UnfinishedFile {
+ public:
+  explicit UnfinishedFile(const std::string& path);
+  ~UnfinishedFile();
+  UnfinishedFile(const UnfinishedFile&) = delete;
+  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
+
+ private:
+  int slot_ = -1;
+};
+
+#ifndef _WIN32
+/// Sets the child process that a signal kills before it removes files; 0 for none. The caller must
+/// set it to 0 again before it reaps the process.
+void setUnfinishedChild(pid_t child);
+#endif
 
 /// Replaces a file. Fails with `ioError`.
 Result<void> writeFile(const std::filesystem::path& path, std::span<const std::byte> bytes);
@@ -63,5 +90,17 @@ class OutputFile {
   int file_ = -1;
   bool isThere_ = false;  ///< Whether this object created the temporary file.
 };
+
+// The rest is for output_file.cpp and output_file_system.cpp.
+
+/// Where output to a file of this name goes. Fails with `ioError`.
+Result<OutputTarget> findTarget(const std::filesystem::path& name);
+
+/// Writes to a target that is written through. Fails with `ioError`.
+Result<void> writeThrough(const OutputTarget& target, std::span<const std::byte> bytes);
+
+/// A name in a folder that no other file has. It is short, since the name of the target may already
+/// have the maximum length.
+std::string temporaryNameIn(const std::filesystem::path& folder);
 
 }  // namespace dermis::samples

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #ifdef _WIN32
+#include <io.h>
 #include <windows.h>
 // After windows.h.
 #include <shellapi.h>
@@ -20,11 +21,72 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "kit/unfinished.h"
+#include "dermis/text.h"
+#include "kit/output_file.h"
 
 namespace dermis::samples {
+namespace {
+
+const char* programName = "dermis";
+std::string subcommandName;
+
+/// If standard error cannot be written, the message is lost, but the exit status is right.
+void print(std::string_view kind, std::string_view message) {
+  std::fflush(stdout);
+  try {
+    const std::string line = fmt::format("{}: {}: {}\n", programName, kind, oneLine(message));
+    (void)std::fwrite(line.data(), 1, line.size(), stderr);
+  } catch (const std::bad_alloc&) {
+    (void)std::fputs("error: out of memory\n", stderr);
+  }
+}
+
+}  // namespace
+
+void setProgramName(const char* name) {
+  programName = name;
+}
+
+void setSubcommandName(std::string name) {
+  subcommandName = std::move(name);
+}
+
+ExitStatus reportError(ExitStatus status, std::string_view message) {
+  print("error", message);
+  return status;
+}
+
+void reportWarning(std::string_view message) {
+  print("warning", message);
+}
+
+void reportNote(std::string_view message) {
+  print("note", message);
+}
+
+ExitStatus reportWrongUsage(std::string_view message) {
+  return reportError(ExitStatus::wrongUsage,
+                     fmt::format("{} (see {}{}{} --help)", message, programName,
+                                 subcommandName.empty() ? "" : " ", subcommandName));
+}
+
+ExitStatus reportModelError(const Error& error) {
+  return reportError(ExitStatus::badInput, error.message);
+}
+
+ExitStatus deviceErrorStatus(const Error& error) {
+  const bool noDevice =
+      error.code == ErrorCode::missingFeature || error.code == ErrorCode::missingEntryPoint;
+  return noDevice ? ExitStatus::noDevice : ExitStatus::stopped;
+}
+
+ExitStatus reportDeviceError(const Error& error) {
+  return reportError(deviceErrorStatus(error), error.message);
+}
+
 namespace {
 
 bool isOption(std::string_view argument) {
@@ -146,6 +208,32 @@ int runProgram(const char* name, int argc, char** argv, ExitStatus (*run)(int ar
   if (std::fflush(stdout) != 0 && status == ExitStatus::done)
     status = reportError(ExitStatus::stopped, "standard output cannot be written");
   return static_cast<int>(status);
+}
+
+namespace {
+
+bool isTerminal(std::FILE* stream) {
+#ifdef _WIN32
+  return _isatty(_fileno(stream)) != 0;
+#else
+  return isatty(fileno(stream)) == 1;
+#endif
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, std::size_t total)
+    : what_(std::move(what)), total_(total), visible_(total > 1 && isTerminal(stderr)) {}
+
+Progress::~Progress() {
+  if (visible_) std::fputs("\r\x1b[K", stderr);
+}
+
+void Progress::step() {
+  ++done_;
+  if (!visible_) return;
+  // Not fmt::print, which throws if the terminal is gone.
+  std::fputs(fmt::format("\r{}: {} of {}", what_, done_, total_).c_str(), stderr);
 }
 
 }  // namespace dermis::samples

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dermis/vulkan/context.h"
-#include "kit/batch_layout.h"
+#include "kit/batch_runner.h"
 #include "kit/buffer.h"
 #include "kit/timestamps.h"
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "kit/pairwise.h"
+#include "kit/method_rotation.h"
 
 namespace dermis::samples {
 namespace {

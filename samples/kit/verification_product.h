@@ -10,7 +10,6 @@
 #include "dermis/verify/accuracy.h"
 #include "kit/batch_runner.h"
 #include "kit/random_rig.h"
-#include "kit/stored_mesh.h"
 
 namespace dermis::samples {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "dermis/vulkan/context.h"
-#include "kit/batch_layout.h"
+#include "kit/batch_runner.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "dermis_command.h"
-#include "kit/target_pool.h"
+#include "kit/batch_runner.h"
 #include "kit/verification_product.h"
 
 namespace dermis::test {

@@ -15,7 +15,7 @@
 #include "comparison_picture.h"
 #include "dermis/verify/reference.h"
 #include "drawing_device.h"
-#include "kit/render/heat_colors.h"
+#include "kit/render/draw.h"
 #include "kit/render/renderer.h"
 #include "picture_sheet.h"
 #include "pictures.h"

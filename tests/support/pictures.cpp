@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "kit/render/texture.h"
+#include "kit/render/image.h"
 #include "test_paths.h"
 
 namespace dermis::test {

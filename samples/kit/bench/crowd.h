@@ -10,7 +10,7 @@
 
 #include "dermis/pack.h"
 #include "dermis/result.h"
-#include "kit/batch_layout.h"
+#include "kit/batch_runner.h"
 
 namespace dermis::samples {
 

@@ -11,7 +11,7 @@
 
 #include "dermis/cpu/skin.h"
 #include "kit/bench/plain_batches.h"
-#include "kit/joining_threads.h"
+#include "kit/in_parallel.h"
 #include "kit/timed_batches.h"
 
 namespace dermis::samples {

@@ -3,14 +3,43 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/types.h"
 #include "dermis/vertex_format.h"
-#include "kit/render/geometry.h"
+#include "kit/buffer.h"
 
 namespace dermis::samples::render {
+
+/// The data of a mesh that skinning does not change.
+struct GeometryData {
+  std::uint32_t vertexCount = 0;
+  std::span<const std::uint32_t> triangles;  ///< 3 indices each, all below `vertexCount`
+  std::span<const float> texcoords;          ///< 2 per vertex, or empty
+  std::span<const float> colors;             ///< 4 per vertex, linear; empty: white
+};
+
+/// The layout in the vertex buffer.
+struct StaticVertex {
+  float texcoord[2];
+  std::uint16_t color[4];
+};
+static_assert(sizeof(StaticVertex) == 16);
+
+class Geometry {
+ public:
+  static Result<Geometry> create(Device& device, const GeometryData& data);
+
+  VkBuffer vertices() const { return vertices_.handle(); }
+  VkBuffer indices() const { return indices_.handle(); }
+  std::uint32_t indexCount() const { return indexCount_; }
+
+ private:
+  MappedBuffer vertices_, indices_;
+  std::uint32_t indexCount_ = 0;
+};
 
 /// An attribute of the vertices: vertex v at `offset + v * stride` of a buffer with
 /// VK_BUFFER_USAGE_VERTEX_BUFFER_BIT.
@@ -48,5 +77,12 @@ struct Draw {
   JointMatrix transform;    ///< to the world: rotation, translation and uniform scale
   bool isMirrored = false;  ///< the pose has turned the triangles inside out
 };
+
+/// The color of a value from 0 to 1 in sRGB: that of shaders/mesh.frag for a surface in uniform
+/// white light.
+std::array<std::uint8_t, 3> heatColor(float value);
+
+/// Whether most joints of a pose mirror. Then skinning reverses the winding order.
+bool isMirrored(std::span<const JointMatrix> pose);
 
 }  // namespace dermis::samples::render

@@ -13,14 +13,12 @@
 
 #include "kit/file_name.h"
 #include "kit/output_file.h"
-#include "kit/render/picture_writer.h"
+#include "kit/render/picture.h"
 
 extern char** environ;
 
-namespace dermis::samples {
+namespace dermis::samples::render {
 namespace {
-
-using render::Picture;
 
 /// Sends raw pictures to the standard input of ffmpeg. It uses a socket, not a pipe: if ffmpeg ends
 /// early, writing is then an error and not a signal.
@@ -182,4 +180,4 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
       std::make_unique<FilmWriter>(output, std::move(*file), ends[0], child));
 }
 
-}  // namespace dermis::samples
+}  // namespace dermis::samples::render

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
-#include "kit/render/picture_writer.h"
+#include "kit/render/picture.h"
 
-namespace dermis::samples {
+namespace dermis::samples::render {
 
 Result<void> checkFilmProgram(const std::string& output) {
   return Error{ErrorCode::missingFeature,
@@ -17,4 +17,4 @@ Result<std::unique_ptr<PictureWriter>> writeFilm(const std::string& output, Pict
   return checkFilmProgram(output).error();
 }
 
-}  // namespace dermis::samples
+}  // namespace dermis::samples::render

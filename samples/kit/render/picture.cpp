@@ -10,7 +10,10 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "kit/file_name.h"
+#include "kit/output_file.h"
 #include "kit/render/stb_headers.h"
 
 namespace dermis::samples::render {
@@ -142,6 +145,41 @@ void Font::draw(Picture& picture, std::string_view text, const Label& label) con
     stbtt_FreeBitmap(shape, nullptr);
     x += static_cast<float>(advance) * scale;
   }
+}
+
+namespace {
+
+class PngWriter final : public PictureWriter {
+ public:
+  explicit PngWriter(std::string output) : output_(std::move(output)) {}
+
+  Result<void> write(const Picture& picture) override {
+    const Result<std::vector<std::byte>> bytes = encodePng(picture);
+    if (!bytes) return bytes.error();
+    return writeFile(pathOf(frameName(output_, frame_++).value_or(output_)), *bytes);
+  }
+
+  Result<void> finish() override { return {}; }
+
+ private:
+  std::string output_;
+  std::uint32_t frame_ = 0;
+};
+
+}  // namespace
+
+std::optional<PictureKind> pictureKind(std::string_view fileName) {
+  for (const auto& [ending, kind] : {std::pair{".png", PictureKind::png},
+                                     {".mp4", PictureKind::mp4},
+                                     {".gif", PictureKind::gif},
+                                     {".apng", PictureKind::apng}}) {
+    if (hasEnding(fileName, ending)) return kind;
+  }
+  return std::nullopt;
+}
+
+std::unique_ptr<PictureWriter> writePngs(const std::string& output) {
+  return std::make_unique<PngWriter>(output);
 }
 
 }  // namespace dermis::samples::render

@@ -8,7 +8,7 @@
 
 #include "dermis/vulkan/vertex_input.h"
 #include "dermis_render_shaders.h"
-#include "kit/render/blocks.h"
+#include "kit/render/lighting.h"
 #include "kit/render/target.h"
 
 namespace dermis::samples::render {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "kit/render/blocks.h"
+#include "kit/render/lighting.h"
 
 namespace dermis::samples::render {
 namespace {

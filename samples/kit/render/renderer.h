@@ -18,11 +18,10 @@
 
 #include "kit/render/camera.h"
 #include "kit/render/draw.h"
+#include "kit/render/image.h"
 #include "kit/render/lighting.h"
 #include "kit/render/pipelines.h"
-#include "kit/render/shadow_maps.h"
 #include "kit/render/target.h"
-#include "kit/render/texture.h"
 
 namespace dermis::samples::render {
 

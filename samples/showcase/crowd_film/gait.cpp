@@ -10,7 +10,7 @@
 
 #include "dermis/verify/reference.h"
 #include "kit/in_parallel.h"
-#include "kit/must.h"
+#include "kit/program.h"
 
 using namespace dermis;
 using samples::Character;

@@ -28,13 +28,11 @@
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/frame_loop.h"
-#include "kit/must.h"
 #include "kit/program.h"
-#include "kit/progress.h"
 #include "kit/render/appearances.h"
-#include "kit/render/picture_writer.h"
+#include "kit/render/draw.h"
+#include "kit/render/picture.h"
 #include "kit/render/renderer.h"
-#include "kit/render/winding.h"
 #include "stroll.h"
 #include "wardrobe.h"
 
@@ -178,7 +176,7 @@ class Painter {
         wardrobe_(character),
         renderer_(must(render::Renderer::create(device))),
         appearances_(device, renderer_, character.model()),
-        isMirrored_(samples::isMirrored(character.pose({}, 0))) {
+        isMirrored_(samples::render::isMirrored(character.pose({}, 0))) {
     std::uint64_t triangles = 0;
     for (const Part& part : character.parts()) {
       triangles += part.source->triangles.size() / 3 * stroll.count();
@@ -265,7 +263,7 @@ class Painter {
 };
 
 void film(samples::OpenDevice& open, const Character& character, const Stroll& stroll,
-          const Options& options, samples::PictureWriter& writer) {
+          const Options& options, samples::render::PictureWriter& writer) {
   SkinnedCrowd crowd(open.context, character, stroll);
   Painter painter(*open.device, character, stroll, options.stroll);
   samples::Progress progress("rendering", options.frames);
@@ -291,7 +289,8 @@ void film(samples::OpenDevice& open, const Character& character, const Stroll& s
 
 /// What is wrong with the options; empty if nothing is.
 std::string complaintAbout(const Options& options) {
-  const std::optional<samples::PictureKind> kind = samples::pictureKind(options.output);
+  const std::optional<samples::render::PictureKind> kind =
+      samples::render::pictureKind(options.output);
   if (!kind) {
     return fmt::format("--output must end in .mp4, .gif, .apng or .png; it is '{}'",
                        options.output);
@@ -300,7 +299,7 @@ std::string complaintAbout(const Options& options) {
   const double framesPerSecond = options.stroll.framesPerSecond, start = options.stroll.start;
   if (!(framesPerSecond >= 1 && framesPerSecond <= 240)) return "--fps must be from 1 to 240";
   if (!(start >= 0 && start <= 1e6)) return "--time must be from 0 to 1000000 seconds";
-  if (*kind != samples::PictureKind::png) return {};
+  if (*kind != samples::render::PictureKind::png) return {};
   if (samples::hasWrongPattern(options.output))
     return "--output may have one placeholder for a number, from %01d to %09d";
   if (options.frames > 1 && !samples::frameName(options.output, 0)) {
@@ -340,8 +339,9 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   const std::string complaint = complaintAbout(options);
   if (!complaint.empty()) return samples::reportWrongUsage(complaint);
   if (options.frames == 0) {
-    const bool isOnePicture = samples::pictureKind(options.output) == samples::PictureKind::png &&
-                              !samples::frameName(options.output, 0);
+    const bool isOnePicture =
+        samples::render::pictureKind(options.output) == samples::render::PictureKind::png &&
+        !samples::frameName(options.output, 0);
     options.frames =
         isOnePicture
             ? 1
@@ -350,11 +350,11 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
   return std::nullopt;
 }
 
-Result<std::unique_ptr<samples::PictureWriter>> openWriter(const Options& options) {
-  const samples::PictureKind kind = *samples::pictureKind(options.output);
-  if (kind == samples::PictureKind::png) return samples::writePngs(options.output);
-  return samples::writeFilm(options.output, kind, options.stroll.width, options.stroll.height,
-                            options.stroll.framesPerSecond);
+Result<std::unique_ptr<samples::render::PictureWriter>> openWriter(const Options& options) {
+  const samples::render::PictureKind kind = *samples::render::pictureKind(options.output);
+  if (kind == samples::render::PictureKind::png) return samples::render::writePngs(options.output);
+  return samples::render::writeFilm(options.output, kind, options.stroll.width,
+                                    options.stroll.height, options.stroll.framesPerSecond);
 }
 
 ExitStatus run(int argc, char** argv) {
@@ -376,7 +376,7 @@ ExitStatus run(int argc, char** argv) {
       {{"--output", options.output, options.frames}}};
   if (const Result<void> kept = samples::checkOutputFiles(outputs, inputs); !kept)
     return samples::reportWrongUsage(kept.error().message);
-  const Result<std::unique_ptr<samples::PictureWriter>> writer = openWriter(options);
+  const Result<std::unique_ptr<samples::render::PictureWriter>> writer = openWriter(options);
   if (!writer) return samples::reportError(ExitStatus::stopped, writer.error().message);
 
   samples::DeviceOptions wanted;

@@ -1,7 +1,8 @@
-#include "kit/render/geometry.h"
+#include "kit/render/draw.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <utility>
 
@@ -46,6 +47,50 @@ Result<Geometry> Geometry::create(Device& device, const GeometryData& data) {
                 data.triangles.size_bytes());
   }
   return geometry;
+}
+
+namespace {
+
+/// Linear; the same as in shaders/mesh.frag.
+constexpr std::array<std::array<float, 3>, 5> stops{{{0.10f, 0.13f, 0.22f},
+                                                     {0.05f, 0.32f, 0.42f},
+                                                     {0.25f, 0.60f, 0.30f},
+                                                     {0.90f, 0.65f, 0.10f},
+                                                     {0.75f, 0.05f, 0.03f}}};
+
+std::uint8_t encoded(float linear) {
+  const float value =
+      linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.f, 1.f)));
+}
+
+}  // namespace
+
+std::array<std::uint8_t, 3> heatColor(float value) {
+  const float place = std::clamp(value, 0.f, 1.f) * 4;
+  const std::size_t stop = std::min(static_cast<std::size_t>(place), std::size_t{3});
+  const float share = place - static_cast<float>(stop);
+  std::array<std::uint8_t, 3> color{};
+  for (std::size_t i = 0; i < 3; ++i)
+    color[i] = encoded(std::lerp(stops[stop][i], stops[stop + 1][i], share));
+  return color;
+}
+
+namespace {
+
+float determinant(const JointMatrix& matrix) {
+  const auto& m = matrix.m;
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+         m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+}  // namespace
+
+bool isMirrored(std::span<const JointMatrix> pose) {
+  const auto mirrored =
+      std::ranges::count_if(pose, [](const JointMatrix& joint) { return determinant(joint) < 0; });
+  return static_cast<std::size_t>(mirrored) * 2 > pose.size();
 }
 
 }  // namespace dermis::samples::render
