@@ -30,8 +30,8 @@
 namespace dermis::samples {
 namespace {
 
-const char* programName = "dermis";
-std::string subcommandName;
+const char* programName = "dermis";  // until `runProgram` sets it
+std::string subcommandName;          // empty for the program itself
 
 /// If standard error cannot be written, the message is lost, but the exit status is right.
 void print(std::string_view kind, std::string_view message) {
@@ -45,14 +45,6 @@ void print(std::string_view kind, std::string_view message) {
 }
 
 }  // namespace
-
-void setProgramName(const char* name) {
-  programName = name;
-}
-
-void setSubcommandName(std::string name) {
-  subcommandName = std::move(name);
-}
 
 ExitStatus reportError(ExitStatus status, std::string_view message) {
   print("error", message);
@@ -173,7 +165,7 @@ ExitStatus runWithArguments(int argc, char** argv, ExitStatus (*run)(int, char**
 
 std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv) {
   const CLI::App* command = findSubcommand(app, argc > 1 ? argv[1] : "");
-  if (command != nullptr) setSubcommandName(command->get_name());
+  if (command != nullptr) subcommandName = command->get_name();
   const std::string complaint =
       complaintAbout(std::span(argv, static_cast<std::size_t>(argc)).subspan(argc > 0 ? 1 : 0),
                      command != nullptr ? *command : app);
@@ -196,7 +188,7 @@ std::optional<ExitStatus> parseOptions(CLI::App& app, int argc, char** argv) {
 
 int runProgram(const char* name, int argc, char** argv, ExitStatus (*run)(int argc, char** argv)) {
   handleSignals();
-  setProgramName(name);
+  programName = name;
   ExitStatus status = ExitStatus::stopped;
   try {
     status = runWithArguments(argc, argv, run);
