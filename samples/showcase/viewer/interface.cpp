@@ -11,7 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include "dermis/text.h"
-#include "kit/render/heat_colors.h"
+#include "kit/render/draw.h"
 
 namespace dermis::viewer {
 namespace {

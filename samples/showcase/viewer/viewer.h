@@ -10,7 +10,7 @@
 
 #include "dermis/method.h"
 #include "interface.h"
-#include "kit/exit_status.h"
+#include "kit/program.h"
 #include "window.h"
 
 namespace dermis {

@@ -15,7 +15,7 @@
 #include <SDL.h>
 
 #include "kit/buffer.h"
-#include "kit/open_device.h"
+#include "kit/device.h"
 #include "kit/render/image.h"
 #include "kit/render/owned.h"
 #include "kit/render/picture.h"
