@@ -9,8 +9,8 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "kernel_instructions.h"
 #include "dermis/layout.h"
+#include "kernel_instructions.h"
 
 namespace dermis::cli {
 namespace {
