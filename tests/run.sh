@@ -92,6 +92,6 @@ case $run in
     sanitized
     ;;
   sanitized) sanitized ;;
-  *) build_and_test "build/$run" "$every_change" "$run" ;;
+  *) build_and_test "build/$run" "$every_change" "$run" -DDERMIS_SANITIZED_TESTS_ELSEWHERE=OFF ;;
 esac
 ./tests/report.sh
