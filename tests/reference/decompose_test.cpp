@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "by_hand.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -14,18 +15,8 @@ using reference::polarParts;
 using reference::SingularValues;
 using reference::singularValues;
 
-double largestEntry(const glm::dmat3& m) {
-  double largest = 0;
-  for (int i = 0; i < 9; ++i) largest = std::max(largest, std::abs(m[i / 3][i % 3]));
-  return largest;
-}
-
 void expectOrthonormal(const glm::dmat3& m) {
   EXPECT_LE(largestEntry(glm::transpose(m) * m - glm::dmat3(1.0)), 1e-14);
-}
-
-glm::dmat3 randomRotation(RigRandom& random) {
-  return rotationAbout(random.direction(), random.between(-pi, pi));
 }
 
 TEST(Decompose, SingularValuesOfKnownProducts) {

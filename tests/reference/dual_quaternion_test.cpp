@@ -2,16 +2,12 @@
 // decides the signs.
 
 #include <algorithm>
-#include "dermis/verify/accuracy.h"
 
+#include "dermis/verify/accuracy.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
 namespace {
-
-JointMatrix turnAboutZ(double degrees) {
-  return jointOf(rotationAbout({0, 0, 1}, degrees * pi / 180));
-}
 
 /// The angle, in degrees from 0 to 360, by which (1, 0, 0) is turned about z.
 double angleOf(const reference::Double3& p) {
@@ -26,29 +22,6 @@ double blendedAngle(std::span<const JointMatrix> pose, std::initializer_list<Rig
   return angleOf(skinned(mesh, pose, Method::dualQuaternion).positions[0]);
 }
 
-TEST(ReferenceDualQuaternion, OneInfluenceIsItsJoint) {
-  RigRandom random(1);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 50; ++joint) {
-    pose.push_back(
-        jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(3)));
-  }
-  OwnedMesh mesh = scatteredMesh(random, 500, 50, 1);
-  const reference::AnalyzedMesh dual = skinned(mesh, pose, Method::dualQuaternion);
-  for (std::size_t vertex = 0; vertex < 500; ++vertex) {
-    const JointMatrix& joint = pose[mesh.joints[vertex]];
-    expectNear(toVector(dual.positions[vertex]),
-               linearOf(joint) * bindPosition(mesh, vertex) + offsetOf(joint), 1e-14);
-  }
-}
-
-TEST(ReferenceDualQuaternion, TranslationsBlendLinearly) {
-  const std::array pose{jointOf(glm::dmat3(1.0), {1, 2, 3}), jointOf(glm::dmat3(1.0), {5, -2, 7})};
-  OwnedMesh mesh;
-  addVertex(mesh, {1, 1, 1}, {{0, 0.25f}, {1, 0.75f}});
-  expectNear(toVector(skinned(mesh, pose, Method::dualQuaternion).positions[0]), {5, 0, 7}, 1e-15);
-}
-
 TEST(ReferenceDualQuaternion, HalfTurnsAboutEveryAxis) {
   RigRandom random(2);
   std::vector<glm::dvec3> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {0, -1, 1}};
@@ -60,131 +33,6 @@ TEST(ReferenceDualQuaternion, HalfTurnsAboutEveryAxis) {
     expectNear(toVector(skinned(mesh, pose, Method::dualQuaternion).positions[0]),
                linearOf(pose[0]) * glm::dvec3(0.5, -0.25, 2) + offsetOf(pose[0]), 1e-14);
   }
-}
-
-TEST(ReferenceDualQuaternion, Truth05_WeightsMayBeMultiplied) {
-  RigRandom random(3);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 9; ++joint) {
-    pose.push_back(
-        jointOf(rotationAbout(random.direction(), random.between(-pi, pi)), random.vector(1)));
-  }
-  OwnedMesh mesh = scatteredMesh(random, 300, 9, 4);
-  const reference::AnalyzedMesh before = skinned(mesh, pose, Method::dualQuaternion);
-  const std::vector<float> weights = mesh.weights;
-  for (float& weight : mesh.weights) weight *= 0.25f;  // exactly
-  const reference::AnalyzedMesh quarter = skinned(mesh, pose, Method::dualQuaternion);
-  for (std::size_t vertex = 0; vertex < 300; ++vertex) {
-    expectNear(toVector(quarter.positions[vertex]), toVector(before.positions[vertex]), 1e-14);
-  }
-  for (std::size_t i = 0; i < weights.size(); ++i) mesh.weights[i] = weights[i] * 0.37f;
-  const reference::AnalyzedMesh part = skinned(mesh, pose, Method::dualQuaternion);
-  for (std::size_t vertex = 0; vertex < 300; ++vertex) {  // the products are rounded to float
-    expectNear(toVector(part.positions[vertex]), toVector(before.positions[vertex]), 4e-6);
-  }
-}
-
-// Joints that float32 holds exactly: then the 1e-14 of double shows.
-TEST(ReferenceDualQuaternion, Truth08_TheResultIsRigid) {
-  RigRandom random(4);
-  for (int trial = 0; trial < 500; ++trial) {
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 4; ++joint) {
-      pose.push_back(jointOf(exactRotation(random), random.vector(1)));
-    }
-    OwnedMesh mesh;
-    const auto weight = [&] { return static_cast<float>(random.between(0.05, 1)); };
-    const float weights[] = {weight(), weight(), weight(), weight()};
-    for (const glm::dvec3& corner :
-         {glm::dvec3(0.0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
-      addVertex(mesh, corner, {{0, weights[0]}, {1, weights[1]}, {2, weights[2]}, {3, weights[3]}});
-    }
-    const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
-    glm::dmat3 r;
-    for (int i = 0; i < 3; ++i) {
-      r[i] = toVector(result.positions[static_cast<std::size_t>(i) + 1]) -
-             toVector(result.positions[0]);
-    }
-    const glm::dmat3 gram = glm::transpose(r) * r;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) EXPECT_NEAR(gram[i][j], i == j ? 1 : 0, 1e-14);
-    }
-    EXPECT_NEAR(glm::determinant(r), 1, 1e-14);
-  }
-}
-
-TEST(ReferenceDualQuaternion, Truth09_NoCandyWrapper) {
-  for (const double degrees : {10.0, 60.0, 90.0, 120.0, 150.0, 179.0, 179.9}) {
-    const std::array pose{JointMatrix{}, turnAboutZ(degrees)};
-    for (const double weight : {0.0, 0.125, 0.25, 0.5, 0.75, 1.0}) {
-      OwnedMesh mesh;
-      addVertex(mesh, {1, 0, 0.5},
-                {{0, static_cast<float>(1 - weight)}, {1, static_cast<float>(weight)}});
-      const reference::Double3 p = skinned(mesh, pose, Method::dualQuaternion).positions[0];
-      EXPECT_NEAR(std::hypot(p[0], p[1]), 1, 1.5e-7) << degrees << " degrees, weight " << weight;
-      EXPECT_NEAR(p[2], 0.5, 1e-7);
-      // The way it turns between the two is known as well.
-      const double half = degrees * pi / 360;
-      const double angle =
-          2 * std::atan2(weight * std::sin(half), 1 - weight + weight * std::cos(half));
-      // Near 180° the float matrix says less about its angle, as the tangent grows.
-      EXPECT_NEAR(angleOf(p), angle * 180 / pi, 2e-5) << degrees << " degrees, weight " << weight;
-    }
-  }
-}
-
-void expectVolumeKept(const JointMatrix& joint, double length) {
-  double error[3];
-  int index = 0;
-  for (const std::uint32_t count : {16u, 32u, 64u}) {
-    Tube tube = tubeOf(count, count, length, 0.5);
-    error[index++] = volumeRatio(tube, joint, Method::dualQuaternion) - 1;
-  }
-  EXPECT_NEAR(error[2], 0, 3e-3);
-  EXPECT_NEAR(error[0] / error[1], 4, 0.4);
-  EXPECT_NEAR(error[1] / error[2], 4, 0.2);
-}
-
-TEST(ReferenceDualQuaternion, Truth10_TwistKeepsTheVolume) {
-  for (const double degrees : {45.0, 90.0, 120.0, 170.0}) {
-    for (const double length : {0.5, 3.0}) {
-      SCOPED_TRACE(testing::Message() << degrees << " degrees, length " << length);
-      expectVolumeKept(turnAboutZ(degrees), length);
-    }
-  }
-}
-
-TEST(ReferenceDualQuaternion, Truth11_BendKeepsTheVolume) {
-  for (const double degrees : {45.0, 90.0, 120.0, 170.0}) {
-    for (const double length : {1.0, 3.0}) {
-      for (const double height : {0.0, 0.2 * length}) {
-        SCOPED_TRACE(testing::Message() << degrees << " degrees, length " << length);
-        const glm::dmat3 bend = rotationAbout({1, 0, 0}, degrees * pi / 180);
-        const glm::dvec3 pivot(0, 0, height);
-        expectVolumeKept(jointOf(bend, pivot - bend * pivot), length);
-      }
-    }
-  }
-}
-
-TEST(ReferenceDualQuaternion, Truth12_TheLowerOfTwoStrongestIsThePivot) {
-  const std::array pose{turnAboutZ(0), turnAboutZ(170), turnAboutZ(-170)};
-  EXPECT_NEAR(blendedAngle(pose, {{0, 0.1f}, {1, 0.45f}, {2, 0.45f}}), 167.27, 0.005);
-  // The order of the slots does not matter, the joint's index does.
-  EXPECT_NEAR(blendedAngle(pose, {{2, 0.45f}, {0, 0.1f}, {1, 0.45f}}), 167.27, 0.005);
-  const std::array swapped{turnAboutZ(0), turnAboutZ(-170), turnAboutZ(170)};
-  EXPECT_NEAR(blendedAngle(swapped, {{0, 0.1f}, {1, 0.45f}, {2, 0.45f}}), 360 - 167.27, 0.005);
-}
-
-TEST(ReferenceDualQuaternion, Truth13_OnATieOfThreeTheLowestJoint) {
-  const std::array pose{turnAboutZ(0), turnAboutZ(140), turnAboutZ(220)};
-  const auto third = 1.0f / 3;
-  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, third}, {2, third}}), 0, 1e-4);
-  EXPECT_NEAR(blendedAngle(pose, {{2, third}, {1, third}, {0, third}}), 0, 1e-4);
-  // The other two answers, each where that influence is a little stronger.
-  const float more = std::nextafter(third, 1.0f);
-  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, more}, {2, third}}), 123.97, 0.005);
-  EXPECT_NEAR(blendedAngle(pose, {{0, third}, {1, third}, {2, more}}), 236.03, 0.005);
 }
 
 TEST(ReferenceDualQuaternion, DuplicatesAreAddedUpBeforeThePivotIsChosen) {

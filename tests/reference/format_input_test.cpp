@@ -85,10 +85,7 @@ struct FormatInputTest : public ::testing::Test {
   }
 
   reference::AnalyzedMesh skinnedFree(const MeshView& view) {
-    const std::array pose{JointMatrix{}};
-    Result<reference::AnalyzedMesh> result = reference::analyze(view, pose, Method::dualQuaternion);
-    EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
-    return result ? std::move(*result) : reference::AnalyzedMesh{};
+    return skinned(view, std::array{JointMatrix{}}, Method::dualQuaternion);
   }
 
   void expectPositions(const std::vector<Stored>& values, ComponentType type) {

@@ -25,6 +25,14 @@ namespace dermis::test {
 
 inline constexpr double pi = std::numbers::pi;
 
+/// Move vertices that have the same weights and inputs by one rigid motion, if the joints are
+/// rigid.
+inline constexpr std::array rigidMethods{
+    Method::dualQuaternion,  Method::dualQuaternionIterative, Method::logMatrix,
+    Method::sphericalBlend,  Method::quaternionTranslation,   Method::centerOfRotation,
+    Method::bulgeControlled,
+};
+
 class RigRandom {
  public:
   explicit RigRandom(std::uint64_t seed) : engine_(seed) {}
@@ -73,6 +81,10 @@ inline JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translati
     joint.m[row][3] = static_cast<float>(translation[row]);
   }
   return joint;
+}
+
+inline JointMatrix turnAboutZ(double degrees, const glm::dvec3& translation = {0, 0, 0}) {
+  return jointOf(rotationAbout({0, 0, 1}, degrees * pi / 180), translation);
 }
 
 /// The 3×3 of a joint as stored, rounding to float32 included.
@@ -170,12 +182,16 @@ inline glm::dvec3 bindNormal(const OwnedMesh& mesh, std::size_t vertex) {
 }
 
 /// The reference's answer; a mesh that it refuses fails the test.
-inline reference::AnalyzedMesh skinned(OwnedMesh& mesh, std::span<const JointMatrix> pose,
-                                       Method method) {
-  Result<reference::AnalyzedMesh> result = reference::analyze(mesh.view(), pose, method);
+inline reference::AnalyzedMesh skinned(const MeshView& mesh, std::span<const JointMatrix> pose,
+                                       Method method, std::span<const MorphWeight> morphs = {}) {
+  Result<reference::AnalyzedMesh> result = reference::analyze(mesh, pose, method, morphs);
   EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
   if (!result) return {};
   return std::move(*result);
+}
+inline reference::AnalyzedMesh skinned(OwnedMesh& mesh, std::span<const JointMatrix> pose,
+                                       Method method) {
+  return skinned(mesh.view(), pose, method);
 }
 
 inline void expectNear(const glm::dvec3& actual, const glm::dvec3& expected, double tolerance) {

@@ -10,94 +10,16 @@
 namespace dermis::test {
 namespace {
 
-struct Skinned {
-  glm::dvec3 position, normal;
-  bool ambiguous = false;
-};
-
-/// Vertex `index` by the formulas of TRUTHS.md, with joints already taken apart.
-Skinned skinByHand(const OwnedMesh& mesh, std::size_t index, std::span<const Parts> joints) {
-  std::vector<double> weight(joints.size(), 0.0);
-  double sum = 0;
-  for (std::size_t slot = 0; slot < mesh.influencesPerVertex; ++slot) {
-    const std::size_t entry = index * mesh.influencesPerVertex + slot;
-    weight[mesh.joints[entry]] += static_cast<double>(mesh.weights[entry]);
-    sum += static_cast<double>(mesh.weights[entry]);
-  }
-  std::size_t pivot = 0;
-  for (std::size_t joint = 1; joint < joints.size(); ++joint) {
-    if (weight[joint] > weight[pivot]) pivot = joint;
-  }
-  const Quaternion pivotQuaternion = quaternionOf(joints[pivot].rotation);
-
-  Skinned result;
-  Quaternion real{}, dual{};
-  glm::dmat3 m(0.0);
-  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
-    if (weight[joint] == 0) continue;
-    const Quaternion q = quaternionOf(joints[joint].rotation);
-    const glm::dvec3& t = joints[joint].translation;
-    const Quaternion d = times({0, t.x / 2, t.y / 2, t.z / 2}, q);
-    double dot = 0;
-    for (std::size_t i = 0; i < 4; ++i) dot += q[i] * pivotQuaternion[i];
-    result.ambiguous |= std::abs(dot) < 1e-5;
-    for (std::size_t i = 0; i < 4; ++i) {
-      real[i] += (dot < 0 ? -1 : 1) * weight[joint] / sum * q[i];
-      dual[i] += (dot < 0 ? -1 : 1) * weight[joint] / sum * d[i];
-    }
-    m += weight[joint] / sum * joints[joint].scaleShear;
-  }
-  double square = 0;
-  for (const double part : real) square += part * part;
-  const Quaternion conjugate{real[0], -real[1], -real[2], -real[3]};
-  const Quaternion t = times(dual, conjugate);
-  const auto rotate = [&](const glm::dvec3& v) {
-    const Quaternion turned = times(times(real, {0, v.x, v.y, v.z}), conjugate);
-    return glm::dvec3(turned[1], turned[2], turned[3]) / square;
-  };
-  result.position =
-      rotate(m * bindPosition(mesh, index)) + 2.0 / square * glm::dvec3(t[1], t[2], t[3]);
-  // det(M) M⁻ᵀ is the adjugate transpose; its sign once gives M⁻ᵀ's direction.
-  result.normal = glm::normalize(rotate(glm::transpose(glm::inverse(m)) * bindNormal(mesh, index)));
-  return result;
-}
-
-/// The condition number decides how exact a normal can be in double.
-void expectAsByHand(OwnedMesh& mesh, std::span<const JointMatrix> pose, double positionTolerance,
-                    double normalTolerance) {
-  std::vector<Parts> parts;
-  for (const JointMatrix& joint : pose) parts.push_back(partsOf(joint));
-  const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
-  std::size_t compared = 0;
-  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
-    const Skinned expected = skinByHand(mesh, vertex, parts);
-    if (expected.ambiguous) continue;
-    expectNear(toVector(result.positions[vertex]), expected.position, positionTolerance);
-    if (result.conditioning[vertex].normalAlignment < 1e-2) continue;
-    expectNear(toVector(result.normals[vertex]), expected.normal, normalTolerance);
-    ++compared;
-  }
-  EXPECT_GT(compared, mesh.vertexCount() * 3 / 4);
-}
-
-TEST(ReferenceTwoPhase, RigidJoints) {
+TEST(ReferenceTwoPhase, DualQuaternionsAreTheirFormula) {
   RigRandom random(1);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 20; ++joint)
-    pose.push_back(jointOf(randomRotation(random), random.vector(2)));
-  OwnedMesh mesh = scatteredMesh(random, 1000, 20, 4);
-  expectAsByHand(mesh, pose, 1e-13, 1e-13);
-}
-
-TEST(ReferenceTwoPhase, ScaleAndShear) {
-  RigRandom random(2);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 20; ++joint) {
-    pose.push_back(
-        jointOf(randomRotation(random) * randomSymmetric(random, 0.3, 3), random.vector(2)));
+  for (const Joints kind : allJoints) {
+    SCOPED_TRACE(testing::Message() << "joints of kind " << static_cast<int>(kind));
+    const std::vector<JointMatrix> pose = randomJoints(random, kind, 20);
+    OwnedMesh mesh = scatteredMesh(random, 1000, 20, 4);
+    const Tolerance tolerance =
+        kind == Joints::rigid ? Tolerance(1e-13, 1e-13) : Tolerance(1e-12, 1e-11);
+    expectFormula(mesh, pose, Method::dualQuaternion, tolerance, dualQuaternionsByHand);
   }
-  OwnedMesh mesh = scatteredMesh(random, 1000, 20, 4);
-  expectAsByHand(mesh, pose, 1e-12, 1e-11);
 }
 
 TEST(ReferenceTwoPhase, AnyAffineJointsMirroredOnesAmongThem) {
@@ -113,18 +35,7 @@ TEST(ReferenceTwoPhase, AnyAffineJointsMirroredOnesAmongThem) {
   ASSERT_GT(mirrored, 4);
   ASSERT_LT(mirrored, 16);
   OwnedMesh mesh = scatteredMesh(random, 1000, 20, 4);
-  expectAsByHand(mesh, pose, 1e-11, 1e-9);
-}
-
-TEST(ReferenceTwoPhase, MirroredJointsOnly) {
-  RigRandom random(4);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 20; ++joint) {
-    pose.push_back(
-        jointOf(randomRotation(random) * randomSymmetric(random, -2, -0.5), random.vector(2)));
-  }
-  OwnedMesh mesh = scatteredMesh(random, 1000, 20, 3);
-  expectAsByHand(mesh, pose, 1e-12, 1e-11);
+  expectFormula(mesh, pose, Method::dualQuaternion, {1e-11, 1e-9}, dualQuaternionsByHand);
 }
 
 // Mirrored and unmirrored joints in one vertex: S of opposite signs, which shrink it.
@@ -165,28 +76,6 @@ TEST(ReferenceTwoPhase, Truth19_OneInfluenceKeepsItsWholeMatrix) {
   }
 }
 
-TEST(ReferenceTwoPhase, Truth19_AScaleOf100IsKeptWhereRigidPartsBlend) {
-  RigRandom random(6);
-  std::vector<JointMatrix> rigid, scaled;
-  for (int joint = 0; joint < 10; ++joint) {
-    const glm::dmat3 rotation = exactRotation(random);  // so that 100 R is stored exactly
-    const glm::dvec3 translation = random.vector(2);
-    rigid.push_back(jointOf(rotation, translation));
-    scaled.push_back(jointOf(rotation * 100.0, translation));
-  }
-  OwnedMesh small = scatteredMesh(random, 300, 10, 4), large = small;
-  for (float& coordinate : small.positions) coordinate = std::round(coordinate * 1024) / 1024;
-  for (std::size_t i = 0; i < small.positions.size(); ++i)
-    large.positions[i] = 100 * small.positions[i];
-  const reference::AnalyzedMesh expected = skinned(large, rigid, Method::dualQuaternion);
-  const reference::AnalyzedMesh result = skinned(small, scaled, Method::dualQuaternion);
-  for (std::size_t vertex = 0; vertex < 300; ++vertex) {
-    if (expected.conditioning[vertex].signAmbiguous) continue;
-    expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-12);
-    expectNear(toVector(result.normals[vertex]), toVector(expected.normals[vertex]), 1e-13);
-  }
-}
-
 // C = R S with a singular S: R is the rotation (det +1) of the two axes that are left.
 TEST(ReferenceTwoPhase, RankTwo) {
   RigRandom random(7);
@@ -204,10 +93,11 @@ TEST(ReferenceTwoPhase, RankTwo) {
     OwnedMesh mesh = scatteredMesh(random, 10, 3, 3);
     const reference::AnalyzedMesh result = skinned(mesh, pose, Method::dualQuaternion);
     for (std::size_t vertex = 0; vertex < 10; ++vertex) {
-      const Skinned expected = skinByHand(mesh, vertex, parts);
+      const ByHand expected(mesh, vertex, pose, parts);
       if (result.conditioning[vertex].signAmbiguous) continue;
       // The third axis follows from two that float32 rounds.
-      expectNear(toVector(result.positions[vertex]), expected.position, 3e-6);
+      expectNear(toVector(result.positions[vertex]), expected.dualQuaternions(expected.position),
+                 3e-6);
     }
   }
 }
@@ -249,7 +139,8 @@ TEST(ReferenceTwoPhase, VerySmallAndVeryLargeScales) {
                              random.vector(1) * scale));
     }
     OwnedMesh mesh = scatteredMesh(random, 200, 5, 3);
-    expectAsByHand(mesh, pose, 1e-12 * scale, 1e-10);
+    expectFormula(mesh, pose, Method::dualQuaternion, {1e-12 * scale, 1e-10},
+                  dualQuaternionsByHand);
   }
 }
 
