@@ -651,13 +651,6 @@ TEST(ReferenceTruths, Truth13_OnATieOfThreeTheLowestJointIsThePivotWhateverTheMe
   EXPECT_NEAR(angleOf(pose, {{0, third}, {1, third}, {2, more}}, iterative), 240, 1e-3);
 }
 
-// ---- 15
-
-TEST(ReferenceTruths, Truth15_AJointIs12FloatsAsAMatrix8AsADualQuaternion) {
-  EXPECT_EQ(sizeof(JointMatrix), 12 * sizeof(float));
-  EXPECT_EQ(sizeof(DualQuatf), 8 * sizeof(float));
-}
-
 // ---- 16: linear blending in float32 against double
 
 TEST(ReferenceTruths, Truth16_LinearBlendingInFloatIsWithin6UnitsOfRounding) {

@@ -7,8 +7,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
-#include <span>
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
@@ -19,193 +17,131 @@ namespace dermis::test {
 
 /// A dual quaternion real + ε dual. It is a rigid transform where |real| = 1 and real · dual = 0;
 /// then q and -q are the same transform.
-template <typename T>
-struct DualQuat {
-  glm::qua<T> real{T(1), T(0), T(0), T(0)};
-  glm::qua<T> dual{T(0), T(0), T(0), T(0)};
+struct DualQuatd {
+  glm::dquat real{1, 0, 0, 0};
+  glm::dquat dual{0, 0, 0, 0};
 };
 
-using DualQuatf = DualQuat<float>;
-using DualQuatd = DualQuat<double>;
-
 /// A rigid transform as rotation (unit quaternion) and translation: d = ½ (0, t) q.
-template <typename T>
-DualQuat<T> fromRotationTranslation(const glm::qua<T>& rotation,
-                                    const glm::vec<3, T>& translation) {
-  const glm::qua<T> t(T(0), translation.x, translation.y, translation.z);
-  return {rotation, (t * rotation) * T(0.5)};
+inline DualQuatd fromRotationTranslation(const glm::dquat& rotation,
+                                         const glm::dvec3& translation) {
+  const glm::dquat t(0, translation.x, translation.y, translation.z);
+  return {rotation, (t * rotation) * 0.5};
 }
 
 /// A rigid transform from its 3×4 matrix (GLM: four columns of three). The 3×3 must be a rotation;
 /// scale or shear in it is not noticed and distorts the result: decompose such a matrix first.
-template <typename T>
-DualQuat<T> fromRigidMatrix(const glm::mat<4, 3, T>& matrix) {
-  const glm::mat<3, 3, T> rotation(matrix[0], matrix[1], matrix[2]);
-  return fromRotationTranslation(glm::normalize(glm::quat_cast(rotation)),
-                                 glm::vec<3, T>(matrix[3]));
+inline DualQuatd fromRigidMatrix(const glm::dmat4x3& matrix) {
+  const glm::dmat3 rotation(matrix[0], matrix[1], matrix[2]);
+  return fromRotationTranslation(glm::normalize(glm::quat_cast(rotation)), glm::dvec3(matrix[3]));
 }
 
 /// The translation of a transform whose real part may be of any length but 0: 2 vec(d q*) / |q|².
 /// (Dividing by |q| instead is a slip of a well-known listing.)
-template <typename T>
-glm::vec<3, T> translationOf(const DualQuat<T>& q) {
-  const glm::qua<T> t = q.dual * glm::conjugate(q.real);
-  return glm::vec<3, T>(t.x, t.y, t.z) * (T(2) / glm::dot(q.real, q.real));
+inline glm::dvec3 translationOf(const DualQuatd& q) {
+  const glm::dquat t = q.dual * glm::conjugate(q.real);
+  return glm::dvec3(t.x, t.y, t.z) * (2 / glm::dot(q.real, q.real));
 }
 
 /// The 3×4 matrix of a transform whose real part may be of any length but 0.
-template <typename T>
-glm::mat<4, 3, T> toMatrix(const DualQuat<T>& q) {
-  const glm::mat<3, 3, T> rotation = glm::mat3_cast(glm::normalize(q.real));
-  return glm::mat<4, 3, T>(rotation[0], rotation[1], rotation[2], translationOf(q));
+inline glm::dmat4x3 toMatrix(const DualQuatd& q) {
+  const glm::dmat3 rotation = glm::mat3_cast(glm::normalize(q.real));
+  return glm::dmat4x3(rotation[0], rotation[1], rotation[2], translationOf(q));
 }
 
-template <typename T>
-DualQuat<T> operator*(const DualQuat<T>& a, const DualQuat<T>& b) {
+inline DualQuatd operator*(const DualQuatd& a, const DualQuatd& b) {
   return {a.real * b.real, a.real * b.dual + a.dual * b.real};
 }
-template <typename T>
-DualQuat<T> operator*(const DualQuat<T>& a, T scalar) {
+inline DualQuatd operator*(const DualQuatd& a, double scalar) {
   return {a.real * scalar, a.dual * scalar};
 }
-template <typename T>
-DualQuat<T> operator+(const DualQuat<T>& a, const DualQuat<T>& b) {
+inline DualQuatd operator+(const DualQuatd& a, const DualQuatd& b) {
   return {a.real + b.real, a.dual + b.dual};
 }
-template <typename T>
-DualQuat<T> operator-(const DualQuat<T>& a) {
+inline DualQuatd operator-(const DualQuatd& a) {
   return {-a.real, -a.dual};
 }
 
 /// The quaternion conjugate of both parts: the inverse of a unit dual quaternion.
-template <typename T>
-DualQuat<T> conjugate(const DualQuat<T>& q) {
+inline DualQuatd conjugate(const DualQuatd& q) {
   return {glm::conjugate(q.real), glm::conjugate(q.dual)};
 }
 
 /// Both parts divided by |real|, and the dual part made orthogonal to the real one: d ← d − (q · d)
 /// q. The orthogonal part moves no point, but `log` and products need it.
-template <typename T>
-DualQuat<T> normalize(const DualQuat<T>& q) {
-  const T inverse = T(1) / std::sqrt(glm::dot(q.real, q.real));
-  const glm::qua<T> real = q.real * inverse;
-  const glm::qua<T> dual = q.dual * inverse;
+inline DualQuatd normalize(const DualQuatd& q) {
+  const double inverse = 1 / std::sqrt(glm::dot(q.real, q.real));
+  const glm::dquat real = q.real * inverse;
+  const glm::dquat dual = q.dual * inverse;
   return {real, dual - real * glm::dot(real, dual)};
 }
 
 /// p moved by q: v + 2 r × (r × v + w v) + 2 (w d_v − d_w r + r × d_v), r and w the vector and
 /// scalar of the real part, which must be of unit length. The component of the dual part along the
 /// real part moves no point.
-template <typename T>
-glm::vec<3, T> transformPoint(const DualQuat<T>& q, const glm::vec<3, T>& v) {
-  const glm::vec<3, T> r(q.real.x, q.real.y, q.real.z);
-  const glm::vec<3, T> d(q.dual.x, q.dual.y, q.dual.z);
-  return v + T(2) * glm::cross(r, glm::cross(r, v) + q.real.w * v) +
-         T(2) * (q.real.w * d - q.dual.w * r + glm::cross(r, d));
-}
-
-/// v rotated by q, whose real part must be of unit length: for directions.
-template <typename T>
-glm::vec<3, T> transformVector(const DualQuat<T>& q, const glm::vec<3, T>& v) {
-  const glm::vec<3, T> r(q.real.x, q.real.y, q.real.z);
-  return v + T(2) * glm::cross(r, glm::cross(r, v) + q.real.w * v);
-}
-
-/// The influence of greatest weight; the first of them on a tie, so that with joints in rising
-/// order it is the lowest joint. 0 for an empty span.
-template <typename T>
-std::size_t pivotOf(std::span<const T> weights) {
-  std::size_t pivot = 0;
-  for (std::size_t i = 1; i < weights.size(); ++i) {
-    if (weights[i] > weights[pivot]) pivot = i;
-  }
-  return pivot;
-}
-
-/// Dual-quaternion linear blending (DLB) before normalizing: Σ s_j w_j q_j, s_j = −1 where q_j lies
-/// in the other hemisphere than the pivot (a dot product of 0 counts as the same). Weights of 0 are
-/// skipped. With weights that sum to 1 the length of its real part is at least the largest weight.
-template <typename T>
-DualQuat<T> blendUnnormalized(std::span<const DualQuat<T>> transforms, std::span<const T> weights) {
-  DualQuat<T> sum{glm::qua<T>(T(0), T(0), T(0), T(0)), glm::qua<T>(T(0), T(0), T(0), T(0))};
-  if (transforms.empty()) return {};
-  const glm::qua<T> pivot = transforms[pivotOf(weights)].real;
-  for (std::size_t i = 0; i < transforms.size(); ++i) {
-    if (weights[i] == T(0)) continue;
-    const T sign = glm::dot(transforms[i].real, pivot) < T(0) ? T(-1) : T(1);
-    sum = sum + transforms[i] * (sign * weights[i]);
-  }
-  return sum;
-}
-
-/// Dual-quaternion linear blending: both parts divided by the length of the real one.
-template <typename T>
-DualQuat<T> blend(std::span<const DualQuat<T>> transforms, std::span<const T> weights) {
-  const DualQuat<T> sum = blendUnnormalized(transforms, weights);
-  return sum * (T(1) / std::sqrt(glm::dot(sum.real, sum.real)));
+inline glm::dvec3 transformPoint(const DualQuatd& q, const glm::dvec3& v) {
+  const glm::dvec3 r(q.real.x, q.real.y, q.real.z);
+  const glm::dvec3 d(q.dual.x, q.dual.y, q.dual.z);
+  return v + 2.0 * glm::cross(r, glm::cross(r, v) + q.real.w * v) +
+         2.0 * (q.real.w * d - q.dual.w * r + glm::cross(r, d));
 }
 
 /// The logarithm of a unit dual quaternion: half the angle and half the way along the screw axis,
 /// as a pure dual quaternion (both scalars 0). q must be truly unit (`normalize`). The angle lies
 /// between 0 and 2π; where the same transform is wanted the short way round, negate a q with a
 /// negative scalar first.
-template <typename T>
-DualQuat<T> log(const DualQuat<T>& q) {
-  const glm::vec<3, T> r(q.real.x, q.real.y, q.real.z);
-  const glm::vec<3, T> d(q.dual.x, q.dual.y, q.dual.z);
-  const T sine = std::sqrt(glm::dot(r, r));
-  const T half = std::atan2(sine, q.real.w);
-  if (sine == T(0)) {
+inline DualQuatd log(const DualQuatd& q) {
+  const glm::dvec3 r(q.real.x, q.real.y, q.real.z);
+  const glm::dvec3 d(q.dual.x, q.dual.y, q.dual.z);
+  const double sine = std::sqrt(glm::dot(r, r));
+  const double half = std::atan2(sine, q.real.w);
+  if (sine == 0) {
     // No rotation, or a full turn whose axis is lost: -q then is the same translation.
-    const glm::vec<3, T> dual = q.real.w < T(0) ? -d : d;
-    return {glm::qua<T>(T(0), T(0), T(0), T(0)), glm::qua<T>(T(0), dual.x, dual.y, dual.z)};
+    const glm::dvec3 dual = q.real.w < 0 ? -d : d;
+    return {glm::dquat(0, 0, 0, 0), glm::dquat(0, dual.x, dual.y, dual.z)};
   }
   // The real part is (half / sine) r. Its derivative along ε gives the dual part, with
   // d(half) = -d_w / sine and d(sine) = r · d / sine = -w d_w / sine from the unit condition.
-  const T factor = half / sine;
-  T slope;  // (1 - half cot(half)) / sine²; the series near 0, where the difference would cancel
-  if (half < T(0.1)) {
-    const T h2 = half * half;
-    slope =
-        (T(1) / T(3) + h2 * (T(1) / T(45) + h2 * (T(2) / T(945) + h2 / T(4725)))) * factor * factor;
+  const double factor = half / sine;
+  // (1 - half cot(half)) / sine²; the series near 0, where the difference would cancel
+  double slope;
+  if (half < 0.1) {
+    const double h2 = half * half;
+    slope = (1 / 3.0 + h2 * (1 / 45.0 + h2 * (2 / 945.0 + h2 / 4725))) * factor * factor;
   } else {
-    slope = (T(1) - factor * q.real.w) / (sine * sine);
+    slope = (1 - factor * q.real.w) / (sine * sine);
   }
-  const glm::vec<3, T> real = factor * r;
-  const glm::vec<3, T> dual = factor * d - (slope * q.dual.w) * r;
-  return {glm::qua<T>(T(0), real.x, real.y, real.z), glm::qua<T>(T(0), dual.x, dual.y, dual.z)};
+  const glm::dvec3 real = factor * r;
+  const glm::dvec3 dual = factor * d - (slope * q.dual.w) * r;
+  return {glm::dquat(0, real.x, real.y, real.z), glm::dquat(0, dual.x, dual.y, dual.z)};
 }
 
 /// The exponential of a pure dual quaternion (both scalars 0): the inverse of `log`.
-template <typename T>
-DualQuat<T> exp(const DualQuat<T>& q) {
-  const glm::vec<3, T> r(q.real.x, q.real.y, q.real.z);
-  const glm::vec<3, T> d(q.dual.x, q.dual.y, q.dual.z);
-  const T square = glm::dot(r, r);
-  const T half = std::sqrt(square);
-  T sinc, slope;        // sin(half) / half, and its derivative divided by half
-  if (half < T(0.1)) {  // the series, where the differences below would cancel
-    sinc = T(1) - square / T(6) *
-                      (T(1) - square / T(20) * (T(1) - square / T(42) * (T(1) - square / T(72))));
-    slope =
-        -T(1) / T(3) * (T(1) - square / T(10) * (T(1) - square / T(28) * (T(1) - square / T(54))));
+inline DualQuatd exp(const DualQuatd& q) {
+  const glm::dvec3 r(q.real.x, q.real.y, q.real.z);
+  const glm::dvec3 d(q.dual.x, q.dual.y, q.dual.z);
+  const double square = glm::dot(r, r);
+  const double half = std::sqrt(square);
+  double sinc, slope;  // sin(half) / half, and its derivative divided by half
+  if (half < 0.1) {    // the series, where the differences below would cancel
+    sinc = 1 - square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)));
+    slope = -1 / 3.0 * (1 - square / 10 * (1 - square / 28 * (1 - square / 54)));
   } else {
     sinc = std::sin(half) / half;
     slope = (std::cos(half) - sinc) / square;
   }
-  const T along = glm::dot(r, d);
-  const glm::vec<3, T> real = sinc * r;
-  const glm::vec<3, T> dual = sinc * d + slope * along * r;
-  return {glm::qua<T>(std::cos(half), real.x, real.y, real.z),
-          glm::qua<T>(-sinc * along, dual.x, dual.y, dual.z)};
+  const double along = glm::dot(r, d);
+  const glm::dvec3 real = sinc * r;
+  const glm::dvec3 dual = sinc * d + slope * along * r;
+  return {glm::dquat(std::cos(half), real.x, real.y, real.z),
+          glm::dquat(-sinc * along, dual.x, dual.y, dual.z)};
 }
 
 /// Screw linear interpolation: a (a* b)^t, the constant-speed screw motion from a to b the short
 /// way round. Both must be truly unit.
-template <typename T>
-DualQuat<T> screwInterpolate(const DualQuat<T>& a, const DualQuat<T>& b, T t) {
-  DualQuat<T> difference = conjugate(a) * b;
-  if (difference.real.w < T(0)) difference = -difference;
+inline DualQuatd screwInterpolate(const DualQuatd& a, const DualQuatd& b, double t) {
+  DualQuatd difference = conjugate(a) * b;
+  if (difference.real.w < 0) difference = -difference;
   return a * exp(log(difference) * t);
 }
 
