@@ -59,16 +59,14 @@ TEST(ReferenceMethods, EqualJointsAreOneJointWhateverTheMethod) {
 // Joints that only shift: every method is linear blending.
 TEST(ReferenceMethods, TranslationsBlendLinearlyWhateverTheMethod) {
   RigRandom random(3);
-  std::vector<JointMatrix> pose;
-  for (int joint = 0; joint < 10; ++joint)
-    pose.push_back(jointOf(glm::dmat3(1.0), random.vector(2)));
+  const std::vector<JointMatrix> pose =
+      poseOf(10, [&] { return jointOf(glm::dmat3(1.0), random.vector(2)); });
   OwnedMesh mesh = meshWithShares(random, 200, 10, 4);
   for (const Method method : allMethods) {
     const reference::AnalyzedMesh result = skinned(mesh, pose, method);
-    for (std::size_t vertex = 0; vertex < 200; ++vertex) {
-      expectNear(toVector(result.positions[vertex]),
-                 ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
-    }
+    expectPositions(result, 1e-14, [&](std::size_t vertex) {
+      return ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex));
+    });
   }
 }
 
@@ -255,11 +253,10 @@ TEST(ReferenceMethods, IterativeBlendingIsWhereTheLogarithmsCancel) {
   for (int trial = 0; trial < 200; ++trial) {
     // Near to each other, for a matrix logarithm knows no hemispheres.
     const glm::dmat3 base = rotationAbout(random.direction(), random.between(-pi, pi));
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 4; ++joint) {
-      pose.push_back(jointOf(base * rotationAbout(random.direction(), random.between(-1.2, 1.2)),
-                             random.vector(1)));
-    }
+    const std::vector<JointMatrix> pose = poseOf(4, [&] {
+      return jointOf(base * rotationAbout(random.direction(), random.between(-1.2, 1.2)),
+                     random.vector(1));
+    });
     OwnedMesh mesh;
     std::vector<float> weights;
     for (int i = 0; i < 4; ++i) weights.push_back(static_cast<float>(random.between(0.1, 1)));
@@ -372,10 +369,9 @@ TEST(ReferenceMethods, SphericalBlendOfACommonAxisIsFinite) {
   for (int trial = 0; trial < 300; ++trial) {
     const glm::dvec3 axis = random.direction();
     const glm::dmat3 first = rotationAbout(random.direction(), random.between(-pi, pi));
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 4; ++joint) {
-      pose.push_back(jointOf(first * rotationAbout(axis, random.between(-1, 1)), random.vector(1)));
-    }
+    const std::vector<JointMatrix> pose = poseOf(4, [&] {
+      return jointOf(first * rotationAbout(axis, random.between(-1, 1)), random.vector(1));
+    });
     OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
     const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
     for (std::size_t vertex = 0; vertex < 5; ++vertex) {
@@ -395,14 +391,13 @@ TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
   RigRandom random(18);
   for (int trial = 0; trial < 100; ++trial) {
     const glm::dmat3 rotation = rotationAbout(random.direction(), random.between(-pi, pi));
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 4; ++joint) pose.push_back(jointOf(rotation, random.vector(1)));
+    const std::vector<JointMatrix> pose =
+        poseOf(4, [&] { return jointOf(rotation, random.vector(1)); });
     OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
     const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
-    for (std::size_t vertex = 0; vertex < 5; ++vertex) {
-      expectNear(toVector(result.positions[vertex]),
-                 ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex)), 1e-14);
-    }
+    expectPositions(result, 1e-14, [&](std::size_t vertex) {
+      return ByHand(mesh, vertex, pose).linear(bindPosition(mesh, vertex));
+    });
   }
 }
 
@@ -411,9 +406,8 @@ TEST(ReferenceMethods, SphericalBlendOfNearlyEqualRotationsStaysNear) {
   RigRandom random(19);
   for (const double angle : {1e-7, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2}) {
     for (int trial = 0; trial < 50; ++trial) {
-      std::vector<JointMatrix> pose;
-      for (int joint = 0; joint < 4; ++joint)
-        pose.push_back(jointOf(rotationAbout(random.direction(), angle), random.vector(1)));
+      const std::vector<JointMatrix> pose = poseOf(
+          4, [&] { return jointOf(rotationAbout(random.direction(), angle), random.vector(1)); });
       OwnedMesh mesh = scatteredMesh(random, 5, 4, 4);
       const reference::AnalyzedMesh result = skinned(mesh, pose, Method::sphericalBlend);
       for (std::size_t vertex = 0; vertex < 5; ++vertex) {
@@ -469,12 +463,10 @@ TEST(ReferenceMethods, BlendedTakesTheMeshsWeightWhereTheVerticesHaveNone) {
     MeshView view = mesh.view();
     if (share != 0.5f) view.dualQuaternionWeight = share;  // a half unless it says otherwise
     const reference::AnalyzedMesh result = skinned(view, pose, Method::blended);
-    for (std::size_t vertex = 0; vertex < 50; ++vertex) {
-      expectNear(toVector(result.positions[vertex]),
-                 (1 - static_cast<double>(share)) * toVector(linear.positions[vertex]) +
-                     static_cast<double>(share) * toVector(dual.positions[vertex]),
-                 1e-15);
-    }
+    expectPositions(result, 1e-15, [&](std::size_t vertex) {
+      return (1 - static_cast<double>(share)) * toVector(linear.positions[vertex]) +
+             static_cast<double>(share) * toVector(dual.positions[vertex]);
+    });
   }
 }
 
@@ -502,8 +494,7 @@ TEST(ReferenceMethods, AVertexAtItsCenterOfRotationGoesWhereLinearBlendingTakesI
   mesh.centersOfRotation = mesh.positions;
   const reference::AnalyzedMesh result = skinned(mesh, pose, Method::centerOfRotation),
                                 linear = skinned(mesh, pose, Method::linear);
-  for (std::size_t vertex = 0; vertex < 300; ++vertex)
-    expectNear(toVector(result.positions[vertex]), toVector(linear.positions[vertex]), 1e-13);
+  expectPositions(result, 1e-13, linear);
 }
 
 TEST(ReferenceMethods, CenterOfRotationAtTheOriginIsQuaternionTranslation) {
@@ -513,8 +504,7 @@ TEST(ReferenceMethods, CenterOfRotationAtTheOriginIsQuaternionTranslation) {
   std::fill(mesh.centersOfRotation.begin(), mesh.centersOfRotation.end(), 0.0f);
   const reference::AnalyzedMesh result = skinned(mesh, pose, Method::centerOfRotation),
                                 expected = skinned(mesh, pose, Method::quaternionTranslation);
-  for (std::size_t vertex = 0; vertex < 300; ++vertex)
-    expectNear(toVector(result.positions[vertex]), toVector(expected.positions[vertex]), 1e-14);
+  expectPositions(result, 1e-14, expected);
 }
 
 // ---- Bulge control
@@ -567,12 +557,10 @@ TEST(ReferenceMethods, BulgeControlTakesTheMeshsStrengthWhereTheVerticesHaveNone
     MeshView view = mesh.view();
     if (strength != 1) view.bulgeStrength = strength;  // all of it unless it says otherwise
     const reference::AnalyzedMesh result = skinned(view, pose, Method::bulgeControlled);
-    for (std::size_t vertex = 0; vertex < 50; ++vertex) {
-      expectNear(toVector(result.positions[vertex]),
-                 (1 - static_cast<double>(strength)) * toVector(dual.positions[vertex]) +
-                     static_cast<double>(strength) * toVector(centered.positions[vertex]),
-                 1e-14);
-    }
+    expectPositions(result, 1e-14, [&](std::size_t vertex) {
+      return (1 - static_cast<double>(strength)) * toVector(dual.positions[vertex]) +
+             static_cast<double>(strength) * toVector(centered.positions[vertex]);
+    });
   }
 }
 
@@ -594,8 +582,7 @@ TEST(ReferenceMethods, SharesOfEveryType) {
       MeshView view = mesh.view();
       view.dualQuaternionWeights = view.bulgeStrengths = shares;
       const reference::AnalyzedMesh result = skinned(view, pose, method);
-      for (std::size_t vertex = 0; vertex < 4; ++vertex)
-        expectNear(toVector(result.positions[vertex]), toVector(whole.positions[vertex]), 1e-7);
+      expectPositions(result, 1e-7, whole);
     }
   }
 }

@@ -83,6 +83,14 @@ inline JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translati
   return joint;
 }
 
+/// So many joints, made one by one.
+template <typename Make>
+std::vector<JointMatrix> poseOf(int count, const Make& make) {
+  std::vector<JointMatrix> pose;
+  while (count-- > 0) pose.push_back(make());
+  return pose;
+}
+
 inline JointMatrix turnAboutZ(double degrees, const glm::dvec3& translation = {0, 0, 0}) {
   return jointOf(rotationAbout({0, 0, 1}, degrees * pi / 180), translation);
 }
@@ -198,6 +206,21 @@ inline void expectNear(const glm::dvec3& actual, const glm::dvec3& expected, dou
   EXPECT_LE(glm::length(actual - expected), tolerance)
       << "(" << actual.x << ", " << actual.y << ", " << actual.z << ") instead of (" << expected.x
       << ", " << expected.y << ", " << expected.z << ")";
+}
+
+/// `expected(vertex)` for the position of every vertex.
+template <typename Expected>
+void expectPositions(const reference::AnalyzedMesh& actual, double tolerance,
+                     const Expected& expected) {
+  for (std::size_t vertex = 0; vertex < actual.positions.size(); ++vertex) {
+    SCOPED_TRACE(vertex);
+    expectNear(toVector(actual.positions[vertex]), expected(vertex), tolerance);
+  }
+}
+inline void expectPositions(const reference::AnalyzedMesh& actual, double tolerance,
+                            const reference::AnalyzedMesh& expected) {
+  expectPositions(actual, tolerance,
+                  [&](std::size_t vertex) { return toVector(expected.positions[vertex]); });
 }
 
 inline bool isFiniteVector(const reference::Double3& v) {

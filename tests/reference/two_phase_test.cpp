@@ -133,11 +133,10 @@ TEST(ReferenceTwoPhase, RankOneAndZeroAreFinite) {
 TEST(ReferenceTwoPhase, VerySmallAndVeryLargeScales) {
   RigRandom random(9);
   for (const double scale : {1e-20, 1e-12, 1e-6, 1e6, 1e12, 1e18}) {
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 5; ++joint) {
-      pose.push_back(jointOf(randomRotation(random) * randomSymmetric(random, 0.5, 2) * scale,
-                             random.vector(1) * scale));
-    }
+    const std::vector<JointMatrix> pose = poseOf(5, [&] {
+      return jointOf(randomRotation(random) * randomSymmetric(random, 0.5, 2) * scale,
+                     random.vector(1) * scale);
+    });
     OwnedMesh mesh = scatteredMesh(random, 200, 5, 3);
     expectFormula(mesh, pose, Method::dualQuaternion, {1e-12 * scale, 1e-10},
                   dualQuaternionsByHand);
@@ -148,9 +147,8 @@ TEST(ReferenceTwoPhase, ANaNInOneJointStaysWithItsVertices) {
   RigRandom random(10);
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinity, -infinity}) {
-    std::vector<JointMatrix> pose;
-    for (int joint = 0; joint < 5; ++joint)
-      pose.push_back(jointOf(randomRotation(random), random.vector(1)));
+    const std::vector<JointMatrix> pose =
+        poseOf(5, [&] { return jointOf(randomRotation(random), random.vector(1)); });
     OwnedMesh mesh = scatteredMesh(random, 100, 5, 2);
     for (const Method method : allMethods) {
       const reference::AnalyzedMesh before = skinned(mesh, pose, method);
