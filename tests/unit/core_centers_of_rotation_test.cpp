@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <random>
 #include <span>
@@ -33,6 +32,8 @@ namespace dermis {
 namespace {
 
 using test::OwnedMesh;
+using test::vectorAt;
+using test::Weights;
 
 struct Surface {
   OwnedMesh mesh;
@@ -47,11 +48,6 @@ std::vector<float> solved(Surface& surface) {
   return result ? std::move(*result) : std::vector<float>{};
 }
 
-glm::dvec3 vectorAt(std::span<const float> values, std::size_t index) {
-  return {static_cast<double>(values[3 * index]), static_cast<double>(values[3 * index + 1]),
-          static_cast<double>(values[3 * index + 2])};
-}
-
 double sizeOf(const OwnedMesh& mesh) {
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
   for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
@@ -60,8 +56,6 @@ double sizeOf(const OwnedMesh& mesh) {
   }
   return glm::length(high - low);
 }
-
-using Weights = std::map<std::uint32_t, double>;
 
 Weights weightsOf(const OwnedMesh& mesh, std::size_t vertex) {
   Weights weights;
@@ -76,48 +70,15 @@ Weights weightsOf(const OwnedMesh& mesh, std::size_t vertex) {
   return weights;
 }
 
-double similarity(const Weights& i, const Weights& t) {
-  double sum = 0;
-  for (const auto& [j, ij] : i) {
-    for (const auto& [k, ik] : i) {
-      if (j == k || !t.contains(j) || !t.contains(k)) continue;
-      const double tj = t.at(j), tk = t.at(k);
-      sum += ij * ik * tj * tk * std::exp(-std::pow((ij * tk - ik * tj) / 0.1, 2));
-    }
-  }
-  return sum;
-}
-
 std::vector<glm::dvec3> directSum(const Surface& surface) {
   const OwnedMesh& mesh = surface.mesh;
-  std::vector<Weights> vertices, triangles;
-  std::vector<glm::dvec3> centroids;
-  std::vector<double> areas;
-  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
+  std::vector<Weights> vertices;
+  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex)
     vertices.push_back(weightsOf(mesh, vertex));
-  }
-  for (std::size_t i = 0; i < surface.triangles.size(); i += 3) {
-    glm::dvec3 corners[3];
-    Weights& weights = triangles.emplace_back();
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const std::uint32_t vertex = surface.triangles[i + corner];
-      corners[corner] = vectorAt(mesh.positions, vertex);
-      for (const auto& [joint, weight] : vertices[vertex]) weights[joint] += weight / 3;
-    }
-    centroids.push_back((corners[0] + corners[1] + corners[2]) / 3.0);
-    areas.push_back(glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0])) / 2);
-  }
+  const test::DirectSum sum(mesh.positions, vertices, surface.triangles);
   std::vector<glm::dvec3> centers;
-  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
-    glm::dvec3 moment(0.0);
-    double sum = 0;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const double factor = similarity(vertices[vertex], triangles[t]) * areas[t];
-      moment += factor * centroids[t];
-      sum += factor;
-    }
-    centers.push_back(sum > 0 ? moment / sum : vectorAt(mesh.positions, vertex));
-  }
+  for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex)
+    centers.push_back(sum.center(vertices[vertex]).value_or(vectorAt(mesh.positions, vertex)));
   return centers;
 }
 

@@ -2,11 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +15,6 @@
 namespace dermis::test {
 namespace {
 
-using Weights = std::map<std::uint32_t, double>;
-
 Weights weightsOf(const gltf::Influences& influences, std::size_t vertex) {
   Weights weights;
   for (std::size_t slot = 4 * vertex; slot < 4 * vertex + 4; ++slot) {
@@ -27,19 +23,6 @@ Weights weightsOf(const gltf::Influences& influences, std::size_t vertex) {
     if (weight != 0) weights[std::to_integer<std::uint32_t>(influences.joints[slot])] += weight;
   }
   return weights;
-}
-
-// Le and Hodgins 2016, σ = 0.1.
-double similarity(const Weights& i, const Weights& t) {
-  double sum = 0;
-  for (const auto& [j, ij] : i) {
-    for (const auto& [k, ik] : i) {
-      if (j == k || !t.contains(j) || !t.contains(k)) continue;
-      const double difference = ij * t.at(k) - ik * t.at(j);
-      sum += ij * ik * t.at(j) * t.at(k) * std::exp(-difference * difference / 0.01);
-    }
-  }
-  return sum;
 }
 
 TEST(GltfCentersTest, CentersOfTheFigureAreThoseOfTheDirectSum) {
@@ -53,40 +36,20 @@ TEST(GltfCentersTest, CentersOfTheFigureAreThoseOfTheDirectSum) {
   const auto centers = centersOf(view.mesh(), 64, primitive.triangles);
   ASSERT_TRUE(centers.ok()) << centers.error().message;
 
-  const auto position = [](const std::vector<float>& values, std::size_t vertex) {
-    return glm::dvec3(values[3 * vertex], values[3 * vertex + 1], values[3 * vertex + 2]);
-  };
-  std::vector<Weights> triangles;
-  std::vector<glm::dvec3> centroids;
-  std::vector<double> areas;
+  std::vector<Weights> vertices;
   double size = 0;
-  for (std::size_t first = 0; first < primitive.triangles.size(); first += 3) {
-    Weights& weights = triangles.emplace_back();
-    glm::dvec3 corners[3];
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const std::uint32_t vertex = primitive.triangles[first + corner];
-      corners[corner] = position(primitive.positions, vertex);
-      for (const auto& [joint, weight] : weightsOf(influences, vertex))
-        weights[joint] += weight / 3;
-    }
-    const auto& [a, b, c] = corners;
-    centroids.push_back((a + b + c) / 3.0);
-    areas.push_back(glm::length(glm::cross(b - a, c - a)) / 2);
-    size = std::max(size, glm::length(a - position(primitive.positions, 0)));
+  for (std::size_t vertex = 0; vertex < primitive.vertexCount; ++vertex) {
+    vertices.push_back(weightsOf(influences, vertex));
+    size = std::max(size, glm::length(vectorAt(primitive.positions, vertex) -
+                                      vectorAt(primitive.positions, 0)));
   }
+  const DirectSum direct(primitive.positions, vertices, primitive.triangles);
   int summed = 0;
   for (std::uint32_t vertex = 0; vertex < primitive.vertexCount; vertex += 13) {
-    const Weights weights = weightsOf(influences, vertex);
-    glm::dvec3 moment(0.0);
-    double sum = 0;
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const double factor = similarity(weights, triangles[t]) * areas[t];
-      moment += factor * centroids[t];
-      sum += factor;
-    }
-    if (sum == 0) continue;
+    const std::optional<glm::dvec3> expected = direct.center(vertices[vertex]);
+    if (!expected) continue;
     ++summed;
-    EXPECT_LE(glm::length(position(*centers, vertex) - moment / sum), 1e-6 * size) << vertex;
+    EXPECT_LE(glm::length(vectorAt(*centers, vertex) - *expected), 1e-6 * size) << vertex;
   }
   EXPECT_GE(summed, 50) << "many vertices have several joints";
 }
