@@ -1,17 +1,16 @@
 // How much memory a file may take: 64 MiB and 64 times the bytes of all its files, each counted
 // once. What would be more is refused before it is made.
 #include <dermis/memory_budget.h>
-#include <unistd.h>
 
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "gltf/failure.h"
 #include "gltf_builder.h"
+#include "temporary_folder.h"
 
 namespace dermis::test {
 namespace {
@@ -53,27 +52,18 @@ TEST(MemoryBudgetTest, NothingIsLargerThanAnObjectCanBe) {
   }
 }
 
-/// A folder that goes away with the test.
 class GltfBudget : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::temp_directory_path() / ("dermis-gltf-budget-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// All zeros; sparse, where the file system can.
   std::filesystem::path writeSparse(const std::string& name, const std::string& start,
                                     std::uint64_t size) const {
-    const std::filesystem::path path = folder_ / name;
-    std::ofstream(path, std::ios::binary) << start;
+    const std::filesystem::path path = folder_.write(name, start);
     std::error_code error;
     std::filesystem::resize_file(path, size, error);
     return error ? std::filesystem::path() : path;
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 /// What a file of so many bytes may take in all.

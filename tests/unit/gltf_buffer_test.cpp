@@ -6,29 +6,20 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 
 #include "gltf_builder.h"
+#include "temporary_folder.h"
 
 namespace dermis::test {
 namespace {
 
-// A folder that goes away with the test.
 class GltfBuffer : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::temp_directory_path() / ("dermis-gltf-buffer-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_ / "inside" / "deeper");
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  GltfBuffer() { std::filesystem::create_directories(folder_ / "inside" / "deeper"); }
 
   void write(const std::string& name, const std::vector<std::byte>& bytes) const {
-    const std::filesystem::path path = folder_ / std::u8string(name.begin(), name.end());
-    std::ofstream stream(path, std::ios::binary);
-    stream.write(reinterpret_cast<const char*>(bytes.data()),
-                 static_cast<std::streamsize>(bytes.size()));
+    folder_.write(name, bytes);
   }
 
   /// Whether a symbolic link can be made: not on every system, nor by everybody.
@@ -38,7 +29,7 @@ class GltfBuffer : public testing::Test {
     return !error;
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 constexpr bool isWindows = std::filesystem::path::preferred_separator != '/';
@@ -122,8 +113,9 @@ TEST_F(GltfBuffer, FollowsLinksInsideTheFolderAlone) {
                 "leads outside the file's folder through a symbolic link");
   }
   // An absolute link into the folder stays inside too.
-  std::filesystem::create_symlink(std::filesystem::canonical(folder_) / "inside" / "plain.bin",
-                                  folder_ / "inside" / "absolute.bin");
+  std::filesystem::create_symlink(
+      std::filesystem::canonical(folder_ / ".") / "inside" / "plain.bin",
+      folder_ / "inside" / "absolute.bin");
   loaded(withUri("absolute.bin").load(folder_ / "inside"));
   // A folder that is reached by a link is the folder.
   std::filesystem::create_directory_symlink("inside", folder_ / "linked");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gltf_builder.h"
+#include "temporary_folder.h"
 
 namespace dermis::test {
 namespace {
@@ -60,15 +61,12 @@ TEST(GltfImageTest, ComeFromBufferViews) {
 }
 
 TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
-  const std::filesystem::path folder =
-      std::filesystem::path(::testing::TempDir()) / "gltf_image_test";
-  std::filesystem::create_directories(folder / "inside");
-  std::ofstream(folder / "inside" / "skin.png") << "picture";
-  std::ofstream(folder / "secret.png") << "secret";
+  const TemporaryFolder folder;
+  folder.write("inside/skin.png", std::string("picture"));
+  folder.write("secret.png", std::string("secret"));
   const gltf::Model found = loadedWithImages(textured({{"uri", "skin.png"}}), folder / "inside");
   EXPECT_EQ(imageText(found), "picture");
   const std::string absolute = (folder / "secret.png").string();
-  std::filesystem::remove(folder / "inside" / "link.png");
   std::error_code notMade;  // without symbolic links, the file is just missing
   std::filesystem::create_symlink("../secret.png", folder / "inside" / "link.png", notMade);
   for (const std::string& uri : std::vector<std::string>{
@@ -79,7 +77,6 @@ TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
     EXPECT_EQ(model.materials.at(0).baseColorTexture.image, gltf::none);
     EXPECT_EQ(model.notes.size(), 1u);
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST(GltfImageTest, WrongOnesCostAPictureAndNoMore) {

@@ -7,13 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <random>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "shader_compiler/no_contraction.h"
+#include "temporary_folder.h"
 
 namespace {
 
@@ -28,23 +27,10 @@ const std::string header = "#version 450\nlayout(local_size_x = 8) in;\n";
 const std::string buffer = "layout(std430, set = 0, binding = 0) buffer Out { float data[]; } o;\n";
 const std::string trivial = header + buffer + "void main() { o.data[0] = 1.0; }\n";
 
-// A folder of its own for each test, gone afterwards.
 class ShaderCompilerTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::random_device random;
-    std::ostringstream name;
-    name << "dermis_shader_compiler_test_" << std::hex << random() << random();
-    folder_ = fs::temp_directory_path() / name.str();
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path write(const std::string& name, const std::string& text) const {
-    fs::path path = folder_ / name;
-    fs::create_directories(path.parent_path());
-    std::ofstream(path, std::ios::binary) << text;
-    return path;
+    return folder_.write(name, text);
   }
 
   ShaderSource source(const std::string& text) const {
@@ -66,7 +52,19 @@ class ShaderCompilerTest : public testing::Test {
     return entries.empty() ? fs::path() : entries.front();
   }
 
-  fs::path folder_;
+  /// An error in the text, of which the message says all this and begins with `start`.
+  static void expectShaderError(const dermis::Result<Words>& result, const std::string& start,
+                                std::initializer_list<std::string> parts = {}) {
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::shaderError);
+    const std::string& message = result.error().message;
+    EXPECT_TRUE(message.starts_with(start)) << message;
+    for (const std::string& part : parts)
+      EXPECT_NE(message.find(part), std::string::npos) << message;
+  }
+  std::string main() const { return (folder_ / "main.comp").string(); }
+
+  dermis::test::TemporaryFolder folder_;
 };
 
 std::string readAll(const fs::path& path) {
@@ -132,12 +130,9 @@ TEST_F(ShaderCompilerTest, CompilesFilesByTheirEnding) {
 }
 
 TEST_F(ShaderCompilerTest, ErrorNamesFileAndLine) {
-  ShaderCompiler compiler;
-  const auto result = compiler.compile(source(header + "void main() {\n  nowhere = 1.0;\n}\n"));
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::shaderError);
-  const std::string expected = (folder_ / "main.comp").string() + ":4: 'nowhere' : undeclared";
-  EXPECT_EQ(result.error().message.substr(0, expected.size()), expected);
+  expectShaderError(
+      ShaderCompiler().compile(source(header + "void main() {\n  nowhere = 1.0;\n}\n")),
+      main() + ":4: 'nowhere' : undeclared");
 }
 
 TEST_F(ShaderCompilerTest, OnlyTheFirstErrorIsReported) {
@@ -151,12 +146,7 @@ TEST_F(ShaderCompilerTest, OnlyTheFirstErrorIsReported) {
 }
 
 TEST_F(ShaderCompilerTest, AnErrorWithoutALineNamesTheFile) {
-  ShaderCompiler compiler;
-  const auto result = compiler.compile(source(header));  // No main.
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::shaderError);
-  const std::string expected = (folder_ / "main.comp").string() + ": ";
-  EXPECT_EQ(result.error().message.substr(0, expected.size()), expected);
+  expectShaderError(ShaderCompiler().compile(source(header)), main() + ": ");  // No main.
 }
 
 TEST_F(ShaderCompilerTest, HostileTextIsAnError) {
@@ -190,22 +180,16 @@ TEST_F(ShaderCompilerTest, IncludesBesideTheIncludingFileThenFromTheFolders) {
 
 TEST_F(ShaderCompilerTest, ErrorInAnIncludeNamesTheInclude) {
   const fs::path inner = write("inner.glsl", "\n\nfloat broken() { return nowhere; }\n");
-  ShaderCompiler compiler;
-  const auto result =
-      compiler.compile(source(header + "#include \"inner.glsl\"\nvoid main() { broken(); }\n"));
-  ASSERT_FALSE(result);
-  const std::string expected = inner.string() + ":3: 'nowhere' : undeclared";
-  EXPECT_EQ(result.error().message.substr(0, expected.size()), expected);
+  expectShaderError(ShaderCompiler().compile(
+                        source(header + "#include \"inner.glsl\"\nvoid main() { broken(); }\n")),
+                    inner.string() + ":3: 'nowhere' : undeclared");
 }
 
 TEST_F(ShaderCompilerTest, LinesAfterAnIncludeAreStillRight) {
   write("inner.glsl", "// 1\n// 2\n// 3");
-  ShaderCompiler compiler;
-  const auto result = compiler.compile(
-      source(header + "#include \"inner.glsl\"\nvoid main() {\n  nowhere = 1.0;\n}\n"));
-  ASSERT_FALSE(result);
-  EXPECT_NE(result.error().message.find("main.comp:5: "), std::string::npos)
-      << result.error().message;
+  expectShaderError(ShaderCompiler().compile(source(
+                        header + "#include \"inner.glsl\"\nvoid main() {\n  nowhere = 1.0;\n}\n")),
+                    main() + ":5: ");
 }
 
 TEST_F(ShaderCompilerTest, EmptyIncludeIsFine) {
@@ -215,14 +199,9 @@ TEST_F(ShaderCompilerTest, EmptyIncludeIsFine) {
 }
 
 TEST_F(ShaderCompilerTest, MissingIncludeIsNamed) {
-  ShaderCompiler compiler;
-  const auto result =
-      compiler.compile(source(header + "#include \"missing.glsl\"\nvoid main() {}\n"));
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::shaderError);
-  EXPECT_NE(result.error().message.find("main.comp:3: "), std::string::npos);
-  EXPECT_NE(result.error().message.find("missing.glsl"), std::string::npos);
-  EXPECT_NE(result.error().message.find("no such file"), std::string::npos);
+  expectShaderError(
+      ShaderCompiler().compile(source(header + "#include \"missing.glsl\"\nvoid main() {}\n")),
+      main() + ":3: ", {"missing.glsl", "no such file"});
 }
 
 TEST_F(ShaderCompilerTest, FoldersAndDevicesAreNoIncludes) {
@@ -236,17 +215,13 @@ TEST_F(ShaderCompilerTest, IncludeCycleIsNamed) {
   write("a.glsl", "#include \"b.glsl\"\n#include \"b.glsl\"\n");
   const fs::path b = write("b.glsl", "\n#include \"a.glsl\"\n#include \"a.glsl\"\n");
   for (const ShaderCompilerOptions& options : {ShaderCompilerOptions(), cached()}) {
-    ShaderCompiler compiler(options);
-    const auto result = compiler.compile(source(header + "#include \"a.glsl\"\nvoid main() {}\n"));
-    ASSERT_FALSE(result);
-    EXPECT_NE(result.error().message.find(b.string() + ":2: "), std::string::npos)
-        << result.error().message;
-    EXPECT_NE(result.error().message.find("includes itself"), std::string::npos);
+    expectShaderError(
+        ShaderCompiler(options).compile(source(header + "#include \"a.glsl\"\nvoid main() {}\n")),
+        b.string() + ":2: ", {"includes itself"});
   }
-  const auto itself = ShaderCompiler().compileFile(
-      write("self.comp", header + "#include \"self.comp\"\nvoid main() {}\n"));
-  ASSERT_FALSE(itself);
-  EXPECT_NE(itself.error().message.find("includes itself"), std::string::npos);
+  expectShaderError(ShaderCompiler().compileFile(
+                        write("self.comp", header + "#include \"self.comp\"\nvoid main() {}\n")),
+                    "", {"includes itself"});
 }
 
 TEST_F(ShaderCompilerTest, IncludesThatGrowWithoutACycleAreStopped) {
@@ -258,11 +233,9 @@ TEST_F(ShaderCompilerTest, IncludesThatGrowWithoutACycleAreStopped) {
     write("level" + std::to_string(level) + ".glsl", text);
   }
   write("level40.glsl", "\n");
-  ShaderCompiler compiler;
-  const auto result =
-      compiler.compile(source(header + "#include \"level0.glsl\"\nvoid main() {}\n"));
-  ASSERT_FALSE(result);
-  EXPECT_NE(result.error().message.find("64 MiB"), std::string::npos) << result.error().message;
+  expectShaderError(
+      ShaderCompiler().compile(source(header + "#include \"level0.glsl\"\nvoid main() {}\n")), "",
+      {"64 MiB"});
 }
 
 TEST_F(ShaderCompilerTest, DefinesReachTheText) {
