@@ -28,8 +28,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInFourteenDispatches) {
     batch.addJob(instance % 3, instance,
                  instance % 2 == 0 ? Method::linear : Method::dualQuaternion, instance % 7 != 0);
   }
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   // The palettes that may scale, and those that do not; then, for both methods with and without
   // normals, a dispatch for each number of influences, and for joints that scale.
   EXPECT_LE(dispatchesOf(out).size(), 14u);
@@ -42,9 +41,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInFourteenDispatches) {
 // However many instances and meshes there are: the palettes, then a dispatch for each form of the
 // kernel.
 TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   for (int repetition = 0; repetition < 20; ++repetition) {
     for (std::uint32_t mesh = 0; mesh < 5; ++mesh) {
       for (std::uint32_t palette = 0; palette < 4; ++palette) {
@@ -52,20 +49,16 @@ TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
       }
     }
   }
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   EXPECT_EQ(dispatchesOf(out)[0].variant.kernel, Kernel::palette);
   // One, two, four, exactly four and eight influences; four with joints that scale.
   EXPECT_EQ(dispatchesOf(out).size(), 2u + 6u);
 }
 
 TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   batch.addJob(1, 2, Method::linear, false);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   ASSERT_EQ(dispatchesOf(out).size(), 1u);
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
   for (std::uint32_t palette = 0; palette < 4; ++palette) {
@@ -74,15 +67,12 @@ TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
 }
 
 TEST(Plan, PosesThatNoDualQuaternionJobUsesAreLeftOut) {
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   batch.addJob(0, 3, Method::dualQuaternion, true);
   batch.addJob(0, 2, Method::linear, true);
   batch.addJob(0, 1, Method::dualQuaternion, true);
   batch.addJob(0, 1, Method::dualQuaternion, true);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
   EXPECT_EQ(out.statusOffset(2), Plan::noStatus);
   EXPECT_EQ(out.statusOffset(4), Plan::noStatus);  // there is none
@@ -94,9 +84,7 @@ TEST(Plan, PosesThatNoDualQuaternionJobUsesAreLeftOut) {
 
 // Dual quaternions serve all methods but one, which wants logarithms.
 TEST(Plan, APoseIsConvertedOnceForEachFormThatIsRead) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(10, 2, 5, true));
-  batch.addPose(5, false);
+  OwnedBatch batch(meshOf(10, 2, 5, true), 5);
   batch.addPose(7, true);
   const auto sizeOf = [&](std::initializer_list<Method> methods, std::uint32_t palette) {
     batch.jobs.clear();
@@ -129,8 +117,7 @@ TEST(Plan, APoseInTwoFormsHasAStatusInEither) {
   batch.addJob(0, 1, Method::blended, true);
   batch.addJob(0, 2, Method::centerOfRotation, true);
   batch.addJob(0, 3, Method::linear, true);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   // As dual quaternions with and without scale, as logarithms likewise.
   const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
   std::uint32_t palettes = 0;
@@ -159,8 +146,7 @@ TEST(Plan, PreviousPosesAreConvertedToTheFormOfTheirJob) {
     job.previousPose = 1;
     batch.place(job, Arrangement::planar);
   }
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  const Plan out = planned(batch, richLimits());
   EXPECT_EQ(out.buffer(BufferRole::palettes).size,
             4 * 16 + 5 * (32 + 32) + 5 * 32 + 5 * (48 + 32) + 5 * 48u);
 }
@@ -176,8 +162,7 @@ TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
     batch.addJob(0, 0, Method::linear, false);
     batch.addJob(1, 0, Method::linear, false);
     batch.addJob(0, 0, Method::linear, false);
-    Plan out;
-    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+    const Plan out = planned(batch);
     const auto has = [&](int number) {
       const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
       return std::ranges::any_of(dispatches, [&](const PlannedDispatch& dispatch) {
@@ -193,9 +178,7 @@ TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
   Plan out;
   EXPECT_TRUE(dispatchesOf(out).empty());
   EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   for (const Batch& empty : {Batch{}, batch.batch()}) {
     ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
     EXPECT_TRUE(dispatchesOf(out).empty());
@@ -436,9 +419,7 @@ TEST(Plan, InvocationsWithFewInstancesSkinSeveralVertices) {
 
 TEST(Plan, InstancesWithDifferentBoxesAreNotCountedUp) {
   const auto isEven = [](float size) {
-    OwnedBatch batch;
-    addMeshes(batch);
-    addPoses(batch);
+    OwnedBatch batch = batchOfFiveMeshes();
     for (std::uint32_t number = 0; number < 5; ++number) {
       Job job = batch.jobOf(0, 0, Method::dualQuaternion);
       job.positions.format = VertexFormat::snorm16x4;

@@ -56,6 +56,13 @@ struct PlanErrors : public ::testing::Test {
   void expectInvalid(std::initializer_list<const char*> parts) {
     expectRefused(ErrorCode::invalidArgument, parts);
   }
+  void expectGoodOnlyIf(bool good, ErrorCode code, std::initializer_list<const char*> parts) {
+    if (good) {
+      expectGood();
+    } else {
+      expectRefused(code, parts);
+    }
+  }
   void expectGood() {
     Plan out;
     const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
@@ -303,11 +310,8 @@ TEST_F(PlanErrors, FormatsThatAnAttributeMayNotHave) {
       job() = good;
       job().box = {{0, 0, 0}, {1, 1, 1}};
       job().*member = {0, 24, allowed.format};
-      if (isAllowed) {
-        expectGood();
-      } else {
-        expectInvalid({"job 1", name, std::string(formatName(allowed.format)).c_str()});
-      }
+      expectGoodOnlyIf(isAllowed, ErrorCode::invalidArgument,
+                       {"job 1", name, std::string(formatName(allowed.format)).c_str()});
     }
   }
 }
@@ -386,18 +390,10 @@ TEST_F(PlanErrors, FewStorageBuffersMeanNoResults) {
     const Job good = job();
     expectGood();
     job().bounds = true;
-    if (buffers == 8) {
-      expectGood();
-    } else {
-      expectRefused(ErrorCode::limitExceeded, {"job 1", "bounds", count.c_str()});
-    }
+    expectGoodOnlyIf(buffers == 8, ErrorCode::limitExceeded, {"job 1", "bounds", count.c_str()});
     job() = good;
     job().positions = {0, 8, VertexFormat::snorm16x4};
-    if (buffers == 8) {
-      expectGood();
-    } else {
-      expectRefused(ErrorCode::limitExceeded, {"job 1", "snorm16", count.c_str()});
-    }
+    expectGoodOnlyIf(buffers == 8, ErrorCode::limitExceeded, {"job 1", "snorm16", count.c_str()});
     job() = good;
   }
 }
@@ -421,12 +417,8 @@ TEST_F(PlanErrors, FewStorageBuffersMeanWholeWords) {
   for (const VertexFormat format :
        {VertexFormat::octahedral16x2, VertexFormat::octahedral8x2, VertexFormat::snorm8x3}) {
     job().normals = {0, 4, format};
-    if (format == VertexFormat::octahedral16x2) {
-      expectGood();
-    } else {
-      expectRefused(ErrorCode::missingFeature,
-                    {"job 1", "normals", "multiples of 4", "4 storage buffers"});
-    }
+    expectGoodOnlyIf(format == VertexFormat::octahedral16x2, ErrorCode::missingFeature,
+                     {"job 1", "normals", "multiples of 4", "4 storage buffers"});
   }
 }
 
@@ -564,31 +556,32 @@ TEST_F(PlanErrors, BoxesOfSnormPositions) {
 // ---- Sizes and limits
 
 TEST_F(PlanErrors, Tunings) {
-  for (const std::uint32_t size : {8u, 16u, 32u, 64u, 128u}) {
-    tuning.workgroupSize = size;
-    expectGood();
-  }
-  for (const std::uint32_t size : {0u, 1u, 4u, 9u, 65u, 96u, 256u, 0x80000000u}) {
-    tuning.workgroupSize = size;
-    expectInvalid({"Tuning::workgroupSize"});
-  }
-  tuning = {};
-  for (const std::uint32_t instances : {1u, 5u, 32u}) {
-    tuning.instancesPerInvocation = instances;
-    expectGood();
-  }
-  for (const std::uint32_t instances : {0u, 33u, 256u, 257u}) {
-    tuning.instancesPerInvocation = instances;
-    expectInvalid({"Tuning::instancesPerInvocation"});
-  }
-  tuning = {};
-  for (const std::uint32_t vertices : {1u, 2u, 16u}) {
-    tuning.verticesPerInvocation = vertices;
-    expectGood();
-  }
-  for (const std::uint32_t vertices : {0u, 3u, 32u, 0x80000000u}) {
-    tuning.verticesPerInvocation = vertices;
-    expectInvalid({"Tuning::verticesPerInvocation"});
+  const struct {
+    std::uint32_t Tuning::*member;
+    const char* name;
+    std::vector<std::uint32_t> good, bad;
+  } cases[] = {{&Tuning::workgroupSize,
+                "Tuning::workgroupSize",
+                {8, 16, 32, 64, 128},
+                {0, 1, 4, 9, 65, 96, 256, 0x80000000u}},
+               {&Tuning::instancesPerInvocation,
+                "Tuning::instancesPerInvocation",
+                {1, 5, 32},
+                {0, 33, 256, 257}},
+               {&Tuning::verticesPerInvocation,
+                "Tuning::verticesPerInvocation",
+                {1, 2, 16},
+                {0, 3, 32, 0x80000000u}}};
+  for (const auto& [member, name, good, bad] : cases) {
+    tuning = {};
+    for (const std::uint32_t value : good) {
+      tuning.*member = value;
+      expectGood();
+    }
+    for (const std::uint32_t value : bad) {
+      tuning.*member = value;
+      expectInvalid({name});
+    }
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <map>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include "abi.h"
@@ -87,10 +88,8 @@ class Simulation {
   std::uint32_t word(std::uint64_t index) const { return tables_.at(index); }
   template <typename Record>
   Record at(std::uint64_t index) const {
-    Record record{};
     static_cast<void>(word(index + sizeof(Record) / 4 - 1));  // it lies in the tables
-    std::memcpy(&record, &tables_[index], sizeof(Record));
-    return record;
+    return abi::load<Record>(tables_, index);
   }
   abi::GroupRecord groupAt(std::uint64_t index) const { return at<abi::GroupRecord>(index); }
   abi::InstanceRecord instanceAt(std::uint64_t index) const {
@@ -527,6 +526,11 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
   return meshOf(vertices, influences, joints, MeshParts{normals, false, 0, true});
 }
 
+OwnedBatch::OwnedBatch(PackedMesh mesh, std::uint32_t joints) {
+  addMesh(std::move(mesh));
+  addPose(joints, false);
+}
+
 void OwnedBatch::addMesh(PackedMesh mesh) {
   meshOffsets.push_back(meshesSize);
   meshesSize += mesh.bytes().size();
@@ -601,23 +605,20 @@ Batch OwnedBatch::batch() const {
               : OutputSizes::oneBuffer(outputSize)};
 }
 
-void addMeshes(OwnedBatch& batch) {
+OwnedBatch batchOfFiveMeshes() {
+  OwnedBatch batch;
   batch.addMesh(meshOf(1, 1, 3, true));
   batch.addMesh(meshOf(63, 2, 5, false));
   batch.addMesh(meshOf(64, 4, 5, MeshParts{true, true, 3}));
   batch.addMesh(meshOf(65, 8, 5, MeshParts{true, true, 9}));
   batch.addMesh(meshOf(1234, 3, 5, MeshParts{true, false, 5}));
-}
-
-void addPoses(OwnedBatch& batch) {
   for (const std::uint32_t joints : {5u, 9u, 300u, 7u}) batch.addPose(joints, joints % 2 == 1);
+  return batch;
 }
 
 OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
   std::mt19937 engine(seed);
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   // The same mesh may stand twice in the mesh buffer.
   batch.meshesSize += 16;
   batch.addMesh(meshOf(64, 4, 5, true));
@@ -668,9 +669,7 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
   const auto below = [&](std::uint32_t count) {
     return static_cast<std::uint32_t>(engine()) % count;
   };
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   for (std::uint32_t index = 0; index < jobs; ++index) {
     Job job = batch.jobOf(below(5), below(4), allMethods[below(allMethods.size())]);
     job.positions.format = anyFormat(engine, isPositionFormat);
@@ -735,6 +734,13 @@ void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tu
   const Result<void> result = makePlan(batch.batch(), limits, tuning, out);
   ASSERT_TRUE(result.ok()) << result.error().message;
   Simulation(batch, limits, tuning, out).run();
+}
+
+Plan planned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning) {
+  Plan out;
+  expectPlanned(batch, limits, tuning, out);
+  if (::testing::Test::HasFatalFailure()) throw std::runtime_error("the plan is wrong");
+  return out;
 }
 
 }  // namespace dermis::test

@@ -31,6 +31,8 @@ enum class Arrangement { interleaved, planar, separate };
 /// A batch that owns what it points to. Meshes and poses are laid out one after another.
 struct OwnedBatch {
   OwnedBatch() = default;
+  /// One mesh and a pose that does not scale.
+  OwnedBatch(PackedMesh mesh, std::uint32_t joints);
   OwnedBatch(OwnedBatch&&) = default;
   OwnedBatch& operator=(OwnedBatch&&) = default;
 
@@ -69,8 +71,7 @@ struct OwnedBatch {
 
 /// Meshes of awkward counts, with and without normals, tangents and morph targets, with 1 to 8
 /// influences; and four poses.
-void addMeshes(OwnedBatch& batch);
-void addPoses(OwnedBatch& batch);
+OwnedBatch batchOfFiveMeshes();
 
 /// Float32 positions and normals in one buffer, interleaved or planar: what any device can do.
 OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs);
@@ -92,5 +93,7 @@ std::vector<std::uint32_t> tablesOf(const Plan& plan);
 /// work, done once.
 void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
                    Plan& out);
+/// The same; throws where it fails the test.
+Plan planned(const OwnedBatch& batch, const DeviceLimits& limits = {}, const Tuning& tuning = {});
 
 }  // namespace dermis::test

@@ -21,9 +21,7 @@ DeviceLimits stagingLimits() {
 /// The skin kernel of one job: positions and normals, float32x3, but for what `change` changes.
 template <typename Change>
 Variant variantOf(Change change) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(100, 4, 4, MeshParts{true, true, 0}));
-  batch.addPose(4, false);
+  OwnedBatch batch(meshOf(100, 4, 4, MeshParts{true, true, 0}), 4);
   batch.addJob(0, 0, Method::dualQuaternion, true);
   batch.outputSize = 1 << 20;
   DeviceLimits limits = stagingLimits();

@@ -202,8 +202,7 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
         batch.jobs[0].pose = palette;
         if (!promises.noMorphTargets) batch.jobs[0].morphs = batch.keep({{1, weight}});
         batch.outputSize = 10000;
-        Plan out;
-        ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, tuning, out));
+        const Plan out = planned(batch, limits, tuning);
         for (const Variant& variant : out.variants()) {
           EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
           unused.erase(variant.key());
@@ -323,9 +322,7 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
 TEST(Plan, AttributesThatStandApartAreNotStoredTogether) {
   DeviceLimits limits = richLimits();
   limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
-  OwnedBatch batch;
-  addMeshes(batch);
-  addPoses(batch);
+  OwnedBatch batch = batchOfFiveMeshes();
   const Job together = batch.addJob(0, 0, Method::dualQuaternion, true);
   Job apart = together;
   apart.positions.offset += 96 * 1000;
@@ -386,9 +383,7 @@ TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
 
 // A kernel leaves the two-phase path out if no palette that it reads may scale.
 TEST(Plan, AJobScalesIfAPoseThatItReadsMay) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(10, 4, 8, MeshParts{true, false, 0}));
-  batch.addPose(8, false);
+  OwnedBatch batch(meshOf(10, 4, 8, MeshParts{true, false, 0}), 8);
   batch.addPose(8, true);
   const auto scales = [&](const Job& job) {
     batch.jobs = {job};

@@ -78,8 +78,7 @@ TEST_P(PlanWindows, SoDoesEveryWriteOfEveryFormatAndMotion) {
     bool differ = false;
     for (std::uint32_t seed = 1; seed <= 4; ++seed) {
       const OwnedBatch batch = randomRichBatch(seed, 80, separate);
-      Plan out;
-      ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(range, alignment), {32, 2}, out));
+      const Plan out = planned(batch, limitsOf(range, alignment), {32, 2});
       for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
         windows.insert(dispatch.windows[0].index);
         differ = differ || !hasOneWindow(dispatch);
@@ -95,15 +94,12 @@ INSTANTIATE_TEST_SUITE_P(Plan, PlanWindows,
                                             ::testing::Values(4u, 64u, 256u)));
 
 TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(800, 1, 1, true));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(800, 1, 1, true), 1);
   Job& job = batch.addJob(0, 0, Method::dualQuaternion, true, 800);
   job.normals.offset += 100;
   const DeviceLimits limits = limitsOf(65536, 256);
   ASSERT_GT(batch.outputSize, 9 * limits.maxStorageBufferRange);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {64, 4}, out));
+  const Plan out = planned(batch, limits, {64, 4});
   EXPECT_EQ(out.instanceCount(), 1u);
   EXPECT_EQ(out.vertexCount(), 800u);
   EXPECT_GE(dispatchesOf(out).size(), 1 + 9u);
@@ -111,14 +107,11 @@ TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
 
 // One result, one extension's morph targets and one palette, however many pieces there are.
 TEST(Plan, TheInstanceThatIsCutHasOneResult) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(800, 1, 1, MeshParts{true, false, 2}));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(800, 1, 1, MeshParts{true, false, 2}), 1);
   Job& job = batch.addJob(0, 0, Method::dualQuaternion, true, 800);
   job.bounds = true;
   job.morphs = batch.keep({{1, 0.5f}, {0, 0.25f}});
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(65536, 256), {64, 4}, out));
+  const Plan out = planned(batch, limitsOf(65536, 256), {64, 4});
   EXPECT_EQ(out.buffer(BufferRole::results).size, sizeof(InstanceResult));
   EXPECT_GE(dispatchesOf(out).size(), 1 + 9u);
 }
@@ -126,17 +119,14 @@ TEST(Plan, TheInstanceThatIsCutHasOneResult) {
 // With storage buffers for each attribute, however far apart a vertex' attributes lie, they fit;
 // with one for all they fit or are refused.
 TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(400, 1, 1, true));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(400, 1, 1, true), 1);
   Job& job = batch.addJob(0, 0, Method::linear, true, 512);
   batch.outputSize += 65536;
   int good = 0, refused = 0, differ = 0;
   for (std::uint64_t apart = 12; apart < 65536; apart += apart < 10000 ? 332 : 7332) {
     SCOPED_TRACE(apart);
     job.normals.offset = job.positions.offset + apart;
-    Plan out;
-    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limitsOf(65536, 256), {64, 4}, out));
+    Plan out = planned(batch, limitsOf(65536, 256), {64, 4});
     const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
     const bool sharesWindows =
         std::all_of(dispatches.begin(), dispatches.end(), [](const PlannedDispatch& dispatch) {
@@ -163,9 +153,7 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
 
 // A 32nd of a range is near, wherever the windows begin and however the vertices are cut.
 TEST(Plan, AttributesThatLieNearShareAWindow) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(400, 1, 1, true));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(400, 1, 1, true), 1);
   const DeviceLimits limits = limitsOf(65536, 256, 4);
   for (const std::uint32_t stride : {128u, 500u, 512u, 1000u, 4096u}) {
     for (std::uint64_t offset = 2048; offset < 8000; offset += 100) {
@@ -184,9 +172,7 @@ TEST(Plan, AttributesThatLieNearShareAWindow) {
 }
 
 TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(1000, 1, 1, MeshParts{true, true, 0}));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(1000, 1, 1, MeshParts{true, true, 0}), 1);
   Job job = batch.jobOf(0, 0, Method::linear);
   job.normals.format = VertexFormat::octahedral16x2;
   job.tangents.format = VertexFormat::snorm8x4;
@@ -198,8 +184,7 @@ TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
   job.tangents = {0, 4, VertexFormat::snorm8x4};
   job.previousPositions = {4 * gigabyte - 12000, 12};
   batch.jobs.push_back(job);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  const Plan out = planned(batch, richLimits());
   ASSERT_EQ(dispatchesOf(out).size(), 1u);
   const std::uint64_t step = outputWindowStep(richLimits());
   EXPECT_EQ(dispatchesOf(out)[0].windows[0].index, 3 * gigabyte / step);
@@ -209,9 +194,7 @@ TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
 }
 
 TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(900, 1, 1, MeshParts{true, false, 0, false}));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(900, 1, 1, MeshParts{true, false, 0, false}), 1);
   batch.hasSeparateOutputs = true;
   for (std::uint64_t instance = 0; instance < 3; ++instance) {
     Job job = batch.jobOf(0, 0, Method::linear);
@@ -221,8 +204,7 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   }
   batch.separateSizes = {3 * 1000 * 64, 3 * 1000 * 16, 0, 0};
   const DeviceLimits limits = limitsOf(3 * 1000 * 16, 4);
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
+  const Plan out = planned(batch, limits);
   std::set<std::uint32_t> positions, normals;
   for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
     positions.insert(dispatch.windows[0].index);
@@ -234,9 +216,7 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
 
 // What lies in one range is not cut; what does not is, and only that.
 TEST(Plan, OnlyWhatLiesInTwoRangesIsCut) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(1234, 1, 1, true));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(1234, 1, 1, true), 1);
   Job& job = batch.addJob(0, 0, Method::linear, true, 68);
   const DeviceLimits limits = limitsOf(1234 * 68, 256);
   const auto runs = [&] {
@@ -254,16 +234,13 @@ TEST(Plan, OnlyWhatLiesInTwoRangesIsCut) {
 
 // Farther into the output than 32 bits can count.
 TEST(Plan, OutputOffsetsHave64Bits) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(100, 1, 1, true));
-  batch.addPose(1, false);
+  OwnedBatch batch(meshOf(100, 1, 1, true), 1);
   for (const std::uint64_t offset :
        {std::uint64_t{0}, std::uint64_t{5} << 32, (std::uint64_t{7} << 40) + 12}) {
     batch.outputSize = offset;
     batch.addJob(0, 0, Method::linear, true);
   }
-  Plan out;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, {}, {}, out));
+  const Plan out = planned(batch);
   EXPECT_EQ(dispatchesOf(out).size(), 3u);
 }
 
