@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
 
 #include "core_plan_simulation.h"
 #include "dermis/vulkan/vulkan.h"
+#include "mock_vulkan.h"
 
 namespace dermis::test {
 
@@ -60,6 +63,45 @@ struct MockBatch {
             outputs,
             range(BufferRole::results)};
   }
+};
+
+/// A context of the pretended device, and what becomes of batches.
+struct MockContextTest : public ::testing::Test {
+  /// Makes the context; `mock.limits` may be changed before.
+  void create(bool push = false, const std::optional<bool>& texelBuffers = {},
+              const void* enabledFeatures = nullptr) {
+    mock.extensions.clear();
+    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
+    vulkan::DeviceDescription description = mock.description();
+    description.texelBuffers = texelBuffers;
+    description.enabledFeatures = enabledFeatures;
+    Result<vulkan::Context> made = vulkan::Context::create(description);
+    ASSERT_TRUE(made.ok());
+    context.emplace(std::move(*made));
+  }
+  /// Prepares and records.
+  Result<void> record(const MockBatch& batch, const vulkan::BatchBuffers& buffers) {
+    mock.dispatches.clear();
+    mock.commands.clear();
+    mock.memoryBarriers.clear();
+    mock.bufferBarriers.clear();
+    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
+    const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
+    if (!bindings) return bindings.error();
+    return context->record(commandBuffer, batch.plan, *bindings);
+  }
+  Result<void> record(const MockBatch& batch) { return record(batch, batch.buffers()); }
+  void expectRefused(const MockBatch& batch, const vulkan::BatchBuffers& buffers, ErrorCode code,
+                     const std::string& text) {
+    const Result<void> recorded = record(batch, buffers);
+    ASSERT_FALSE(recorded.ok()) << text;
+    EXPECT_EQ(recorded.error().code, code) << recorded.error().message;
+    EXPECT_NE(recorded.error().message.find(text), std::string::npos) << recorded.error().message;
+    EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
+  }
+
+  MockVulkan mock;
+  std::optional<vulkan::Context> context;
 };
 
 }  // namespace dermis::test

@@ -24,44 +24,7 @@ using vulkan::BatchBuffers;
 using vulkan::BufferRange;
 using vulkan::OutputBuffers;
 
-struct RecordTest : public ::testing::Test {
-  /// Makes the context of a device like this; `mock.limits` may be changed before.
-  void create(bool push = false, bool features = false) {
-    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    halves.storageBuffer16BitAccess = VK_TRUE;
-    mock.extensions.clear();
-    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
-    vulkan::DeviceDescription description = mock.description();
-    if (features) description.enabledFeatures = &halves;
-    Result<vulkan::Context> made = vulkan::Context::create(description);
-    ASSERT_TRUE(made.ok());
-    context.emplace(std::move(*made));
-  }
-  /// Prepares and records.
-  Result<void> record(const MockBatch& batch, const BatchBuffers& buffers) {
-    mock.dispatches.clear();
-    mock.commands.clear();
-    mock.memoryBarriers.clear();
-    mock.bufferBarriers.clear();
-    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
-    const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
-    if (!bindings) return bindings.error();
-    return context->record(commandBuffer, batch.plan, *bindings);
-  }
-  Result<void> record(const MockBatch& batch) { return record(batch, batch.buffers()); }
-  void expectRefused(const MockBatch& batch, const BatchBuffers& buffers, ErrorCode code,
-                     const std::string& text) {
-    const Result<void> recorded = record(batch, buffers);
-    ASSERT_FALSE(recorded.ok()) << text;
-    EXPECT_EQ(recorded.error().code, code) << recorded.error().message;
-    EXPECT_NE(recorded.error().message.find(text), std::string::npos) << recorded.error().message;
-    EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
-  }
-
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  MockVulkan mock;
-  std::optional<vulkan::Context> context;
-};
+struct RecordTest : public MockContextTest {};
 
 /// Everything of a batch in buffers of its own: all formats, motion, bounds.
 MockBatch richBatch(const DeviceLimits& limits) {
@@ -80,59 +43,45 @@ MockBatch richBatch(const DeviceLimits& limits) {
 
 // ---- Bindings
 
-BufferRange& rangeOf(BatchBuffers& buffers, BufferRole role) {
-  switch (role) {
-    case BufferRole::meshes:
-      return buffers.meshes;
-    case BufferRole::poses:
-      return buffers.poses;
-    case BufferRole::tables:
-      return buffers.tables;
-    case BufferRole::palettes:
-      return buffers.palettes;
-    case BufferRole::results:
-      return buffers.results;
-    case BufferRole::positions:
-      return buffers.outputs.positions;
-    case BufferRole::normals:
-      return buffers.outputs.normals;
-    case BufferRole::tangents:
-      return buffers.outputs.tangents;
-    default:
-      return buffers.outputs.previousPositions;
-  }
-}
-
-const std::pair<BufferRole, const char*> roles[] = {
-    {BufferRole::meshes, "meshes"},
-    {BufferRole::poses, "poses"},
-    {BufferRole::tables, "tables"},
-    {BufferRole::palettes, "palettes"},
-    {BufferRole::results, "results"},
-    {BufferRole::positions, "outputs.positions"},
-    {BufferRole::normals, "outputs.normals"},
-    {BufferRole::tangents, "outputs.tangents"},
-    {BufferRole::previousPositions, "outputs.previousPositions"}};
+struct BoundRole {
+  BufferRole role;
+  const char* name;
+  BufferRange& (*range)(BatchBuffers&);
+};
+const BoundRole roles[] = {
+    {BufferRole::meshes, "meshes", [](BatchBuffers& b) -> BufferRange& { return b.meshes; }},
+    {BufferRole::poses, "poses", [](BatchBuffers& b) -> BufferRange& { return b.poses; }},
+    {BufferRole::tables, "tables", [](BatchBuffers& b) -> BufferRange& { return b.tables; }},
+    {BufferRole::palettes, "palettes", [](BatchBuffers& b) -> BufferRange& { return b.palettes; }},
+    {BufferRole::results, "results", [](BatchBuffers& b) -> BufferRange& { return b.results; }},
+    {BufferRole::positions, "outputs.positions",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs.positions; }},
+    {BufferRole::normals, "outputs.normals",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs.normals; }},
+    {BufferRole::tangents, "outputs.tangents",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs.tangents; }},
+    {BufferRole::previousPositions, "outputs.previousPositions",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs.previousPositions; }}};
 
 TEST_F(RecordTest, RangesThatCannotBeBoundAreRefused) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
   ASSERT_TRUE(record(batch).ok());
-  for (const auto& [role, name] : roles) {
+  for (const auto& [role, name, rangeOf] : roles) {
     BatchBuffers buffers = batch.buffers();
-    ASSERT_NE(rangeOf(buffers, role).size, 0u) << name;
-    rangeOf(buffers, role).offset = 16;
+    ASSERT_NE(rangeOf(buffers).size, 0u) << name;
+    rangeOf(buffers).offset = 16;
     expectRefused(batch, buffers, ErrorCode::invalidArgument,
                   std::string(name) + ": the offset 16 is not a multiple of this device's 256");
     buffers = batch.buffers();
     for (const VkDeviceSize size :
-         {VkDeviceSize{0}, VkDeviceSize{VK_WHOLE_SIZE}, rangeOf(buffers, role).size + 2}) {
-      rangeOf(buffers, role).size = size;
+         {VkDeviceSize{0}, VkDeviceSize{VK_WHOLE_SIZE}, rangeOf(buffers).size + 2}) {
+      rangeOf(buffers).size = size;
       expectRefused(batch, buffers, ErrorCode::invalidArgument,
                     std::string(name) + ": its size must be");
     }
-    rangeOf(buffers, role).offset = 512;
-    rangeOf(buffers, role).size = batch.range(role).size;
+    rangeOf(buffers).offset = 512;
+    rangeOf(buffers).size = batch.range(role).size;
     EXPECT_TRUE(record(batch, buffers).ok()) << name;
   }
 }
@@ -140,11 +89,11 @@ TEST_F(RecordTest, RangesThatCannotBeBoundAreRefused) {
 TEST_F(RecordTest, OnlyOutputsMayBeLargerThanARange) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
-  for (const auto& [role, name] : roles) {
+  for (const auto& [role, name, rangeOf] : roles) {
     BatchBuffers buffers = batch.buffers();
-    rangeOf(buffers, role).size = context->limits().maxStorageBufferRange;
+    rangeOf(buffers).size = context->limits().maxStorageBufferRange;
     EXPECT_TRUE(record(batch, buffers).ok()) << name;
-    rangeOf(buffers, role).size += 4;
+    rangeOf(buffers).size += 4;
     if (role >= BufferRole::positions) {
       EXPECT_TRUE(record(batch, buffers).ok()) << name;
     } else {
@@ -183,16 +132,16 @@ TEST_F(RecordTest, WithFourStorageBuffersAllAttributesGoToOne) {
 TEST_F(RecordTest, BuffersThatThePlanUsesMustBeLargeEnough) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
-  for (const auto& [role, name] : roles) {
+  for (const auto& [role, name, rangeOf] : roles) {
     const std::string prefix = "outputs.";
     std::string text = name;
     if (text.find(prefix) == 0) text.erase(0, prefix.size());
     if (text == "previousPositions") text = "previous positions";
     const std::string needed = std::to_string(batch.plan.buffer(role).size);
     BatchBuffers buffers = batch.buffers();
-    rangeOf(buffers, role).size -= 4;
+    rangeOf(buffers).size -= 4;
     expectRefused(batch, buffers, ErrorCode::invalidArgument, needed + " bytes of " + text);
-    rangeOf(buffers, role) = {};
+    rangeOf(buffers) = {};
     expectRefused(batch, buffers, ErrorCode::invalidArgument, "the bindings have 0");
   }
 }
@@ -496,6 +445,7 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     bytes.storageBuffer8BitAccess = VK_TRUE;
     bytes.scalarBlockLayout = seed % 8 < 4 ? VK_TRUE : VK_FALSE;
     bytes.pNext = &integers;
+    VkPhysicalDevice16BitStorageFeatures halves{};
     halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
     halves.storageBuffer16BitAccess = VK_TRUE;
     halves.pNext = &bytes;
@@ -523,7 +473,10 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
 }
 
 TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
-  ASSERT_NO_FATAL_FAILURE(create(true, true));
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  halves.storageBuffer16BitAccess = VK_TRUE;
+  ASSERT_NO_FATAL_FAILURE(create(true, {}, &halves));
   MockBatch batch = richBatch(context->limits());
   Job halved = batch.batch.jobOf(0, 0, Method::linear);
   halved.positions.format = VertexFormat::float16x3;

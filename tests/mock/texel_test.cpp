@@ -17,35 +17,16 @@
 namespace dermis::test {
 namespace {
 
-struct TexelTest : public ::testing::Test {
+struct TexelTest : public MockContextTest {
   TexelTest() {
     mock.limits.maxTexelBufferElements = 1 << 27;
     mock.limits.minTexelBufferOffsetAlignment = 16;
   }
-  void create(bool push = false, bool texelBuffers = true) {
-    mock.extensions.clear();
-    if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
-    vulkan::DeviceDescription description = mock.description();
-    description.texelBuffers = texelBuffers;
-    Result<vulkan::Context> made = vulkan::Context::create(description);
-    ASSERT_TRUE(made.ok());
-    context.emplace(std::move(*made));
-  }
-  Result<void> record(const MockBatch& batch, const vulkan::BatchBuffers& buffers) {
-    mock.dispatches.clear();
-    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
-    const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
-    if (!bindings) return bindings.error();
-    return context->record(commandBuffer, batch.plan, *bindings);
-  }
-
-  MockVulkan mock;
-  std::optional<vulkan::Context> context;
 };
 
 TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
   for (const bool push : {false, true}) {
-    ASSERT_NO_FATAL_FAILURE(create(push));
+    ASSERT_NO_FATAL_FAILURE(create(push, true));
     mock.texelDescriptorsInPool = 0;
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
     vulkan::BatchBuffers buffers = batch.buffers();
@@ -133,7 +114,7 @@ TEST_F(TexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
   const MockBatch batch = MockBatch::withAllMethods(context->limits());
   EXPECT_EQ(batch.plan.buffer(BufferRole::meshes).usage & 0x04u, 0u);
   for (const Variant& variant : batch.plan.variants()) EXPECT_FALSE(variant.texels);
-  ASSERT_TRUE(record(batch, batch.buffers()).ok());
+  ASSERT_TRUE(record(batch).ok());
   EXPECT_TRUE(mock.views.empty());
 }
 
@@ -143,15 +124,15 @@ TEST_F(TexelTest, ADeviceWithFewTexelsReadsStorageBuffers) {
   const std::uint64_t range = mock.limits.maxStorageBufferRange;
   for (const std::uint64_t texels : {std::uint64_t{65536}, range / 4 - 1}) {
     mock.limits.maxTexelBufferElements = static_cast<std::uint32_t>(texels);
-    ASSERT_NO_FATAL_FAILURE(create());
+    ASSERT_NO_FATAL_FAILURE(create(false, true));
     EXPECT_FALSE(context->limits().texelBuffers);
     EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 256u);
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
-    ASSERT_TRUE(record(batch, batch.buffers()).ok());
+    ASSERT_TRUE(record(batch).ok());
     EXPECT_TRUE(mock.views.empty());
   }
   mock.limits.maxTexelBufferElements = static_cast<std::uint32_t>(range / 4);
-  ASSERT_NO_FATAL_FAILURE(create());
+  ASSERT_NO_FATAL_FAILURE(create(false, true));
   EXPECT_TRUE(context->limits().texelBuffers);
 }
 
@@ -261,12 +242,7 @@ TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   VkPhysicalDeviceFeatures2 features{};
   features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features.features.shaderInt64 = VK_TRUE;
-  vulkan::DeviceDescription description = mock.description();
-  description.enabledFeatures = &features;
-  description.texelBuffers = true;
-  Result<vulkan::Context> made = vulkan::Context::create(description);
-  ASSERT_TRUE(made.ok());
-  context.emplace(std::move(*made));
+  ASSERT_NO_FATAL_FAILURE(create(false, true, &features));
   ASSERT_TRUE(context->limits().shaderInt64);
   MockBatch batch;
   batch.batch.addJob(0, 0, Method::dualQuaternion, true);
@@ -281,15 +257,12 @@ TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   vulkan::BatchBuffers buffers = batch.buffers();
   EXPECT_TRUE(record(batch, buffers).ok());
   buffers.outputs.normals.buffer = bufferOf(BufferRole::normals);
-  const Result<void> recorded = record(batch, buffers);
-  ASSERT_FALSE(recorded.ok());
-  EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
-  EXPECT_NE(recorded.error().message.find("one buffer"), std::string::npos);
+  expectRefused(batch, buffers, ErrorCode::invalidArgument, "one buffer");
 }
 
 TEST_F(TexelTest, AlignmentIsTheGreaterOfBoth) {
   mock.limits.minTexelBufferOffsetAlignment = 1024;
-  ASSERT_NO_FATAL_FAILURE(create());
+  ASSERT_NO_FATAL_FAILURE(create(false, true));
   EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 1024u);
   ASSERT_NO_FATAL_FAILURE(create(false, false));
   EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 256u);
@@ -300,7 +273,7 @@ TEST_F(TexelTest, AFailedViewIsAnErrorAndLeaksNothing) {
   mock.allocator = &callbacks;
   for (const bool push : {false, true}) {
     for (int failAfter = 0; failAfter <= 5; ++failAfter) {
-      ASSERT_NO_FATAL_FAILURE(create(push));
+      ASSERT_NO_FATAL_FAILURE(create(push, true));
       const MockBatch batch = MockBatch::withAllMethods(context->limits());
       mock.failing = "vkCreateBufferView";
       mock.failAfter = failAfter;
