@@ -1,6 +1,7 @@
 #include "command_log.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace dermis::test {
 namespace {
@@ -25,13 +26,12 @@ struct RealFunctions {
   PFN_vkCreateQueryPool CreateQueryPool;
 } real;
 
-/// Counts the call; whether it fails, and with what.
-bool fails(const char* name, VkResult& result) {
+/// Counts the call; what it fails with, if it does.
+std::optional<VkResult> failureOf(const char* name) {
   ++commandLog->calls[name];
   const auto failure = commandLog->failures.find(name);
-  if (failure == commandLog->failures.end()) return false;
-  result = failure->second;
-  return true;
+  if (failure == commandLog->failures.end()) return std::nullopt;
+  return failure->second;
 }
 
 void VKAPI_CALL cmdDispatch(VkCommandBuffer commandBuffer, std::uint32_t x, std::uint32_t y,
@@ -84,9 +84,8 @@ void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer commandBuffer, VkPipelineStag
 
 VkResult VKAPI_CALL createBuffer(VkDevice device, const VkBufferCreateInfo* info,
                                  const VkAllocationCallbacks* allocator, VkBuffer* buffer) {
-  VkResult result = VK_SUCCESS;
-  if (fails("vkCreateBuffer", result)) return result;
-  result = real.CreateBuffer(device, info, allocator, buffer);
+  if (const auto failure = failureOf("vkCreateBuffer")) return *failure;
+  const VkResult result = real.CreateBuffer(device, info, allocator, buffer);
   if (result == VK_SUCCESS) ++commandLog->buffersAlive;
   return result;
 }
@@ -97,9 +96,8 @@ void VKAPI_CALL destroyBuffer(VkDevice device, VkBuffer buffer,
 }
 VkResult VKAPI_CALL allocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
                                    const VkAllocationCallbacks* allocator, VkDeviceMemory* memory) {
-  VkResult result = VK_SUCCESS;
-  if (fails("vkAllocateMemory", result)) return result;
-  result = real.AllocateMemory(device, info, allocator, memory);
+  if (const auto failure = failureOf("vkAllocateMemory")) return *failure;
+  const VkResult result = real.AllocateMemory(device, info, allocator, memory);
   if (result != VK_SUCCESS) return result;
   ++commandLog->allocationsAlive;
   commandLog->allocatedBytes += info->allocationSize;
@@ -112,20 +110,17 @@ void VKAPI_CALL freeMemory(VkDevice device, VkDeviceMemory memory,
 }
 VkResult VKAPI_CALL bindBufferMemory(VkDevice device, VkBuffer buffer, VkDeviceMemory memory,
                                      VkDeviceSize offset) {
-  VkResult result = VK_SUCCESS;
-  if (fails("vkBindBufferMemory", result)) return result;
+  if (const auto failure = failureOf("vkBindBufferMemory")) return *failure;
   return real.BindBufferMemory(device, buffer, memory, offset);
 }
 VkResult VKAPI_CALL mapMemory(VkDevice device, VkDeviceMemory memory, VkDeviceSize offset,
                               VkDeviceSize size, VkMemoryMapFlags flags, void** data) {
-  VkResult result = VK_SUCCESS;
-  if (fails("vkMapMemory", result)) return result;
+  if (const auto failure = failureOf("vkMapMemory")) return *failure;
   return real.MapMemory(device, memory, offset, size, flags, data);
 }
 VkResult VKAPI_CALL createQueryPool(VkDevice device, const VkQueryPoolCreateInfo* info,
                                     const VkAllocationCallbacks* allocator, VkQueryPool* pool) {
-  VkResult result = VK_SUCCESS;
-  if (fails("vkCreateQueryPool", result)) return result;
+  if (const auto failure = failureOf("vkCreateQueryPool")) return *failure;
   return real.CreateQueryPool(device, info, allocator, pool);
 }
 

@@ -48,13 +48,9 @@ std::vector<std::byte> CpuEngine::readOutput() const {
 
 Streams CpuEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
   const InstanceOutput output = must(system_.output(instance));
-  const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
-  Streams streams;
-  if (output.size == 0) return streams;
+  if (output.size == 0) return {};
   const std::uint32_t vertices = vertexCounts_.at({output.mesh.index, output.mesh.generation});
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    streams[stream] = readAttribute(bytes, attributes[stream], vertices);
-  return streams;
+  return readStreams(bytes, output, vertices);
 }
 
 }  // namespace dermis::test

@@ -40,6 +40,15 @@ std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
   return copy;
 }
 
+Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& output,
+                    std::uint32_t vertexCount) {
+  Streams streams;
+  if (output.size == 0) return streams;
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    streams[stream] = readAttribute(bytes, attributesOf(output)[stream], vertexCount);
+  return streams;
+}
+
 PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
                       std::uint32_t influences) {
   OwnedMesh mesh = randomMesh(seed, vertexCount, jointCount, influences);

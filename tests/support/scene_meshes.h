@@ -33,6 +33,10 @@ using Streams = std::array<std::vector<std::byte>, streamCount>;
 /// The attributes of an output, by `Stream`.
 std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output);
 
+/// All of an output of so many vertices; nothing where there is none.
+Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& output,
+                    std::uint32_t vertexCount);
+
 /// One attribute of so many vertices out of the bytes of an output buffer.
 std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
                                      const OutputAttribute& attribute, std::uint32_t vertexCount);

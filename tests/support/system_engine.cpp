@@ -218,12 +218,7 @@ Streams SystemEngine::read(InstanceHandle instance) {
 
 Streams SystemEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
   const InstanceOutput output = must(system_.output(instance));
-  const std::array<OutputAttribute, streamCount> attributes = attributesOf(output);
-  Streams streams;
-  if (output.size == 0) return streams;
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    streams[stream] = readAttribute(bytes, attributes[stream], vertexCount(output.mesh));
-  return streams;
+  return output.size == 0 ? Streams{} : readStreams(bytes, output, vertexCount(output.mesh));
 }
 
 }  // namespace dermis::test
