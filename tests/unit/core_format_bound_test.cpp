@@ -222,6 +222,12 @@ TEST(FormatBounds, PositionsInABoxAreInsideAndSomeAreNear) {
   }
 }
 
+struct Formats {
+  VertexFormat position = VertexFormat::float32x3;
+  VertexFormat normal = VertexFormat::float32x3;
+  VertexFormat tangent = VertexFormat::float32x4;
+};
+
 /// One vertex of each attribute, encoded, and what is expected of it.
 struct OneVertex {
   OneVertex() {
@@ -232,22 +238,20 @@ struct OneVertex {
   }
 
   /// Encodes all that is expected.
-  void encode(VertexFormat position, VertexFormat normal, VertexFormat tangent) {
-    positionFormat = position;
-    normalFormat = normal;
-    tangentFormat = tangent;
-    positionBytes = encodePosition(position, expected.positions[0], box);
-    normalBytes = encodeNormal(normal, expected.normals[0]);
-    tangentBytes = encodeTangent(tangent, expected.tangents[0]);
+  void encode(const Formats& wanted) {
+    formats = wanted;
+    positionBytes = encodePosition(formats.position, expected.positions[0], box);
+    normalBytes = encodeNormal(formats.normal, expected.normals[0]);
+    tangentBytes = encodeTangent(formats.tangent, expected.tangents[0]);
   }
 
   Comparison compared(Method method = Method::linear, const Exemptions& exemptions = {}) const {
     reference::SkinnedMesh bounded = expected;
     bounded.bounds = {boundsOf(method, conditioning)};
     SkinnedView view;
-    view.positions = {positionBytes.data(), 1, formatSize(positionFormat), positionFormat};
-    view.normals = {normalBytes.data(), 1, formatSize(normalFormat), normalFormat};
-    view.tangents = {tangentBytes.data(), 1, formatSize(tangentFormat), tangentFormat};
+    view.positions = {positionBytes.data(), 1, formatSize(formats.position), formats.position};
+    view.normals = {normalBytes.data(), 1, formatSize(formats.normal), formats.normal};
+    view.tangents = {tangentBytes.data(), 1, formatSize(formats.tangent), formats.tangent};
     view.box = box;
     const Result<Comparison> result = compareWithReference(bounded, view, exemptions);
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
@@ -257,7 +261,7 @@ struct OneVertex {
 
   reference::SkinnedMesh expected;  ///< without bounds
   reference::Conditioning conditioning;
-  VertexFormat positionFormat{}, normalFormat{}, tangentFormat{};
+  Formats formats;
   EncodedVertex positionBytes, normalBytes, tangentBytes;
   Box box{{-1, -1, -1}, {1, 1, 1}};
 };
@@ -278,7 +282,7 @@ TEST_P(ComparePosition, APositionIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
-      vertex.encode(GetParam(), VertexFormat::float32x3, VertexFormat::float32x4);
+      vertex.encode({.position = GetParam()});
       const Double3 stored = decodePosition(GetParam(), vertex.positionBytes.data(), vertex.box);
       const double skinning = positionBound(method, vertex.conditioning);
       Double3& expected = vertex.expected.positions[0];
@@ -301,7 +305,7 @@ TEST_P(CompareNormal, ANormalIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
-      vertex.encode(VertexFormat::float32x3, GetParam(), VertexFormat::float32x4);
+      vertex.encode({.normal = GetParam()});
       const double bound = normalBound(method, vertex.conditioning) + normalFormatBound(GetParam());
       vertex.expected.normals[0] =
           awayFrom(decodeNormal(GetParam(), vertex.normalBytes.data()), share * bound);
@@ -316,7 +320,7 @@ TEST_P(CompareTangent, ATangentIsHeldToItsOwnBound) {
   for (const Method method : allMethods) {
     for (const double share : {0.5, 0.999, 1.001, 2.0}) {
       OneVertex vertex;
-      vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, GetParam());
+      vertex.encode({.tangent = GetParam()});
       const double bound =
           tangentBound(method, vertex.conditioning) + tangentFormatBound(GetParam());
       const Double3 expected =
@@ -333,7 +337,7 @@ TEST_P(CompareTangent, AWrongHandednessIsFound) {
   for (const double handedness : {1.0, -1.0}) {
     OneVertex vertex;
     vertex.expected.tangents[0][3] = handedness;
-    vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, GetParam());
+    vertex.encode({.tangent = GetParam()});
     EXPECT_TRUE(vertex.passes());
     vertex.expected.tangents[0][3] = -handedness;
     EXPECT_FALSE(vertex.passes());
@@ -348,7 +352,7 @@ TEST_P(CompareTangent, AWrongHandednessIsFound) {
 // The smallest step that the format has away from ±1.
 TEST_P(CompareFourth, AHandednessThatIsNotWholeIsFound) {
   OneVertex vertex;
-  vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, GetParam());
+  vertex.encode({.tangent = GetParam()});
   const std::size_t lastComponent = vertex.tangentBytes.size() / 4 * 3;
   // From -127 to -126, for -128 stands for -1 too; to the next number of a float.
   const unsigned char bits = isSnorm(GetParam()) ? 3 : 1;
@@ -362,8 +366,8 @@ TEST_P(CompareFourth, FourthComponentsMustBeFilled) {
   for (const bool ofPosition : {true, false}) {
     if (ofPosition && !isPositionFormat(GetParam())) continue;
     OneVertex vertex;
-    vertex.encode(ofPosition ? GetParam() : VertexFormat::float32x3,
-                  ofPosition ? VertexFormat::float32x3 : GetParam(), VertexFormat::float32x4);
+    vertex.encode({.position = ofPosition ? GetParam() : VertexFormat::float32x3,
+                   .normal = ofPosition ? VertexFormat::float32x3 : GetParam()});
     EXPECT_TRUE(vertex.passes());
     EncodedVertex& bytes = ofPosition ? vertex.positionBytes : vertex.normalBytes;
     bytes[bytes.size() / 4 * 3] ^= 2;
@@ -378,7 +382,7 @@ TEST_P(CompareNormal, AZeroDirectionStaysZeroOrIsUpInAnOctahedron) {
   vertex.expected.tangents[0] = {0, 0, 0, 1};
   const VertexFormat tangentFormat =
       isTangentFormat(GetParam()) ? GetParam() : VertexFormat::float32x4;
-  vertex.encode(VertexFormat::float32x3, GetParam(), tangentFormat);
+  vertex.encode({.normal = GetParam(), .tangent = tangentFormat});
   for (const Method method : allMethods) EXPECT_TRUE(vertex.passes(method));
   const EncodedVertex zeroNormal = vertex.normalBytes;
   vertex.normalBytes = encodeNormal(GetParam(), {0, 1, 0});
@@ -397,7 +401,7 @@ TEST_P(CompareLength, WhereOnlyTheLengthCanBeSaidTheFormatIsAllowedFor) {
   for (int trial = 0; trial < 10000; ++trial) {
     const Double3 any = directions.next();
     const Double4 stored{any[0], any[1], any[2], -1};
-    vertex.encode(VertexFormat::float32x3, GetParam(), VertexFormat::float32x4);
+    vertex.encode({.normal = GetParam()});
     vertex.normalBytes = encodeNormal(GetParam(), any);
     EXPECT_TRUE(vertex.passes());
     vertex.normalBytes =
@@ -405,7 +409,7 @@ TEST_P(CompareLength, WhereOnlyTheLengthCanBeSaidTheFormatIsAllowedFor) {
                                   any[2] * (1 - 2.1 * tolerance)});
     EXPECT_FALSE(vertex.passes());
     if (!isTangentFormat(GetParam())) continue;
-    vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, GetParam());
+    vertex.encode({.tangent = GetParam()});
     vertex.tangentBytes = encodeTangent(GetParam(), stored);
     EXPECT_TRUE(vertex.passes());
   }
@@ -418,7 +422,7 @@ TEST_P(CompareFinite, NumbersThatAreNotFiniteFail) {
     OneVertex vertex;
     const VertexFormat tangentFormat =
         isTangentFormat(GetParam()) ? GetParam() : VertexFormat::float32x4;
-    vertex.encode(GetParam(), GetParam(), tangentFormat);
+    vertex.encode({.position = GetParam(), .normal = GetParam(), .tangent = tangentFormat});
     EXPECT_TRUE(vertex.passes(method));
     const OneVertex good = vertex;
     vertex.positionBytes = encodePosition(GetParam(), infinite);
@@ -458,7 +462,7 @@ TEST(CompareHalf, APositionMayOverflowWhereTheReferenceDoes) {
   OneVertex vertex;
   vertex.conditioning.scale = 70000;  // a bound of 0.025
   const auto passes = [&](double expected, double stored) {
-    vertex.encode(VertexFormat::float16x3, VertexFormat::float32x3, VertexFormat::float32x4);
+    vertex.encode({.position = VertexFormat::float16x3});
     vertex.expected.positions[0] = {1, expected, -2};
     vertex.positionBytes = encodePosition(VertexFormat::float16x3, {1, stored, -2});
     return vertex.passes();
@@ -481,7 +485,7 @@ TEST(CompareHalf, APositionMayOverflowWhereTheReferenceDoes) {
 
 TEST(CompareHalf, AnArbitraryPositionMayOverflowWhereItIsLarge) {
   OneVertex vertex;
-  vertex.encode(VertexFormat::float16x3, VertexFormat::float32x3, VertexFormat::float32x4);
+  vertex.encode({.position = VertexFormat::float16x3});
   vertex.positionBytes = encodePosition(VertexFormat::float16x3, {HUGE_VAL, 0, 0});
   vertex.conditioning.signAmbiguous = true;
   EXPECT_FALSE(vertex.compared(Method::dualQuaternion, {1, 0}).passed());
@@ -495,14 +499,14 @@ TEST(CompareBox, WhatLiesOutsideIsComparedWithTheNearestPointOfTheBox) {
     OneVertex vertex;
     vertex.box = {{-1, 2, 5}, {1, 4, 5}};
     vertex.expected.positions[0] = {3, 2.5, 4};
-    vertex.encode(format, VertexFormat::float32x3, VertexFormat::float32x4);
+    vertex.encode({.position = format});
     EXPECT_TRUE(vertex.passes());
     EXPECT_EQ(vertex.compared().clamped, 1u);
     EXPECT_LT(vertex.compared().largestPositionError, 1e-4);
     vertex.positionBytes = encodePosition(format, {0.999, 2.5, 5}, vertex.box);
     EXPECT_FALSE(vertex.passes());
     vertex.expected.positions[0] = {1, 2, 5};
-    vertex.encode(format, VertexFormat::float32x3, VertexFormat::float32x4);
+    vertex.encode({.position = format});
     EXPECT_TRUE(vertex.passes());
     EXPECT_EQ(vertex.compared().clamped, 0u) << "its faces belong to the box";
   }
@@ -513,7 +517,7 @@ TEST(CompareBox, ABoxThatIsNoneIsRefused) {
   const float infinity = std::numeric_limits<float>::infinity();
   OneVertex vertex;
   vertex.expected.bounds.resize(1);
-  vertex.encode(VertexFormat::snorm16x3, VertexFormat::float32x3, VertexFormat::float32x4);
+  vertex.encode({.position = VertexFormat::snorm16x3});
   SkinnedView view;
   view.positions = {vertex.positionBytes.data(), 1, 6, VertexFormat::snorm16x3};
   for (const Box& box :
@@ -524,7 +528,7 @@ TEST(CompareBox, ABoxThatIsNoneIsRefused) {
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
   }
   // Other formats have no use for it.
-  vertex.encode(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::float32x4);
+  vertex.encode({});
   view.positions = {vertex.positionBytes.data(), 1, 12, VertexFormat::float32x3};
   EXPECT_TRUE(compareWithReference(vertex.expected, view).ok());
 }

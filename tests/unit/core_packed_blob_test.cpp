@@ -97,11 +97,13 @@ struct DamagedBlob : public ::testing::Test {
   }
 
   /// Word `index` changed, the checksum made right again.
+  static Blob changed(Blob blob, std::size_t index, std::uint32_t value) {
+    blob.words().at(index) = value;
+    blob.seal();
+    return blob;
+  }
   void expectRefusedWith(std::size_t index, std::uint32_t value) {
-    Blob changed = blob;
-    changed.words().at(index) = value;
-    changed.seal();
-    expectRefused(changed.bytes(), ErrorCode::invalidData,
+    expectRefused(changed(blob, index, value).bytes(), ErrorCode::invalidData,
                   "word " + std::to_string(index) + " = " + std::to_string(value));
   }
   std::uint32_t size() const { return static_cast<std::uint32_t>(blob.size()); }
@@ -158,10 +160,8 @@ TEST_F(DamagedBlob, SwappedWordsAreRefused) {
 TEST_F(DamagedBlob, AnotherVersionIsNamed) {
   ASSERT_EQ(abi::MESH_VERSION, 6u);
   for (const std::uint32_t version : {0u, 1u, 2u, 3u, 4u, 5u, 7u, 0xffffffffu}) {
-    Blob changed = blob;
-    changed.words()[header::version] = version;
-    changed.seal();
-    const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
+    const Result<PackedMesh> result =
+        PackedMesh::fromBytes(changed(blob, header::version, version).bytes());
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::unsupportedVersion);
     EXPECT_NE(result.error().message.find("version " + std::to_string(version)), std::string::npos);
@@ -215,12 +215,11 @@ TEST_F(DamagedBlob, EveryHeaderFieldIsChecked) {
 }
 
 TEST_F(DamagedBlob, WhatOnlySomeMethodsWantMayBeAbsent) {
-  Blob changed = blob;
+  Blob without = blob;
   for (const std::uint32_t header :
        {header::centers, header::dualQuaternionWeights, header::bulgeStrengths}) {
-    changed.words()[header] = 0;
-    changed.seal();
-    const Result<PackedMesh> result = PackedMesh::fromBytes(changed.bytes());
+    without = changed(without, header, 0);
+    const Result<PackedMesh> result = PackedMesh::fromBytes(without.bytes());
     ASSERT_TRUE(result.ok()) << result.error().message;
     EXPECT_FALSE(result->info().hasCentersOfRotation);
   }
@@ -296,18 +295,14 @@ TEST_F(DamagedBlob, DisplacementsOutsideTheBlobAreRefused) {
         expectRefusedWith(entry + morphBlockDisplacements, offset);
       }
       // At the very end there is room for those that there are, and for no more.
-      Blob changed = blob;
-      changed.words()[entry + morphBlockDisplacements] = size() - displaced * words;
-      changed.seal();
-      ASSERT_TRUE(PackedMesh::fromBytes(changed.bytes()).ok());
+      const Blob atEnd = changed(blob, entry + morphBlockDisplacements, size() - displaced * words);
+      ASSERT_TRUE(PackedMesh::fromBytes(atEnd.bytes()).ok());
       // One more in the mask, high or low.
       for (const std::uint32_t half : {0u, 1u}) {
-        const std::uint32_t mask = changed.word(entry + half);
+        const std::uint32_t mask = atEnd.word(entry + half);
         if (mask == 0xffffffffu) continue;
-        Blob fuller = changed;
-        fuller.words()[entry + half] = mask | (mask + 1);
-        fuller.seal();
-        expectRefused(fuller.bytes(), ErrorCode::invalidData, "mask " + std::to_string(half));
+        expectRefused(changed(atEnd, entry + half, mask | (mask + 1)).bytes(),
+                      ErrorCode::invalidData, "mask " + std::to_string(half));
       }
     }
   }

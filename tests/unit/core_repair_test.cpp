@@ -33,6 +33,17 @@ T valueAt(const AttributeView& view, std::uint32_t vertex, std::uint32_t compone
   return value;
 }
 
+using Vector = std::array<float, 3>;
+constexpr Vector zero{0, 0, 0};
+
+Vector vectorAt(const AttributeView& view, std::uint32_t vertex) {
+  return {valueAt<float>(view, vertex, 0), valueAt<float>(view, vertex, 1),
+          valueAt<float>(view, vertex, 2)};
+}
+Vector vectorAt(const std::vector<float>& values, std::uint32_t vertex) {
+  return {values[vertex * 3], values[vertex * 3 + 1], values[vertex * 3 + 2]};
+}
+
 OwnedMesh goodMesh() {
   OwnedMesh mesh;
   mesh.name = "a mesh with a name that is too long for the small-string buffer";
@@ -65,10 +76,8 @@ TEST(Repair, AGoodMeshComesBackAsItWas) {
   EXPECT_EQ(view.influenceSets[0].joints.type, ComponentType::uint32);
   EXPECT_EQ(view.influenceSets[0].weights.type, ComponentType::float32);
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      EXPECT_EQ(valueAt<float>(view.positions, vertex, i), mesh.positions[vertex * 3 + i]);
-      EXPECT_EQ(valueAt<float>(view.normals, vertex, i), mesh.normals[vertex * 3 + i]);
-    }
+    EXPECT_EQ(vectorAt(view.positions, vertex), vectorAt(mesh.positions, vertex));
+    EXPECT_EQ(vectorAt(view.normals, vertex), vectorAt(mesh.normals, vertex));
     for (std::uint32_t slot = 0; slot < 4; ++slot) {
       EXPECT_EQ(valueAt<float>(view.influenceSets[0].weights, vertex, slot),
                 mesh.weights[vertex * 4 + slot]);
@@ -113,12 +122,10 @@ TEST(Repair, ElementsThatAreNotFiniteBecomeZeroAsAWhole) {
   view.tangents = floatAttribute(tangents.data(), 6, 4);
   const RepairedMesh result = repaired(view, 10);
   const MeshView mended = result.view();
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(valueAt<float>(mended.positions, 1, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.positions, 2, i), mesh.positions[2 * 3 + i]);
-    EXPECT_EQ(valueAt<float>(mended.normals, 2, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.normals, 1, i), mesh.normals[1 * 3 + i]);
-  }
+  EXPECT_EQ(vectorAt(mended.positions, 1), zero);
+  EXPECT_EQ(vectorAt(mended.positions, 2), vectorAt(mesh.positions, 2));
+  EXPECT_EQ(vectorAt(mended.normals, 2), zero);
+  EXPECT_EQ(vectorAt(mended.normals, 1), vectorAt(mesh.normals, 1));
   for (std::uint32_t i = 0; i < 4; ++i) {
     EXPECT_EQ(valueAt<float>(mended.tangents, 3, i), 0.0f);
     EXPECT_EQ(valueAt<float>(mended.tangents, 4, i), 0.5f);
@@ -144,10 +151,7 @@ TEST(Repair, WhatOnlySomeMethodsWantIsKept) {
     EXPECT_EQ(valueAt<float>(mended.dualQuaternionWeights, vertex, 0),
               static_cast<float>(weights[vertex]) / 65535);
     EXPECT_EQ(valueAt<float>(mended.bulgeStrengths, vertex, 0), mesh.bulgeStrengths[vertex]);
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      EXPECT_EQ(valueAt<float>(mended.centersOfRotation, vertex, i),
-                mesh.centersOfRotation[vertex * 3 + i]);
-    }
+    EXPECT_EQ(vectorAt(mended.centersOfRotation, vertex), vectorAt(mesh.centersOfRotation, vertex));
   }
   // What the mesh lacks it goes on lacking, with the mesh's own shares.
   view = goodMesh().view();
@@ -178,10 +182,8 @@ TEST(Repair, SharesAreClampedCentersThatAreNotFiniteBecomeZero) {
   for (std::uint32_t vertex = 0; vertex < 6; ++vertex) {
     EXPECT_EQ(valueAt<float>(mended.dualQuaternionWeights, vertex, 0), weights[vertex]);
     EXPECT_EQ(valueAt<float>(mended.bulgeStrengths, vertex, 0), strengths[vertex]);
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      EXPECT_EQ(valueAt<float>(mended.centersOfRotation, vertex, i),
-                vertex == 1 || vertex == 4 ? 0.0f : 5.0f);
-    }
+    EXPECT_EQ(vectorAt(mended.centersOfRotation, vertex),
+              vertex == 1 || vertex == 4 ? zero : (Vector{5, 5, 5}));
   }
   EXPECT_TRUE(validate(mended, 10).findings.empty());
   EXPECT_TRUE(pack(mended, 10)->info().hasCentersOfRotation);
@@ -224,10 +226,9 @@ TEST(Repair, APositionThatOverflowsByItsScaleBecomesZero) {
   MeshView view = mesh.view();
   view.positionScale = {2, 2, 2};
   const RepairedMesh result = repaired(view, 10);
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(valueAt<float>(result.view().positions, 1, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(result.view().positions, 2, i), 2 * mesh.positions[2 * 3 + i]);
-  }
+  EXPECT_EQ(vectorAt(result.view().positions, 1), zero);
+  for (float& x : mesh.positions) x *= 2;
+  EXPECT_EQ(vectorAt(result.view().positions, 2), vectorAt(mesh.positions, 2));
 }
 
 TEST(Repair, AFourthComponentThatIsNotReadIsLeftOut) {
@@ -301,15 +302,14 @@ TEST(Repair, DisplacementsThatAreNotFiniteBecomeZeroAsAWhole) {
   EXPECT_EQ(result.report().find(MeshProblem::nonFiniteMorph)->count, 2u);
   const MeshView mended = result.view();
   EXPECT_TRUE(validate(mended, 10).findings.empty());
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(valueAt<float>(mended.morphTargets[0].normals, 2, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.morphTargets[0].normals, 3, i), targets.dense[3 * 3 + i]);
-    // Its position is finite: it stays.
+  EXPECT_EQ(vectorAt(mended.morphTargets[0].normals, 2), zero);
+  EXPECT_EQ(vectorAt(mended.morphTargets[0].normals, 3), vectorAt(targets.dense, 3));
+  // Its position is finite: it stays.
+  for (std::uint32_t i = 0; i < 3; ++i)
     EXPECT_NE(valueAt<float>(mended.morphTargets[0].positions, 2, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].positions, 1, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].tangents, 1, i), 0.0f);
-    EXPECT_EQ(valueAt<float>(mended.morphTargets[1].positions, 0, i), targets.sparse[i]);
-  }
+  EXPECT_EQ(vectorAt(mended.morphTargets[1].positions, 1), zero);
+  EXPECT_EQ(vectorAt(mended.morphTargets[1].tangents, 1), zero);
+  EXPECT_EQ(vectorAt(mended.morphTargets[1].positions, 0), vectorAt(targets.sparse, 0));
 }
 
 TEST(Repair, MorphTargetsWhoseVerticesMakeNoSenseAreRefused) {

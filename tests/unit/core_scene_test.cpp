@@ -12,6 +12,7 @@
 
 #include "dermis/scene.h"
 #include "plan_commands.h"
+#include "scene_meshes.h"
 
 namespace dermis::test {
 namespace {
@@ -45,11 +46,20 @@ struct OneInstance {
     instance = *scene.addInstance(description);
   }
 
+  void plan(std::uint64_t frame, std::uint64_t completed) {
+    must(scene.beginFrame(frame, completed));
+    must(scene.plan(planned));
+  }
+  void record(std::uint64_t frame, std::uint64_t completed) {
+    plan(frame, completed);
+    must(scene.commit());
+  }
+
   Scene scene = *Scene::create(smallScene());
   MeshHandle mesh;
   PoseHandle pose;
   InstanceHandle instance;
-  Plan plan;
+  Plan planned;
 };
 
 /// The kinds of a plan's commands, and for copies and clears their buffers.
@@ -94,10 +104,9 @@ std::vector<std::string> namesOf(const Plan& plan) {
 
 TEST(Scene, AFrameUploadsConvertsSkinsAndReadsBack) {
   OneInstance one;
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  one.plan(1, 0);
   EXPECT_EQ(
-      namesOf(one.plan),
+      namesOf(one.planned),
       (std::vector<std::string>{"barrier", "upload to tables", "barrier", "palette", "clear",
                                 "barrier", "skin", "barrier", "results to read-back", "barrier"}));
 }
@@ -178,90 +187,80 @@ TEST(Scene, TheGpuChoosesBeforeItSkins) {
   const std::vector<std::string> first{"barrier",
                                        "upload to tables",
                                        "clear counters",
-                                       "clear history",
+                                       "clear history",  //
                                        "barrier",
                                        "visibility",
                                        "barrier",
-                                       "visibility",
+                                       "visibility",  //
                                        "barrier",
                                        "palette",
-                                       "clear",
+                                       "clear",  //
                                        "barrier",
-                                       "indirect skin",
+                                       "indirect skin",  //
                                        "barrier",
                                        "counters to read-back",
                                        "results to read-back",
                                        "barrier"};
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(namesOf(one.plan), first);
+  one.plan(1, 0);
+  EXPECT_EQ(namesOf(one.planned), first);
   // History is cleared until a frame that does so is recorded, and never again.
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(namesOf(one.plan), first);
+  ASSERT_TRUE(one.scene.plan(one.planned).ok());
+  EXPECT_EQ(namesOf(one.planned), first);
   ASSERT_TRUE(one.scene.commit().ok());
-  ASSERT_TRUE(one.scene.beginFrame(2, 1).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear history"), 0);
-  EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear counters"), 1);
+  one.plan(2, 1);
+  EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 0);
+  EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear counters"), 1);
 }
 
 TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
   OneInstance one;
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  const std::vector<std::string> all = namesOf(one.plan);
-  ASSERT_TRUE(one.scene.beginFrame(2, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(namesOf(one.plan), all);
+  one.plan(1, 0);
+  const std::vector<std::string> all = namesOf(one.planned);
+  one.plan(2, 0);
+  EXPECT_EQ(namesOf(one.planned), all);
   EXPECT_EQ(one.scene.output(one.instance)->size, 0u);
   ASSERT_TRUE(one.scene.commit().ok());
   EXPECT_EQ(one.scene.output(one.instance)->size, 100u * 12u);
   EXPECT_EQ(one.scene.statistics().lastFrame.skinnedInstances, 1u);
-  ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_TRUE(one.plan.commands().empty());
+  one.plan(3, 2);
+  EXPECT_TRUE(one.planned.commands().empty());
 }
 
 TEST(Scene, AnAbandonedFrameIsPlannedAgain) {
   OneInstance one;
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  const std::vector<std::string> all = namesOf(one.plan);
+  one.plan(1, 0);
+  const std::vector<std::string> all = namesOf(one.planned);
   ASSERT_TRUE(one.scene.commit().ok());
   EXPECT_EQ(one.scene.skinnedInstances().size(), 1u);
   ASSERT_TRUE(one.scene.abandonFrame(1).ok());
   EXPECT_EQ(one.scene.output(one.instance)->size, 0u);
   EXPECT_TRUE(one.scene.skinnedInstances().empty());
   EXPECT_EQ(one.scene.statistics().lastFrame.skinnedInstances, 0u);
-  ASSERT_TRUE(one.scene.plan(one.plan).ok()) << "in the same frame";
-  EXPECT_EQ(namesOf(one.plan), all);
+  ASSERT_TRUE(one.scene.plan(one.planned).ok()) << "in the same frame";
+  EXPECT_EQ(namesOf(one.planned), all);
   ASSERT_TRUE(one.scene.commit().ok());
   ASSERT_TRUE(one.scene.abandonFrame(1).ok());
-  ASSERT_TRUE(one.scene.beginFrame(2, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok()) << "in another";
-  EXPECT_EQ(namesOf(one.plan), all);
+  one.plan(2, 0);
+  EXPECT_EQ(namesOf(one.planned), all);
   ASSERT_TRUE(one.scene.commit().ok());
   EXPECT_EQ(one.scene.output(one.instance)->size, 100u * 12u);
-  ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_TRUE(one.plan.commands().empty());
+  one.plan(3, 2);
+  EXPECT_TRUE(one.planned.commands().empty());
 }
 
 // The GPU's history was not cleared either.
 TEST(Scene, AnAbandonedFrameClearsNothing) {
   OneInstance one(true);
   for (std::uint64_t frame = 1; frame < 4; ++frame) {
-    ASSERT_TRUE(one.scene.beginFrame(frame, 0).ok());
-    ASSERT_TRUE(one.scene.plan(one.plan).ok());
-    EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear history"), 1) << frame;
+    one.plan(frame, 0);
+    EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 1) << frame;
     ASSERT_TRUE(one.scene.commit().ok());
     if (frame < 3) {
       ASSERT_TRUE(one.scene.abandonFrame(frame).ok());
     }
   }
-  ASSERT_TRUE(one.scene.beginFrame(4, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  EXPECT_EQ(std::ranges::count(namesOf(one.plan), "clear history"), 0);
+  one.plan(4, 0);
+  EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 0);
 }
 
 // The frame in which it was hidden was never displayed: it moved in the frame before, and rests.
@@ -273,7 +272,7 @@ TEST(Scene, WhatWasHiddenInAnAbandonedFrameOnlySettles) {
   description.layout.motion = Motion::kept;
   const InstanceHandle moving = *one.scene.addInstance(description);
   const auto runFrame = [&](std::uint64_t frame) {
-    ASSERT_TRUE(one.scene.plan(one.plan).ok());
+    ASSERT_TRUE(one.scene.plan(one.planned).ok());
     ASSERT_TRUE(one.scene.commit().ok()) << frame;
   };
   for (std::uint64_t frame = 1; frame < 3; ++frame) {
@@ -300,15 +299,14 @@ TEST(Scene, OnlyTheFrameCommittedLastIsAbandoned) {
     EXPECT_NE(abandoned.error().message.find("frame " + std::to_string(frame)), std::string::npos);
   };
   expectRefused(0);
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  one.plan(1, 0);
   expectRefused(1);
   ASSERT_TRUE(one.scene.commit().ok());
   expectRefused(2);
   ASSERT_TRUE(one.scene.beginFrame(2, 0).ok());
   expectRefused(1);
   expectRefused(2);
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
+  ASSERT_TRUE(one.scene.plan(one.planned).ok());
   ASSERT_TRUE(one.scene.commit().ok());
   EXPECT_TRUE(one.scene.abandonFrame(2).ok());
   expectRefused(2);
@@ -321,7 +319,7 @@ TEST(Scene, AbandonedFramesAreNotInFlight) {
   const auto place = [&](std::uint64_t frame) {
     EXPECT_TRUE(one.scene.beginFrame(frame, 0).ok()) << frame;
     const std::uint64_t offset = one.scene.writePose(one.pose)->offset;
-    EXPECT_TRUE(one.scene.plan(one.plan).ok());
+    EXPECT_TRUE(one.scene.plan(one.planned).ok());
     EXPECT_TRUE(one.scene.commit().ok());
     return offset;
   };
@@ -354,13 +352,12 @@ TEST(Scene, AChangedSceneIsNotCommitted) {
   for (const auto& change : changes) {
     OneInstance one;
     EXPECT_FALSE(one.scene.commit().ok()) << "nothing is planned";
-    ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-    ASSERT_TRUE(one.scene.plan(one.plan).ok());
+    one.plan(1, 0);
     change(one);
     const Result<void> committed = one.scene.commit();
     ASSERT_FALSE(committed.ok());
     EXPECT_EQ(committed.error().code, ErrorCode::invalidArgument);
-    ASSERT_TRUE(one.scene.plan(one.plan).ok());
+    ASSERT_TRUE(one.scene.plan(one.planned).ok());
     EXPECT_TRUE(one.scene.commit().ok());
     EXPECT_FALSE(one.scene.commit().ok()) << "once";
   }
@@ -368,9 +365,7 @@ TEST(Scene, AChangedSceneIsNotCommitted) {
 
 TEST(Scene, ReadsBackOnlyWhatWasRecorded) {
   OneInstance one;
-  ASSERT_TRUE(one.scene.beginFrame(1, 0).ok());
-  ASSERT_TRUE(one.scene.plan(one.plan).ok());
-  ASSERT_TRUE(one.scene.commit().ok());
+  one.record(1, 0);
   ASSERT_TRUE(one.scene.beginFrame(2, 1).ok());
   std::vector<std::byte> bytes(one.scene.buffer(BufferRole::readBack).size);
   EXPECT_FALSE(one.scene.readBack(0, bytes).ok());
