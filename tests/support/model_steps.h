@@ -66,7 +66,26 @@ class ModelSteps {
                             const InstanceDescription& description,
                             std::span<const MorphWeight> morphs) = 0;
 
-  void run();
+  void run() {
+    for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
+      kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
+    makeSystem();
+    for (std::uint32_t number = 0; number < stepCount && !::testing::Test::HasFailure(); ++number) {
+      SCOPED_TRACE("step " + std::to_string(number));
+      step();
+      if (number % systemSteps != systemSteps - 1) continue;
+      runFrame();
+      expectOutputs();
+      growths_ += outputGeneration();
+      makeSystem();
+    }
+    // Or else nothing was tested.
+    EXPECT_GT(checkedInstances_, 1000u);
+    EXPECT_GT(movedInstances_, 20u);
+    EXPECT_GT(refusals_, 20u);
+    EXPECT_GT(abandonedFrames_, 50u);
+    EXPECT_GT(growths_, 100u);
+  }
   void makeSystem() {
     model_.reset();
     meshes_.clear();
@@ -84,25 +103,269 @@ class ModelSteps {
   auto anyMesh() { return std::next(meshes_.begin(), below(meshes_.size())); }
 
   // The steps.
-  void addMesh();
-  void removeMesh();
-  void addPose();
-  void removePose();
-  void addInstance();
-  void removeInstance();
-  void changeInstance();
-  void setMesh(ModelInstance& instance);
-  void changeSeveral();
-  void setVisibility();
-  void tryStaleHandle();
-  void runFrame();
-  void beginFrame();
-  void changeMeanwhile();
-  void step();
+  void addMesh() {
+    if (meshes_.size() >= 12) return;
+    const std::uint32_t kind = below(meshKinds);
+    kindOf_[nextNumber_] = kind;
+    meshes_[nextNumber_++] = {engine_->addMesh(kinds_[kind]), kind};
+  }
+  void removeMesh() {
+    if (meshes_.size() < 3) return;
+    const auto mesh = anyMesh();
+    const Result<void> removed = system().removeMesh(mesh->second.handle);
+    EXPECT_NE(removed.ok(), model_->isMeshUsed(mesh->first));
+    if (removed) meshes_.erase(mesh);
+  }
+  void addPose() {
+    if (model_->poses.size() >= 30) return;
+    const std::uint32_t pose = below(poseCount);
+    const PoseWriter writer = hasGpu && chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
+    const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
+    if (!added) return;  // places of palettes that went are not free yet
+    model_->poses[nextNumber_++] = {*added, pose};
+    engine_->writePose(*added, systemPose(pose));
+  }
+  void removePose() {
+    if (model_->poses.size() < 3) return;
+    const auto palette = anyPalette();
+    const Result<void> removed = system().removePose(palette->second.handle);
+    EXPECT_NE(removed.ok(), model_->isPoseUsed(palette->first));
+    if (removed) model_->poses.erase(palette);
+  }
+  void addInstance() {
+    if (meshes_.empty() || model_->poses.empty()) return;
+    const auto mesh = anyMesh();
+    const auto palette = anyPalette();
+    ModelInstance instance;
+    instance.mesh = mesh->first;
+    instance.pose = palette->first;
+    instance.vertexCount = kinds_[mesh->second.kind].vertexCount();
+    InstanceDescription& description = instance.description;
+    description.mesh = mesh->second.handle;
+    description.pose = palette->second.handle;
+    description.method = methods[below(methods.size())];
+    description.layout = someLayouts()[below(3)];
+    description.culledOnGpu = hasGpu && chance(25);
+    if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
+    prepare(description);
+    const Result<InstanceHandle> added = system().addInstance(description);
+    if (!added) {
+      expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
+      return;
+    }
+    instance.handle = *added;
+    model_->instances.push_back(instance);
+  }
+  void removeInstance() {
+    if (model_->instances.empty()) return;
+    const std::uint32_t index = below(model_->instances.size());
+    gone_.push_back(model_->instances[index].handle);
+    must(system().removeInstance(gone_.back()));
+    model_->remove(index);
+  }
+  void changeInstance() {
+    if (model_->instances.empty()) return;
+    ModelInstance& instance = anyInstance();
+    switch (below(6)) {
+      case 0:
+      case 1:
+        instance.isVisible = !instance.isVisible || chance(30);
+        return must(system().change({.instance = instance.handle, .visible = instance.isVisible}));
+      case 2:
+        instance.morphs = (instance.morphs + 1 + below(2)) % 3;
+        instance.isChanged = true;
+        return must(
+            system().change({.instance = instance.handle, .morphs = morphSets[instance.morphs]}));
+      case 3:
+        if (instance.description.culledOnGpu) return;
+        instance.description.updateInterval = chance(50) ? 1 : 2 + below(4);
+        instance.waitedFrames = 0;
+        return must(system().change(
+            {.instance = instance.handle, .updateInterval = instance.description.updateInterval}));
+      case 4:
+        instance.teleports = instance.isChanged = true;
+        return must(system().change({.instance = instance.handle, .teleports = true}));
+      default:
+        return setMesh(instance);
+    }
+  }
+  void setMesh(ModelInstance& instance) {
+    // Twice between two frames would leave open whether its output has been another's.
+    if (instance.changesMesh) return;
+    const auto mesh = anyMesh();
+    if (mesh->first == instance.mesh) return;
+    const std::uint32_t vertexCount = kinds_[mesh->second.kind].vertexCount();
+    if (const Result<void> set =
+            system().change({.instance = instance.handle, .mesh = mesh->second.handle});
+        !set) {
+      expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
+      return;
+    }
+    instance.mesh = mesh->first;
+    instance.description.mesh = mesh->second.handle;
+    prepare(instance.description);
+    instance.vertexCount = vertexCount;
+    instance.isChanged = instance.changesMesh = true;
+  }
+  /// In one call: methods, poses, visibility, morph weights and jumps, of some instances twice.
+  void changeSeveral() {
+    if (model_->instances.empty()) return;
+    std::vector<InstanceChange> changes;
+    for (std::uint32_t count = 1 + below(12); count != 0; --count) {
+      ModelInstance& instance = anyInstance();
+      InstanceChange& change = changes.emplace_back();
+      change.instance = instance.handle;
+      if (chance(40)) change.visible = instance.isVisible = chance(60);
+      if (chance(20)) change.teleports = instance.teleports = instance.isChanged = true;
+      if (chance(30)) {
+        const auto pose = anyPalette();
+        change.pose = pose->second.handle;
+        instance.pose = pose->first;
+        instance.description.pose = pose->second.handle;
+      }
+      if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
+      if (change.pose || change.method) {
+        prepare(instance.description);
+        instance.isChanged = instance.isUrgent = true;
+        instance.waitedFrames = 0;
+      }
+      if (chance(30)) {
+        instance.morphs = below(3);
+        change.morphs = morphSets[instance.morphs];
+        instance.isChanged = true;
+      }
+      if (chance(20) && !instance.description.culledOnGpu) {
+        change.updateInterval = instance.description.updateInterval = 1 + below(4);
+        instance.waitedFrames = 0;
+      }
+    }
+    must(system().change(changes));
+  }
+  /// Of all instances, as culling decides.
+  void setVisibility() {
+    std::vector<InstanceVisibility> wanted;
+    for (ModelInstance& instance : model_->instances) {
+      if (chance(20)) instance.isVisible = !instance.isVisible;
+      if (chance(10) && !instance.description.culledOnGpu) {
+        instance.description.updateInterval = 1 + below(4);
+        instance.waitedFrames = 0;
+      }
+      wanted.push_back({instance.handle, instance.isVisible, instance.description.updateInterval});
+    }
+    must(system().setVisibility(wanted));
+  }
+  void tryStaleHandle() {
+    if (gone_.empty()) return;
+    const InstanceHandle stale = gone_[below(gone_.size())];
+    EXPECT_FALSE(system().removeInstance(stale).ok());
+    EXPECT_FALSE(system().change({.instance = stale, .visible = true}).ok());
+    EXPECT_FALSE(system().output(stale).ok());
+    const InstanceVisibility shown{stale, true, 1};
+    EXPECT_FALSE(system().setVisibility({&shown, 1}).ok());
+  }
+  void runFrame() {
+    for (auto& [number, palette] : model_->poses) {
+      if (!chance(60)) continue;
+      const std::uint32_t pose = below(poseCount);
+      engine_->writePose(palette.handle, systemPose(pose));
+      model_->writePose(number, pose);
+    }
+    if (chance(15)) system().compact(below(40'000));
+    if (chance(15)) {
+      abandon();
+      ++abandonedFrames_;
+      if (chance(50)) return beginFrame();
+    }
+    submit();
+    ++submittedFrames_;
+    model_->afterRecord();
+    movedInstances_ += system().movedInstances().size();
+    if (submittedFrames_ % 8 == 0) expectOutputs();
+    beginFrame();
+  }
+  void beginFrame() {
+    if constexpr (hasGpu) {
+      engine_->begin(below(framesInFlight));
+    } else {
+      engine_->begin();
+    }
+    model_->beginFrame();
+  }
+  /// Between `record` and `abandonFrame`, when poses cannot be written.
+  void changeMeanwhile() {
+    for (std::uint32_t count = below(6); count != 0; --count) {
+      switch (below(6)) {
+        case 0:
+          addMesh();
+          break;
+        case 1:
+          removeMesh();
+          break;
+        case 2:
+          removePose();
+          break;
+        case 3:
+          addInstance();
+          break;
+        case 4:
+          removeInstance();
+          break;
+        default:
+          changeSeveral();
+      }
+    }
+    if (chance(15)) system().compact(below(40'000));
+  }
+  void step() {
+    const std::uint32_t kind = below(100);
+    const bool isCrowded = model_->instances.size() > 60;
+    if (kind < 4) return addMesh();
+    if (kind < 7) return removeMesh();
+    if (kind < 13) return addPose();
+    if (kind < 17) return removePose();
+    if (kind < 38) return isCrowded ? removeInstance() : addInstance();
+    if (kind < 50) return removeInstance();
+    if (kind < 65) return changeInstance();
+    if (kind < 73) return changeSeveral();
+    if (kind < 75) return setVisibility();
+    if (kind < 78) return tryStaleHandle();
+    runFrame();
+  }
 
-  void expectRoomIsMissing(const Error& error, std::uint64_t size);
-  const Streams& expected(const ModelInstance& instance, const ShownPose& shown);
-  void expectOutputs();
+  /// Refused where there is no room, and only there.
+  void expectRoomIsMissing(const Error& error, std::uint64_t size) {
+    EXPECT_EQ(error.code, ErrorCode::limitExceeded) << error.message;
+    ++refusals_;
+    EXPECT_LT(system().statistics().outputs.largestFree, size + 256) << error.message;
+  }
+  const Streams& expected(const ModelInstance& instance, const ShownPose& shown) {
+    // Meshes are told apart by what is in them, of which there are few.
+    const std::uint32_t kind = kindOf_.at(shown.mesh);
+    const ShownPose content{kind, shown.pose, shown.morphs, shown.method};
+    InstanceDescription description = instance.description;
+    description.method = shown.method;
+    Streams& streams = expected_[{content, description.layout.tangents}];
+    if (streams[positionStream].empty())
+      streams =
+          skinAlone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
+    return streams;
+  }
+  void expectOutputs() {
+    const std::vector<std::byte> bytes = engine_->readOutput();
+    for (const ModelInstance& instance : model_->instances) {
+      if (!instance.shown) continue;
+      SCOPED_TRACE("frame " + std::to_string(engine_->frame()) + ", instance " +
+                   std::to_string(instance.handle.index));
+      const Streams streams = engine_->read(bytes, instance.handle);
+      const Streams& wanted = expected(instance, *instance.shown);
+      for (std::size_t stream = 0; stream < previousStream; ++stream)
+        EXPECT_TRUE(streams[stream] == wanted[stream]) << "stream " << stream;
+      ++checkedInstances_;
+      if (instance.description.layout.motion == Motion::none || !instance.before) continue;
+      EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
+          << "previous positions";
+    }
+  }
 
   static constexpr bool hasGpu = Engine::hasGpu;
   std::mt19937 random_;
@@ -118,324 +381,5 @@ class ModelSteps {
   std::uint64_t growths_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };
-
-template <class Engine>
-void ModelSteps<Engine>::addMesh() {
-  if (meshes_.size() >= 12) return;
-  const std::uint32_t kind = below(meshKinds);
-  kindOf_[nextNumber_] = kind;
-  meshes_[nextNumber_++] = {engine_->addMesh(kinds_[kind]), kind};
-}
-
-template <class Engine>
-void ModelSteps<Engine>::removeMesh() {
-  if (meshes_.size() < 3) return;
-  const auto mesh = anyMesh();
-  const Result<void> removed = system().removeMesh(mesh->second.handle);
-  EXPECT_NE(removed.ok(), model_->isMeshUsed(mesh->first));
-  if (removed) meshes_.erase(mesh);
-}
-
-template <class Engine>
-void ModelSteps<Engine>::addPose() {
-  if (model_->poses.size() >= 30) return;
-  const std::uint32_t pose = below(poseCount);
-  const PoseWriter writer = hasGpu && chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
-  const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
-  if (!added) return;  // places of palettes that went are not free yet
-  model_->poses[nextNumber_++] = {*added, pose};
-  engine_->writePose(*added, systemPose(pose));
-}
-
-template <class Engine>
-void ModelSteps<Engine>::removePose() {
-  if (model_->poses.size() < 3) return;
-  const auto palette = anyPalette();
-  const Result<void> removed = system().removePose(palette->second.handle);
-  EXPECT_NE(removed.ok(), model_->isPoseUsed(palette->first));
-  if (removed) model_->poses.erase(palette);
-}
-
-/// Refused where there is no room, and only there.
-template <class Engine>
-void ModelSteps<Engine>::expectRoomIsMissing(const Error& error, std::uint64_t size) {
-  EXPECT_EQ(error.code, ErrorCode::limitExceeded) << error.message;
-  ++refusals_;
-  EXPECT_LT(system().statistics().outputs.largestFree, size + 256) << error.message;
-}
-
-template <class Engine>
-void ModelSteps<Engine>::addInstance() {
-  if (meshes_.empty() || model_->poses.empty()) return;
-  const auto mesh = anyMesh();
-  const auto palette = anyPalette();
-  ModelInstance instance;
-  instance.mesh = mesh->first;
-  instance.pose = palette->first;
-  instance.vertexCount = kinds_[mesh->second.kind].vertexCount();
-  InstanceDescription& description = instance.description;
-  description.mesh = mesh->second.handle;
-  description.pose = palette->second.handle;
-  description.method = methods[below(methods.size())];
-  description.layout = someLayouts()[below(3)];
-  description.culledOnGpu = hasGpu && chance(25);
-  if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
-  prepare(description);
-  const Result<InstanceHandle> added = system().addInstance(description);
-  if (!added) {
-    expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
-    return;
-  }
-  instance.handle = *added;
-  model_->instances.push_back(instance);
-}
-
-template <class Engine>
-void ModelSteps<Engine>::removeInstance() {
-  if (model_->instances.empty()) return;
-  const std::uint32_t index = below(model_->instances.size());
-  gone_.push_back(model_->instances[index].handle);
-  must(system().removeInstance(gone_.back()));
-  model_->remove(index);
-}
-
-template <class Engine>
-void ModelSteps<Engine>::setMesh(ModelInstance& instance) {
-  // Twice between two frames would leave open whether its output has been another's.
-  if (instance.changesMesh) return;
-  const auto mesh = anyMesh();
-  if (mesh->first == instance.mesh) return;
-  const std::uint32_t vertexCount = kinds_[mesh->second.kind].vertexCount();
-  if (const Result<void> set =
-          system().change({.instance = instance.handle, .mesh = mesh->second.handle});
-      !set) {
-    expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
-    return;
-  }
-  instance.mesh = mesh->first;
-  instance.description.mesh = mesh->second.handle;
-  prepare(instance.description);
-  instance.vertexCount = vertexCount;
-  instance.isChanged = instance.changesMesh = true;
-}
-
-template <class Engine>
-void ModelSteps<Engine>::changeInstance() {
-  if (model_->instances.empty()) return;
-  ModelInstance& instance = anyInstance();
-  switch (below(6)) {
-    case 0:
-    case 1:
-      instance.isVisible = !instance.isVisible || chance(30);
-      return must(system().change({.instance = instance.handle, .visible = instance.isVisible}));
-    case 2:
-      instance.morphs = (instance.morphs + 1 + below(2)) % 3;
-      instance.isChanged = true;
-      return must(
-          system().change({.instance = instance.handle, .morphs = morphSets[instance.morphs]}));
-    case 3:
-      if (instance.description.culledOnGpu) return;
-      instance.description.updateInterval = chance(50) ? 1 : 2 + below(4);
-      instance.waitedFrames = 0;
-      return must(system().change(
-          {.instance = instance.handle, .updateInterval = instance.description.updateInterval}));
-    case 4:
-      instance.teleports = instance.isChanged = true;
-      return must(system().change({.instance = instance.handle, .teleports = true}));
-    default:
-      return setMesh(instance);
-  }
-}
-
-/// In one call: methods, poses, visibility, morph weights and jumps, of some instances twice.
-template <class Engine>
-void ModelSteps<Engine>::changeSeveral() {
-  if (model_->instances.empty()) return;
-  std::vector<InstanceChange> changes;
-  for (std::uint32_t count = 1 + below(12); count != 0; --count) {
-    ModelInstance& instance = anyInstance();
-    InstanceChange& change = changes.emplace_back();
-    change.instance = instance.handle;
-    if (chance(40)) change.visible = instance.isVisible = chance(60);
-    if (chance(20)) change.teleports = instance.teleports = instance.isChanged = true;
-    if (chance(30)) {
-      const auto pose = anyPalette();
-      change.pose = pose->second.handle;
-      instance.pose = pose->first;
-      instance.description.pose = pose->second.handle;
-    }
-    if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
-    if (change.pose || change.method) {
-      prepare(instance.description);
-      instance.isChanged = instance.isUrgent = true;
-      instance.waitedFrames = 0;
-    }
-    if (chance(30)) {
-      instance.morphs = below(3);
-      change.morphs = morphSets[instance.morphs];
-      instance.isChanged = true;
-    }
-    if (chance(20) && !instance.description.culledOnGpu) {
-      change.updateInterval = instance.description.updateInterval = 1 + below(4);
-      instance.waitedFrames = 0;
-    }
-  }
-  must(system().change(changes));
-}
-
-/// Of all instances, as culling decides.
-template <class Engine>
-void ModelSteps<Engine>::setVisibility() {
-  std::vector<InstanceVisibility> wanted;
-  for (ModelInstance& instance : model_->instances) {
-    if (chance(20)) instance.isVisible = !instance.isVisible;
-    if (chance(10) && !instance.description.culledOnGpu) {
-      instance.description.updateInterval = 1 + below(4);
-      instance.waitedFrames = 0;
-    }
-    wanted.push_back({instance.handle, instance.isVisible, instance.description.updateInterval});
-  }
-  must(system().setVisibility(wanted));
-}
-
-template <class Engine>
-void ModelSteps<Engine>::tryStaleHandle() {
-  if (gone_.empty()) return;
-  const InstanceHandle stale = gone_[below(gone_.size())];
-  EXPECT_FALSE(system().removeInstance(stale).ok());
-  EXPECT_FALSE(system().change({.instance = stale, .visible = true}).ok());
-  EXPECT_FALSE(system().output(stale).ok());
-  const InstanceVisibility shown{stale, true, 1};
-  EXPECT_FALSE(system().setVisibility({&shown, 1}).ok());
-}
-
-template <class Engine>
-void ModelSteps<Engine>::runFrame() {
-  for (auto& [number, palette] : model_->poses) {
-    if (!chance(60)) continue;
-    const std::uint32_t pose = below(poseCount);
-    engine_->writePose(palette.handle, systemPose(pose));
-    model_->writePose(number, pose);
-  }
-  if (chance(15)) system().compact(below(40'000));
-  if (chance(15)) {
-    abandon();
-    ++abandonedFrames_;
-    if (chance(50)) return beginFrame();
-  }
-  submit();
-  ++submittedFrames_;
-  model_->afterRecord();
-  movedInstances_ += system().movedInstances().size();
-  if (submittedFrames_ % 8 == 0) expectOutputs();
-  beginFrame();
-}
-
-template <class Engine>
-void ModelSteps<Engine>::beginFrame() {
-  if constexpr (hasGpu) {
-    engine_->begin(below(framesInFlight));
-  } else {
-    engine_->begin();
-  }
-  model_->beginFrame();
-}
-
-/// Between `record` and `abandonFrame`, when poses cannot be written.
-template <class Engine>
-void ModelSteps<Engine>::changeMeanwhile() {
-  for (std::uint32_t count = below(6); count != 0; --count) {
-    switch (below(6)) {
-      case 0:
-        addMesh();
-        break;
-      case 1:
-        removeMesh();
-        break;
-      case 2:
-        removePose();
-        break;
-      case 3:
-        addInstance();
-        break;
-      case 4:
-        removeInstance();
-        break;
-      default:
-        changeSeveral();
-    }
-  }
-  if (chance(15)) system().compact(below(40'000));
-}
-
-template <class Engine>
-const Streams& ModelSteps<Engine>::expected(const ModelInstance& instance, const ShownPose& shown) {
-  // Meshes are told apart by what is in them, of which there are few.
-  const std::uint32_t kind = kindOf_.at(shown.mesh);
-  const ShownPose content{kind, shown.pose, shown.morphs, shown.method};
-  InstanceDescription description = instance.description;
-  description.method = shown.method;
-  Streams& streams = expected_[{content, description.layout.tangents}];
-  if (streams[positionStream].empty())
-    streams = skinAlone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
-  return streams;
-}
-
-template <class Engine>
-void ModelSteps<Engine>::expectOutputs() {
-  const std::vector<std::byte> bytes = engine_->readOutput();
-  for (const ModelInstance& instance : model_->instances) {
-    if (!instance.shown) continue;
-    SCOPED_TRACE("frame " + std::to_string(engine_->frame()) + ", instance " +
-                 std::to_string(instance.handle.index));
-    const Streams streams = engine_->read(bytes, instance.handle);
-    const Streams& wanted = expected(instance, *instance.shown);
-    for (std::size_t stream = 0; stream < previousStream; ++stream)
-      EXPECT_TRUE(streams[stream] == wanted[stream]) << "stream " << stream;
-    ++checkedInstances_;
-    if (instance.description.layout.motion == Motion::none || !instance.before) continue;
-    EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
-        << "previous positions";
-  }
-}
-
-template <class Engine>
-void ModelSteps<Engine>::step() {
-  const std::uint32_t kind = below(100);
-  const bool isCrowded = model_->instances.size() > 60;
-  if (kind < 4) return addMesh();
-  if (kind < 7) return removeMesh();
-  if (kind < 13) return addPose();
-  if (kind < 17) return removePose();
-  if (kind < 38) return isCrowded ? removeInstance() : addInstance();
-  if (kind < 50) return removeInstance();
-  if (kind < 65) return changeInstance();
-  if (kind < 73) return changeSeveral();
-  if (kind < 75) return setVisibility();
-  if (kind < 78) return tryStaleHandle();
-  runFrame();
-}
-
-template <class Engine>
-void ModelSteps<Engine>::run() {
-  for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
-    kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
-  makeSystem();
-  for (std::uint32_t number = 0; number < stepCount && !::testing::Test::HasFailure(); ++number) {
-    SCOPED_TRACE("step " + std::to_string(number));
-    step();
-    if (number % systemSteps != systemSteps - 1) continue;
-    runFrame();
-    expectOutputs();
-    growths_ += outputGeneration();
-    makeSystem();
-  }
-  // Or else nothing was tested.
-  EXPECT_GT(checkedInstances_, 1000u);
-  EXPECT_GT(movedInstances_, 20u);
-  EXPECT_GT(refusals_, 20u);
-  EXPECT_GT(abandonedFrames_, 50u);
-  EXPECT_GT(growths_, 100u);
-}
 
 }  // namespace dermis::test

@@ -64,17 +64,56 @@ class SystemModel {
   std::map<std::uint32_t, ModelPose> poses;
   std::vector<ModelInstance> instances;
 
-  bool isPoseUsed(std::uint32_t pose) const;
-  bool isMeshUsed(std::uint32_t mesh) const;
-  void writePose(std::uint32_t number, std::uint32_t pose);
+  bool isPoseUsed(std::uint32_t palette) const {
+    return std::ranges::any_of(
+        instances, [&](const ModelInstance& instance) { return instance.pose == palette; });
+  }
+  bool isMeshUsed(std::uint32_t mesh) const {
+    return std::ranges::any_of(
+        instances, [&](const ModelInstance& instance) { return instance.mesh == mesh; });
+  }
+  void writePose(std::uint32_t number, std::uint32_t pose) {
+    poses.at(number).pose = pose;
+    for (ModelInstance& instance : instances) {
+      if (instance.pose == number) instance.isChanged = true;
+    }
+  }
   /// The instance was removed in the frame that was begun last.
-  void remove(std::size_t index);
+  void remove(std::size_t index) {
+    if (instances[index].hasPlace()) lock(instances[index].output);
+    std::swap(instances[index], instances.back());
+    instances.pop_back();
+  }
 
   /// After `beginFrame`: places are free again, and what the GPU did in the newest complete frame
   /// is known, which is checked.
-  void beginFrame();
+  void beginFrame() {
+    std::erase_if(locked_,
+                  [&](const Place& place) { return place.frame <= engine_.completedFrame(); });
+    const CullingStatistics gpu = engine_->statistics().lastCompletedFrame;
+    const auto counted = gpuCounts_.find(gpu.frame);
+    if (counted == gpuCounts_.end()) return;
+    EXPECT_EQ(gpu.visibleInstances, counted->second.visible) << "frame " << gpu.frame;
+    EXPECT_EQ(gpu.skinnedInstances, counted->second.skinned) << "frame " << gpu.frame;
+    EXPECT_EQ(gpu.settledInstances, counted->second.settled) << "frame " << gpu.frame;
+    gpuCounts_.erase(gpuCounts_.begin(), std::next(counted));
+  }
   /// After `record`: checks what was skinned, settled and moved, and where everything stands.
-  void afterRecord();
+  void afterRecord() {
+    Lists lists{indicesOf(engine_->skinnedInstances()),
+                indicesOf(engine_->settledInstances()),
+                indicesOf(engine_->movedInstances()),
+                {},
+                {}};
+    for (ModelInstance& instance : instances) {
+      SCOPED_TRACE("frame " + std::to_string(engine_.frame()) + ", instance " +
+                   std::to_string(instance.handle.index));
+      update(instance, lists);
+    }
+    checkPlacesAreApart();
+    checkStatistics(lists);
+    gpuCounts_[engine_.frame()] = lists.gpu;
+  }
 
  private:
   struct Place {
@@ -95,204 +134,122 @@ class SystemModel {
     return {instance.mesh, poses.at(instance.pose).pose, instance.morphs,
             instance.description.method};
   }
-  void lock(const InstanceOutput& output);
-  void checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed);
-  void checkPlacesAreApart() const;
-  void update(ModelInstance& instance, Lists& lists);
-  void updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists);
-  void updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists);
-  bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists);
-  void checkStatistics(const Lists& lists) const;
+  void lock(const InstanceOutput& output) {
+    locked_.push_back({output.offset, output.offset + output.size, engine_.frame()});
+  }
+  void checkPlace(ModelInstance& instance, const InstanceOutput& output, bool isListed) {
+    const bool hasPlace = output.size != 0;
+    const bool hadPlace = instance.hasPlace();
+    const bool stays = hasPlace && hadPlace && output.offset == instance.output.offset &&
+                       output.size == instance.output.size;
+    EXPECT_TRUE(hasPlace || !hadPlace) << "it lost its place";
+    EXPECT_TRUE(isListed || stays || !hadPlace) << "it moved";
+    EXPECT_FALSE(isListed && stays) << "it did not move";
+    // Where another stood that a frame under way may still read.
+    for (const Place& place : locked_) {
+      EXPECT_TRUE(!hasPlace || stays || output.offset >= place.end ||
+                  output.offset + output.size <= place.begin)
+          << "a place of a frame under way is used again";
+    }
+  }
+  void checkPlacesAreApart() const {
+    std::map<std::uint64_t, std::uint64_t> places;
+    for (const ModelInstance& instance : instances) {
+      if (!instance.hasPlace()) continue;
+      EXPECT_TRUE(places.emplace(instance.output.offset, instance.output.size).second);
+    }
+    std::uint64_t end = 0;
+    for (const auto& [offset, size] : places) {
+      EXPECT_GE(offset, end) << "two instances overlap";
+      end = offset + size;
+    }
+  }
+  void update(ModelInstance& instance, Lists& lists) {
+    const InstanceOutput output = must(engine_->output(instance.handle));
+    checkPlace(instance, output, lists.moved.contains(instance.handle.index));
+    // Out of view it has the place and the vertices of its old mesh until somebody looks.
+    const bool isWanted = output.size != 0 && output.mesh == instance.description.mesh;
+    const bool isPlaced = isWanted && instance.changesMesh;
+    if (instance.hasPlace() && output.offset != instance.output.offset) lock(instance.output);
+    instance.output = output;
+    if (isWanted) instance.changesMesh = false;
+    EXPECT_TRUE(isWanted || !instance.isVisible);
+    if (instance.isDisplayed()) {
+      updateDisplayed(instance, isPlaced, lists);
+    } else {
+      updateHidden(instance, isPlaced, lists);
+    }
+    instance.teleports = false;
+  }
+  void updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
+    EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
+    EXPECT_FALSE(lists.settled.contains(instance.handle.index)) << "nobody sees it";
+    if (isPlaced) instance.shown = instance.before = std::nullopt;
+    instance.wasDisplayed = false;
+  }
+  void updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
+    const bool comesBack = !instance.wasDisplayed;
+    const bool hasPrevious = instance.description.layout.motion != Motion::none;
+    const bool isCulled = instance.description.culledOnGpu;
+    const bool isSettled = lists.settled.contains(instance.handle.index);
+    lists.gpu.visible += isCulled;
+    if (isSkinnedNow(instance, isPlaced, lists)) {
+      lists.gpu.skinned += isCulled;
+      EXPECT_FALSE(isSettled) << "it was skinned";
+      const bool restarts = isPlaced || instance.teleports || comesBack;
+      const ShownPose now = wantedPose(instance);
+      instance.before = restarts ? now : instance.shown;
+      instance.shown = now;
+      instance.isMoving = hasPrevious && !restarts;
+      instance.isChanged = instance.isUrgent = false;
+      instance.waitedFrames = 0;
+    } else {
+      lists.gpu.settled += isCulled && instance.isMoving;
+      EXPECT_TRUE(isCulled || isSettled == instance.isMoving)
+          << "it settles in the next frame that displays it, and in no other";
+      instance.before = instance.shown;
+      instance.isMoving = false;
+      if (instance.isChanged) ++instance.waitedFrames;
+      EXPECT_LT(instance.waitedFrames, instance.description.updateInterval) << "it waits too long";
+    }
+    instance.wasDisplayed = true;
+  }
+  bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
+    const bool comesBack = !instance.wasDisplayed;
+    const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
+    const bool isForced = isPlaced || instance.teleports || instance.isUrgent || isOwed;
+    if (instance.description.culledOnGpu) return isForced;
+    const bool isSkinned = lists.skinned.contains(instance.handle.index);
+    if (isForced) {
+      EXPECT_TRUE(isSkinned) << "it changed";
+    } else if (!instance.isChanged && !comesBack) {
+      EXPECT_FALSE(isSkinned) << "it did not change";
+    } else if (!comesBack) {
+      const std::pair beat{instance.pose, instance.description.updateInterval};
+      EXPECT_EQ(lists.beats.emplace(beat, isSkinned).first->second, isSkinned)
+          << "instances of one palette take the same frames";
+    }
+    return isSkinned;
+  }
+  void checkStatistics(const Lists& lists) const {
+    const FrameWorkStatistics frame = engine_->statistics().lastFrame;
+    EXPECT_EQ(frame.frame, engine_.frame());
+    EXPECT_EQ(frame.instances, instances.size());
+    EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());
+    EXPECT_EQ(frame.settledInstances, lists.settled.size());
+    std::uint64_t vertices = 0;
+    for (const ModelInstance& instance : instances) {
+      if (lists.skinned.contains(instance.handle.index)) vertices += instance.vertexCount;
+    }
+    EXPECT_EQ(frame.skinnedVertices, vertices);
+    const bool didNothing =
+        lists.skinned.empty() && lists.settled.empty() && frame.culledCandidates == 0;
+    EXPECT_TRUE(!didNothing || engine_.isIdle()) << "nothing changed";
+  }
 
   Engine& engine_;
   std::vector<Place> locked_;
   std::map<std::uint64_t, GpuCounts> gpuCounts_;  ///< by frame
 };
-
-template <class Engine>
-bool SystemModel<Engine>::isPoseUsed(std::uint32_t palette) const {
-  return std::ranges::any_of(
-      instances, [&](const ModelInstance& instance) { return instance.pose == palette; });
-}
-
-template <class Engine>
-bool SystemModel<Engine>::isMeshUsed(std::uint32_t mesh) const {
-  return std::ranges::any_of(instances,
-                             [&](const ModelInstance& instance) { return instance.mesh == mesh; });
-}
-
-template <class Engine>
-void SystemModel<Engine>::writePose(std::uint32_t number, std::uint32_t pose) {
-  poses.at(number).pose = pose;
-  for (ModelInstance& instance : instances) {
-    if (instance.pose == number) instance.isChanged = true;
-  }
-}
-
-template <class Engine>
-void SystemModel<Engine>::lock(const InstanceOutput& output) {
-  locked_.push_back({output.offset, output.offset + output.size, engine_.frame()});
-}
-
-template <class Engine>
-void SystemModel<Engine>::remove(std::size_t index) {
-  if (instances[index].hasPlace()) lock(instances[index].output);
-  std::swap(instances[index], instances.back());
-  instances.pop_back();
-}
-
-template <class Engine>
-void SystemModel<Engine>::beginFrame() {
-  std::erase_if(locked_,
-                [&](const Place& place) { return place.frame <= engine_.completedFrame(); });
-  const CullingStatistics gpu = engine_->statistics().lastCompletedFrame;
-  const auto counted = gpuCounts_.find(gpu.frame);
-  if (counted == gpuCounts_.end()) return;
-  EXPECT_EQ(gpu.visibleInstances, counted->second.visible) << "frame " << gpu.frame;
-  EXPECT_EQ(gpu.skinnedInstances, counted->second.skinned) << "frame " << gpu.frame;
-  EXPECT_EQ(gpu.settledInstances, counted->second.settled) << "frame " << gpu.frame;
-  gpuCounts_.erase(gpuCounts_.begin(), std::next(counted));
-}
-
-template <class Engine>
-void SystemModel<Engine>::checkPlace(ModelInstance& instance, const InstanceOutput& output,
-                                     bool isListed) {
-  const bool hasPlace = output.size != 0;
-  const bool hadPlace = instance.hasPlace();
-  const bool stays = hasPlace && hadPlace && output.offset == instance.output.offset &&
-                     output.size == instance.output.size;
-  EXPECT_TRUE(hasPlace || !hadPlace) << "it lost its place";
-  EXPECT_TRUE(isListed || stays || !hadPlace) << "it moved";
-  EXPECT_FALSE(isListed && stays) << "it did not move";
-  // Where another stood that a frame under way may still read.
-  for (const Place& place : locked_) {
-    EXPECT_TRUE(!hasPlace || stays || output.offset >= place.end ||
-                output.offset + output.size <= place.begin)
-        << "a place of a frame under way is used again";
-  }
-}
-
-template <class Engine>
-void SystemModel<Engine>::checkPlacesAreApart() const {
-  std::map<std::uint64_t, std::uint64_t> places;
-  for (const ModelInstance& instance : instances) {
-    if (!instance.hasPlace()) continue;
-    EXPECT_TRUE(places.emplace(instance.output.offset, instance.output.size).second);
-  }
-  std::uint64_t end = 0;
-  for (const auto& [offset, size] : places) {
-    EXPECT_GE(offset, end) << "two instances overlap";
-    end = offset + size;
-  }
-}
-
-template <class Engine>
-bool SystemModel<Engine>::isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
-  const bool comesBack = !instance.wasDisplayed;
-  const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
-  const bool isForced = isPlaced || instance.teleports || instance.isUrgent || isOwed;
-  if (instance.description.culledOnGpu) return isForced;
-  const bool isSkinned = lists.skinned.contains(instance.handle.index);
-  if (isForced) {
-    EXPECT_TRUE(isSkinned) << "it changed";
-  } else if (!instance.isChanged && !comesBack) {
-    EXPECT_FALSE(isSkinned) << "it did not change";
-  } else if (!comesBack) {
-    const std::pair beat{instance.pose, instance.description.updateInterval};
-    EXPECT_EQ(lists.beats.emplace(beat, isSkinned).first->second, isSkinned)
-        << "instances of one palette take the same frames";
-  }
-  return isSkinned;
-}
-
-template <class Engine>
-void SystemModel<Engine>::updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
-  const bool comesBack = !instance.wasDisplayed;
-  const bool hasPrevious = instance.description.layout.motion != Motion::none;
-  const bool isCulled = instance.description.culledOnGpu;
-  const bool isSettled = lists.settled.contains(instance.handle.index);
-  lists.gpu.visible += isCulled;
-  if (isSkinnedNow(instance, isPlaced, lists)) {
-    lists.gpu.skinned += isCulled;
-    EXPECT_FALSE(isSettled) << "it was skinned";
-    const bool restarts = isPlaced || instance.teleports || comesBack;
-    const ShownPose now = wantedPose(instance);
-    instance.before = restarts ? now : instance.shown;
-    instance.shown = now;
-    instance.isMoving = hasPrevious && !restarts;
-    instance.isChanged = instance.isUrgent = false;
-    instance.waitedFrames = 0;
-  } else {
-    lists.gpu.settled += isCulled && instance.isMoving;
-    EXPECT_TRUE(isCulled || isSettled == instance.isMoving)
-        << "it settles in the next frame that displays it, and in no other";
-    instance.before = instance.shown;
-    instance.isMoving = false;
-    if (instance.isChanged) ++instance.waitedFrames;
-    EXPECT_LT(instance.waitedFrames, instance.description.updateInterval) << "it waits too long";
-  }
-  instance.wasDisplayed = true;
-}
-
-template <class Engine>
-void SystemModel<Engine>::updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
-  EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
-  EXPECT_FALSE(lists.settled.contains(instance.handle.index)) << "nobody sees it";
-  if (isPlaced) instance.shown = instance.before = std::nullopt;
-  instance.wasDisplayed = false;
-}
-
-template <class Engine>
-void SystemModel<Engine>::update(ModelInstance& instance, Lists& lists) {
-  const InstanceOutput output = must(engine_->output(instance.handle));
-  checkPlace(instance, output, lists.moved.contains(instance.handle.index));
-  // Out of view it has the place and the vertices of its old mesh until somebody looks.
-  const bool isWanted = output.size != 0 && output.mesh == instance.description.mesh;
-  const bool isPlaced = isWanted && instance.changesMesh;
-  if (instance.hasPlace() && output.offset != instance.output.offset) lock(instance.output);
-  instance.output = output;
-  if (isWanted) instance.changesMesh = false;
-  EXPECT_TRUE(isWanted || !instance.isVisible);
-  if (instance.isDisplayed()) {
-    updateDisplayed(instance, isPlaced, lists);
-  } else {
-    updateHidden(instance, isPlaced, lists);
-  }
-  instance.teleports = false;
-}
-
-template <class Engine>
-void SystemModel<Engine>::checkStatistics(const Lists& lists) const {
-  const FrameWorkStatistics frame = engine_->statistics().lastFrame;
-  EXPECT_EQ(frame.frame, engine_.frame());
-  EXPECT_EQ(frame.instances, instances.size());
-  EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());
-  EXPECT_EQ(frame.settledInstances, lists.settled.size());
-  std::uint64_t vertices = 0;
-  for (const ModelInstance& instance : instances) {
-    if (lists.skinned.contains(instance.handle.index)) vertices += instance.vertexCount;
-  }
-  EXPECT_EQ(frame.skinnedVertices, vertices);
-  const bool didNothing =
-      lists.skinned.empty() && lists.settled.empty() && frame.culledCandidates == 0;
-  EXPECT_TRUE(!didNothing || engine_.isIdle()) << "nothing changed";
-}
-
-template <class Engine>
-void SystemModel<Engine>::afterRecord() {
-  Lists lists{indicesOf(engine_->skinnedInstances()),
-              indicesOf(engine_->settledInstances()),
-              indicesOf(engine_->movedInstances()),
-              {},
-              {}};
-  for (ModelInstance& instance : instances) {
-    SCOPED_TRACE("frame " + std::to_string(engine_.frame()) + ", instance " +
-                 std::to_string(instance.handle.index));
-    update(instance, lists);
-  }
-  checkPlacesAreApart();
-  checkStatistics(lists);
-  gpuCounts_[engine_.frame()] = lists.gpu;
-}
 
 }  // namespace dermis::test
