@@ -360,15 +360,6 @@ TEST(GltfAnimation, ReadsKeysThatBreakRules) {
   EXPECT_TRUE(expectNoted(file, "accessor 3: count is 0").clips.at(0).channels.empty());
 }
 
-TEST(GltfAnimation, UsesAStrideWhereNoneMayStand) {
-  FileBuilder file = animated({0, 1}, {0, 0, 0, 99, 8, 0, 0, 99}, "translation", "LINEAR");
-  file.json["accessors"][4]["count"] = 2;
-  file.json["bufferViews"][4]["byteStride"] = 16;
-  const gltf::Model model =
-      expectNoted(file, "output: bufferView 4 of accessor 4 has a byteStride of 16");
-  EXPECT_EQ(model.clips[0].channels[0].values, (Floats{0, 0, 0, 8, 0, 0}));
-}
-
 TEST(GltfAnimation, LeavesOutChannelsWithoutEffect) {
   FileBuilder file = animated({0, 1}, {0, 0, 0, 1, 0, 0}, "translation", "LINEAR");
   file.json["animations"][0]["channels"].push_back(Json(channel(file)));

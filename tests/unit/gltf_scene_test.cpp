@@ -330,26 +330,5 @@ TEST(GltfSkin, RefusesBadMatrices) {
   loaded(withMatrices(two(19, 1e-7f)));
 }
 
-TEST(GltfSkin, UsesAStrideWhereNoneMayStand) {
-  for (const std::size_t stride : {64u, 80u, 252u}) {
-    FileBuilder file = skinnedTriangle();
-    const std::vector<float> first = matrixByColumns(1, 2, 3, 4),
-                             second = matrixByColumns(5, 6, 7, 8);
-    std::vector<float> stored(stride / 4 + 16, 99.0f);
-    std::copy(first.begin(), first.end(), stored.begin());
-    std::copy(second.begin(), second.end(), stored.end() - 16);
-    file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(stored, "MAT4");
-    file.json["accessors"].back()["count"] = 2;
-    file.json["bufferViews"].back()["byteStride"] = stride;
-    const gltf::Model model =
-        expectNoted(file, "inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of " +
-                              std::to_string(stride));
-    ASSERT_EQ(model.skins[0].inverseBindMatrices.size(), 2u);
-    EXPECT_EQ(model.skins[0].inverseBindMatrices[0].m[2][3], 4.0f);
-    EXPECT_EQ(model.skins[0].inverseBindMatrices[1].m[1][1], 5.0f);
-    EXPECT_EQ(model.skins[0].inverseBindMatrices[1].m[0][3], 6.0f);
-  }
-}
-
 }  // namespace
 }  // namespace dermis::test
