@@ -110,12 +110,20 @@ JointMatrix turnAbout(const glm::dvec3& axis, double angle, const glm::dvec3& po
   return jointOf(rotation, point - rotation * point);
 }
 
-void addVertex(OwnedMesh& mesh, const glm::dvec3& position, std::span<const std::uint32_t> joints,
-               std::span<const double> weights) {
+constexpr std::array<std::uint32_t, 10> inOrder{0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
+
+OwnedMesh meshOf(std::uint32_t influencesPerVertex) {
+  OwnedMesh mesh;
+  mesh.influencesPerVertex = influencesPerVertex;
+  return mesh;
+}
+
+void addVertex(OwnedMesh& mesh, const glm::dvec3& position, std::span<const double> weights,
+               std::span<const std::uint32_t> joints = inOrder) {
   for (int i = 0; i < 3; ++i) mesh.positions.push_back(static_cast<float>(position[i]));
   for (std::size_t slot = 0; slot < mesh.influencesPerVertex; ++slot) {
-    mesh.joints.push_back(slot < joints.size() ? joints[slot] : 0);
-    mesh.weights.push_back(slot < joints.size() ? static_cast<float>(weights[slot]) : 0.0f);
+    mesh.joints.push_back(slot < weights.size() ? joints[slot] : 0);
+    mesh.weights.push_back(slot < weights.size() ? static_cast<float>(weights[slot]) : 0.0f);
   }
 }
 
@@ -227,17 +235,14 @@ struct Climber {
 
   /// By how much of the distance between the joints' points the vertex sticks out.
   double escape(Method method) const {
-    OwnedMesh mesh;
-    mesh.influencesPerVertex = static_cast<std::uint32_t>(weights.size());
-    std::vector<std::uint32_t> joints;
+    OwnedMesh mesh = meshOf(static_cast<std::uint32_t>(weights.size()));
     std::vector<JointMatrix> pose;
     for (std::uint32_t i = 0; i < weights.size(); ++i) {
-      joints.push_back(i);
       glm::dmat3 linear = glm::mat3_cast(rotations[i]);
       for (int column = 0; column < 3; ++column) linear[column] *= scales[i][column];
       pose.push_back(jointOf(linear, translations[i]));
     }
-    addVertex(mesh, position, joints, weights);
+    addVertex(mesh, position, weights);
     const JointBounds bounds = boundsOf(mesh.view(), static_cast<std::uint32_t>(pose.size()));
     const Box box = skinnedBounds(bounds, pose, method);
     const Result<reference::SkinnedMesh> skinned = reference::skin(mesh.view(), pose, method);
@@ -279,14 +284,12 @@ TEST(Bounds, CannotBeEscapedByClimbing) {
 TEST(Bounds, HoldVerticesOfJointsInOppositeHemispheres) {
   // Rotations of 0°, 140° and 220°: no signs bring their quaternions into one hemisphere.
   for (int tilt = 0; tilt < 40; ++tilt) {
-    OwnedMesh mesh;
-    mesh.influencesPerVertex = 3;
+    OwnedMesh mesh = meshOf(3);
     Random random(static_cast<std::uint32_t>(tilt));
-    const std::array<std::uint32_t, 3> joints{0, 1, 2};
     for (int i = 0; i < 20; ++i) {
       const std::array weights{random.between(0.3, 0.36), random.between(0.3, 0.36),
                                random.between(0.3, 0.36)};
-      addVertex(mesh, random.vector(1), joints, weights);
+      addVertex(mesh, random.vector(1), weights);
     }
     const glm::dvec3 axis(1, 0.02 * tilt, 0);
     const std::array pose{turnAbout(axis, 0, {0, 0, 0}),
@@ -365,11 +368,8 @@ double excess(OwnedMesh& mesh, std::span<const JointMatrix> pose, Method method)
 }
 
 TEST(Bounds, AreExactForOneVertexOfOneJoint) {
-  OwnedMesh mesh;
-  mesh.influencesPerVertex = 1;
-  const std::array<std::uint32_t, 1> joint{0};
-  const std::array weight{1.0};
-  addVertex(mesh, {0.5, -0.25, 2}, joint, weight);
+  OwnedMesh mesh = meshOf(1);
+  addVertex(mesh, {0.5, -0.25, 2}, std::array{1.0});
   const std::array pose{turnAbout({1, 2, 3}, 1.1, {1, 1, 0})};
   const JointBounds bounds = boundsOf(mesh.view(), 1);
   EXPECT_LE(widest(skinnedBounds(bounds, pose, Method::linear)), 8e-6f);
@@ -398,11 +398,8 @@ TEST(Bounds, AddNothingWhereAllJointsMoveAlike) {
 TEST(Bounds, AddTheArcOfATurn) {
   // A vertex halfway between two joints that turn against each other by 90° stands on the arc; the
   // box of one such vertex ends there.
-  OwnedMesh mesh;
-  mesh.influencesPerVertex = 2;
-  const std::array<std::uint32_t, 2> joints{0, 1};
-  const std::array weights{0.5, 0.5};
-  addVertex(mesh, {1, 0, 0}, joints, weights);
+  OwnedMesh mesh = meshOf(2);
+  addVertex(mesh, {1, 0, 0}, std::array{0.5, 0.5});
   const std::array pose{turnAbout({0, 0, 1}, -pi / 4, {0, 0, 0}),
                         turnAbout({0, 0, 1}, pi / 4, {0, 0, 0})};
   const JointBounds bounds = boundsOf(mesh.view(), 2);
@@ -464,7 +461,7 @@ struct Creature {
     const std::array joints{joint, parent, parents[parent]};
     const std::array weights{1 - blend, 0.9 * blend, 0.1 * blend};
     const std::size_t count = blend == 0 ? 1 : parent == parents[parent] ? 2 : 3;
-    addVertex(mesh, position, std::span(joints).first(count), std::span(weights).first(count));
+    addVertex(mesh, position, std::span(weights).first(count), joints);
   }
 
   std::vector<JointMatrix> pose(Random& random, double mostAngle) const {
@@ -531,12 +528,9 @@ TEST(Bounds, StayTightWhereAJointScales) {
 }
 
 TEST(Bounds, KeepVerticesWithoutWeightInBindPose) {
-  OwnedMesh mesh;
-  mesh.influencesPerVertex = 1;
-  const std::array<std::uint32_t, 1> joint{0};
-  const std::array none{0.0}, whole{1.0};
-  addVertex(mesh, {5, 0, 0}, joint, none);
-  addVertex(mesh, {0, 0, 0}, joint, whole);
+  OwnedMesh mesh = meshOf(1);
+  addVertex(mesh, {5, 0, 0}, std::array{0.0});
+  addVertex(mesh, {0, 0, 0}, std::array{1.0});
   const std::array pose{jointOf(glm::dmat3(1.0), {0, 3, 0})};
   expectInside(mesh, pose, "a vertex without weight");
   const JointBounds bounds = boundsOf(mesh.view(), 1);
@@ -544,9 +538,8 @@ TEST(Bounds, KeepVerticesWithoutWeightInBindPose) {
   EXPECT_NEAR(static_cast<double>(box.max[0]), 5, 1e-5);
   EXPECT_NEAR(static_cast<double>(box.min[1]), 0, 1e-5);
 
-  OwnedMesh still;
-  still.influencesPerVertex = 1;
-  addVertex(still, {5, 6, 7}, joint, none);
+  OwnedMesh still = meshOf(1);
+  addVertex(still, {5, 6, 7}, std::array{0.0});
   const JointBounds stillBounds = boundsOf(still.view(), 1);
   EXPECT_EQ(stillBounds.requiredJoints, 0u);
   const Box point = skinnedBounds(stillBounds, {}, Method::dualQuaternion);
