@@ -48,6 +48,12 @@ inline DualQuatd randomRigid(RigRandom& random, double reach = 1) {
   return rigidOf(q, random.vector(reach));
 }
 
+inline std::vector<DualQuatd> randomRigids(RigRandom& random, std::size_t count) {
+  std::vector<DualQuatd> rigids;
+  while (rigids.size() < count) rigids.push_back(randomRigid(random));
+  return rigids;
+}
+
 inline std::vector<double> randomWeights(RigRandom& random, std::size_t count) {
   std::vector<double> weights(count);
   double sum = 0;

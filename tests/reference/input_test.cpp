@@ -201,19 +201,6 @@ TEST_F(InputTest, Truth05_UnnormalizedWeightsAreNormalized) {
   expectAsPlain(scaled.view(), 0);
 }
 
-TEST_F(InputTest, AVertexWithoutWeightStaysInBindPose) {
-  for (std::size_t vertex = 0; vertex < plain.vertexCount(); vertex += 2) {
-    for (std::size_t slot = 0; slot < 4; ++slot) plain.weights[vertex * 4 + slot] = 0;
-  }
-  for (const Method method : allMethods) {
-    const reference::AnalyzedMesh result = skinned(plain, pose, method);
-    for (std::size_t vertex = 0; vertex < plain.vertexCount(); vertex += 2) {
-      EXPECT_EQ(toVector(result.positions[vertex]), bindPosition(plain, vertex));
-    }
-    EXPECT_NE(toVector(result.positions[1]), bindPosition(plain, 1));
-  }
-}
-
 TEST_F(InputTest, RefusesWhatPackRefuses) {
   const auto refused = [&](OwnedMesh mesh, std::string_view part) {
     for (const Method method : allMethods) {

@@ -318,34 +318,5 @@ TEST(Property, Truth08_ThroughPosesTheBlendIsAsRigidAsItsJoints) {
   }
 }
 
-// From the left by transforms that float32 and its products hold exactly.
-TEST(Property, Truth04_ThroughPosesItIsInvariantFromTheLeft) {
-  RigRandom random(10);
-  constexpr std::uint32_t jointCount = 500;
-  const auto exactly = [](const glm::dvec3& v) { return glm::round(v * 1024.0) / 1024.0; };
-  const glm::dmat3 turn = exactRotation(random);
-  const glm::dvec3 shift = exactly(random.vector(4));
-  std::vector<JointMatrix> pose, moved;
-  for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
-    const double angle = joint % 4 == 0 ? pi : random.between(-pi, pi);
-    pose.push_back(jointOf(rotationAbout(random.direction(), angle), exactly(random.vector(4))));
-    moved.push_back(jointOf(turn * linearOf(pose.back()), turn * offsetOf(pose.back()) + shift));
-  }
-  OwnedMesh mesh = scatteredMesh(random, caseCount, jointCount, 4);
-  const reference::AnalyzedMesh before = skinned(mesh, pose, Method::dualQuaternion);
-  const reference::AnalyzedMesh after = skinned(mesh, moved, Method::dualQuaternion);
-  for (std::size_t vertex = 0; vertex < caseCount; ++vertex) {
-    if (before.conditioning[vertex].signAmbiguous) continue;
-    ASSERT_LE(glm::length(toVector(after.positions[vertex]) -
-                          (turn * toVector(before.positions[vertex]) + shift)),
-              2e-13)
-        << vertex;
-    ASSERT_LE(
-        glm::length(toVector(after.normals[vertex]) - turn * toVector(before.normals[vertex])),
-        1e-13)
-        << vertex;
-  }
-}
-
 }  // namespace
 }  // namespace dermis::test

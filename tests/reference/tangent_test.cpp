@@ -51,18 +51,6 @@ glm::dmat3 randomMatrix(RigRandom& random) {
   return glm::dmat3(random.vector(1), random.vector(1), random.vector(1));
 }
 
-TEST(ReferenceTangents, LinearTakesTheBlendedMatrixItself) {
-  RigRandom random(1);
-  for (int trial = 0; trial < 1000; ++trial) {
-    const std::array pose{jointOf(randomMatrix(random)), jointOf(randomMatrix(random))};
-    TangentMesh mesh = vertexWithTangent(random.direction(), {{0, 0.25f}, {1, 0.75f}});
-    const glm::dmat3 blended = linearOf(pose[0]) * 0.25 + linearOf(pose[1]) * 0.75;
-    const reference::AnalyzedMesh result = mesh.skinned(pose, Method::linear);
-    expectNear(direction(result.tangents[0]), glm::normalize(blended * mesh.bind(0)), 1e-13);
-    EXPECT_NEAR(glm::length(direction(result.tangents[0])), 1, 1e-15);
-  }
-}
-
 // Two points that lie a tangent apart move to points that lie the skinned tangent apart: the map is
 // affine where the weights, and the centres of rotation, are equal. In `blended` too, but there the
 // directions are a mean of two unit vectors (below).
