@@ -176,18 +176,11 @@ TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
 
 TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
   Plan out;
-  EXPECT_TRUE(dispatchesOf(out).empty());
-  EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
+  expectEmpty(out);
   OwnedBatch batch = batchOfFiveMeshes();
   for (const Batch& empty : {Batch{}, batch.batch()}) {
     ASSERT_TRUE(makePlan(empty, {}, {}, out).ok());
-    EXPECT_TRUE(dispatchesOf(out).empty());
-    EXPECT_TRUE(out.variants().empty());
-    EXPECT_EQ(out.instanceCount(), 0u);
-    EXPECT_EQ(out.vertexCount(), 0u);
-    EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
-    EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
-    EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
+    expectEmpty(out);
     EXPECT_TRUE(writeTables(out, {}).ok());
   }
 }

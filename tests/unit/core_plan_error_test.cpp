@@ -44,14 +44,7 @@ struct PlanErrors : public ::testing::Test {
       EXPECT_NE(result.error().message.find(part), std::string::npos)
           << "'" << result.error().message << "' lacks '" << part << "'";
     }
-    EXPECT_TRUE(dispatchesOf(out).empty());
-    EXPECT_TRUE(out.variants().empty());
-    EXPECT_EQ(out.instanceCount(), 0u);
-    EXPECT_EQ(out.vertexCount(), 0u);
-    EXPECT_EQ(out.buffer(BufferRole::tables).size, 0u);
-    EXPECT_EQ(out.buffer(BufferRole::results).size, 0u);
-    EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
-    EXPECT_EQ(out.resultOffset(0), Plan::noResult);
+    expectEmpty(out);
   }
   void expectInvalid(std::initializer_list<const char*> parts) {
     expectRefused(ErrorCode::invalidArgument, parts);

@@ -729,6 +729,17 @@ std::vector<std::uint32_t> tablesOf(const Plan& plan) {
   return words;
 }
 
+void expectEmpty(const Plan& plan) {
+  EXPECT_TRUE(dispatchesOf(plan).empty());
+  EXPECT_TRUE(plan.variants().empty());
+  EXPECT_EQ(plan.instanceCount(), 0u);
+  EXPECT_EQ(plan.vertexCount(), 0u);
+  for (const BufferRole role : {BufferRole::tables, BufferRole::palettes, BufferRole::results})
+    EXPECT_EQ(plan.buffer(role).size, 0u);
+  EXPECT_EQ(plan.statusOffset(0), Plan::noStatus);
+  EXPECT_EQ(plan.resultOffset(0), Plan::noResult);
+}
+
 void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
                    Plan& out) {
   const Result<void> result = makePlan(batch.batch(), limits, tuning, out);

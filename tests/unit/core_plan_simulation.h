@@ -88,6 +88,7 @@ bool wantsResult(const Job& job);
 std::vector<MorphWeight> activeMorphs(std::span<const MorphWeight> morphs);
 
 std::vector<std::uint32_t> tablesOf(const Plan& plan);
+void expectEmpty(const Plan& plan);
 
 /// Makes the plan and runs it; fails the test where what the kernels would do is not the batch's
 /// work, done once.
