@@ -44,20 +44,13 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
                     std::span<const MorphWeight> morphs) override {
     VertexLayout layout = description.layout;
     const bool hasPrevious = std::exchange(layout.motion, Motion::none) != Motion::none;
-    const cpu::Mesh own = must(cpu::Mesh::create(mesh));
     cpu::Instance instance;
     instance.pose = pose;
     instance.morphs = morphs;
-    cpu::Job job;
-    job.mesh = &own;
-    job.method = description.method;
-    job.places = must(placeVertices(layout, mesh.vertexCount()));
-    std::vector<std::byte> bytes(job.places.size);
-    instance.output = bytes.data();
-    job.instances = {&instance, 1};
-    must(cpu::skin(job));
+    const std::vector<std::byte> bytes = skinOne(mesh, description.method, layout, instance);
+    const VertexPlaces places = must(placeVertices(layout, mesh.vertexCount()));
     const std::array<OutputAttribute, streamCount> attributes{
-        job.places.positions, job.places.normals, job.places.tangents, {}};
+        places.positions, places.normals, places.tangents, {}};
     Streams streams;
     for (std::size_t stream = 0; stream < previousStream; ++stream)
       streams[stream] = readAttribute(bytes, attributes[stream], mesh.vertexCount());

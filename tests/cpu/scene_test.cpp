@@ -51,22 +51,12 @@ class CpuSceneTest : public ::testing::Test {
   }
   /// What a job of the instance alone writes, and finds out.
   std::vector<std::byte> alone(std::size_t index, std::uint32_t seed, InstanceResult& found) const {
-    const cpu::Mesh mesh = must(cpu::Mesh::create(packed_));
-    VertexLayout layout = descriptions_[index].layout;
     const std::vector<JointMatrix> pose = poseOf(seed, index);
-    cpu::Job job;
-    job.mesh = &mesh;
-    job.method = descriptions_[index].method;
-    job.places = must(placeVertices(layout, vertexCount));
-    std::vector<std::byte> bytes(job.places.size);
     cpu::Instance instance;
     instance.pose = pose;
-    instance.output = bytes.data();
     instance.box = descriptions_[index].box;
     instance.result = &found;
-    job.instances = {&instance, 1};
-    must(cpu::skin(job));
-    return bytes;
+    return skinOne(packed_, descriptions_[index].method, descriptions_[index].layout, instance);
   }
 
   PackedMesh packed_ = meshOf(vertexCount);
@@ -240,16 +230,10 @@ TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
     description.pose = must(engine_->addPose(jointCount, {.mayScale = mayScale}));
     engine_.writePose(description.pose, pose);
     instances_.push_back(must(engine_->addInstance(description)));
-    const cpu::Mesh mesh = must(cpu::Mesh::create(packed_));
-    cpu::Job job;
-    job.mesh = &mesh;
-    job.places = must(placeVertices(description.layout, vertexCount));
     cpu::Instance instance;
     instance.pose = pose;
     instance.mayScale = mayScale;
-    instance.output = outputs.emplace_back(job.places.size).data();
-    job.instances = {&instance, 1};
-    must(cpu::skin(job));
+    outputs.push_back(skinOne(packed_, description.method, description.layout, instance));
   }
   engine_.submit();
   EXPECT_NE(outputs[0], outputs[1]);

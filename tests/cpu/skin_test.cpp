@@ -43,6 +43,23 @@ VertexLayout layoutOf(VertexFormat positions, VertexFormat normals, VertexFormat
 const VertexLayout plainLayout =
     layoutOf(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::none);
 
+cpu::Job jobOf(const cpu::Mesh& mesh, Method method, const VertexPlaces& places,
+               std::span<const cpu::Instance> instances) {
+  cpu::Job job;
+  job.mesh = &mesh;
+  job.method = method;
+  job.places = places;
+  job.instances = instances;
+  return job;
+}
+
+/// What the bytes of outputs are before.
+constexpr std::byte untouched{0x5a};
+
+bool isUntouched(std::span<const std::byte> bytes) {
+  return std::ranges::all_of(bytes, [](std::byte b) { return b == untouched; });
+}
+
 /// Instances of one mesh in poses of one kind, side by side in memory.
 struct Crowd {
   Crowd(std::uint32_t vertexCount, std::uint32_t influences, Rigidity rigidity,
@@ -52,7 +69,7 @@ struct Crowd {
     samples::addMorphs(source, 5, 3);
     mesh.emplace(cpu::Mesh::create(pack(source.view(), jointCount).value()).value());
     places = placeVertices(layout, vertexCount).value();
-    output.assign(places.size * instanceCount, std::byte{0x5a});
+    output.assign(places.size * instanceCount, untouched);
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
       poses.push_back(randomPose(40 + i, jointCount, rigidity));
       cpu::Instance instance;
@@ -69,16 +86,15 @@ struct Crowd {
       instances[i].output = output.data() + places.size * i;
     }
   }
-  cpu::Job job(Method method) const {
-    cpu::Job job;
-    job.mesh = &*mesh;
-    job.method = method;
-    job.places = places;
-    job.instances = instances;
+  cpu::Job job(Method method, std::uint32_t firstVertex = 0,
+               std::uint32_t vertexEnd = 0xffffffffu) const {
+    cpu::Job job = jobOf(*mesh, method, places, instances);
+    job.firstVertex = firstVertex;
+    job.vertexEnd = vertexEnd;
     return job;
   }
   void skin(Method method) {
-    std::ranges::fill(output, std::byte{0x5a});
+    std::ranges::fill(output, untouched);
     const Result<void> done = cpu::skin(job(method));
     ASSERT_TRUE(done.ok()) << done.error().message;
   }
@@ -162,13 +178,11 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
       ASSERT_TRUE(cpu::setTarget(target).ok());
       crowd.skin(method);
       EXPECT_TRUE(crowd.output == first) << target;
-      std::ranges::fill(crowd.output, std::byte{0x5a});
+      std::ranges::fill(crowd.output, untouched);
       std::uint32_t begin = 0;
       for (const std::uint32_t end : {13u, 100u, 104u, 250u, 0xffffffffu}) {
         for (std::size_t i = 0; i < instanceCount; i += 3) {
-          cpu::Job job = crowd.job(method);
-          job.firstVertex = begin;
-          job.vertexEnd = end;
+          cpu::Job job = crowd.job(method, begin, end);
           job.instances = job.instances.subspan(i, std::min<std::size_t>(3, instanceCount - i));
           ASSERT_TRUE(cpu::skin(job).ok());
         }
@@ -213,10 +227,8 @@ TEST_F(CpuSkinTest, ThreadsShareTheVerticesOfOneInstance) {
   std::vector<std::thread> threads;
   for (std::uint32_t part = 0; part < 4; ++part) {
     threads.emplace_back([&crowd, part] {
-      cpu::Job job = crowd.job(Method::bulgeControlled);
-      job.firstVertex = part * 1250;
-      job.vertexEnd = (part + 1) * 1250;
-      EXPECT_TRUE(cpu::skin(job).ok());
+      EXPECT_TRUE(
+          cpu::skin(crowd.job(Method::bulgeControlled, part * 1250, (part + 1) * 1250)).ok());
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -234,12 +246,8 @@ TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
     cpu::Instance instance;
     instance.pose = pose;
     instance.output = output.data();
-    cpu::Job job;
-    job.mesh = &mesh;
-    job.method = method;
-    job.places = placeVertices(plainLayout, 4001).value();
-    job.instances = {&instance, 1};
-    ASSERT_TRUE(cpu::skin(job).ok());
+    const VertexPlaces places = placeVertices(plainLayout, 4001).value();
+    ASSERT_TRUE(cpu::skin(jobOf(mesh, method, places, {&instance, 1})).ok());
     const reference::SkinnedMesh expected = reference::skin(source.view(), pose, method).value();
     // Random numbers differ between standard libraries, and with them whether rotations of a vertex
     // are antipodal.
@@ -285,10 +293,8 @@ TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
   std::vector<InstanceResult> sums(instanceCount);
   for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &parts[i];
   for (const std::uint32_t begin : {0u, 77u}) {
-    cpu::Job job = crowd.job(Method::dualQuaternion);
-    job.firstVertex = begin;
-    job.vertexEnd = begin == 0 ? 77 : 203;
-    ASSERT_TRUE(cpu::skin(job).ok());
+    const std::uint32_t end = begin == 0 ? 77 : 203;
+    ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
     for (std::size_t i = 0; i < instanceCount; ++i) cpu::addResult(sums[i], parts[i]);
   }
   EXPECT_EQ(std::memcmp(sums.data(), results.data(), sizeof(InstanceResult) * instanceCount), 0);
@@ -413,21 +419,21 @@ TEST_F(CpuSkinTest, BytesBetweenAndBehindAttributesStay) {
   crowd.skin(Method::dualQuaternion);
   for (std::size_t byte = 0; byte < crowd.output.size(); ++byte) {
     if (byte % 20 >= 8) {
-      ASSERT_EQ(crowd.output[byte], std::byte{0x5a}) << byte;
+      ASSERT_EQ(crowd.output[byte], untouched) << byte;
     }
   }
   // The plain way, into memory that begins at odd addresses too.
   Crowd plain(203, 4, Rigidity::rigid, plainLayout);
   plain.skin(Method::dualQuaternion);
-  std::vector<std::byte> odd(plain.places.size + 2, std::byte{0x5a});
+  std::vector<std::byte> odd(plain.places.size + 2, untouched);
   cpu::Instance instance = plain.instances[0];
   instance.output = odd.data() + 1;
   cpu::Job job = plain.job(Method::dualQuaternion);
   job.instances = {&instance, 1};
   ASSERT_TRUE(cpu::skin(job).ok());
   EXPECT_TRUE(std::equal(odd.begin() + 1, odd.end() - 1, plain.output.begin()));
-  EXPECT_EQ(odd.front(), std::byte{0x5a});
-  EXPECT_EQ(odd.back(), std::byte{0x5a});
+  EXPECT_EQ(odd.front(), untouched);
+  EXPECT_EQ(odd.back(), untouched);
 }
 
 // An array for each attribute, as programs without a GPU like it.
@@ -481,16 +487,11 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
     Crowd crowd(203, 4, Rigidity::rigid, layout);
     const std::uint32_t stride = crowd.places.positions.stride;
     for (const auto& [begin, end] : {std::pair{13u, 101u}, {16u, 19u}, {5u, 5u}, {200u, 203u}}) {
-      std::ranges::fill(crowd.output, std::byte{0x5a});
-      cpu::Job job = crowd.job(Method::dualQuaternion);
-      job.firstVertex = begin;
-      job.vertexEnd = end;
-      ASSERT_TRUE(cpu::skin(job).ok());
+      std::ranges::fill(crowd.output, untouched);
+      ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
       for (std::size_t byte = 0; byte < crowd.output.size(); byte += stride) {
         const std::size_t vertex = byte % crowd.places.size / stride;
-        const auto all = std::span(crowd.output).subspan(byte, stride);
-        const bool isWritten =
-            !std::ranges::all_of(all, [](std::byte b) { return b == std::byte{0x5a}; });
+        const bool isWritten = !isUntouched(std::span(crowd.output).subspan(byte, stride));
         ASSERT_EQ(isWritten, vertex >= begin && vertex < end) << vertex;
       }
     }
@@ -543,8 +544,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
     ASSERT_FALSE(done.ok()) << text;
     EXPECT_EQ(done.error().code, ErrorCode::invalidArgument) << done.error().message;
     EXPECT_NE(done.error().message.find(text), std::string::npos) << done.error().message;
-    EXPECT_TRUE(
-        std::ranges::all_of(crowd.output, [](std::byte b) { return b == std::byte{0x5a}; }));
+    EXPECT_TRUE(isUntouched(crowd.output));
   };
   const cpu::Job good = crowd.job(Method::dualQuaternion);
   cpu::Job bad = good;
@@ -610,11 +610,8 @@ TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
     cpu::Instance instance;
     instance.pose = pose;
     instance.output = skinned;
-    cpu::Job job;
-    job.mesh = &*mesh;
-    job.places = placeVertices({}, 1).value();
-    job.instances = {&instance, 1};
-    ASSERT_TRUE(cpu::skin(job).ok());
+    const VertexPlaces places = placeVertices({}, 1).value();
+    ASSERT_TRUE(cpu::skin(jobOf(*mesh, cpu::Job{}.method, places, {&instance, 1})).ok());
     EXPECT_NEAR(skinned[2], 3, 1e-5);
   }
 }

@@ -6,6 +6,20 @@
 
 namespace dermis::test {
 
+std::vector<std::byte> skinOne(const PackedMesh& mesh, Method method, const VertexLayout& layout,
+                               cpu::Instance instance) {
+  const cpu::Mesh made = must(cpu::Mesh::create(mesh));
+  cpu::Job job;
+  job.mesh = &made;
+  job.method = method;
+  job.places = must(placeVertices(layout, mesh.vertexCount()));
+  std::vector<std::byte> bytes(job.places.size);
+  instance.output = bytes.data();
+  job.instances = {&instance, 1};
+  must(cpu::skin(job));
+  return bytes;
+}
+
 CpuEngine::CpuEngine(const cpu::SkinningSystemDescription& description)
     : system_(must(cpu::SkinningSystem::create(description))) {}
 

@@ -8,10 +8,15 @@
 #include <span>
 #include <vector>
 
+#include "dermis/cpu/skin.h"
 #include "dermis/cpu/skinning_system.h"
 #include "scene_meshes.h"
 
 namespace dermis::test {
+
+/// What a job of that instance alone writes.
+std::vector<std::byte> skinOne(const PackedMesh& mesh, Method method, const VertexLayout& layout,
+                               cpu::Instance instance);
 
 class CpuEngine {
  public:
