@@ -48,6 +48,11 @@ std::vector<float> solved(Surface& surface) {
   return result ? std::move(*result) : std::vector<float>{};
 }
 
+CenterOfRotationSolver solverOf(Surface& surface) {
+  return CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles)
+      .value();
+}
+
 double sizeOf(const OwnedMesh& mesh) {
   glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
   for (std::size_t vertex = 0; vertex < mesh.vertexCount(); ++vertex) {
@@ -290,13 +295,11 @@ TEST(CentersOfRotation, TakeNoNoticeOfTrianglesWithoutArea) {
 TEST(CentersOfRotation, AreTheSameToTheBitHoweverTheyAreCut) {
   Surface surface = randomSurface(1, 1000, 2000, 7, 4);
   const std::vector<float> expected = solved(surface);
-  Result<CenterOfRotationSolver> made =
-      CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
-  ASSERT_TRUE(made.ok());
+  CenterOfRotationSolver made = solverOf(surface);
   for (const std::uint32_t threads : {0u, 1u, 2u, 3u, 7u, 100u})
-    EXPECT_EQ(samples::solveCenters(*made, threads), expected) << threads << " threads";
+    EXPECT_EQ(samples::solveCenters(made, threads), expected) << threads << " threads";
   surface = {};  // the solver has what it needs
-  const CenterOfRotationSolver solver = std::move(*made);
+  const CenterOfRotationSolver solver = std::move(made);
   ASSERT_EQ(solver.vertexCount(), 1000u);
   for (const std::size_t size : {1u, 7u, 333u, 1000u}) {
     std::vector<float> centers(3000, std::nanf(""));
@@ -313,14 +316,12 @@ TEST(CentersOfRotation, AreTheSameToTheBitHoweverTheyAreCut) {
 TEST(CentersOfRotation, AreSolvedByThreadsOfTheEngine) {
   Surface surface = randomSurface(2, 500, 800, 6, 4);
   const std::vector<float> expected = solved(surface);
-  const Result<CenterOfRotationSolver> solver =
-      CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
-  ASSERT_TRUE(solver.ok());
+  const CenterOfRotationSolver solver = solverOf(surface);
   std::vector<float> centers(1500);
   std::vector<std::thread> threads;
   for (std::uint32_t i = 0; i < 5; ++i) {
     threads.emplace_back([&, i] {
-      EXPECT_TRUE(solver->solve(100 * i, std::span(centers).subspan(std::size_t{300} * i, 300)));
+      EXPECT_TRUE(solver.solve(100 * i, std::span(centers).subspan(std::size_t{300} * i, 300)));
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -329,12 +330,10 @@ TEST(CentersOfRotation, AreSolvedByThreadsOfTheEngine) {
 
 TEST(CentersOfRotation, RefusePiecesOutsideTheMesh) {
   Surface surface = randomSurface(3, 20, 30, 4, 2);
-  const Result<CenterOfRotationSolver> solver =
-      CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
-  ASSERT_TRUE(solver.ok());
+  const CenterOfRotationSolver solver = solverOf(surface);
   std::vector<float> centers(63, 7.0f);
   const auto refused = [&](std::uint32_t first, std::size_t size) {
-    const Result<void> result = solver->solve(first, std::span(centers).first(size));
+    const Result<void> result = solver.solve(first, std::span(centers).first(size));
     return !result.ok() && result.error().code == ErrorCode::invalidArgument;
   };
   EXPECT_TRUE(refused(0, 63));
@@ -342,19 +341,17 @@ TEST(CentersOfRotation, RefusePiecesOutsideTheMesh) {
   EXPECT_TRUE(refused(0, 4));
   EXPECT_TRUE(refused(std::numeric_limits<std::uint32_t>::max(), 3));
   EXPECT_EQ(centers, std::vector<float>(63, 7.0f));
-  EXPECT_TRUE(solver->solve(20, {}));
-  EXPECT_TRUE(solver->solve(19, std::span(centers).first(3)));
+  EXPECT_TRUE(solver.solve(20, {}));
+  EXPECT_TRUE(solver.solve(19, std::span(centers).first(3)));
 }
 
 TEST(CentersOfRotation, ToolsTellTheCallingThreadHowFarTheyAre) {
   Surface surface = randomSurface(4, 2000, 500, 5, 3);
-  const Result<CenterOfRotationSolver> solver =
-      CenterOfRotationSolver::make(surface.mesh.view(), surface.jointCount, surface.triangles);
-  ASSERT_TRUE(solver.ok());
+  const CenterOfRotationSolver solver = solverOf(surface);
   const std::thread::id caller = std::this_thread::get_id();
   for (const std::uint32_t threads : {1u, 3u}) {
     std::vector<float> fractions;
-    samples::solveCenters(*solver, threads, [&](float fraction) {
+    samples::solveCenters(solver, threads, [&](float fraction) {
       fractions.push_back(fraction);
       EXPECT_EQ(std::this_thread::get_id(), caller);
     });
@@ -369,14 +366,11 @@ TEST(CentersOfRotation, ToolsTellTheCallingThreadHowFarTheyAre) {
 TEST(CentersOfRotation, SayWhatIsWrong) {
   Surface surface = randomSurface(6, 20, 30, 4, 2);
   surface.mesh.name = "Fox";
-  const auto errorOf = [](Surface& wrong) {
+  const auto expectError = [](Surface wrong, ErrorCode code, const std::string& words) {
     const Result<std::vector<float>> result =
         test::centersOf(wrong.mesh.view(), wrong.jointCount, wrong.triangles);
-    EXPECT_FALSE(result.ok());
-    return result ? Error{} : result.error();
-  };
-  const auto expectError = [&](Surface wrong, ErrorCode code, const std::string& words) {
-    const Error error = errorOf(wrong);
+    ASSERT_FALSE(result.ok()) << words;
+    const Error& error = result.error();
     EXPECT_EQ(error.code, code) << words;
     EXPECT_NE(error.message.find("mesh 'Fox'"), std::string::npos) << error.message;
     EXPECT_NE(error.message.find(words), std::string::npos) << error.message;
