@@ -106,9 +106,6 @@ TEST(GltfNode, NotesPropertiesThatHaveNoEffect) {
                         "node 0: children lists 1 twice")
                 .nodeOrder,
             (std::vector<std::uint32_t>{0, 1}));
-  expectNoted(withNodes({{{"skin", 0}}}), "node 0: it has skin but no mesh");
-  expectNoted(withNodes({{{"camera", 2}}}), "node 0: camera is 2");
-  expectNoted(withNodes({{{"weights", {1}}}}), "node 0: it has weights but no mesh");
   expectNoted(withNodes({{{"matrix", {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}}),
               "node 0: the fourth row of its matrix is not 0 0 0 1");
   const gltf::Model model = expectNoted(
