@@ -522,18 +522,14 @@ TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
         }
       }
     }
-    std::vector<float> positions(3);
-    const std::uint32_t outside = 203;
-    EXPECT_FALSE(
-        cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], {&outside, 1}, positions)
-            .ok());
-    EXPECT_FALSE(
-        cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], vertices, positions)
-            .ok());
-    EXPECT_FALSE(cpu::skinVertices(*crowd.mesh, Method::logMatrix, crowd.instances[0],
-                                   std::span(vertices).first(1), positions)
-                     .ok());
-    EXPECT_TRUE(cpu::skinVertices(*crowd.mesh, Method::linear, crowd.instances[0], {}, {}).ok());
+    const auto isDone = [&](Method method, std::span<const std::uint32_t> some, std::size_t room) {
+      std::vector<float> positions(room * 3);
+      return cpu::skinVertices(*crowd.mesh, method, crowd.instances[0], some, positions).ok();
+    };
+    EXPECT_FALSE(isDone(Method::linear, std::array{203u}, 1)) << "outside";
+    EXPECT_FALSE(isDone(Method::linear, vertices, 1)) << "too little room";
+    EXPECT_FALSE(isDone(Method::logMatrix, std::array{200u}, 1)) << "a method for comparison";
+    EXPECT_TRUE(isDone(Method::linear, {}, 0)) << "none";
   }
 }
 
