@@ -22,12 +22,15 @@ namespace {
 constexpr double u = 1.0 / 16777216.0;  // 2^-24
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Accuracy, TheUnitIsTwoToTheMinus24) {
+struct Accuracy : public ::testing::Test {
+  reference::Conditioning conditioning;
+};
+
+TEST_F(Accuracy, TheUnitIsTwoToTheMinus24) {
   EXPECT_EQ(floatRounding, u);
 }
 
-TEST(Accuracy, Truth16_PositionBounds) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, Truth16_PositionBounds) {
   conditioning.scale = 2.5;
   conditioning.distance = 3;
   EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning), 6 * u * 2.5);
@@ -37,8 +40,7 @@ TEST(Accuracy, Truth16_PositionBounds) {
   EXPECT_NEAR(positionBound(Method::linear, conditioning), 3.6e-3, 1e-4);
 }
 
-TEST(Accuracy, JointsTakenForRigidAddTheirStretchOfTheDistance) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, JointsTakenForRigidAddTheirStretchOfTheDistance) {
   conditioning.scale = 1;
   conditioning.distance = 3;
   conditioning.rigidShortcut = 1e-6;
@@ -48,8 +50,7 @@ TEST(Accuracy, JointsTakenForRigidAddTheirStretchOfTheDistance) {
   EXPECT_DOUBLE_EQ(positionBound(Method::dualQuaternion, conditioning), 72 * u + 3e-6);
 }
 
-TEST(Accuracy, QuaternionsThatCancelByMoreThanAQuarterAreLessCertain) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, QuaternionsThatCancelByMoreThanAQuarterAreLessCertain) {
   conditioning.scale = 1;
   for (const double length : {1.0, 0.25}) {
     conditioning.blendLength = length;
@@ -63,8 +64,7 @@ TEST(Accuracy, QuaternionsThatCancelByMoreThanAQuarterAreLessCertain) {
   EXPECT_DOUBLE_EQ(normalBound(Method::linear, conditioning), 8 * u);
 }
 
-TEST(Accuracy, WhatAGpuMayFlushToZeroCounts) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, WhatAGpuMayFlushToZeroCounts) {
   conditioning.distance = 3;
   EXPECT_EQ(positionBound(Method::linear, conditioning), 0x1p-118);
   EXPECT_EQ(positionBound(Method::dualQuaternion, conditioning), 0x1p-118);
@@ -74,8 +74,7 @@ TEST(Accuracy, WhatAGpuMayFlushToZeroCounts) {
   EXPECT_LT(tangentBound(Method::linear, conditioning), 0) << "more than a twentieth";
 }
 
-TEST(Accuracy, Truth16_NormalBounds) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, Truth16_NormalBounds) {
   EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 1.5e-6);
   conditioning.rigidShortcut = 2e-6;
   EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternion, conditioning), 3.5e-6);
@@ -93,8 +92,7 @@ TEST(Accuracy, Truth16_NormalBounds) {
   EXPECT_LT(normalBound(Method::dualQuaternion, conditioning), 0);
 }
 
-TEST(Accuracy, TangentBoundsAreThoseOfNormalsWithTheirOwnAlignment) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, TangentBoundsAreThoseOfNormalsWithTheirOwnAlignment) {
   conditioning.normalAlignment = 0.5;
   conditioning.tangentAlignment = 0.25;
   conditioning.rigidShortcut = 2e-6;
@@ -109,9 +107,9 @@ TEST(Accuracy, TangentBoundsAreThoseOfNormalsWithTheirOwnAlignment) {
   EXPECT_LT(tangentBound(Method::dualQuaternion, conditioning), 0);
 }
 
-TEST(Accuracy, ALeverageCountsAsTheScaleDoesButForLinear) {
+TEST_F(Accuracy, ALeverageCountsAsTheScaleDoesButForLinear) {
   for (const Method method : allMethods) {
-    reference::Conditioning conditioning;
+    conditioning = {};
     conditioning.scale = 2;
     conditioning.distance = 3;
     const double without = positionBound(method, conditioning);
@@ -128,8 +126,7 @@ TEST(Accuracy, ALeverageCountsAsTheScaleDoesButForLinear) {
   }
 }
 
-TEST(Accuracy, StepsThatShrinkSlowlyMultiplyWhatTurnsADirection) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, StepsThatShrinkSlowlyMultiplyWhatTurnsADirection) {
   conditioning.turning = 4;
   conditioning.rigidShortcut = 0.5e-6;
   EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternionIterative, conditioning), 6.5e-6);
@@ -139,8 +136,7 @@ TEST(Accuracy, StepsThatShrinkSlowlyMultiplyWhatTurnsADirection) {
   EXPECT_DOUBLE_EQ(normalBound(Method::dualQuaternionIterative, conditioning), 7e-6 + 6 * u);
 }
 
-TEST(Accuracy, DirectionsThatCancelInABlendAreTheLessCertain) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, DirectionsThatCancelInABlendAreTheLessCertain) {
   conditioning.normalRotatedOnly = false;
   conditioning.normalLength = 0.5;
   conditioning.tangentLength = 0.25;
@@ -151,8 +147,7 @@ TEST(Accuracy, DirectionsThatCancelInABlendAreTheLessCertain) {
   EXPECT_LT(tangentBound(Method::blended, conditioning), 0) << "0.00075 is less than 1e-3";
 }
 
-TEST(Accuracy, WhatTheBindPoseIsOffByIsStretchedAndDividedByTheAlignment) {
-  reference::Conditioning conditioning;
+TEST_F(Accuracy, WhatTheBindPoseIsOffByIsStretchedAndDividedByTheAlignment) {
   conditioning.positionRounding = 10;
   conditioning.stretch = 3;
   EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning), 30 * u);

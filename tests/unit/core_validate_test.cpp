@@ -230,19 +230,19 @@ TEST_F(ValidateTest, ComponentsThatAnAttributeMayHave) {
 }
 
 TEST_F(ValidateTest, StridesAreHeldAgainstTheTypesSize) {
-  view.positions.type = ComponentType::snorm16;
-  view.positions.stride = 6;
-  EXPECT_TRUE(findsNothing());
-  view.positions.stride = 5;
-  EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
-            "mesh 'Fox': the stride of the positions is 5 bytes, but an element has 6");
+  const auto expectLeast = [&](AttributeView& attribute, ComponentType type, std::uint32_t stride,
+                               const std::string& sentence) {
+    attribute.type = type;
+    attribute.stride = stride;
+    EXPECT_TRUE(findsNothing()) << sentence;
+    attribute.stride = stride - 1;
+    EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0), "mesh 'Fox': the " + sentence);
+  };
+  expectLeast(view.positions, ComponentType::snorm16, 6,
+              "stride of the positions is 5 bytes, but an element has 6");
   view.positions = mesh.view().positions;
-  view.tangents.type = ComponentType::snorm8;
-  view.tangents.stride = 4;
-  EXPECT_TRUE(findsNothing());
-  view.tangents.stride = 3;
-  EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0),
-            "mesh 'Fox': the stride of the tangents is 3 bytes, but an element has 4");
+  expectLeast(view.tangents, ComponentType::snorm8, 4,
+              "stride of the tangents is 3 bytes, but an element has 4");
 }
 
 TEST_F(ValidateTest, JointsAndWeightsOfDifferentNumber) {
