@@ -23,7 +23,7 @@ option(DERMIS_BUILD_SHADER_COMPILER "Build dermis::shader_compiler, GLSL to SPIR
 option(DERMIS_BUILD_CPU "Build dermis::cpu, skinning by SIMD instructions of the CPU; needs Highway" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_VERIFY "Build dermis::verify, the reference and the accuracy contract" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_BUILD_GLTF "Build dermis::gltf, the glTF 2.0 importer" ${PROJECT_IS_TOP_LEVEL})
-option(DERMIS_BUILD_SAMPLES "Build the dermis command, the sample models and the samples" ${dermisIsDeveloped})
+option(DERMIS_BUILD_SAMPLES "Build the dermis command and the samples" ${dermisIsDeveloped})
 option(DERMIS_BUILD_SHOWCASE "Build the viewer, which needs SDL 2 and Dear ImGui, and the film of a crowd" OFF)
 # The tests use internal functions, which a shared library hides.
 set(dermisTestsByDefault ${dermisIsDeveloped})

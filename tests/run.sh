@@ -2,7 +2,7 @@
 # Builds Dermis with all warnings as errors and runs its tests. Installs missing packages first.
 #
 #   tests/run.sh                   what CI runs: `ci`, then `sanitized`. What both could run, `sanitized` runs
-#   tests/run.sh PRESET            ci, dev, release, asan or tsan: builds all, runs all tests
+#   tests/run.sh PRESET            ci, dev, release, asan or tsan: builds it, runs all tests of every change
 #   tests/run.sh sanitized         what needs no device, with address and undefined-behavior sanitizers
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
@@ -77,21 +77,21 @@ every_change="-LE nightly|showcase"
 
 sanitized() {
   kernels=build/ci/shaders/dermis_kernels
-  if [ ! -f "$kernels/dermis_kernels.cpp" ]; then
-    cmake --preset ci >build/ci.log
-    cmake --build build/ci --target dermis_kernels
-  fi
+  [ -f build/ci/CMakeCache.txt ] || cmake --preset ci >build/ci.log
+  cmake --build build/ci --target dermis_kernels
   build_and_test build/sanitized "-L sanitized" asan -DDERMIS_SANITIZE_TESTS=OFF -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=ON \
     -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels"
 }
 
 step "install" ./cmake/install-deps.sh
+outcome=0
 case $run in
   all)
-    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON
-    sanitized
+    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON || outcome=$?
+    sanitized || outcome=$?
     ;;
-  sanitized) sanitized ;;
-  *) build_and_test "build/$run" "$every_change" "$run" -DDERMIS_SANITIZED_TESTS_ELSEWHERE=OFF ;;
+  sanitized) sanitized || outcome=$? ;;
+  *) build_and_test "build/$run" "$every_change" "$run" -DDERMIS_SANITIZED_TESTS_ELSEWHERE=OFF || outcome=$? ;;
 esac
 ./tests/report.sh
+exit "$outcome"

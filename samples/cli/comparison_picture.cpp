@@ -325,9 +325,6 @@ Result<render::Picture> drawComparison(samples::OpenDevice& device, const Compar
   return ComparisonDrawer(device, sheet, font, notes, step).draw();
 }
 
-/// Sample models as binary glTF, in built_in_models.cpp, which embed_models.cmake writes.
-extern const std::span<const std::byte> embeddedBar, embeddedArm;
-
 Result<BuiltInScenes> loadBuiltInScenes(const MeshPreparation& preparation) {
   Result<Scene> bar = loadScene(embeddedBar, "bar.glb", preparation);
   if (!bar) return bar.error();

@@ -2,9 +2,11 @@
 // scene, with names and numbers below, and a heat map of the distance from dual quaternions.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -59,6 +61,9 @@ Result<samples::render::Picture> drawComparison(samples::OpenDevice& device,
 struct BuiltInScenes {
   Scene bar, arm;
 };
+
+/// Both as binary glTF, in built_in_models.cpp, which embed_models.cmake writes.
+extern const std::span<const std::byte> embeddedBar, embeddedArm;
 
 Result<BuiltInScenes> loadBuiltInScenes(const MeshPreparation& preparation);
 

@@ -1,8 +1,7 @@
 # Writes built_in_models.cpp, the bytes of the sample models that the command contains:
 #
 #   cmake -DMODELS=samples/models -DOUTPUT=built_in_models.cpp -P embed_models.cmake
-set(text "#include <cstddef>\n#include <span>\n\nnamespace dermis::cli {\n"
-  "extern const std::span<const std::byte> embeddedBar, embeddedArm;\n")
+set(text "#include \"comparison_picture.h\"\n\nnamespace dermis::cli {\n")
 foreach(name IN ITEMS Bar Arm)
   string(TOLOWER ${name} file)
   file(READ ${MODELS}/${file}.glb bytes HEX)

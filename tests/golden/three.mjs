@@ -1,6 +1,6 @@
 // Writes three.tsv: poses of the sample models as three.js skins them (linear blending), by its own
 // loader, its own clips and its own sums in double precision. Run it where npm has installed
-// three@0.170.0, with the folder of the built sample models:
+// three@0.170.0, with the folder samples/models:
 //
 //   node three.mjs FOLDER > three.tsv
 

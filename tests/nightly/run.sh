@@ -67,13 +67,13 @@ part_tsan() {
   build tsan gpu_test system_test
   tests tsan -R 'ThreadsTest|ModelTest'
   build tsan cpu_test
-  tests tsan -R 'Cpu(Skin|Scene)Test'
+  tests tsan -R 'Cpu(Skin|Scene|Model)Test'
 }
 
 part_clang() {
   # Without precompiled headers, to find files that include too little.
-  cmake --preset clang -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON
-  build clang
+  cmake --preset clang -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DDERMIS_BUILD_SHOWCASE=ON
+  build clang all showcase_tests nightly_tests
   tests clang -L sanitized
   tests clang -R '^package\.'
 }
@@ -91,7 +91,7 @@ part_debian() {
   lintian --fail-on error build/debian/*.deb
 }
 
-# tests/cross: runs the tests that need no device. The command generates, skins and verifies models; the vertices must have the same
+# tests/cross: runs the tests that need no device. The command skins and verifies models; the vertices must have the same
 # bits as those that it skins on this machine. Kernels are taken from build/ci, except for arm64, whose build compiles them with the
 # host's compiler.
 cross() { # SYSTEM [EMULATOR]: a toolchain file of tests/cross

@@ -5,7 +5,7 @@
 namespace dermis::test {
 
 extern const char* const sourceFolder;        ///< the repository
-extern const char* const sampleModels;        ///< the folder of the generated models
+extern const char* const sampleModels;        ///< the folder of the sample models
 extern const char* const kernelModules;       ///< the folder of the kernels, NAME.spv
 extern const char* const kernelSources;       ///< the folder of their GLSL, as it is installed
 extern const char* const dermisProgram;       ///< the command

@@ -23,7 +23,7 @@ struct InstructionSet {
 };
 
 extern const InstructionSet avx3, avx2, sse4;
-/// What every processor has that runs the program.
+/// Needs nothing but what the compiler assumes.
 extern const InstructionSet baseline;
 
 }  // namespace dermis::cpu

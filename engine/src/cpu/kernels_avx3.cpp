@@ -8,6 +8,6 @@
 #include "cpu/kernels_inl.h"
 
 namespace dermis::cpu {
-const InstructionSet avx3{HWY_TARGET, HWY_NAMESPACE::skinTask};
+constinit const InstructionSet avx3{HWY_TARGET, HWY_NAMESPACE::skinTask};
 }
 #endif

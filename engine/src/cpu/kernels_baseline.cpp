@@ -1,11 +1,12 @@
-// The kernels for what every processor has that runs the program: NEON on arm64. On x86, where
-// nearly all processors have more, only the general path: of SSE2 or, with a Highway that lacks it,
-// of plain code.
+// The kernels that need nothing but what the compiler assumes. On arm64, these are the kernels for
+// NEON. On x86 they are the fallback for processors without SSE4, which has only the general path:
+// for SSE2 or, with Highway 1.0, for EMU128, which is plain code.
 #include "cpu/kernels.h"
 
 #ifdef DERMIS_CPU_HAS_SSE4
 #define DERMIS_CPU_GENERAL_ONLY
-#define HWY_DISABLED_TARGETS (~((1LL << 14) | HWY_EMU128 | HWY_SCALAR))  // the first is SSE2
+#define DERMIS_CPU_SSE2 (1LL << 14)  // HWY_SSE2, which Highway 1.0 does not define
+#define HWY_DISABLED_TARGETS (~(DERMIS_CPU_SSE2 | HWY_EMU128 | HWY_SCALAR))
 // Highway considers EMU128 broken with GCC before 12.3 (bug 106322). Dermis does not use the
 // affected operations; tests compare the resulting bits.
 #define HWY_BROKEN_EMU128 0
@@ -16,5 +17,5 @@
 #include "cpu/kernels_inl.h"
 
 namespace dermis::cpu {
-const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask};
+constinit const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask};
 }

@@ -15,6 +15,7 @@
 #include "cpu/plain_inl.h"
 #endif
 #include "cpu/task.h"
+#include "strict_floating_point.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {

@@ -1,4 +1,4 @@
-// Push constants of each draw. samples/kit/render/blocks.h declares the same in C++.
+// Push constants of each draw. samples/kit/render/lighting.h declares the same in C++.
 #ifndef DERMIS_RENDER_DRAW_GLSL
 #define DERMIS_RENDER_DRAW_GLSL
 

@@ -1,4 +1,4 @@
-// Uniform data of one view of a picture. samples/kit/render/blocks.h declares the same in C++.
+// Uniform data of one view of a picture. samples/kit/render/lighting.h declares the same in C++.
 #ifndef DERMIS_RENDER_VIEW_GLSL
 #define DERMIS_RENDER_VIEW_GLSL
 
