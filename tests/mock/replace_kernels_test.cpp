@@ -35,7 +35,7 @@ class ReplaceKernelsTest : public ::testing::Test {
                                   if (auto once = std::exchange(test.meanwhile, nullptr)) once();
                                   return Words{0xa};
                                 }};
-    context.emplace(std::move(*vulkan::Context::create(description)));
+    context.emplace(*vulkan::Context::create(description));
     batch.batch.addJob(0, 0, Method::dualQuaternion, true);
     batch.makePlan(context->limits());
     for (const Variant& variant : batch.plan.variants()) {

@@ -103,7 +103,7 @@ Result<std::uint32_t> Pipelines::replace(std::span<const KernelModule> modules,
       for (const auto& [key, built] : pipelines_) {
         if (modules.empty() || moduleOf(built.variant) == modules.end()) continue;
         const bool isThere = std::ranges::any_of(
-            replacements, [&](const Built& other) { return other.variant.key() == key; });
+            replacements, [&key = key](const Built& other) { return other.variant.key() == key; });
         if (!isThere) missing.push_back(built.variant);
       }
       if (missing.empty()) {
