@@ -6,7 +6,7 @@ set(library "${prefix}/${libFolder}/libdermis_cpu.a")
 say("Disassemble ${library}")
 execute_process(COMMAND "${objdump}" -d -C --no-show-raw-insn "${library}"
                 COMMAND awk "/^[0-9a-f]+ </ { name = $0; sub(/^[0-9a-f]+ /, \"\", name); avx = name ~ /N_AVX[23]/ }
-                             /\tv[a-z0-9]+ / { if (avx) ++inside; else if (!seen[name]++) print \"  \" name }
+                             /\tv[a-z0-9]+[ \t]/ { if (avx) ++inside; else if (!seen[name]++) print \"  \" name }
                              END { print inside + 0, \"instructions in AVX namespaces\" }"
                 OUTPUT_VARIABLE found COMMAND_ERROR_IS_FATAL ANY)
 string(REGEX MATCH "([0-9]+) instructions in AVX namespaces" count "${found}")
