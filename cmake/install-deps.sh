@@ -17,7 +17,7 @@ libglm-dev libtinygltf-dev nlohmann-json3-dev
 libcli11-dev libfmt-dev
 pkg-config libvulkan-volk-dev dpkg-dev file
 libstb-dev fonts-dejavu-core
-libgtest-dev libbenchmark-dev
+libgtest-dev libbenchmark-dev libx11-dev
 doxygen
 "
 if [ "${1:-}" = nightly ]; then
