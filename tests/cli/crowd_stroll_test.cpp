@@ -1,4 +1,4 @@
-// The film's figures and its camera: feet that do not slide, and heads that nobody flies through.
+// The film's figures and its camera: feet that do not slide, and no flight through a head.
 
 #include <gtest/gtest.h>
 

@@ -33,11 +33,11 @@ using Streams = std::array<std::vector<std::byte>, streamCount>;
 /// The attributes of an output, by `Stream`.
 std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output);
 
-/// All of an output of so many vertices; nothing where there is none.
+/// All attributes of an output with `vertexCount` vertices; empty if there is no output.
 Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& output,
                     std::uint32_t vertexCount);
 
-/// One attribute of so many vertices out of the bytes of an output buffer.
+/// One attribute of `vertexCount` vertices, copied from the bytes of an output buffer.
 std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
                                      const OutputAttribute& attribute, std::uint32_t vertexCount);
 
@@ -47,7 +47,8 @@ inline constexpr auto previousStream = static_cast<std::size_t>(Stream::previous
 
 using Pose = std::vector<JointMatrix>;
 
-/// A random mesh with everything that methods and layouts may want, for poses of so many joints.
+/// A random mesh with every attribute that methods and layouts use, for poses of `jointCount`
+/// joints.
 PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount = 8,
                       std::uint32_t influences = 4);
 

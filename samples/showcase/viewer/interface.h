@@ -26,7 +26,7 @@ struct State {
 
 inline constexpr std::uint32_t panelWidth = 300;  ///< at the left of the window
 
-/// A time in a clip that is repeated. The end of the clip is a pose of its own.
+/// A time in a clip that is repeated. The end of the clip is a separate pose.
 double repeatedTime(double time, double duration);
 
 /// `view` is null if there is no model.

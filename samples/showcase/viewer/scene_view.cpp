@@ -204,7 +204,7 @@ Result<void> SceneView::recordSkinning(VkCommandBuffer commandBuffer, const Shot
   return {};
 }
 
-/// Skins in a submission of its own.
+/// Skins in a separate submission.
 Result<void> SceneView::skin(const Shot& shot) {
   const VkCommandBuffer commandBuffer = beginCommands(*device_->device);
   return endCommands(*device_->device, commandBuffer, recordSkinning(commandBuffer, shot));

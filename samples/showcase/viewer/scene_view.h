@@ -93,7 +93,7 @@ class SceneView {
   void skinAgain() { posed_.reset(), valued_.reset(); }
 
   /// Skins what has changed, draws it, and returns the picture. The scene must allow the methods.
-  /// To show errors, it first skins in a submission of its own, and waits for the reference, which
+  /// To show errors, it first skins in a separate submission, and waits for the reference, which
   /// is slow.
   Result<const samples::render::RenderTarget*> record(VkCommandBuffer commandBuffer,
                                                       const Shot& shot);
