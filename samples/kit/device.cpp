@@ -392,7 +392,7 @@ void Device::freeCommandBuffer(VkCommandBuffer commandBuffer) {
   functions_.FreeCommandBuffers(device_, commandPool_, 1, &commandBuffer);
 }
 
-Result<void> Device::submitAndWait(VkCommandBuffer commandBuffer) {
+Result<void> Device::submitAndWait(VkCommandBuffer commandBuffer, std::uint32_t times) {
   VkFenceCreateInfo fenceInfo{};
   fenceInfo.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
   VkFence fence = VK_NULL_HANDLE;
@@ -402,8 +402,9 @@ Result<void> Device::submitAndWait(VkCommandBuffer commandBuffer) {
   }
   VkSubmitInfo submit{};
   submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-  submit.commandBufferCount = 1;
-  submit.pCommandBuffers = &commandBuffer;
+  const std::vector<VkCommandBuffer> commandBuffers(times, commandBuffer);
+  submit.commandBufferCount = times;
+  submit.pCommandBuffers = commandBuffers.data();
   VkResult result = functions_.QueueSubmit(queue_, 1, &submit, fence);
   const char* function = "vkQueueSubmit";
   if (result == VK_SUCCESS) {

@@ -86,8 +86,9 @@ class Device {
       VkCommandBufferLevel level = VK_COMMAND_BUFFER_LEVEL_PRIMARY);
   void freeCommandBuffer(VkCommandBuffer commandBuffer);
 
-  /// Submits and waits. Fails with `vulkanError`.
-  Result<void> submitAndWait(VkCommandBuffer commandBuffer);
+  /// Submits a command buffer and waits. It is executed as many times as `times` says, one after
+  /// the other; more than once only if it was begun for simultaneous use. Fails with `vulkanError`.
+  Result<void> submitAndWait(VkCommandBuffer commandBuffer, std::uint32_t times = 1);
 
   /// Calls `record` between the begin and the end of a command buffer, submits it and waits. Fails
   /// with `vulkanError`, and if `record` does; then nothing is submitted.

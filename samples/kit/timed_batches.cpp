@@ -1,6 +1,5 @@
 #include "kit/timed_batches.h"
 
-#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -52,6 +51,7 @@ Result<void> TimedBatches::record(TimedBatch& batch) {
   const VulkanFunctions& functions = device_->functions();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
   batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
   recordBarrier(*device_, batch.commandBuffer,
@@ -95,11 +95,7 @@ Result<void> TimedBatches::add(std::span<const SkinRequest> requests, const Outp
 }
 
 Result<double> TimedBatches::skin(std::size_t batch) {
-  const auto begin = std::chrono::steady_clock::now();
-  if (Result<void> done = device_->submitAndWait(batches_[batch]->commandBuffer); !done)
-    return done.error();
-  if (hasTimestamps()) return timestamps_.seconds();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return timestamps_.measure(batches_[batch]->commandBuffer);
 }
 
 }  // namespace dermis::samples

@@ -1,11 +1,17 @@
 #include "kit/timestamps.h"
 
+#include <algorithm>
 #include <array>
+#include <chrono>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 namespace dermis::samples {
 namespace {
+
+/// How long a measurement keeps a GPU busy.
+constexpr double busySeconds = 20e-3;
 
 std::uint32_t timestampBits(const Device& device) {
   const VkPhysicalDevice physicalDevice = device.description().physicalDevice;
@@ -21,11 +27,11 @@ std::uint32_t timestampBits(const Device& device) {
 
 Result<Timestamps> Timestamps::create(Device& device) {
   Timestamps timestamps;
+  timestamps.device_ = &device;
   const std::uint32_t bits = timestampBits(device);
   if (bits == 0) return timestamps;
   VkPhysicalDeviceProperties properties{};
   device.functions().GetPhysicalDeviceProperties(device.description().physicalDevice, &properties);
-  timestamps.device_ = &device;
   timestamps.validBits_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
   timestamps.period_ = static_cast<double>(properties.limits.timestampPeriod) * 1e-9;
   VkQueryPoolCreateInfo info{};
@@ -77,6 +83,20 @@ Result<double> Timestamps::seconds() const {
   }
   // The counter may have wrapped around.
   return static_cast<double>((ticks[1] - ticks[0]) & validBits_) * period_;
+}
+
+Result<double> Timestamps::measure(VkCommandBuffer commandBuffer) const {
+  const auto execute = [this, commandBuffer](std::uint32_t times) -> Result<double> {
+    const auto begin = std::chrono::steady_clock::now();
+    if (Result<void> done = device_->submitAndWait(commandBuffer, times); !done)
+      return done.error();
+    if (has()) return seconds();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / times;
+  };
+  const Result<double> once = execute(1);
+  if (!once || device_->info().type == "CPU") return once;
+  const double times = std::ceil(busySeconds / std::max(*once, 1e-9));
+  return execute(static_cast<std::uint32_t>(std::clamp(times, 1.0, 1000.0)));
 }
 
 }  // namespace dermis::samples

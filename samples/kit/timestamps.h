@@ -31,6 +31,13 @@ class Timestamps {
   /// Seconds between both in the last submission, which must be complete. Fails with `vulkanError`.
   Result<double> seconds() const;
 
+  /// Executes a command buffer that contains both, and returns the seconds that it took: on the
+  /// device if it has timestamps, otherwise from submission to the end of waiting. A GPU lowers its
+  /// clock between short submissions, so it executes the command buffer repeatedly, for 20 ms, and
+  /// the last execution counts: begin it for simultaneous use, with a barrier after the previous
+  /// execution. Fails with `vulkanError`.
+  Result<double> measure(VkCommandBuffer commandBuffer) const;
+
  private:
   Device* device_ = nullptr;
   VkQueryPool pool_ = VK_NULL_HANDLE;

@@ -263,7 +263,7 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
 }
 
 /// A GPU in a PC: device memory, host memory, a little that is both, and a type that needs a
-/// feature. All of it is lavapipe's only type.
+/// feature. All of it is the device's first type that the CPU can write.
 struct PretendedHeaps {
   static constexpr std::uint32_t deviceType = 0, hostType = 1, mappedDeviceType = 2, oddType = 3;
 
@@ -276,6 +276,8 @@ struct PretendedHeaps {
     allocateMemory = reinterpret_cast<PFN_vkAllocateMemory>(find("vkAllocateMemory"));
     getBufferMemoryRequirements =
         reinterpret_cast<PFN_vkGetBufferMemoryRequirements>(find("vkGetBufferMemoryRequirements"));
+    reinterpret_cast<PFN_vkGetPhysicalDeviceMemoryProperties>(
+        find("vkGetPhysicalDeviceMemoryProperties"))(description.physicalDevice, &real);
     device.replace("vkGetPhysicalDeviceMemoryProperties", &getProperties);
     device.replace("vkAllocateMemory", &allocate);
     device.replace("vkGetBufferMemoryRequirements", &getRequirements);
@@ -286,11 +288,12 @@ struct PretendedHeaps {
   std::array<std::uint64_t, 4> taken{};
 
  private:
+  static constexpr VkMemoryPropertyFlags mapped =
+      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
   static void VKAPI_CALL getProperties(VkPhysicalDevice,
                                        VkPhysicalDeviceMemoryProperties* properties) {
     constexpr VkMemoryPropertyFlags local = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    constexpr VkMemoryPropertyFlags mapped =
-        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     *properties = {};
     properties->memoryTypeCount = properties->memoryHeapCount = 4;
     properties->memoryTypes[deviceType] = {local, 0};
@@ -302,6 +305,10 @@ struct PretendedHeaps {
   static void VKAPI_CALL getRequirements(VkDevice device, VkBuffer buffer,
                                          VkMemoryRequirements* requirements) {
     current->getBufferMemoryRequirements(device, buffer, requirements);
+    current->realType = 0;
+    while ((requirements->memoryTypeBits >> current->realType & 1) == 0 ||
+           (current->real.memoryTypes[current->realType].propertyFlags & mapped) != mapped)
+      ++current->realType;
     requirements->memoryTypeBits = 15;
   }
   static VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateInfo* info,
@@ -312,11 +319,13 @@ struct PretendedHeaps {
     current->free[type] -= info->allocationSize;
     current->taken[type] += info->allocationSize;
     VkMemoryAllocateInfo real = *info;
-    real.memoryTypeIndex = 0;
+    real.memoryTypeIndex = current->realType;
     return current->allocateMemory(device, &real, callbacks, memory);
   }
 
   static inline PretendedHeaps* current = nullptr;
+  VkPhysicalDeviceMemoryProperties real{};
+  std::uint32_t realType = 0;  ///< for the buffer whose requirements were asked for last
   PFN_vkAllocateMemory allocateMemory = nullptr;
   PFN_vkGetBufferMemoryRequirements getBufferMemoryRequirements = nullptr;
 };

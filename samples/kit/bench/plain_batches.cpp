@@ -1,11 +1,11 @@
 #include "kit/bench/plain_batches.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <type_traits>
 #include <utility>
 
+#include "dermis/vulkan/scope.h"
 #include "plain_kernels.h"
 
 namespace dermis::samples {
@@ -236,10 +236,13 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
   commandBuffer = device_.allocateCommandBuffer();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  begin.flags = VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
   if (Result<void> begun = checkVulkan(
           "vkBeginCommandBuffer", device_.functions().BeginCommandBuffer(commandBuffer, &begin));
       !begun)
     return begun;
+  // After the previous execution.
+  recordBarrier(device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
   timestamps_.recordBegin(commandBuffer);
   if (kernel == PlainKernel::dualQuaternion) {
     if (Result<void> recorded = recordPalettes(crowd, commandBuffer); !recorded) return recorded;
@@ -251,12 +254,7 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
 }
 
 Result<double> PlainBatches::skin(PlainKernel kernel) {
-  const auto begin = std::chrono::steady_clock::now();
-  if (Result<void> done = device_.submitAndWait(commandBuffers_[static_cast<std::size_t>(kernel)]);
-      !done)
-    return done.error();
-  if (timestamps_.has()) return timestamps_.seconds();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return timestamps_.measure(commandBuffers_[static_cast<std::size_t>(kernel)]);
 }
 
 }  // namespace dermis::samples
