@@ -37,6 +37,8 @@ run() { # NAME COMMAND...: runs it, and adds its outcome to the table
 { echo "commit $commit"; date -u +"%Y-%m-%d"; } >>"$out/gpu.txt"
 run devices "$here/dermis" devices
 run verify "$here/dermis" verify --quick --device "$device" --json "$out/verify.json"
+run verify_cpu "$here/dermis" verify --quick --device cpu
+run cpu_test env -u CI -u DERMIS_TEST_DATA "$here/cpu_test" --gtest_brief=1
 run search "$here/dermis_gpu_benchmark" "$out/search.json" "$seconds" "$instances" "$commit"
 run bench "$here/dermis" bench --device "$device" --instances "$instances" --json "$out/bench.json"
 run scene timeout 120 "$here/dermis_system_benchmark" 3 "$instances"

@@ -218,6 +218,16 @@ TEST_F(CpuSkinTest, TheInstructionSetsOfThisProcessorAreThere) {
   EXPECT_NE(none.error().message.find(names.back()), std::string::npos) << none.error().message;
 }
 
+#if defined(__x86_64__) && !defined(DERMIS_CPU_NO_AVX)
+// Every test that goes through the instruction sets leaves out those that the processor lacks. No
+// emulator of Debian's has AVX-512, so only a processor can run that code.
+TEST_F(CpuSkinTest, The512BitCodeIsRun) {
+  if (std::ranges::count(cpu::targetNames(), "AVX3") == 0)
+    GTEST_SKIP() << "NOT TESTED: the 512-bit code, because this processor has no AVX-512";
+  EXPECT_TRUE(cpu::setTarget("AVX3").ok());
+}
+#endif
+
 // Four threads skin a quarter each, at the same time.
 TEST_F(CpuSkinTest, ThreadsShareTheVerticesOfOneInstance) {
   Crowd crowd(5000, 4, Rigidity::shear, plainLayout);

@@ -8,6 +8,7 @@
 #   tsan         the thread sanitizer on the tests with threads and on the bookkeeping of scenes
 #   clang        all of Dermis built by Clang, with the tests of the CPU's side and of the packages
 #   debian       the Debian packages and the source package on clean systems, Debian 12 and 13, programs built and run there
+#   layers       the device tests on a clean Debian 13, under its validation layer and under the newest one
 #   windows      the engine and the command built by MinGW-w64; tests and the command run by Wine
 #   x86          the same for 32-bit x86, run by this machine
 #   arm64        the same for arm64, run by qemu
@@ -23,12 +24,13 @@
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
 #
 # Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
-# date, the commit and the minutes that it took; commit that file. A part that fails does not stop those after it.
+# date, the commit, the minutes that it took and the processor: the tests of the CPU path run its 512-bit code only where the processor
+# has AVX-512. Commit that file. A part that fails does not stop those after it.
 set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive packages golden showcase programs"
+parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive packages golden showcase programs"
 passed=tests/nightly/passed.tsv
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
 
@@ -89,6 +91,10 @@ part_debian() {
     ./tests/nightly/debian.sh build/nightly/debian build/debian/dermis-*.tar.gz "$release" "$@"
   done
   lintian --fail-on error build/debian/*.deb
+}
+
+part_layers() {
+  ./tests/nightly/layers.sh build/nightly/layers "$device_suites"
 }
 
 # tests/cross: runs the tests that need no device. The command skins and verifies models; the vertices must have the same
@@ -287,6 +293,10 @@ for part in "$@"; do
   esac
 done
 
+processor=$(awk -F ': *' '
+  /^(vendor_id|cpu family|model)[ \t]*:/ { name = name $2 " " }
+  /^flags/ { print name (/ avx512bw/ ? "with" : "without") " AVX-512"; exit }' /proc/cpuinfo)
+
 ./cmake/install-deps.sh nightly
 mkdir -p build/nightly
 failed=
@@ -304,8 +314,8 @@ for part in "$@"; do
   echo "nightly: $part passed in $minutes min"
   commit=$(git rev-parse --short HEAD)
   [ -z "$(git status --porcelain --untracked-files=no -- . ":!$passed")" ] || commit=$commit+changes
-  { grep -v "^$part	" "$passed" 2>/dev/null || printf 'part\tlast passed\tcommit\tminutes\n'
-    printf '%s\t%s\t%s\t%s\n' "$part" "$(date -u +%Y-%m-%d)" "$commit" "$minutes"; } >"$passed.new"
+  { grep -v "^$part	" "$passed" 2>/dev/null || printf 'part\tlast passed\tcommit\tminutes\tprocessor\n'
+    printf '%s\t%s\t%s\t%s\t%s\n' "$part" "$(date -u +%Y-%m-%d)" "$commit" "$minutes" "${processor:-$(uname -m)}"; } >"$passed.new"
   mv "$passed.new" "$passed"
 done
 [ -z "$failed" ] || { echo "nightly: failed:$failed"; exit 1; }
