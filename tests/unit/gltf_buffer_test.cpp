@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "gltf/buffers.h"
 #include "gltf_builder.h"
 #include "temporary_folder.h"
 
@@ -219,11 +220,44 @@ TEST_F(GltfBuffer, ReadsDataUris) {
   }
 }
 
+// What `fetch` of browsers decodes: https://fetch.spec.whatwg.org/#data-urls.
+TEST_F(GltfBuffer, DecodesDataUrisAsBrowsersDo) {
+  std::vector<std::byte> all;
+  for (int value = 0; value < 256; ++value) all.push_back(static_cast<std::byte>(value));
+  const std::string base64 = encodeBase64(all);
+  ASSERT_TRUE(base64.ends_with("=="));
+  std::string escaped, wrapped;
+  for (std::size_t i = 0; i < base64.size(); ++i) {
+    const char character = base64[i];
+    escaped += character == '+'   ? "%2B"
+               : character == '/' ? "%2f"
+               : character == '=' ? "%3D"
+                                  : std::string(1, character);
+    wrapped += character;
+    if (i % 76 == 75) wrapped += "\r\n\t ";
+  }
+  for (const std::string& uri :
+       {"data:;base64," + base64, "DATA:Application/Octet-Stream;BASE64," + base64,
+        "Data:;Base64 ," + base64, "data:;base64," + escaped, "data:;base64," + wrapped + "\n",
+        "data:;base64,%20" + wrapped + "%0A", "data:;base64," + base64 + "#fragment"}) {
+    EXPECT_EQ(gltf::decodeDataUri(uri, "it"), all) << uri.substr(0, 40);
+    EXPECT_TRUE(gltf::isDataUri(uri));
+  }
+  EXPECT_EQ(gltf::decodeDataUri("data:base64,AA%3d", "it"), bytesOf(std::string("AA=")))
+      << "without a semicolon it is a media type";
+  EXPECT_FALSE(gltf::isDataUri("data.bin"));
+  const std::string binary = encodeBase64(skinnedTriangle().binary);
+  EXPECT_EQ(firstPrimitive(loaded(withUri("DATA:;BASE64," + binary))).positions[3], 1.0f);
+}
+
 TEST_F(GltfBuffer, RefusesBrokenDataUris) {
   expectInvalid(withUri("data:application/octet-stream;base64"), "has no comma");
   expectInvalid(withUri("data:;base64,AAAA*AAA"), "character 4 of its data URI is not base64");
   expectInvalid(withUri("data:;base64,AAAA==AA"), "is not base64");
   expectInvalid(withUri("data:;base64,AAAAA"), "is truncated");
+  expectInvalid(withUri("data:;base64,AAAA==="), "is not base64");
+  expectInvalid(withUri("data:;base64,AA%3"), "a '%' without two digits");
+  expectInvalid(withUri("data:;base64#,AAAA"), "has no comma");
   expectInvalid(withUri("data:;base64,AAAA"), "are outside bufferView 0 of 3 bytes");
   expectInvalid(withUri("data:,%zz"), "a '%' without two digits");
 }

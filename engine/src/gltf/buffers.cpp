@@ -13,6 +13,10 @@ namespace {
 
 constexpr std::uint8_t notADigit = 0xff;
 
+bool isSpace(char character) {
+  return std::string_view(" \t\n\f\r").find(character) != std::string_view::npos;
+}
+
 std::uint8_t base64Digit(char character) {
   if (character >= 'A' && character <= 'Z') return static_cast<std::uint8_t>(character - 'A');
   if (character >= 'a' && character <= 'z') return static_cast<std::uint8_t>(character - 'a' + 26);
@@ -24,15 +28,16 @@ std::uint8_t base64Digit(char character) {
 }
 
 std::vector<std::byte> decodeBase64(std::string_view text, const std::string& where) {
-  const std::size_t length = text.size();
-  while (!text.empty() && text.back() == '=' && length - text.size() < 2) text.remove_suffix(1);
-  if (text.size() % 4 == 1) failInvalid(where, ": the base64 text of its data URI is truncated");
-
+  for (int padding = 0; !text.empty() && (isSpace(text.back()) || text.back() == '=');) {
+    if (text.back() == '=' && ++padding > 2) break;
+    text.remove_suffix(1);
+  }
   std::vector<std::byte> bytes;
   bytes.reserve(text.size() * 3 / 4);
   std::uint32_t bits = 0;
   std::uint32_t bitCount = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
+    if (isSpace(text[i])) continue;
     const std::uint8_t digit = base64Digit(text[i]);
     if (digit == notADigit) failInvalid(where, ": character ", i, " of its data URI is not base64");
     bits = (bits << 6 | digit) & 0xffff;
@@ -41,7 +46,17 @@ std::vector<std::byte> decodeBase64(std::string_view text, const std::string& wh
     bitCount -= 8;
     bytes.push_back(static_cast<std::byte>(bits >> bitCount & 0xff));
   }
+  if (bitCount == 6) failInvalid(where, ": the base64 text of its data URI is truncated");
   return bytes;
+}
+
+// Of the ASCII letters, the lower case.
+std::string lowerCase(std::string_view text) {
+  std::string lower(text);
+  for (char& letter : lower) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return lower;
 }
 
 // A buffer may be shorter than its byteLength. The bytes that an accessor needs must exist.
@@ -76,20 +91,23 @@ class SideBuffers {
   std::map<std::filesystem::path, std::uint64_t> needed_;
 };
 
-bool isDataUri(const std::string& uri) {
-  return uri.starts_with("data:");
-}
-
 }  // namespace
 
+bool isDataUri(std::string_view uri) {
+  return lowerCase(uri.substr(0, 5)) == "data:";
+}
+
 std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& where) {
+  uri = uri.substr(0, uri.find('#'));
   const std::size_t comma = uri.find(',');
   if (comma == std::string_view::npos) failInvalid(where, ": its data URI has no comma");
-  const std::string_view header = uri.substr(0, comma);
-  const std::string_view data = uri.substr(comma + 1);
-  if (header.ends_with(";base64")) return decodeBase64(data, where);
+  std::string_view header = uri.substr(0, comma);
+  while (isSpace(header.back())) header.remove_suffix(1);
+  constexpr std::string_view base64 = ";base64";
+  const std::string text = decodePercent(uri.substr(comma + 1), where);
+  if (lowerCase(header.substr(header.size() - std::min(header.size(), base64.size()))) == base64)
+    return decodeBase64(text, where);
 
-  const std::string text = decodePercent(data, where);
   std::vector<std::byte> bytes(text.size());
   std::transform(text.begin(), text.end(), bytes.begin(),
                  [](char character) { return static_cast<std::byte>(character); });
@@ -120,7 +138,7 @@ std::vector<Buffer> loadBuffers(const Document& document,
     if (isLost[i]) continue;
     attempt(i, [&] {
       if (description.uri && isDataUri(*description.uri)) {
-        spend(budget, description.uri->size(), 1, where);
+        spend(budget, description.uri->size(), 2, where);
         buffer.storage =
             std::make_shared<const std::vector<std::byte>>(decodeDataUri(*description.uri, where));
       } else if (description.uri) {

@@ -29,7 +29,12 @@ std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
                                 SideFiles& files, MemoryBudget& budget, Notes& notes);
 
-/// The bytes of a data URI (RFC 2397), base64 or percent-encoded. `where` names it in messages.
+/// Whether this is a data URI, in any case: "DATA:" too.
+bool isDataUri(std::string_view uri);
+
+/// The bytes of a data URI (RFC 2397), base64 or percent-encoded. As in browsers, names ignore
+/// case, base64 may be percent-encoded and contain white space, and a fragment is left out. Takes
+/// memory of up to twice the length of the URI. `where` names it in messages.
 std::vector<std::byte> decodeDataUri(std::string_view uri, const std::string& where);
 
 }  // namespace dermis::gltf

@@ -115,8 +115,8 @@ class ImageReader {
       return {view.begin(), view.end()};
     }
     if (!image.uri) failInvalid(where, ": it has neither a uri nor a bufferView");
-    if (image.uri->starts_with("data:")) {
-      spend(model_.budget, image.uri->size(), 1, where);
+    if (isDataUri(*image.uri)) {
+      spend(model_.budget, image.uri->size(), 2, where);
       return decodeDataUri(*image.uri, where);
     }
     const FileToRead file = files_.find(*image.uri, where);
