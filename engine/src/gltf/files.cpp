@@ -58,10 +58,6 @@ bool isInside(const std::filesystem::path& file, const std::filesystem::path& fo
          folder.end();
 }
 
-std::string inFull(const std::filesystem::path& path) {
-  return join("'", oneLine(utf8(path)), "'");
-}
-
 /// Resolves all links.
 std::filesystem::path realPath(const std::filesystem::path& path, std::error_code& error) {
 #ifdef _WIN32
@@ -92,15 +88,15 @@ std::ifstream open(const FileToRead& file, const std::string& where) {
   if (stream) return stream;
   const std::string reason =
       errno == 0 ? std::string() : ": " + std::generic_category().message(errno);
-  fail(ErrorCode::ioError, join(where, ": ", inFull(file.path), " cannot be opened", reason));
+  fail(ErrorCode::ioError, join(where, ": ", file.name, " cannot be opened", reason));
 }
 
 // Reads at most `count` bytes, fewer if the file ends.
 std::vector<std::byte> readBytes(std::ifstream& stream, std::uint64_t count,
-                                 const std::filesystem::path& path, const std::string& where) {
+                                 const std::string& name, const std::string& where) {
   std::vector<std::byte> bytes(static_cast<std::size_t>(count));
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count));
-  if (stream.bad()) fail(ErrorCode::ioError, join(where, ": reading ", inFull(path), " failed"));
+  if (stream.bad()) fail(ErrorCode::ioError, join(where, ": reading ", name, " failed"));
   bytes.resize(static_cast<std::size_t>(stream.gcount()));
   return bytes;
 }
@@ -118,11 +114,11 @@ std::string utf8(const std::filesystem::path& path) {
   return std::string(text.begin(), text.end());
 }
 
-FileToRead findFile(const std::filesystem::path& path, const std::string& where) {
+FileToRead findFile(const std::filesystem::path& path, const std::string& name,
+                    const std::string& where) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   const auto refuse = [&](const auto&... what) { fail(ErrorCode::ioError, join(where, what...)); };
-  const std::string name = inFull(path);
   if (status.type() == std::filesystem::file_type::not_found) refuse("there is no file ", name);
   if (error) refuse(name, " cannot be opened: ", error.message());
   if (status.type() == std::filesystem::file_type::directory) refuse(name, " is a folder");
@@ -130,19 +126,19 @@ FileToRead findFile(const std::filesystem::path& path, const std::string& where)
     refuse(name, " is a pipe, a socket or a device, not a file");
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) refuse(name, " cannot be opened: ", error.message());
-  return {path, size};
+  return {path, size, name};
 }
 
 std::vector<std::byte> readModelFile(const FileToRead& file) {
   const std::string where = "the file";
   std::ifstream stream = open(file, where);
   const std::vector<std::byte> start =
-      readBytes(stream, std::min<std::uint64_t>(file.size, containerStart), file.path, where);
+      readBytes(stream, std::min<std::uint64_t>(file.size, containerStart), file.name, where);
   checkStart(start, file.size);
   checkSize(file.size, where);
   stream.clear();
   stream.seekg(0);
-  return readBytes(stream, file.size, file.path, where);
+  return readBytes(stream, file.size, file.name, where);
 }
 
 SideFiles::SideFiles(std::filesystem::path folder, MemoryBudget& budget)
@@ -155,7 +151,7 @@ FileToRead SideFiles::find(std::string_view uri, const std::string& where) const
     fail(ErrorCode::ioError,
          join(where, ": ", name,
               " cannot be read: the model was loaded from memory, without a folder"));
-  const FileToRead named = findFile(folder_ / relative, where + ": ");
+  const FileToRead named = findFile(folder_ / relative, name, where + ": ");
   // Links are resolved here, once, so that the opened path has none. It must still be in the
   // folder.
   std::error_code error;
@@ -169,7 +165,7 @@ FileToRead SideFiles::find(std::string_view uri, const std::string& where) const
          join(where, ": ", name,
               " leads outside the file's folder through a symbolic link and is not opened"));
   }
-  return {real, named.size};
+  return {real, named.size, name};
 }
 
 Bytes SideFiles::read(const FileToRead& file, std::uint64_t needed, const std::string& where) {
@@ -182,7 +178,7 @@ Bytes SideFiles::read(const FileToRead& file, std::uint64_t needed, const std::s
   spend(budget_, count, 1, where);
   std::ifstream stream = open(file, where);
   known =
-      std::make_shared<const std::vector<std::byte>>(readBytes(stream, count, file.path, where));
+      std::make_shared<const std::vector<std::byte>>(readBytes(stream, count, file.name, where));
   return known;
 }
 

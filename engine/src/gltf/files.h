@@ -24,6 +24,7 @@ using Bytes = std::shared_ptr<const std::vector<std::byte>>;
 struct FileToRead {
   std::filesystem::path path;
   std::uint64_t size = 0;
+  std::string name;  ///< for messages, in quotes
 };
 
 /// A path for messages. `path::string` uses the code page of the machine with some standard
@@ -31,8 +32,10 @@ struct FileToRead {
 std::string utf8(const std::filesystem::path& path);
 
 /// Throws `Failure` with `ioError` if there is no such file, it is a folder, or access is denied.
-/// `where` is the prefix of messages, with a colon, or empty.
-FileToRead findFile(const std::filesystem::path& path, const std::string& where = {});
+/// `name` is the file's name in messages, in quotes, and `where` their prefix, with a colon, or
+/// empty.
+FileToRead findFile(const std::filesystem::path& path, const std::string& name,
+                    const std::string& where = {});
 
 /// Reads the whole file of a model. Throws `Failure`: with `ioError`, or with `invalidData` or
 /// `limitExceeded` if its size or its first bytes show, before the rest is read, that it cannot be

@@ -67,7 +67,8 @@ Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesy
 
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
   return guarded([&] {
-    const FileToRead file = findFile(path);
+    // The name is the user's, not a file's: it is not cut.
+    const FileToRead file = findFile(path, join("'", oneLine(utf8(path)), "'"));
     // A path without a folder is relative to the current folder. An empty folder would mean that
     // the file has no folder.
     const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
