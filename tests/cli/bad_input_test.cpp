@@ -622,7 +622,7 @@ TEST_F(BadInput, FilesThatAreNoModelsAreRefusedBeforeTheyAreRead) {
   std::error_code error;
   std::filesystem::resize_file(sparse, std::uint64_t{1} << 40, error);
   if (error) GTEST_SKIP() << "no sparse files here";
-  expectRefusedSoon(sparse, "the maximum is 4294967295");
+  expectRefusedSoon(sparse, "the maximum is 4294967296");
   std::filesystem::remove(sparse);
 }
 

@@ -139,10 +139,10 @@ TEST(GltfContainer, RefusesDeepNesting) {
   const auto nested = [&](std::size_t depth) {
     return bytesOf(start + std::string(depth, '[') + std::string(depth, ']') + "}");
   };
-  loaded(loadFromMemory(nested(255), {}));
-  expectInvalidBytes(nested(256), "nested deeper than 256 levels at byte");
-  expectInvalidBytes(nested(1'000'000), "nested deeper than 256 levels");
-  expectInvalidBytes(bytesOf(std::string(1'000'000, '[')), "nested deeper than 256 levels");
+  loaded(loadFromMemory(nested(511), {}));
+  expectInvalidBytes(nested(512), "nested deeper than 512 levels at byte");
+  expectInvalidBytes(nested(1'000'000), "nested deeper than 512 levels");
+  expectInvalidBytes(bytesOf(std::string(1'000'000, '[')), "nested deeper than 512 levels");
   // Brackets in a string are no nesting.
   loaded(loadFromMemory(bytesOf(start + "\"" + std::string(1000, '[') + "\\\"[\"}"), {}));
 }

@@ -384,6 +384,9 @@ std::vector<Violation> rulesOfNodes() {
            push("/scenes/0/nodes", 3))},
       {"cycle", refused, Three::refuses, "node 1: it is part of, or below, a cycle of nodes",
        set("/nodes/2/children", {1})},
+      {"cycle_of_unused_nodes", noted, Three::loads,
+       "node 3: it is part of, or below, a cycle of nodes",
+       all(push("/nodes", {{"children", {4}}}), push("/nodes", {{"children", {3}}}))},
       {"joint_twice", noted, Three::loads, "skin 0: joints lists 2 twice",
        all(set("/skins/0/joints", {1, 2, 2}),
            store(matrices,
@@ -406,6 +409,11 @@ std::vector<Violation> rulesOfNodes() {
        "skin 0: inverse bind matrix 0: its fourth row is not 0 0 0 1",
        store(matrices, Floats{1, 0, 0, 0.5f, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,  0, 1,
                               1, 0, 0, 0,    0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
+             floatType)},
+      {"matrix_with_an_inexact_fourth_row", noted, Three::loads,
+       "skin 0: inverse bind matrix 0: its fourth row is not 0 0 0 1; it is ignored",
+       store(matrices, Floats{1, 0, 0, 1e-4f, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,  0, 1.0001f,
+                              1, 0, 0, 0,     0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
              floatType)},
       {"skin_without_a_mesh", noted, Three::loads, "node 1: it has skin but no mesh",
        set("/nodes/1/skin", 0)},
@@ -489,11 +497,12 @@ std::vector<Violation> rulesOfAnimations() {
        "output: accessor 8 is VEC4 of byte, not VEC4 of float or normalized byte",
        store(rotations, std::vector<std::int8_t>{0, 0, 0, 127, 0, 0, 90, 90}, byteType)},
       {"channel_twice", noted, Three::loads,
-       "animation 0 channel 3: another channel already animates the translation of node 1 "
-       "with the same sampler",
+       "animation 0 channel 3: another channel already animates the translation of node 1; it is "
+       "left out",
        [](File& f) { at(f, channels).push_back(Json(at(f, channels)[0])); }},
-      {"channel_contradicts_another", refused, Three::misreads,
-       "animation 0 channel 3: another channel already animates the translation of node 1",
+      {"channel_contradicts_another", noted, Three::misreads,
+       "animation 0 channel 3: another channel already animates the translation of node 1; it is "
+       "left out",
        [](File& f) {
          addChannel(times, f.addFloats({5, 5, 5, 6, 6, 6}, "VEC3"),
                     {{"node", 1}, {"path", "translation"}})(f);

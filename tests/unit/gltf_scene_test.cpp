@@ -79,9 +79,26 @@ TEST(GltfNode, FollowsADeepChain) {
 }
 
 TEST(GltfNode, RefusesWhatIsNoTree) {
-  expectInvalid(withNodes({{{"children", {1}}}, {{"children", {0}}}}),
-                "node 0: it is part of, or below, a cycle of nodes");
-  expectInvalid(withNodes({Json::object(), {{"children", {1}}}}), "node 1: it is part of");
+  const auto withCycle = [](Json joints) {
+    FileBuilder file = skinnedTriangle();
+    for (const int child : {4, 3, 6}) file.json["nodes"].push_back({{"children", {child}}});
+    file.json["nodes"][4]["children"].push_back(5);
+    file.json["nodes"].push_back({{"translation", {1, 0, 0}}});
+    file.json["skins"][0]["joints"] = joints;
+    return file;
+  };
+  const gltf::Model model =
+      expectNoted(withCycle({1, 2}), "node 3: it is part of, or below, a cycle of nodes");
+  EXPECT_EQ(model.nodeOrder.size(), 7u);
+  EXPECT_EQ(nodeGlobals(model, none, 0).size(), 7u);
+  expectInvalid(withCycle({1, 4}), "node 4: it is part of, or below, a cycle of nodes");
+  expectInvalid(withCycle({1, 6}), "node 6: it is part of, or below, a cycle of nodes");
+  FileBuilder file = withCycle({1, 2});
+  file.json["nodes"][5]["mesh"] = file.json["nodes"][5]["skin"] = 0;
+  expectInvalid(file, "node 5: it is part of, or below, a cycle of nodes");
+  file = withCycle({1, 2});
+  file.json["scenes"][0]["nodes"].push_back(3);
+  expectInvalid(file, "node 3: it is part of, or below, a cycle of nodes");
   expectInvalid(withNodes({{{"children", {2}}}, {{"children", {2}}}, Json::object()}),
                 "node 2: it is a child of both node 0 and node 1");
 }
@@ -325,6 +342,8 @@ TEST(GltfSkin, RefusesBadMatrices) {
   expectInvalid(withMatrices(two(19, 0.5f)),
                 "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1");
   loaded(withMatrices(two(19, 1e-7f)));
+  expectNoted(withMatrices(two(19, 1e-4f)),
+              "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1; it is ignored");
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <map>
+#include <set>
 #include <utility>
 
 #include "gltf/failure.h"
@@ -258,22 +258,17 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
               Tally& tally) {
   Clip clip;
   clip.name = animation.name;
-  // Keyed by node and path. The key has no enumeration: a map of one would be exported, because
+  // Nodes and paths. The key has no enumeration: a set of one would be exported, because
   // enumerations are never hidden.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> samplers;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> targets;
   for (std::size_t i = 0; i < animation.channels.size(); ++i) {
     const std::string where = join("animation ", index, " channel ", i);
     auto channel = readChannel(source, animation, animation.channels[i], where, tally);
     if (!channel) continue;
-    const int sampler = animation.channels[i].sampler;
-    const std::pair target(channel->node, static_cast<std::uint32_t>(channel->path));
-    const auto [first, isNew] = samplers.emplace(target, sampler);
-    if (!isNew) {
-      const std::string sentence =
-          join(where, ": another channel already animates the ", animation.channels[i].target_path,
-               " of node ", channel->node);
-      if (first->second != sampler) failInvalid(sentence);
-      source.notes().broken(NoteKind::channel, sentence, " with the same sampler");
+    if (!targets.emplace(channel->node, static_cast<std::uint32_t>(channel->path)).second) {
+      source.notes().broken(NoteKind::channel, where, ": another channel already animates the ",
+                            animation.channels[i].target_path, " of node ", channel->node,
+                            "; it is left out");
       continue;
     }
     decomposeTarget(model, *channel, where, source.notes());

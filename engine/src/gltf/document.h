@@ -13,8 +13,8 @@
 namespace dermis::gltf {
 
 /// Maximum nesting of JSON. Parsers recurse, so deeper nesting could overflow the stack. Real files
-/// stay below 20.
-inline constexpr std::uint32_t deepestNesting = 256;
+/// stay below 20, but `extras` may contain anything.
+inline constexpr std::uint32_t deepestNesting = 512;
 
 /// tinygltf refuses indices without a bufferView, which the specification allows (zeros, or a
 /// sparse accessor). Therefore indices are passed to it as an attribute of this name.

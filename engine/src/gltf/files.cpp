@@ -31,25 +31,27 @@ bool hasScheme(std::string_view uri) {
   return colon != std::string_view::npos && uri.find('/') > colon;
 }
 
-// The path of a side file relative to the folder, as its URI spells it. Throws `Failure` if it may
-// leave the folder.
+// The path of a side file relative to the folder, without "..". Throws `Failure` if it leaves the
+// folder.
 std::filesystem::path relativePath(std::string_view uri, const std::string& where) {
-  if (hasScheme(uri)) {
-    fail(ErrorCode::ioError, join(where, ": ", inQuotes(uri), " is not a relative file name"));
-  }
+  const auto refuse = [&](std::string_view name, const char* reason) {
+    fail(ErrorCode::ioError, join(where, ": ", inQuotes(name), " ", reason));
+  };
+  constexpr const char* notRelative = "is not a relative file name";
+  if (hasScheme(uri)) refuse(uri, notRelative);
   const std::string text = decodePercent(uri, where);
+  if (text.empty()) refuse(text, "is not a file name");
+  if (text.find('\0') != std::string::npos) refuse(text, "contains a zero byte");
+  // Windows would take it for a separator.
+  if (text.find('\\') != std::string::npos)
+    refuse(text, "contains a backslash; in a URI, a slash separates folders");
   // On Windows, a colon names a drive or another stream of a file.
   constexpr bool isWindows = std::filesystem::path::preferred_separator != '/';
-  const bool hostile = text.empty() || text.find('\0') != std::string::npos ||
-                       text.find('\\') != std::string::npos || hasScheme(text) ||
-                       (isWindows && text.find(':') != std::string::npos);
-  const std::filesystem::path relative(std::u8string(text.begin(), text.end()));
-  const bool outside = hostile || relative.is_absolute() || relative.has_root_path() ||
-                       std::find(relative.begin(), relative.end(), "..") != relative.end();
-  if (outside) {
-    fail(ErrorCode::ioError,
-         join(where, ": ", inQuotes(text), " is outside the file's folder and is not opened"));
-  }
+  const std::filesystem::path path(std::u8string(text.begin(), text.end()));
+  if (hasScheme(text) || path.has_root_path() || (isWindows && text.find(':') != std::string::npos))
+    refuse(text, notRelative);
+  const std::filesystem::path relative = path.lexically_normal();
+  if (*relative.begin() == "..") refuse(text, "is outside the file's folder and is not opened");
   return relative;
 }
 

@@ -2,9 +2,11 @@
 // far as needed.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,8 +17,9 @@
 
 namespace dermis::gltf {
 
-/// Maximum size of a file: a GLB file cannot be larger, and no buffer needs to be.
-inline constexpr std::uint64_t largestFile = 0xffffffff;
+/// Maximum bytes that are read of a file: 4 GiB, or what an object may have on 32-bit systems.
+inline constexpr std::uint64_t largestFile =
+    std::min<std::uint64_t>(std::uint64_t{1} << 32, std::numeric_limits<std::ptrdiff_t>::max());
 
 using Bytes = std::shared_ptr<const std::vector<std::byte>>;
 

@@ -47,9 +47,27 @@ void readParents(const tinygltf::Model& content, Model& model) {
   }
 }
 
+// The nodes whose transforms decide where something skinned is: skinned nodes, joints, and what the
+// default scene lists.
+std::vector<bool> findUsed(const Source& source, const Model& model) {
+  const tinygltf::Model& content = source.content();
+  std::vector<bool> used(model.nodes.size(), false);
+  for (std::size_t i = 0; i < used.size(); ++i)
+    used[i] = model.nodes[i].mesh != none && model.nodes[i].skin != none;
+  const auto use = [&](const std::vector<int>& nodes) {
+    for (const int node : nodes) used[static_cast<std::size_t>(node)] = true;
+  };
+  for (std::size_t i = 0; i < content.skins.size(); ++i)
+    if (source.usage().skins[i]) use(content.skins[i].joints);
+  if (!content.scenes.empty())
+    use(content.scenes[static_cast<std::size_t>(std::max(content.defaultScene, 0))].nodes);
+  return used;
+}
+
 // Roots first, then their children, and so on. The nodes that remain are in a cycle, because no
-// node has two parents.
-void orderNodes(const tinygltf::Model& content, Model& model) {
+// node has two parents. If none of them is used, they become roots.
+void orderNodes(const Source& source, Model& model) {
+  const tinygltf::Model& content = source.content();
   model.nodeOrder.reserve(model.nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     if (model.nodes[i].parent == none) model.nodeOrder.push_back(i);
@@ -62,8 +80,14 @@ void orderNodes(const tinygltf::Model& content, Model& model) {
   if (model.nodeOrder.size() == model.nodes.size()) return;
   std::vector<bool> reached(model.nodes.size(), false);
   for (const std::uint32_t node : model.nodeOrder) reached[node] = true;
-  const auto first = std::find(reached.begin(), reached.end(), false);
-  failInvalid("node ", first - reached.begin(), ": it is part of, or below, a cycle of nodes");
+  const std::vector<bool> used = findUsed(source, model);
+  for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
+    if (reached[i]) continue;
+    source.notes().tolerateUnlessUsed(
+        used[i], [&] { failInvalid("node ", i, ": it is part of, or below, a cycle of nodes"); });
+    model.nodes[i].parent = none;
+    model.nodeOrder.push_back(i);
+  }
 }
 
 }  // namespace
@@ -96,7 +120,7 @@ void readNodes(const Source& source, Model& model) {
     if (readTransform(from, i, node, source.notes())) ++normalized;
   }
   readParents(content, model);
-  orderNodes(content, model);
+  orderNodes(source, model);
   if (normalized > 0) {
     model.notes.push_back(
         join(counted(normalized, "node rotation"), " normalized: not of unit length"));

@@ -11,10 +11,11 @@ namespace {
 constexpr Format matrixFormat[] = {{TINYGLTF_COMPONENT_TYPE_FLOAT, false}};
 
 // Converts the file's column-major matrix to rows.
-JointMatrix toJointMatrix(const float* columns, const std::string& where) {
+JointMatrix toJointMatrix(const float* columns, const std::string& where, Notes& notes) {
   // The specification requires an exact fourth row, but exporters that invert in float32 leave
-  // rounding errors in it.
-  constexpr float tolerance = 1e-5f;
+  // rounding errors in it. A row farther off is noted, and refused if it may mean something.
+  constexpr float tolerance = 1e-5f, refused = 1e-2f;
+  float error = 0;
   JointMatrix matrix;
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
@@ -22,11 +23,14 @@ JointMatrix toJointMatrix(const float* columns, const std::string& where) {
       if (!std::isfinite(value)) failInvalid(where, " contains a number that is not finite");
       if (row < 3) {
         matrix.m[row][column] = value;
-      } else if (std::abs(value - (column == 3 ? 1.0f : 0.0f)) > tolerance) {
-        failInvalid(where, ": its fourth row is not 0 0 0 1");
+      } else {
+        error = std::max(error, std::abs(value - (column == 3 ? 1.0f : 0.0f)));
       }
     }
   }
+  if (error > refused) failInvalid(where, ": its fourth row is not 0 0 0 1");
+  if (error > tolerance)
+    notes.broken(NoteKind::matrix, where, ": its fourth row is not 0 0 0 1; it is ignored");
   return matrix;
 }
 
@@ -46,7 +50,8 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
   const std::vector<float> floats = source.floats(accessor);
   std::vector<JointMatrix> matrices(joints);
   for (std::size_t i = 0; i < joints; ++i) {
-    matrices[i] = toJointMatrix(floats.data() + i * 16, join(where, ": inverse bind matrix ", i));
+    matrices[i] = toJointMatrix(floats.data() + i * 16, join(where, ": inverse bind matrix ", i),
+                                source.notes());
   }
   return matrices;
 }
