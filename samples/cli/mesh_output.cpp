@@ -82,7 +82,7 @@ std::string uniqueName(const std::string& name, std::size_t part, std::set<std::
 class ObjWriter {
  public:
   void add(const OutputPart& part, const std::string& name) {
-    const std::vector<std::vector<float>>& texcoords = part.primitive->texcoords;
+    const std::vector<gltf::SharedArray<float>>& texcoords = part.primitive->texcoords;
     put("o {}\n", name);
     addVectors("v", part.positions);
     if (!texcoords.empty()) addTexcoords(texcoords[0]);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -17,15 +18,32 @@
 namespace dermis::cli {
 namespace {
 
-/// In the packed mesh and in the repaired one: positions, normals, tangents, centers.
-constexpr std::uint64_t bytesPerVertex = 2 * 4 * 16;
-/// Weight and joint: packed, repaired, and temporarily during the conversion.
-constexpr std::uint64_t bytesPerInfluence = 3 * 8;
-/// Packed, and as views of the repaired mesh.
-constexpr std::uint64_t bytesPerTarget = sizeof(MorphTargetView) + 48;
+/// Whether the budget has the memory of a packed mesh, which a repaired one does not exceed.
+bool spendOnMesh(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
+  constexpr std::uint64_t bytesPerVertex = 4 * 16;  // positions, normals, tangents, centers
+  constexpr std::uint64_t bytesPerInfluence = 8;    // a weight and a joint
+  const std::uint64_t vertices = primitive.vertexCount;
+  // A packed target also takes up to 16 bytes for each 64 vertices.
+  const std::uint64_t bytesPerTarget = sizeof(MorphTargetView) + 48 + vertices / 4;
+  std::uint64_t displacements = 0;
+  for (const gltf::MorphTarget& target : primitive.morphTargets)
+    displacements += target.vertices.size() + target.positions.size() + target.normals.size() +
+                     target.tangents.size();
+  return budget.spend(vertices, bytesPerVertex) &&
+         budget.spend(vertices * primitive.influencesPerVertex(), bytesPerInfluence) &&
+         budget.spend(primitive.morphTargets.size(), bytesPerTarget) &&
+         budget.spend(displacements, sizeof(float));
+}
+
+Error tooLarge(const gltf::Primitive& primitive, std::uint32_t jointCount) {
+  return Error{ErrorCode::limitExceeded,
+               fmt::format("mesh '{}' for {} joints: it needs more memory than the limit for a "
+                           "file of this size",
+                           primitive.name, jointCount)};
+}
 
 template <typename Joint>
-std::uint32_t largestOf(std::span<const std::byte> joints) {
+std::uint32_t largestOf(const gltf::SharedArray<std::byte>& joints) {
   Joint largest = 0;
   for (std::size_t at = 0; at + sizeof(Joint) <= joints.size(); at += sizeof(Joint)) {
     Joint joint;
@@ -37,28 +55,30 @@ std::uint32_t largestOf(std::span<const std::byte> joints) {
 
 }  // namespace
 
-std::uint32_t namedJoints(const gltf::Mesh& mesh) {
+VertexKey vertexKey(const gltf::Primitive& primitive) {
+  VertexKey key{primitive.positions.data(), primitive.normals.data(), primitive.tangents.data()};
+  for (const gltf::Influences& set : primitive.influences)
+    key.insert(key.end(), {set.joints.data(), set.weights.data()});
+  for (const gltf::MorphTarget& target : primitive.morphTargets)
+    key.insert(key.end(), {target.vertices.data(), target.positions.data(), target.normals.data(),
+                           target.tangents.data()});
+  return key;
+}
+
+std::uint32_t NamedJoints::of(const gltf::Mesh& mesh) {
   std::uint32_t named = 1;
   for (const gltf::Primitive& primitive : mesh.primitives) {
     for (const gltf::Influences& set : primitive.influences) {
-      named = std::max(named, 1 + (set.jointType == ComponentType::uint8
-                                       ? largestOf<std::uint8_t>(set.joints)
-                                       : largestOf<std::uint16_t>(set.joints)));
+      const auto [largest, isNew] = largest_.emplace(set.joints.data(), 0);
+      if (isNew) {
+        largest->second = set.jointType == ComponentType::uint8
+                              ? largestOf<std::uint8_t>(set.joints)
+                              : largestOf<std::uint16_t>(set.joints);
+      }
+      named = std::max(named, 1 + largest->second);
     }
   }
   return named;
-}
-
-bool PreparedMesh::spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
-  const std::uint64_t influences =
-      std::uint64_t{primitive.vertexCount} * primitive.influencesPerVertex();
-  std::uint64_t displacements = 0;
-  for (const gltf::MorphTarget& target : primitive.morphTargets)
-    displacements += target.positions.size() + target.normals.size() + target.tangents.size();
-  return budget.spend(primitive.vertexCount, bytesPerVertex) &&
-         budget.spend(influences, bytesPerInfluence) &&
-         budget.spend(primitive.morphTargets.size(), bytesPerTarget) &&
-         budget.spend(displacements, 3 * sizeof(float));
 }
 
 MeshView PreparedMesh::view() const {
@@ -70,7 +90,10 @@ MeshView PreparedMesh::view() const {
 
 Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     const gltf::Primitive& primitive, std::uint32_t jointCount, const MeshPreparation& preparation,
-    const CentersOfPrimitive& centers) {
+    gltf::MemoryBudget& budget, const CentersOfPrimitive& centers) {
+  // The packed mesh grows, so that up to half of it may be unused.
+  if (!spendOnMesh(primitive, budget) || !spendOnMesh(primitive, budget))
+    return tooLarge(primitive, jointCount);
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
   mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
   mesh->original_.dualQuaternionWeight = preparation.dualQuaternionWeight;
@@ -79,6 +102,7 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
   if (!mesh->report_.packable()) {
     if (preparation.strict)
       return Error{ErrorCode::invalidMesh, mesh->report_.findings.front().message};
+    if (!spendOnMesh(primitive, budget)) return tooLarge(primitive, jointCount);
     Result<RepairedMesh> repaired = repair(mesh->original_, jointCount);
     if (!repaired) return repaired.error();
     mesh->repaired_.emplace(std::move(*repaired));
@@ -100,6 +124,10 @@ constexpr std::uint32_t mostSlots = 32;
 
 /// 20 bytes in the solver, and temporarily the same again.
 constexpr std::uint64_t bytesPerPair = 40;
+/// Of a vertex and its center, joined and repaired.
+constexpr std::uint64_t bytesPerJoinedVertex = 80;
+/// Joined, copied for the solver, and repaired.
+constexpr std::uint64_t bytesPerJoinedInfluence = 24;
 
 struct JointWeight {
   float weight;
@@ -110,13 +138,17 @@ struct JointWeight {
 /// needs.
 class JoinedMesh {
  public:
+  std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(ends_.size()); }
+
+  /// Adds triangles between vertices from `first` on.
+  void addTriangles(std::uint32_t first, std::span<const std::uint32_t> indices) {
+    for (const std::uint32_t index : indices) triangles_.push_back(first + index);
+  }
+
   /// `mesh` must be repaired, and so tightly packed.
-  void add(const MeshView& mesh, std::span<const std::uint32_t> indices) {
-    const auto first = static_cast<std::uint32_t>(positions_.size() / 3);
+  void addVertices(const MeshView& mesh) {
     const auto* position = static_cast<const float*>(mesh.positions.data);
     positions_.insert(positions_.end(), position, position + std::size_t{mesh.vertexCount} * 3);
-    for (const std::uint32_t index : indices) triangles_.push_back(first + index);
-
     const InfluenceSet& set = mesh.influenceSets.front();
     const auto* joint = static_cast<const std::uint32_t*>(set.joints.data);
     const auto* weight = static_cast<const float*>(set.weights.data);
@@ -208,12 +240,27 @@ Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
 
 Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint32_t jointCount) {
   JoinedMesh joined;
-  for (const gltf::Primitive& primitive : mesh.primitives) {
+  std::map<VertexKey, std::uint32_t> firsts;  // the first joined vertex of vertices that are shared
+  std::vector<std::uint32_t> firstOf(mesh.primitives.size());
+  for (std::size_t index = 0; index < firstOf.size(); ++index) {
+    const gltf::Primitive& primitive = mesh.primitives[index];
     if (primitive.influences.empty()) continue;
-    const gltf::PrimitiveView view(primitive);
-    const Result<RepairedMesh> repaired = repair(view.mesh(), jointCount);
-    if (!repaired) return repaired.error();
-    joined.add(repaired->view(), primitive.triangles);
+    const auto [first, isNew] = firsts.emplace(vertexKey(primitive), joined.vertexCount());
+    firstOf[index] = first->second;
+    if (isNew) {
+      const std::uint64_t vertices = primitive.vertexCount;
+      if (!budget_.spend(vertices, bytesPerJoinedVertex) ||
+          !budget_.spend(vertices * primitive.influencesPerVertex(), bytesPerJoinedInfluence))
+        return tooMuch(mesh, "need too much memory");
+      const gltf::PrimitiveView view(primitive);
+      const Result<RepairedMesh> repaired = repair(view.mesh(), jointCount);
+      if (!repaired) return repaired.error();
+      joined.addVertices(repaired->view());
+    }
+    if (!budget_.spend(primitive.triangles.size(), sizeof(std::uint32_t)) ||
+        !budget_.spend(primitive.vertexCount, 3 * sizeof(float)))
+      return tooMuch(mesh, "need too much memory");
+    joined.addTriangles(firstOf[index], primitive.triangles.values());
   }
   if (!budget_.spend(joined.pairCount(), bytesPerPair))
     return tooMuch(mesh, "need too much memory");
@@ -229,13 +276,11 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
   const std::vector<float> all = solve(*solver);
 
   Centers centers(mesh.primitives.size());
-  const float* next = all.data();
   for (std::size_t index = 0; index < centers.size(); ++index) {
     const gltf::Primitive& primitive = mesh.primitives[index];
     if (primitive.influences.empty()) continue;
-    const float* end = next + std::size_t{primitive.vertexCount} * 3;
-    centers[index].assign(next, end);
-    next = end;
+    const float* first = all.data() + std::size_t{firstOf[index]} * 3;
+    centers[index].assign(first, first + std::size_t{primitive.vertexCount} * 3);
   }
   return centers;
 }

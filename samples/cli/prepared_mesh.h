@@ -37,8 +37,19 @@ struct MeshPreparation {
 /// The limit if the user named a method that needs centers of rotation.
 inline constexpr std::uint64_t mostCenterTermsAsked = 10'000'000'000;
 
-/// The number of joints that the mesh can refer to. Further joints make no difference.
-std::uint32_t namedJoints(const gltf::Mesh& mesh);
+/// The addresses of all arrays that the vertices of a primitive consist of. Primitives that share
+/// their vertices have the same, and so can share what is prepared from them.
+using VertexKey = std::vector<const void*>;
+VertexKey vertexKey(const gltf::Primitive& primitive);
+
+/// Finds the number of joints that a mesh can refer to. Further joints make no difference.
+class NamedJoints {
+ public:
+  std::uint32_t of(const gltf::Mesh& mesh);
+
+ private:
+  std::map<const void*, std::uint32_t> largest_;  ///< by array of joints
+};
 
 /// The help text of `--strict`.
 inline constexpr const char* strictHelp =
@@ -50,14 +61,13 @@ using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 /// Not movable, because its views point to its own data.
 class PreparedMesh {
  public:
-  /// Spends the memory of `prepare`; false if the budget is too small.
-  static bool spend(const gltf::Primitive& primitive, gltf::MemoryBudget& budget);
-
-  /// The primitive must have influences, and outlive this object. Fails with `invalidMesh` (if
-  /// `strict`, also for faults that could be repaired), or if `centers` does, which is called last.
+  /// The primitive must have influences, and outlive this object. Spends what it allocates. Fails
+  /// with `invalidMesh` (if `strict`, also for faults that could be repaired), with `limitExceeded`
+  /// if the budget is too small, or if `centers` does, which is called last.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
+                                                             gltf::MemoryBudget& budget,
                                                              const CentersOfPrimitive& centers);
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;

@@ -14,9 +14,13 @@ namespace {
 
 /// Adds to the first three of every `components` values.
 void addDisplacements(std::vector<float>& values, std::size_t components,
-                      const std::vector<float>& displacements, float weight) {
-  for (std::size_t i = 0; i / 3 * components < values.size() && i < displacements.size(); ++i)
-    values[i / 3 * components + i % 3] += weight * displacements[i];
+                      std::span<const std::uint32_t> vertices, std::span<const float> displacements,
+                      float weight) {
+  if (values.empty()) return;
+  for (std::size_t i = 0; i < displacements.size(); ++i) {
+    const std::size_t vertex = vertices.empty() ? i / 3 : vertices[i / 3];
+    values[vertex * components + i % 3] += weight * displacements[i];
+  }
 }
 
 template <typename Vector>
@@ -44,9 +48,9 @@ SkinnedPart bindPose(const ScenePart& part, std::span<const MorphWeight> morphs)
   SkinnedPart skinned{part.primitive->positions, part.primitive->normals, part.primitive->tangents};
   for (const MorphWeight& morph : morphs) {
     const gltf::MorphTarget& target = part.primitive->morphTargets[morph.target];
-    addDisplacements(skinned.positions, 3, target.positions, morph.weight);
-    addDisplacements(skinned.normals, 3, target.normals, morph.weight);
-    addDisplacements(skinned.tangents, 4, target.tangents, morph.weight);
+    addDisplacements(skinned.positions, 3, target.vertices, target.positions, morph.weight);
+    addDisplacements(skinned.normals, 3, target.vertices, target.normals, morph.weight);
+    addDisplacements(skinned.tangents, 4, target.vertices, target.tangents, morph.weight);
   }
   return skinned;
 }

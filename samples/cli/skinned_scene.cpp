@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -17,8 +18,10 @@ namespace {
 
 /// Memory of a part except its vertices: the part, its names, and the output of `info` about it.
 constexpr std::uint64_t bytesPerPart = 1024;
-/// Memory per vertex of a pose: float32 positions and normals, in memory and in a file.
-constexpr std::uint64_t bytesPerPosedVertex = 48;
+/// Memory per vertex of a pose: float32 positions, normals and tangents.
+constexpr std::uint64_t bytesPerPosedVertex = 40;
+/// Memory per vertex of a primitive that is drawn: texture coordinates and a color.
+constexpr std::uint64_t bytesPerDrawnVertex = 16;
 /// Memory per weight of a morph target: sampled, and in the list of active ones.
 constexpr std::uint64_t bytesPerTarget = 2 * sizeof(MorphWeight);
 /// A part's name is copied several times when it is written to a file.
@@ -45,6 +48,7 @@ void addFindings(Scene& scene, const MeshReport& report) {
 
 /// Counts the parts before any is made, because a few nodes and a few primitives can make many.
 bool spendOnParts(gltf::Model& model) {
+  std::set<const gltf::Primitive*> drawn;
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Mesh& mesh = model.meshes[source.mesh];
     const gltf::Primitive& primitive = mesh.primitives[source.primitive];
@@ -52,6 +56,11 @@ bool spendOnParts(gltf::Model& model) {
     if (!model.budget.spend(1, bytesPerPart) || !model.budget.spend(name, copiesOfName) ||
         !model.budget.spend(mesh.morphTargetCount, bytesPerTarget) ||
         !model.budget.spend(primitive.vertexCount, bytesPerPosedVertex)) {
+      return false;
+    }
+    if (drawn.insert(&primitive).second &&
+        (!model.budget.spend(primitive.triangles.size(), sizeof(std::uint32_t)) ||
+         !model.budget.spend(primitive.vertexCount, bytesPerDrawnVertex))) {
       return false;
     }
   }
@@ -70,17 +79,15 @@ class Preparer {
     gltf::Model& model = *scene_.model;
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     const auto [named, isNew] = namedJoints_.emplace(source.mesh, 0);
-    if (isNew) named->second = namedJoints(model.meshes[source.mesh]);
+    if (isNew) named->second = joints_.of(model.meshes[source.mesh]);
     const auto joints =
         std::min(static_cast<std::uint32_t>(model.skins[source.skin].joints.size()), named->second);
     std::shared_ptr<const PreparedMesh>& mesh = prepared_[{&primitive, joints}];
     if (mesh != nullptr) return mesh;
-    if (!PreparedMesh::spend(primitive, model.budget)) {
-      return Error{ErrorCode::limitExceeded,
-                   fmt::format("mesh '{}' for {} joints: it needs more memory than the limit for a "
-                               "file of this size",
-                               primitive.name, joints)};
-    }
+    // Centers of rotation depend on all primitives of the mesh.
+    std::shared_ptr<const PreparedMesh>& shared =
+        shared_[{vertexKey(primitive), joints, preparation_.centersOfRotation ? source.mesh : 0}];
+    if (shared != nullptr) return mesh = shared;
     const CentersOfPrimitive findCenters = [&]() -> Result<std::vector<float>> {
       if (!preparation_.centersOfRotation) return std::vector<float>();
       Result<std::vector<float>> found = centers_.of(model, source, joints);
@@ -90,9 +97,9 @@ class Preparer {
       return std::vector<float>();
     };
     Result<std::shared_ptr<const PreparedMesh>> made =
-        PreparedMesh::prepare(primitive, joints, preparation_, findCenters);
+        PreparedMesh::prepare(primitive, joints, preparation_, model.budget, findCenters);
     if (!made) return made;
-    mesh = std::move(*made);
+    mesh = shared = std::move(*made);
     addFindings(scene_, mesh->report());
     return mesh;
   }
@@ -102,9 +109,13 @@ class Preparer {
   const MeshPreparation& preparation_;
   MeshCenters centers_;
   std::set<std::string> refused_;  ///< meshes that need too much work, each reported once
+  NamedJoints joints_;
   std::map<std::uint32_t, std::uint32_t> namedJoints_;  ///< by mesh
   std::map<std::pair<const gltf::Primitive*, std::uint32_t>, std::shared_ptr<const PreparedMesh>>
       prepared_;
+  /// By vertices, number of joints, and mesh.
+  std::map<std::tuple<VertexKey, std::uint32_t, std::uint32_t>, std::shared_ptr<const PreparedMesh>>
+      shared_;
 };
 
 /// `file` is the file's name, for messages.

@@ -15,10 +15,12 @@ namespace {
 bool spendOnPart(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
   std::uint64_t displacements = 0;
   for (const gltf::MorphTarget& target : primitive.morphTargets)
-    displacements += target.positions.size() + target.normals.size() + target.tangents.size();
+    displacements += target.vertices.size() + target.positions.size() + target.normals.size() +
+                     target.tangents.size();
   const std::uint64_t perVertex = 64 + std::uint64_t{16} * primitive.influencesPerVertex();
   return budget.spend(1, sizeof(Part)) && budget.spend(primitive.vertexCount, perVertex) &&
-         budget.spend(primitive.morphTargets.size(), sizeof(MorphTargetView) + 16) &&
+         budget.spend(primitive.morphTargets.size(),
+                      sizeof(MorphTargetView) + 16 + primitive.vertexCount / 4) &&
          budget.spend(displacements, 2 * sizeof(float));
 }
 

@@ -760,6 +760,121 @@ TEST_F(BadInput, CentresOfRotationAreFoundOncePerMesh) {
   EXPECT_EQ(result.errors.find("centers of rotation"), std::string::npos) << result.errors;
 }
 
+// ---- ordinary files that share vertices, and sparse morph targets
+
+enum class Targets { sparse, dense };
+
+/// A strip of triangles whose `materials` primitives share all vertices, with `targets` morph
+/// targets of three vertices each. The first two are active.
+FileBuilder strip(std::uint32_t vertices, std::uint32_t materials, std::uint32_t targets,
+                  Targets kind = Targets::sparse) {
+  FileBuilder file = denseMesh(vertices);
+  file.json["nodes"][2]["rotation"] = {0, 0, 0.6, 0.8};
+  const std::vector<float> normals(std::size_t{vertices} * 3, 0.5f);
+  file.attributes()["NORMAL"] = file.addFloats(normals, "VEC3");
+  for (std::uint32_t target = 0; target < targets; ++target) {
+    const std::vector<std::uint32_t> elements{target, target + 7, vertices - 1 - target};
+    std::vector<float> values{1, 2, 3, 4, 5, 6, 7, 8, static_cast<float>(target)};
+    Json accessor = {{"componentType", floatType}, {"count", vertices}, {"type", "VEC3"}};
+    if (kind == Targets::sparse) {
+      accessor["sparse"] = {
+          {"count", elements.size()},
+          {"indices",
+           {{"bufferView", file.addView(bytesOf(elements))}, {"componentType", unsignedIntType}}},
+          {"values", {{"bufferView", file.addView(bytesOf(values))}}}};
+    } else {
+      std::vector<float> all(std::size_t{vertices} * 3, 0.0f);
+      for (std::size_t i = 0; i < 9; ++i) all[elements[i / 3] * std::size_t{3} + i % 3] = values[i];
+      accessor["bufferView"] = file.addView(bytesOf(all));
+    }
+    const std::size_t number = file.addAccessor(accessor);
+    file.primitive()["targets"].push_back({{"POSITION", number}, {"NORMAL", number}});
+  }
+  if (targets > 0) {
+    file.json["meshes"][0]["weights"] = std::vector<float>(targets, 0.0f);
+    file.json["meshes"][0]["weights"][0] = 1;
+    file.json["meshes"][0]["weights"][1] = -0.5;
+  }
+  Json triangles = file.json["accessors"][file.primitive()["indices"].get<std::size_t>()];
+  const std::uint32_t all = 3 * (vertices - 2), each = all / 3 / materials * 3;
+  Json primitives = Json::array();
+  for (std::uint32_t material = 0; material < materials; ++material) {
+    triangles["byteOffset"] = 4 * each * material;
+    triangles["count"] = material + 1 < materials ? each : all - each * material;
+    primitives.push_back(file.primitive());
+    primitives.back()["indices"] = file.addAccessor(triangles);
+  }
+  file.json["meshes"][0]["primitives"] = primitives;
+  return file;
+}
+
+/// Expects that each of the primitives of `shared` is skinned as the only one of `single` is.
+void expectSkinnedAlike(const FileBuilder& shared, std::size_t materials, const FileBuilder& single,
+                        const std::vector<std::string>& options) {
+  const Ply one = skinned(writeModel("single.gltf", single), options);
+  const Ply all = skinned(writeModel("shared.gltf", shared), options);
+  ASSERT_FALSE(one.positions.empty());
+  ASSERT_EQ(all.positions.size(), one.positions.size() * materials);
+  for (std::size_t i = 0; i < all.positions.size(); ++i) {
+    ASSERT_EQ(all.positions[i], one.positions[i % one.positions.size()]) << i;
+    ASSERT_EQ(all.normals[i], one.normals[i % one.positions.size()]) << i;
+  }
+  EXPECT_EQ(all.faces.size(), one.faces.size());
+}
+
+// What is shared, and what is sparse, takes memory once, and for its values alone.
+TEST_F(BadInput, SharedVerticesAndSparseTargetsFitTheBudget) {
+  struct Shape {
+    std::uint32_t vertices, materials, targets;
+  };
+  for (const Shape& shape : {Shape{20'000, 40, 0}, Shape{8'000, 1, 300}, Shape{3'000, 9, 57}}) {
+    const FileBuilder file = strip(shape.vertices, shape.materials, shape.targets);
+    expectSkinnedAlike(file, shape.materials,
+                       strip(shape.vertices, 1, std::min(shape.targets, 2u), Targets::dense),
+                       {"--device", "cpu"});
+    const CommandResult info = dermis({"info", outFile("shared.gltf"), "--strict"});
+    EXPECT_EQ(info.status, 0) << info.errors;
+  }
+}
+
+TEST_F(BadInput, SharedVerticesHaveTheCentersOfRotationOfOneMesh) {
+  expectSkinnedAlike(strip(500, 3, 2), 3, strip(500, 1, 2),
+                     {"--device", "reference", "--method", "center_of_rotation"});
+}
+
+TEST_F(BadInput, SparseTargetsMoveAMeshWithoutJoints) {
+  const auto inBindPose = [](FileBuilder file) {
+    for (Json& primitive : file.json["meshes"][0]["primitives"]) {
+      primitive["attributes"].erase("JOINTS_0");
+      primitive["attributes"].erase("WEIGHTS_0");
+    }
+    return file;
+  };
+  expectSkinnedAlike(inBindPose(strip(100, 2, 3)), 2, inBindPose(strip(100, 1, 3, Targets::dense)),
+                     {"--device", "cpu"});
+}
+
+// Few accessors make many meshes: each pair of joints and weights is one.
+TEST_F(BadInput, PairsOfSharedAccessorsAreCounted) {
+  FileBuilder file = copies(1, 1, 20'000);
+  const Json joints = file.accessor("JOINTS_0"), weights = file.accessor("WEIGHTS_0");
+  Json primitives = Json::array();
+  std::vector<std::size_t> ofJoints, ofWeights;
+  for (std::size_t i = 0; i < 30; ++i) {
+    ofJoints.push_back(file.addAccessor(joints));
+    ofWeights.push_back(file.addAccessor(weights));
+  }
+  for (const std::size_t joint : ofJoints) {
+    for (const std::size_t weight : ofWeights) {
+      primitives.push_back(file.primitive());
+      primitives.back()["attributes"]["JOINTS_0"] = joint;
+      primitives.back()["attributes"]["WEIGHTS_0"] = weight;
+    }
+  }
+  file.json["meshes"][0]["primitives"] = primitives;
+  expectRefusedSoon(writeModel("pairs.gltf", file), "than the limit for a file of this size");
+}
+
 // ---- no Vulkan loader, no device, a missing feature
 
 TEST_F(BadInput, NoLoaderNoDeviceOrAMissingFeatureIsNamedAndTheReferenceStillWorks) {

@@ -142,6 +142,29 @@ TEST_F(GltfBudget, CountsNodesTimesPrimitivesBeforeItMakesThem) {
   expectError(nothing.load(), ErrorCode::limitExceeded, "and the primitives of mesh 0");
 }
 
+/// `count` primitives of 20,000 vertices, each with its own accessors unless they are shared.
+FileBuilder ofManyVertices(std::size_t count, bool isShared) {
+  FileBuilder file = product(1, count);
+  for (Json& accessor : file.json["accessors"]) accessor["count"] = 20'000;
+  if (isShared) return file;
+  for (std::size_t i = 1; i < count; ++i) {
+    Json& attributes = file.json["meshes"][0]["primitives"][i]["attributes"];
+    for (Json& attribute : attributes)
+      attribute = file.addAccessor(file.json["accessors"][attribute.get<std::size_t>()]);
+  }
+  return file;
+}
+
+TEST_F(GltfBudget, SpendsSharedAccessorsOnce) {
+  const std::uint64_t one = loaded(ofManyVertices(1, true)).budget.left();
+  const FileBuilder file = ofManyVertices(200, true);
+  const gltf::Model model = loaded(file);
+  EXPECT_EQ(model.skinnedPrimitives.size(), 200u);
+  EXPECT_GT(model.budget.left(), one - 200 * 1000);
+  expectError(ofManyVertices(200, false).load(), ErrorCode::limitExceeded,
+              "it needs more memory than");
+}
+
 TEST_F(GltfBudget, CountsWhatIsMadeOfAText) {
   for (const char* section : {"nodes", "materials", "meshes", "skins", "animations", "accessors",
                               "bufferViews", "scenes"}) {

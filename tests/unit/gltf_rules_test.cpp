@@ -40,8 +40,8 @@ std::vector<double> meaningOf(const gltf::Model& model) {
   if (model.skinnedPrimitives.empty()) return numbers;
   const gltf::SkinnedPrimitive& skinned = model.skinnedPrimitives[0];
   const gltf::Primitive& primitive = model.meshes[skinned.mesh].primitives[skinned.primitive];
-  append(numbers, primitive.positions);
-  append(numbers, primitive.triangles);
+  append(numbers, primitive.positions.values());
+  append(numbers, primitive.triangles.values());
   for (const gltf::Influences& set : primitive.influences) {
     if (set.jointType == ComponentType::uint8)
       append(numbers, componentsOf<std::uint8_t>(set.joints));
@@ -54,7 +54,8 @@ std::vector<double> meaningOf(const gltf::Model& model) {
     else
       append(numbers, componentsOf<float>(set.weights));
   }
-  for (const gltf::MorphTarget& target : primitive.morphTargets) append(numbers, target.positions);
+  for (const gltf::MorphTarget& target : primitive.morphTargets)
+    append(numbers, target.positions.values());
   append(numbers, gltf::morphWeights(model, skinned.node, 0, 0.5));
   const auto matrices = gltf::pose(model, skinned.skin, 0, 0.5);
   for (std::size_t joint = 0; joint < 2 && joint < matrices.size(); ++joint) {

@@ -14,10 +14,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "dermis/export.h"
@@ -90,9 +92,45 @@ struct Material {
   bool doubleSided = false;
 };
 
-/// Displacements of one morph target, 3 floats per vertex. An absent attribute is empty.
+/// An array that cannot be changed. Copies share its memory, and so do all primitives that use the
+/// same accessor: a shared accessor is decoded once.
+template <typename T>
+class SharedArray {
+ public:
+  SharedArray() = default;
+  /// Takes the values.
+  SharedArray(std::vector<T> values)
+      : values_(std::make_shared<const std::vector<T>>(std::move(values))) {}
+
+  /// The values. Valid while this array or a copy of it exists.
+  const std::vector<T>& values() const {
+    static const std::vector<T> noValues;
+    return values_ ? *values_ : noValues;
+  }
+  operator const std::vector<T>&() const { return values(); }
+
+  const T* data() const { return values().data(); }
+  std::size_t size() const { return values().size(); }
+  bool empty() const { return values().empty(); }
+  const T& operator[](std::size_t index) const { return values()[index]; }
+  auto begin() const { return values().begin(); }
+  auto end() const { return values().end(); }
+
+  /// Compares the values.
+  friend bool operator==(const SharedArray& a, const SharedArray& b) {
+    return a.values() == b.values();
+  }
+
+ private:
+  std::shared_ptr<const std::vector<T>> values_;
+};
+
+/// Displacements of one morph target, 3 floats per element. An absent attribute is empty.
 struct MorphTarget {
-  std::vector<float> positions, normals, tangents;
+  /// The vertices that the elements belong to, strictly ascending. If empty, there is an element
+  /// for each vertex. Not empty if all accessors of the target have only sparse values.
+  SharedArray<std::uint32_t> vertices;
+  SharedArray<float> positions, normals, tangents;
 };
 
 /// JOINTS_n and WEIGHTS_n of one n: 4 influences per vertex, tightly packed. The component types
@@ -101,8 +139,8 @@ struct MorphTarget {
 struct Influences {
   ComponentType jointType = ComponentType::uint8;     ///< uint8 or uint16
   ComponentType weightType = ComponentType::float32;  ///< float32, unorm8 or unorm16
-  std::vector<std::byte> joints;
-  std::vector<std::byte> weights;
+  SharedArray<std::byte> joints;
+  SharedArray<std::byte> weights;
 };
 
 /// One decoded primitive of a mesh. Attributes are float32 whatever the file stores: normalized
@@ -115,16 +153,16 @@ struct Primitive {
   /// (text.h).
   std::string name;
   std::uint32_t vertexCount = 0;
-  std::vector<float> positions;               ///< 3 per vertex
-  std::vector<float> normals;                 ///< 3 per vertex, or empty
-  std::vector<float> tangents;                ///< 4 per vertex, or empty
-  std::vector<std::vector<float>> texcoords;  ///< TEXCOORD_0, 1, …: 2 per vertex each
-  std::vector<float> colors;  ///< COLOR_0: 4 per vertex, or empty; alpha is 1 if the file has none
+  SharedArray<float> positions;               ///< 3 per vertex
+  SharedArray<float> normals;                 ///< 3 per vertex, or empty
+  SharedArray<float> tangents;                ///< 4 per vertex, or empty
+  std::vector<SharedArray<float>> texcoords;  ///< TEXCOORD_0, 1, …: 2 per vertex each
+  SharedArray<float> colors;  ///< COLOR_0: 4 per vertex, or empty; alpha is 1 if the file has none
   /// One element for each set. If empty, the primitive stays in bind pose: `pack` refuses it, and
   /// it is drawn without skinning.
   std::vector<Influences> influences;
   /// 3 vertex indices per triangle. Strips and fans are converted. Empty for points and lines.
-  std::vector<std::uint32_t> triangles;
+  SharedArray<std::uint32_t> triangles;
   std::vector<MorphTarget> morphTargets;
   std::uint32_t material = none;  ///< index into `Model::materials`
 

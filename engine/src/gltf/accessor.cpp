@@ -352,7 +352,10 @@ bool Source::hasNoData(int accessor) const {
   return found.bufferView < 0 && !found.sparse.isSparse;
 }
 
-// Primitives may share accessors. Shared data is decoded, and spent, once per use.
+bool Source::isZeroElsewhere(int accessor) const {
+  return content().accessors[static_cast<std::size_t>(accessor)].bufferView < 0;
+}
+
 void Source::spendOnAccessor(int index) {
   refuseFaulty(index);
   spend(std::uint64_t{count(index)} * components(index), sizeof(float),
@@ -382,6 +385,11 @@ std::vector<std::uint32_t> Source::sparseIndices(int index) {
   return elements;
 }
 
+const std::byte* Source::sparseData(int index) const {
+  const auto& values = content().accessors[static_cast<std::size_t>(index)].sparse.values;
+  return viewData(values.bufferView) + values.byteOffset;
+}
+
 // Calls `visit` with the index and the address of each component, then again for those that sparse
 // values replace. Components of an accessor without a bufferView are zero and not visited.
 template <typename Visit>
@@ -399,8 +407,7 @@ void Source::forEachComponent(int index, Visit visit) {
     }
   }
   if (accessor.sparse.isSparse) {
-    const std::byte* data =
-        viewData(accessor.sparse.values.bufferView) + accessor.sparse.values.byteOffset;
+    const std::byte* data = sparseData(index);
     for (const std::uint32_t element : sparseIndices(index)) {
       for (std::size_t j = 0; j < width; ++j, data += component) visit(element * width + j, data);
     }
@@ -432,6 +439,21 @@ std::vector<float> Source::floats(int index) {
   return decode<float>(index, [&](const std::byte* address) {
     return loadFloat(address, accessor.componentType, accessor.normalized);
   });
+}
+
+Source::SparseValues Source::sparseFloats(int index) {
+  refuseFaulty(index);
+  const auto [componentType, normalized] = format(index);
+  const std::size_t width = components(index), size = sizeOfComponent(componentType);
+  SparseValues sparse{sparseIndices(index), {}};
+  spend(sparse.elements.size() * width, sizeof(float), join("accessor ", index, " sparse values"));
+  sparse.values.resize(sparse.elements.size() * width);
+  const std::byte* data = sparseData(index);
+  for (float& value : sparse.values) {
+    value = loadFloat(data, componentType, normalized);
+    data += size;
+  }
+  return sparse;
 }
 
 std::vector<std::uint32_t> Source::integers(int index) {

@@ -23,8 +23,8 @@ struct Format {
 /// A file opened for reading: its structure and its bytes.
 class Source {
  public:
-  /// Checks every bufferView and accessor against the buffers. Reading data spends its memory from
-  /// the budget. Budget and notes must outlive this object. Throws `Failure`.
+  /// Checks every bufferView and accessor against the buffers. Each call that decodes data spends
+  /// its memory from the budget. Budget and notes must outlive this object. Throws `Failure`.
   Source(Document document, std::vector<Buffer> buffers, MemoryBudget& budget, Notes& notes);
 
   const tinygltf::Model& content() const { return document_.content; }
@@ -56,6 +56,8 @@ class Source {
   std::uint32_t components(int accessor) const;
   /// The accessor has neither a bufferView nor sparse values: it is all zeros.
   bool hasNoData(int accessor) const;
+  /// The accessor has no bufferView: elements without a sparse value are zero.
+  bool isZeroElsewhere(int accessor) const;
 
   /// All components of all elements as float32. Normalized integers are divided by their largest
   /// value, and signed ones clamped to at least −1 (glTF 2.0, 3.6.2.2); other integers keep their
@@ -63,6 +65,13 @@ class Source {
   std::vector<float> floats(int accessor);
   /// The same for unsigned integers that are not normalized.
   std::vector<std::uint32_t> integers(int accessor);
+
+  struct SparseValues {
+    std::vector<std::uint32_t> elements;  ///< in the order of the file
+    std::vector<float> values;            ///< all components of each element
+  };
+  /// Only the sparse values of an accessor, converted as by `floats`.
+  SparseValues sparseFloats(int accessor);
 
   /// All components of all elements as they are stored, tightly packed.
   std::vector<std::byte> stored(int accessor);
@@ -93,6 +102,7 @@ class Source {
   std::uint64_t strideOf(const tinygltf::Accessor& accessor) const;
   void spendOnAccessor(int accessor);
   std::vector<std::uint32_t> sparseIndices(int accessor);
+  const std::byte* sparseData(int accessor) const;
   template <typename Visit>
   void forEachComponent(int accessor, Visit visit);
   template <typename Value, typename Read>

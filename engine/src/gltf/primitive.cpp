@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "gltf/failure.h"
@@ -207,66 +209,56 @@ class PrimitiveCheck {
   std::string where_;
 };
 
+// The type of joints or weights as they are kept: bytes and shorts as in the file, other formats as
+// the type that they are converted to.
+ComponentType keptType(const Source& source, int accessor, ComponentType byte,
+                       ComponentType sixteen, ComponentType other) {
+  switch (source.format(accessor).componentType) {
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return byte;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return sixteen;
+    default:
+      return other;
+  }
+}
+
+bool isByteOrShort(const Source& source, int accessor) {
+  const int type = source.format(accessor).componentType;
+  return type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
+         type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
+}
+
 // Unsigned bytes and shorts are joints whether or not they are marked as normalized. Other formats
 // are converted to shorts.
-void readJoints(Source& source, int accessor, const std::string& where, Influences& set) {
-  const int type = source.format(accessor).componentType;
-  if (type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
-      type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT) {
-    const bool bytes = type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE;
-    set.jointType = bytes ? ComponentType::uint8 : ComponentType::uint16;
-    set.joints = source.stored(accessor);
-    return;
-  }
+SharedArray<std::byte> decodeJoints(Source& source, int accessor, const std::string& where) {
+  if (isByteOrShort(source, accessor)) return source.stored(accessor);
   // Exact up to 2^24; joints above 2^16 are refused.
   const std::vector<float> values = source.floats(accessor);
   source.spend(values.size(), sizeof(std::uint16_t), where);
-  set.jointType = ComponentType::uint16;
-  set.joints.resize(values.size() * sizeof(std::uint16_t));
+  std::vector<std::byte> joints(values.size() * sizeof(std::uint16_t));
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] >= 0 && values[i] <= 65535 && values[i] == std::floor(values[i]))) {
       failInvalid(where, ": component ", i % 4, " of vertex ", i / 4, " is ", values[i],
                   ", which is not a joint");
     }
     const auto joint = static_cast<std::uint16_t>(values[i]);
-    std::memcpy(&set.joints[i * sizeof joint], &joint, sizeof joint);
+    std::memcpy(&joints[i * sizeof joint], &joint, sizeof joint);
   }
+  return joints;
 }
 
 // Unsigned bytes and shorts are weights from 0 to 1 whether or not they are marked as normalized.
-void readWeights(Source& source, int accessor, const std::string& where, Influences& set) {
-  switch (source.format(accessor).componentType) {
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      set.weightType = ComponentType::unorm8;
-      set.weights = source.stored(accessor);
-      return;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      set.weightType = ComponentType::unorm16;
-      set.weights = source.stored(accessor);
-      return;
-    default:
-      break;
-  }
+SharedArray<std::byte> decodeWeights(Source& source, int accessor, const std::string& where) {
+  if (isByteOrShort(source, accessor)) return source.stored(accessor);
   const std::vector<float> values = source.floats(accessor);
   source.spend(values.size(), sizeof(float), where);
-  set.weightType = ComponentType::float32;
-  set.weights.resize(values.size() * sizeof(float));
-  if (!values.empty()) std::memcpy(set.weights.data(), values.data(), set.weights.size());
+  std::vector<std::byte> weights(values.size() * sizeof(float));
+  if (!values.empty()) std::memcpy(weights.data(), values.data(), weights.size());
+  return weights;
 }
 
-std::vector<Influences> readInfluences(Source& source, const std::map<std::string, int>& attributes,
-                                       const std::string& where) {
-  std::vector<Influences> sets(countSets(attributes, "JOINTS_", where));
-  for (std::size_t i = 0; i < sets.size(); ++i) {
-    const std::string joints = join("JOINTS_", i), weights = join("WEIGHTS_", i);
-    readJoints(source, attributes.at(joints), join(where, " ", joints), sets[i]);
-    readWeights(source, attributes.at(weights), join(where, " ", weights), sets[i]);
-  }
-  return sets;
-}
-
-std::vector<float> readColors(Source& source, int accessor, const std::string& where) {
-  if (accessor < 0) return {};
+SharedArray<float> decodeColors(Source& source, int accessor, const std::string& where) {
   std::vector<float> colors = source.floats(accessor);
   if (source.components(accessor) == 4) return colors;
   source.spend(source.count(accessor), 16, where);
@@ -275,31 +267,51 @@ std::vector<float> readColors(Source& source, int accessor, const std::string& w
   return opaque;
 }
 
-std::vector<float> readOptional(Source& source, int accessor) {
-  return accessor < 0 ? std::vector<float>() : source.floats(accessor);
-}
+// The accessors of a morph target, or −1: positions, normals, tangents.
+using TargetAccessors = std::array<int, 3>;
 
-// Reads sets from 0 up to the first missing one.
-std::vector<std::vector<float>> readTexcoords(Source& source,
-                                              const std::map<std::string, int>& attributes) {
-  std::vector<std::vector<float>> sets;
-  for (;;) {
-    const int accessor = findAttribute(attributes, join("TEXCOORD_", sets.size()));
-    if (accessor < 0) return sets;
-    sets.push_back(source.floats(accessor));
+TargetAccessors accessorsOf(const Source& source, const std::map<std::string, int>& attributes) {
+  TargetAccessors accessors;
+  std::size_t next = 0;
+  for (const char* name : {"POSITION", "NORMAL", "TANGENT"}) {
+    const int accessor = findAttribute(attributes, name);
+    // Zeros displace nothing.
+    accessors[next++] = accessor >= 0 && source.hasNoData(accessor) ? -1 : accessor;
   }
+  return accessors;
 }
 
-MorphTarget readTarget(Source& source, const std::map<std::string, int>& attributes) {
+// A target whose accessors all have only sparse values keeps only those vertices.
+MorphTarget decodeSparseTarget(Source& source, const TargetAccessors& accessors) {
+  std::array<Source::SparseValues, 3> sparse;
+  std::vector<std::uint32_t> vertices;
+  for (std::size_t i = 0; i < accessors.size(); ++i) {
+    if (accessors[i] < 0) continue;
+    sparse[i] = source.sparseFloats(accessors[i]);
+    vertices.insert(vertices.end(), sparse[i].elements.begin(), sparse[i].elements.end());
+  }
+  std::ranges::sort(vertices);
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
   MorphTarget target;
-  target.positions = readOptional(source, findAttribute(attributes, "POSITION"));
-  target.normals = readOptional(source, findAttribute(attributes, "NORMAL"));
-  target.tangents = readOptional(source, findAttribute(attributes, "TANGENT"));
+  if (vertices.empty()) return target;
+  const std::array arrays{&target.positions, &target.normals, &target.tangents};
+  for (std::size_t i = 0; i < accessors.size(); ++i) {
+    if (accessors[i] < 0) continue;
+    std::vector<float> values(3 * vertices.size());
+    const float* from = sparse[i].values.data();
+    for (const std::uint32_t element : sparse[i].elements) {
+      const auto place = std::ranges::lower_bound(vertices, element) - vertices.begin();
+      std::copy_n(from, 3, values.begin() + 3 * place);
+      from += 3;
+    }
+    *arrays[i] = std::move(values);
+  }
+  target.vertices = std::move(vertices);
   return target;
 }
 
-std::vector<std::uint32_t> readIndices(Source& source, int accessor, std::uint32_t vertexCount,
-                                       const std::string& where) {
+std::vector<std::uint32_t> decodeIndices(Source& source, int accessor, std::uint32_t vertexCount,
+                                         const std::string& where) {
   if (accessor >= 0) {
     std::vector<std::uint32_t> indices = source.integers(accessor);
     for (std::size_t i = 0; i < indices.size(); ++i) {
@@ -332,12 +344,11 @@ std::vector<std::uint32_t> unroll(const std::vector<std::uint32_t>& indices, int
   return triangles;
 }
 
-std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primitive& from,
-                                         std::uint32_t vertexCount, const std::string& where) {
-  const int accessor = findAttribute(from.attributes, indicesAttribute);
+SharedArray<std::uint32_t> decodeTriangles(Source& source, int accessor, int mode,
+                                           std::uint32_t vertexCount, const std::string& where) {
   // The indices of points and lines are checked, but form no triangles.
-  std::vector<std::uint32_t> indices = readIndices(source, accessor, vertexCount, where);
-  switch (from.mode) {
+  std::vector<std::uint32_t> indices = decodeIndices(source, accessor, vertexCount, where);
+  switch (mode) {
     case TINYGLTF_MODE_TRIANGLES:
       if (indices.size() % 3 != 0) {
         source.notes().broken(NoteKind::restOfTriangles, where, ": the last ", indices.size() % 3,
@@ -348,7 +359,7 @@ std::vector<std::uint32_t> readTriangles(Source& source, const tinygltf::Primiti
     case TINYGLTF_MODE_TRIANGLE_STRIP:
     case TINYGLTF_MODE_TRIANGLE_FAN:
       source.spend(indices.size(), 12, where);
-      return unroll(indices, from.mode);
+      return unroll(indices, mode);
     default:
       return {};
   }
@@ -385,29 +396,78 @@ std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh) {
   return static_cast<std::uint32_t>(most);
 }
 
-Primitive readPrimitive(Source& source, std::uint32_t meshIndex, std::uint32_t primitiveIndex) {
-  const tinygltf::Mesh& mesh = source.content().meshes[meshIndex];
+SharedArray<float> PrimitiveReader::floats(int accessor) {
+  if (accessor < 0) return {};
+  return once(floats_, accessor, [&] { return source_.floats(accessor); });
+}
+
+std::vector<Influences> PrimitiveReader::influences(const std::map<std::string, int>& attributes,
+                                                    const std::string& where) {
+  std::vector<Influences> sets(countSets(attributes, "JOINTS_", where));
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    const std::string jointsName = join("JOINTS_", i), weightsName = join("WEIGHTS_", i);
+    const int joints = attributes.at(jointsName), weights = attributes.at(weightsName);
+    sets[i].jointType = keptType(source_, joints, ComponentType::uint8, ComponentType::uint16,
+                                 ComponentType::uint16);
+    sets[i].weightType = keptType(source_, weights, ComponentType::unorm8, ComponentType::unorm16,
+                                  ComponentType::float32);
+    sets[i].joints = once(joints_, joints, [&] {
+      return decodeJoints(source_, joints, join(where, " ", jointsName));
+    });
+    sets[i].weights = once(weights_, weights, [&] {
+      return decodeWeights(source_, weights, join(where, " ", weightsName));
+    });
+  }
+  return sets;
+}
+
+// Reads sets from 0 up to the first missing one.
+std::vector<SharedArray<float>> PrimitiveReader::texcoords(
+    const std::map<std::string, int>& attributes) {
+  std::vector<SharedArray<float>> sets;
+  for (;;) {
+    const int accessor = findAttribute(attributes, join("TEXCOORD_", sets.size()));
+    if (accessor < 0) return sets;
+    sets.push_back(floats(accessor));
+  }
+}
+
+MorphTarget PrimitiveReader::target(const std::map<std::string, int>& attributes) {
+  const TargetAccessors accessors = accessorsOf(source_, attributes);
+  const auto isSparse = [&](int accessor) {
+    return accessor < 0 || source_.isZeroElsewhere(accessor);
+  };
+  if (std::ranges::all_of(accessors, isSparse))
+    return once(targets_, accessors, [&] { return decodeSparseTarget(source_, accessors); });
+  return {{}, floats(accessors[0]), floats(accessors[1]), floats(accessors[2])};
+}
+
+Primitive PrimitiveReader::read(std::uint32_t meshIndex, std::uint32_t primitiveIndex) {
+  const tinygltf::Mesh& mesh = source_.content().meshes[meshIndex];
   const tinygltf::Primitive& from = mesh.primitives[primitiveIndex];
+  const std::map<std::string, int>& attributes = from.attributes;
   const std::string where = primitivePlace(meshIndex, primitiveIndex);
   Primitive primitive;
   primitive.name = primitiveName(mesh, meshIndex, primitiveIndex);
   primitive.material = indexOf(from.material);
-  const int positions = findAttribute(from.attributes, "POSITION");
+  const int positions = findAttribute(attributes, "POSITION");
   if (positions < 0) {
-    source.notes().remark(NoteKind::noPositions, where, ": it has no positions and is left out");
+    source_.notes().remark(NoteKind::noPositions, where, ": it has no positions and is left out");
     return primitive;
   }
-  primitive.vertexCount = source.count(positions);
-  primitive.positions = source.floats(positions);
-  primitive.normals = readOptional(source, findAttribute(from.attributes, "NORMAL"));
-  primitive.tangents = readOptional(source, findAttribute(from.attributes, "TANGENT"));
-  primitive.texcoords = readTexcoords(source, from.attributes);
-  primitive.colors = readColors(source, findAttribute(from.attributes, "COLOR_0"), where);
-  primitive.influences = readInfluences(source, from.attributes, where);
-  primitive.triangles = readTriangles(source, from, primitive.vertexCount, where);
-  for (const auto& target : from.targets) {
-    primitive.morphTargets.push_back(readTarget(source, target));
-  }
+  primitive.vertexCount = source_.count(positions);
+  primitive.positions = floats(positions);
+  primitive.normals = floats(findAttribute(attributes, "NORMAL"));
+  primitive.tangents = floats(findAttribute(attributes, "TANGENT"));
+  primitive.texcoords = texcoords(attributes);
+  if (const int colors = findAttribute(attributes, "COLOR_0"); colors >= 0)
+    primitive.colors = once(colors_, colors, [&] { return decodeColors(source_, colors, where); });
+  primitive.influences = influences(attributes, where);
+  const int indices = findAttribute(attributes, indicesAttribute);
+  primitive.triangles = once(
+      triangles_, std::tuple(indices, from.mode, primitive.vertexCount),
+      [&] { return decodeTriangles(source_, indices, from.mode, primitive.vertexCount, where); });
+  for (const auto& target : from.targets) primitive.morphTargets.push_back(this->target(target));
   return primitive;
 }
 

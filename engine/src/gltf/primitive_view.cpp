@@ -5,10 +5,10 @@
 namespace dermis::gltf {
 namespace {
 
-AttributeView optionalFloats(const std::vector<float>& values, std::uint32_t vertexCount,
-                             std::uint32_t components) {
+AttributeView optionalFloats(const std::vector<float>& values, std::uint32_t components) {
   if (values.empty()) return {};
-  return floatAttribute(values.data(), vertexCount, components);
+  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                        components);
 }
 
 AttributeView influenceView(const std::vector<std::byte>& bytes, std::uint32_t vertexCount,
@@ -26,20 +26,20 @@ PrimitiveView::PrimitiveView(const Primitive& primitive) : primitive_(&primitive
   }
   for (const MorphTarget& target : primitive.morphTargets) {
     MorphTargetView& view = morphTargets_.emplace_back();
-    view.positions = optionalFloats(target.positions, count, 3);
-    view.normals = optionalFloats(target.normals, count, 3);
-    view.tangents = optionalFloats(target.tangents, count, 3);
+    view.vertices = target.vertices.values();
+    view.positions = optionalFloats(target.positions, 3);
+    view.normals = optionalFloats(target.normals, 3);
+    view.tangents = optionalFloats(target.tangents, 3);
   }
 }
 
 MeshView PrimitiveView::mesh() const& {
-  const std::uint32_t count = primitive_->vertexCount;
   MeshView view;
   view.name = primitive_->name;
-  view.vertexCount = count;
-  view.positions = optionalFloats(primitive_->positions, count, 3);
-  view.normals = optionalFloats(primitive_->normals, count, 3);
-  view.tangents = optionalFloats(primitive_->tangents, count, 4);
+  view.vertexCount = primitive_->vertexCount;
+  view.positions = optionalFloats(primitive_->positions, 3);
+  view.normals = optionalFloats(primitive_->normals, 3);
+  view.tangents = optionalFloats(primitive_->tangents, 4);
   view.influenceSets = influenceSets_;
   view.morphTargets = morphTargets_;
   return view;

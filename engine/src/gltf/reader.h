@@ -1,7 +1,12 @@
 // The steps that make a `Model` from a checked source. Each may throw `Failure`.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "dermis/gltf.h"
@@ -35,8 +40,34 @@ void checkPrimitives(Source& source);
 /// those meshes.
 void readScene(Source& source, Model& model);
 
-/// Reads one primitive with all its data.
-Primitive readPrimitive(Source& source, std::uint32_t mesh, std::uint32_t primitive);
+/// Reads primitives with all their data. Decodes each accessor once, however many use it.
+class PrimitiveReader {
+ public:
+  explicit PrimitiveReader(Source& source) : source_(source) {}
+
+  Primitive read(std::uint32_t mesh, std::uint32_t primitive);
+
+ private:
+  /// The element of `known` with this key; `decode` makes it if there is none.
+  template <typename Key, typename Value, typename Decode>
+  static const Value& once(std::map<Key, Value>& known, const Key& key, Decode decode) {
+    const auto found = known.find(key);
+    return found != known.end() ? found->second : known.emplace(key, decode()).first->second;
+  }
+  SharedArray<float> floats(int accessor);
+  std::vector<SharedArray<float>> texcoords(const std::map<std::string, int>& attributes);
+  std::vector<Influences> influences(const std::map<std::string, int>& attributes,
+                                     const std::string& where);
+  MorphTarget target(const std::map<std::string, int>& attributes);
+
+  Source& source_;
+  // By accessor. Joints, weights and colors may be converted.
+  std::map<int, SharedArray<float>> floats_, colors_;
+  std::map<int, SharedArray<std::byte>> joints_, weights_;
+  /// By the accessor of the indices, mode, and number of vertices.
+  std::map<std::tuple<int, int, std::uint32_t>, SharedArray<std::uint32_t>> triangles_;
+  std::map<std::array<int, 3>, MorphTarget> targets_;  ///< sparse ones
+};
 
 /// Number of morph targets of the primitive that has the most.
 std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh);

@@ -52,7 +52,8 @@ constexpr std::array sections{Section{"buffers", sizeof(BufferDescription) + siz
                               Section{"cameras", 0}};
 constexpr std::uint64_t bytesPerPrimitive = sizeof(tinygltf::Primitive) + sizeof(Primitive);
 constexpr std::uint64_t bytesPerTarget = sizeof(std::map<std::string, int>) + sizeof(MorphTarget);
-constexpr std::uint64_t bytesPerAttribute = 128;  // in a map, including its name
+// In a map, including its name, and in the map of decoded data.
+constexpr std::uint64_t bytesPerAttribute = 256;
 constexpr std::uint64_t bytesPerSampler = 2 * sizeof(tinygltf::AnimationSampler);
 constexpr std::uint64_t bytesPerChannel = sizeof(tinygltf::AnimationChannel) + sizeof(Channel);
 

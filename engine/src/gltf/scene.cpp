@@ -43,13 +43,10 @@ std::vector<bool> findReachable(const Source& source, Model& model) {
   return std::vector<bool>(model.nodes.size(), true);
 }
 
-void readMesh(Source& source, Model& model, std::uint32_t index) {
+void readMesh(PrimitiveReader& reader, std::size_t count, Model& model, std::uint32_t index) {
   Mesh& mesh = model.meshes[index];
   if (!mesh.primitives.empty()) return;
-  const auto count = source.content().meshes[index].primitives.size();
-  for (std::uint32_t i = 0; i < count; ++i) {
-    mesh.primitives.push_back(readPrimitive(source, index, i));
-  }
+  for (std::uint32_t i = 0; i < count; ++i) mesh.primitives.push_back(reader.read(index, i));
 }
 
 void addNote(Model& model, std::size_t count, const char* what, const char* rest) {
@@ -70,6 +67,7 @@ void readScene(Source& source, Model& model) {
   }
 
   const std::vector<bool> reachable = findReachable(source, model);
+  PrimitiveReader reader(source);
   std::size_t outside = 0, notSkinned = 0, inBindPose = 0;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
@@ -77,7 +75,7 @@ void readScene(Source& source, Model& model) {
     if (!reachable[i]) ++outside;
     if (reachable[i] && node.skin == none) ++notSkinned;
     if (!reachable[i] || node.skin == none) continue;
-    readMesh(source, model, node.mesh);
+    readMesh(reader, content.meshes[node.mesh].primitives.size(), model, node.mesh);
     const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
     // A few nodes and a few primitives can make many pairs.
     source.spend(primitives.size(), 2 * sizeof(SkinnedPrimitive),
