@@ -25,7 +25,8 @@ struct ValidateMorphs : public ::testing::Test {
     mesh.name = "Fox";
     mesh.influencesPerVertex = 1;
     mesh.positions.assign(vertexCount * 3, 1.0f);
-    mesh.normals.assign(vertexCount * 3, 1.0f);
+    for (std::uint32_t vertex = 0; vertex < vertexCount; ++vertex)
+      mesh.normals.insert(mesh.normals.end(), {0.0f, 1.0f, 0.0f});
     mesh.joints.assign(vertexCount, 0);
     mesh.weights.assign(vertexCount, 1.0f);
     view = mesh.view();

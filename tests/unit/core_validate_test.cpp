@@ -234,7 +234,7 @@ TEST_F(ValidateTest, StridesAreHeldAgainstTheTypesSize) {
                                const std::string& sentence) {
     attribute.type = type;
     attribute.stride = stride;
-    EXPECT_TRUE(findsNothing()) << sentence;
+    EXPECT_TRUE(validate(view, jointCount).packable()) << sentence;
     attribute.stride = stride - 1;
     EXPECT_EQ(onlyFinding(MeshProblem::strideTooSmall, 1, 0), "mesh 'Fox': the " + sentence);
   };
@@ -336,7 +336,10 @@ TEST_F(ValidateTest, SharesThatAreNotFrom0To1) {
 
 TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
   using Halves = std::initializer_list<std::uint16_t>;
-  std::vector<std::uint16_t> halves(vertexCount * 4, 0x3c00);
+  const std::uint16_t good[] = {0x3c00, 0, 0, 0x3c00};  // 1 0 0 1
+  std::vector<std::uint16_t> halves;
+  for (std::size_t vertex = 0; vertex < vertexCount; ++vertex)
+    halves.insert(halves.end(), std::begin(good), std::end(good));
   const AttributeView view16{halves.data(), vertexCount, 8, ComponentType::float16, 4};
   view.positions = view.normals = view.tangents = view16;
   EXPECT_TRUE(findsNothing());
@@ -350,18 +353,20 @@ TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
       EXPECT_NE(report.find(MeshProblem::nonFiniteTangent), nullptr);
       EXPECT_EQ(report.find(MeshProblem::nonFinitePosition) != nullptr, component != 3);
       EXPECT_EQ(report.find(MeshProblem::nonFiniteNormal) != nullptr, component != 3);
-      halves[6 * 4 + component] = 0x3c00;
+      halves[6 * 4 + component] = good[component];
     }
   }
-  for (const std::uint16_t good : Halves{0x7bff, 0xfbff, 0x0001, 0x8000}) {
-    halves[6 * 4] = good;
+  view.normals = view.tangents = {};
+  for (const std::uint16_t value : Halves{0x7bff, 0xfbff, 0x0001, 0x8000}) {
+    halves[6 * 4] = value;
     EXPECT_TRUE(findsNothing());
   }
 }
 
 TEST_F(ValidateTest, AFourthComponentThatIsNotReadMayBeAnything) {
-  std::vector<float> values(vertexCount * 4, 1.0f);
-  for (std::size_t vertex = 0; vertex < vertexCount; ++vertex) values[vertex * 4 + 3] = nan;
+  std::vector<float> values;
+  for (std::size_t vertex = 0; vertex < vertexCount; ++vertex)
+    values.insert(values.end(), {0, 1, 0, nan});
   view.positions = floatAttribute(values.data(), vertexCount, 4);
   EXPECT_TRUE(findsNothing());
   view.normals = view.positions;
@@ -428,9 +433,13 @@ TEST_F(ValidateTest, JointsOutsideThePose) {
 }
 
 TEST_F(ValidateTest, Truth14_JointsOfSlotsWithoutWeightMayBeAnything) {
-  mesh.joints[7 * 4 + 2] = 0xffffffffu;
-  mesh.joints[7 * 4 + 3] = 0xffffffffu;  // nor are they duplicates
-  EXPECT_TRUE(findsNothing());
+  mesh.joints[7 * 4 + 2] = 24;
+  mesh.joints[7 * 4 + 3] = 24;  // nor are they duplicates
+  EXPECT_EQ(onlyFinding(MeshProblem::unusedJointOutOfRange, 1, 7),
+            "mesh 'Fox', vertex 7: joint 24, with weight 0, is outside the pose of 24 joints");
+  mesh.joints[7 * 4 + 3] = 0xffffffffu;
+  mesh.joints[2 * 4 + 3] = 0xffffffffu;
+  onlyFinding(MeshProblem::unusedJointOutOfRange, 2, 2);
 }
 
 TEST_F(ValidateTest, JointsEndWithTheLargestPose) {
@@ -566,6 +575,32 @@ TEST_F(ValidateTest, VerticesWithoutWeight) {
             "mesh 'Fox', vertex 3: no joint has a weight; the vertex stays in bind pose");
 }
 
+// The tolerance is that of the official validator, in which lengths of bytes count as 1.
+TEST_F(ValidateTest, DirectionsOfAnotherLength) {
+  for (const float good : {0.9933f, 1.0067f}) {
+    mesh.normals[4 * 3 + 2] = tangents[5 * 4] = good;
+    EXPECT_TRUE(findsNothing()) << good;
+  }
+  for (const float bad : {0.9932f, 1.0068f, 0.0f}) {
+    mesh.normals[4 * 3 + 2] = bad;
+    tangents[5 * 4] = 1;
+    onlyFinding(MeshProblem::normalLength, 1, 4);
+    mesh.normals[4 * 3 + 2] = 1;
+    tangents[5 * 4] = bad;
+    onlyFinding(MeshProblem::tangentLength, 1, 5);
+  }
+  EXPECT_EQ(validate(view, jointCount).findings[0].message,
+            "mesh 'Fox', vertex 5: the tangent has a length of 0, not 1");
+}
+
+TEST_F(ValidateTest, TangentsWithoutAHandedness) {
+  tangents[3 * 4 + 3] = -1;
+  EXPECT_TRUE(findsNothing());
+  tangents[3 * 4 + 3] = 0.5f;
+  EXPECT_EQ(onlyFinding(MeshProblem::tangentSign, 1, 3),
+            "mesh 'Fox', vertex 3: the handedness of the tangent is 0.5, not 1 or -1");
+}
+
 TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {
   mesh.weights[0] = nan;
   mesh.weights[1 * 4] = -1;
@@ -593,12 +628,12 @@ TEST_F(ValidateTest, FindingsStandInTheOrderOfTheirKinds) {
 
 TEST(Validate, EveryKindHasANameAndAConsequence) {
   std::set<std::string> names;
-  for (int kind = 0; kind <= static_cast<int>(MeshProblem::vertexWithoutWeight); ++kind) {
+  for (int kind = 0; kind <= static_cast<int>(MeshProblem::tangentSign); ++kind) {
     const auto problem = static_cast<MeshProblem>(kind);
     names.insert(meshProblemName(problem));
     EXPECT_EQ(refusedByPack(problem), kind <= static_cast<int>(MeshProblem::jointOutOfRange));
   }
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(MeshProblem::vertexWithoutWeight) + 1);
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(MeshProblem::tangentSign) + 1);
   EXPECT_STREQ(meshProblemName(MeshProblem::jointOutOfRange), "joint out of range");
   EXPECT_STREQ(meshProblemName(static_cast<MeshProblem>(99)), "unknown");
 }

@@ -11,7 +11,7 @@
 
 namespace dermis {
 
-/// Kinds of problems. `pack` refuses a mesh with any problem up to `jointOutOfRange`. It fixes the
+/// Kinds of problems. `pack` refuses a mesh with any problem up to `jointOutOfRange`, and accepts the
 /// others.
 enum class MeshProblem : std::uint8_t {
   // The views are not valid. `repair` cannot help.
@@ -32,10 +32,14 @@ enum class MeshProblem : std::uint8_t {
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
   jointOutOfRange,  ///< a joint that the pose does not have, with a weight that is not 0
-  // Values that `pack` fixes.
-  weightsNotNormalized,  ///< the weights of a vertex do not sum to 1: they are normalized
-  duplicateJoint,        ///< a joint occurs twice in a vertex: its weights are added
-  vertexWithoutWeight,   ///< all weights are 0: the vertex stays in bind pose
+  // Values that `pack` fixes or ignores, and lengths that do not matter to skinning.
+  weightsNotNormalized,   ///< the weights of a vertex do not sum to 1: they are normalized
+  duplicateJoint,         ///< a joint occurs twice in a vertex: its weights are added
+  vertexWithoutWeight,    ///< all weights are 0: the vertex stays in bind pose
+  unusedJointOutOfRange,  ///< a joint that the pose does not have, with weight 0: it is ignored
+  normalLength,           ///< a normal is not of unit length
+  tangentLength,          ///< a tangent is not of unit length
+  tangentSign,            ///< the handedness of a tangent is neither 1 nor -1
 };
 
 /// One kind of problem in one mesh.
@@ -73,8 +77,9 @@ DERMIS_CORE_API const char* meshProblemName(MeshProblem problem);
 
 /// Finds all problems of a mesh. O(vertices × influences + displacements). `jointCount` is the
 /// number of joints of the skeleton; numbers above `maxPoseJoints` count as that. If there are
-/// float weights, a sum counts as 1 within 2e-7 for each weight other than 0, which is the
-/// tolerance of the official glTF validator. Integer weights must sum to exactly 1.
+/// float weights, a sum counts as 1 within 2e-7 for each weight other than 0. Integer weights must
+/// sum to exactly 1. A direction is of unit length within 0.00674. Both are the tolerances of the
+/// official glTF validator.
 DERMIS_CORE_API MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
 /// A repaired copy of a mesh. Owns its memory. Movable, not copyable.

@@ -15,7 +15,7 @@
 namespace dermis {
 namespace {
 
-constexpr std::size_t problemCount = static_cast<std::size_t>(MeshProblem::vertexWithoutWeight) + 1;
+constexpr std::size_t problemCount = static_cast<std::size_t>(MeshProblem::tangentSign) + 1;
 
 /// Collects at most one finding a kind; the sentence is made for its first place only.
 class Findings {
@@ -220,11 +220,43 @@ bool isFinitePosition(const MeshView& mesh, std::uint32_t vertex) {
   return true;
 }
 
-void checkDirection(const AttributeView& view, std::uint32_t components, MeshProblem problem,
-                    const char* name, std::uint32_t vertex, Findings& findings) {
-  if (!view || isFiniteElement(view, vertex, components)) return;
+/// Returns whether there is an element and it is finite.
+bool checkFinite(const AttributeView& view, std::uint32_t components, MeshProblem problem,
+                 const char* name, std::uint32_t vertex, Findings& findings) {
+  if (!view) return false;
+  if (isFiniteElement(view, vertex, components)) return true;
   findings.addVertex(problem, vertex,
                      [&] { return std::string("the ") + name + " is not finite"; });
+  return false;
+}
+
+void checkLength(const AttributeView& view, MeshProblem problem, const char* name,
+                 std::uint32_t vertex, Findings& findings) {
+  constexpr double tolerance = 0.00674;
+  double square = 0;
+  for (std::uint32_t component = 0; component < 3; ++component) {
+    const double value = static_cast<double>(loadFloat(view, vertex, component));
+    square += value * value;
+  }
+  const double length = std::sqrt(square);
+  if (std::abs(length - 1) <= tolerance) return;
+  findings.addVertex(problem, vertex, [&] {
+    return std::string("the ") + name + " has a length of " + inWords(length) + ", not 1";
+  });
+}
+
+void checkDirections(const MeshView& mesh, std::uint32_t vertex, Findings& findings) {
+  if (checkFinite(mesh.normals, 3, MeshProblem::nonFiniteNormal, "normal", vertex, findings))
+    checkLength(mesh.normals, MeshProblem::normalLength, "normal", vertex, findings);
+  if (!checkFinite(mesh.tangents, 4, MeshProblem::nonFiniteTangent, "tangent", vertex, findings))
+    return;
+  checkLength(mesh.tangents, MeshProblem::tangentLength, "tangent", vertex, findings);
+  const float sign = loadFloat(mesh.tangents, vertex, 3);
+  if (sign == 1 || sign == -1) return;
+  findings.addVertex(MeshProblem::tangentSign, vertex, [&] {
+    return "the handedness of the tangent is " + inWords(static_cast<double>(sign)) +
+           ", not 1 or -1";
+  });
 }
 
 bool isShare(float share) {
@@ -293,8 +325,15 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
       const double weight = loadWeight(set.weights, vertex, slot);
-      if (weight == 0) continue;
       const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
+      if (weight == 0) {
+        if (joint < jointCount) continue;
+        findings.addVertex(MeshProblem::unusedJointOutOfRange, vertex, [&] {
+          return "joint " + std::to_string(joint) + ", with weight 0, is outside the pose of " +
+                 std::to_string(jointCount) + " joints";
+        });
+        continue;
+      }
       if (!std::isfinite(weight)) {
         findings.addVertex(MeshProblem::nonFiniteWeight, vertex, [&] {
           return "the weight of joint " + std::to_string(joint) + " is not finite";
@@ -384,6 +423,14 @@ const char* meshProblemName(MeshProblem problem) {
       return "joint twice in a vertex";
     case MeshProblem::vertexWithoutWeight:
       return "vertex without weight";
+    case MeshProblem::unusedJointOutOfRange:
+      return "joint out of range, with weight 0";
+    case MeshProblem::normalLength:
+      return "normal not of unit length";
+    case MeshProblem::tangentLength:
+      return "tangent not of unit length";
+    case MeshProblem::tangentSign:
+      return "tangent without handedness";
   }
   return "unknown";
 }
@@ -425,10 +472,9 @@ MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {
       findings.addVertex(MeshProblem::nonFinitePosition, vertex,
                          [] { return std::string("the position is not finite"); });
     }
-    checkDirection(mesh.normals, 3, MeshProblem::nonFiniteNormal, "normal", vertex, findings);
-    checkDirection(mesh.tangents, 4, MeshProblem::nonFiniteTangent, "tangent", vertex, findings);
-    checkDirection(mesh.centersOfRotation, 3, MeshProblem::nonFiniteCenter, "center of rotation",
-                   vertex, findings);
+    checkDirections(mesh, vertex, findings);
+    checkFinite(mesh.centersOfRotation, 3, MeshProblem::nonFiniteCenter, "center of rotation",
+                vertex, findings);
     checkInfluences(mesh, joints, vertex, used, findings);
   }
   checkShares(mesh.dualQuaternionWeights, mesh.dualQuaternionWeight, "dual-quaternion weight",
