@@ -1,20 +1,18 @@
-// What three.js' GLTFLoader makes of the files of the test GltfRules, and what the glTF validator
-// says of them. The column "three" of tests/unit/gltf_rules*.cpp was found by it, with three 0.187.0
-// (gltf-validator 2.0.0-dev.3.10, Node.js 20).
+// What three.js' GLTFLoader makes of the files of the test GltfRules. The column "three" of
+// tests/unit/gltf_rules.cpp was found by it, with three 0.187.0 (Node.js 20).
 //
 //   DERMIS_WRITE_RULES=/tmp/rules build/…/gltf_test --gtest_filter='GltfRules.*'
-//   cd /tmp/some-empty-folder && npm install three@0.187.0 gltf-validator@2.0.0-dev.3.10
+//   cd /tmp/some-empty-folder && npm install three@0.187.0
 //   cp …/tests/gltf_rules/three.mjs . && node three.mjs /tmp/rules
 //
-// Prints a line for each file: its name, loads | misreads | refuses, the validator's errors, and
-// three's own message. Ends with 1 where that is not what expected.tsv says.
+// Prints a line for each file: its name, loads | misreads | refuses, and three's own message. Ends
+// with 1 where that is not what expected.tsv says.
 //
 // loads: a skinned mesh comes out whose vertices are, half a second into the clip, where those of
 // flawless.gltf are (or, for files that expected.tsv calls "other", all finite). misreads: something
 // else comes out, or nothing ever.
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
 import { join } from 'node:path';
 
 globalThis.self = globalThis;
@@ -22,13 +20,6 @@ globalThis.ProgressEvent ??= class ProgressEvent extends Event {};
 
 const THREE = await import('three');
 const { GLTFLoader } = await import('three/addons/loaders/GLTFLoader.js');
-
-let validator = null;
-try {
-  validator = createRequire(import.meta.url)('gltf-validator');
-} catch {
-  console.error('gltf-validator is not installed: its column is empty');
-}
 
 const [folder, single] = process.argv.slice(2);
 console.warn = () => {};
@@ -70,17 +61,6 @@ async function load(name) {
   }
 }
 
-async function validate(name) {
-  if (!validator) return '';
-  try {
-    const report = await validator.validateBytes(new Uint8Array(readFileSync(join(folder, name))));
-    const codes = report.issues.messages.filter((m) => m.severity === 0).map((m) => m.code);
-    return [...new Set(codes)].join(' ');
-  } catch (error) {
-    return String(error).split('\n')[0];
-  }
-}
-
 // In a process of its own: some files make it loop for ever.
 function loadApart(name) {
   try {
@@ -114,7 +94,7 @@ for (const line of readFileSync(join(folder, 'expected.tsv'), 'utf8').trim().spl
   }
   const agrees = verdict === expected;
   if (!agrees) ++failures;
-  console.log([name, verdict, agrees ? '' : `EXPECTED ${expected}`, await validate(name),
+  console.log([name, verdict, agrees ? '' : `EXPECTED ${expected}`,
                result.error ?? result.complaints.join('; ')].join('\t'));
 }
 console.log(`${failures} differ from expected.tsv; three ${THREE.REVISION}`);

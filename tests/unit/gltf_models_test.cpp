@@ -2,7 +2,6 @@
 // sound.
 #include <algorithm>
 #include <fstream>
-#include <map>
 #include <set>
 
 #include "gltf_builder.h"
@@ -65,29 +64,6 @@ TEST(GltfModels, AllLoad) {
       }
     }
   }
-}
-
-// The models that break rules without losing their meaning, and which one each breaks first. All
-// others pass the strict reading, too.
-TEST(GltfModels, StrictReadingRefusesThoseThatBreakRules) {
-  const auto data = testDataFolder();
-  if (!data) GTEST_SKIP() << noTestData;
-  const std::map<std::string, std::string> broken = {
-      {"AssetGenerator_Animation_Skin/Animation_Skin_06.gltf",
-       "skin 0: its joints have no common root"}};
-  std::set<std::string> refused;
-  for (const auto& file : models(*data)) {
-    const std::string name = std::filesystem::relative(file, *data / "models").generic_string();
-    SCOPED_TRACE(name);
-    const Result<gltf::Model> strict = gltf::load(file, {.strict = true});
-    const auto found = broken.find(name);
-    EXPECT_EQ(strict.ok(), found == broken.end())
-        << (strict.ok() ? "loaded" : strict.error().message);
-    if (strict) continue;
-    refused.insert(name);
-    if (found != broken.end()) expectError(strict, ErrorCode::invalidData, found->second);
-  }
-  EXPECT_EQ(refused.size(), broken.size());
 }
 
 // The binary and the text form of one model are the same model.

@@ -215,6 +215,16 @@ TEST(GltfPrimitive, KeepsAPrimitiveWithoutJoints) {
   const gltf::PrimitiveView view(primitive);
   EXPECT_TRUE(view.mesh().influenceSets.empty());
   ASSERT_EQ(model.notes.size(), 1u);
+  EXPECT_EQ(model.notes[0],
+            "node 0: it has a skin, but mesh 0 has no joints and stays in bind pose");
+}
+
+TEST(GltfPrimitive, KeepsAPrimitiveWithoutJointsBesideOneThatHasThem) {
+  FileBuilder file = skinnedTriangle();
+  Json& primitives = file.json["meshes"][0]["primitives"];
+  primitives.push_back({{"attributes", {{"POSITION", file.attributes()["POSITION"]}}}});
+  const gltf::Model model = loaded(file.load({}, {.strict = true}));
+  ASSERT_EQ(model.notes.size(), 1u);
   EXPECT_EQ(model.notes[0], "1 primitive left in bind pose: a skinned node, but no joints");
 }
 

@@ -126,6 +126,12 @@ Change withBuffer(std::size_t longer = 0) {
   };
 }
 
+/// A root with this matrix above the joints.
+Change addRoot(const Json& matrix) {
+  return all(push("/nodes", {{"children", {1}}, {"matrix", matrix}}),
+             set("/scenes/0/nodes", {0, 3}));
+}
+
 /// Three keys for the translation at these times.
 Change retime(const Floats& times) {
   return all(setFloats(samplers + "/0/input", times, "SCALAR"),
@@ -295,7 +301,7 @@ std::vector<Violation> rulesOfMeshes() {
       {"indices_normalized", noted, Three::misreads,
        "indices: accessor 3 is SCALAR of normalized unsigned short",
        set(accessor(indices) + "/normalized", true)},
-      {"indices_left_over", noted, Three::loads,
+      {"indices_left_over", Verdict::remarked, Three::loads,
        "mesh 0 primitive 0: the last 1 indices do not form a triangle and are left out",
        all(store(indices, Shorts{0, 1, 2, 0}, unsignedShortType),
            set(accessor(indices) + "/count", 4))},
@@ -401,7 +407,14 @@ std::vector<Violation> rulesOfNodes() {
        all(erase("/nodes/1/children"), set("/scenes/0/nodes", {0, 1, 2})), false},
       {"skeleton_of_no_number", noted, Three::loads,
        "skin 0: skeleton is 9, and the file has 3 nodes", set("/skins/0/skeleton", 9)},
-      {"skeleton_is_no_common_root", Verdict::used, Three::loads, "", set("/skins/0/skeleton", 2)},
+      {"skeleton_is_no_common_root", noted, Three::loads,
+       "skin 0: its skeleton, node 2, is not a common root of its joints",
+       set("/skins/0/skeleton", 2)},
+      {"joints_outside_the_scene", noted, Three::misreads,
+       "node 0: its skin, 0, has joints outside the scene", set("/scenes/0/nodes", {0})},
+      {"skinned_mesh_without_joints", noted, Three::misreads,
+       "node 0: it has a skin, but mesh 0 has no joints and stays in bind pose",
+       all(erase(attributes + "/JOINTS_0"), erase(attributes + "/WEIGHTS_0")), false},
       {"matrices_too_few", refused, Three::misreads,
        "skin 0 inverseBindMatrices: accessor 5 has 1 matrices for 2 joints",
        set(accessor(matrices) + "/count", 1)},
@@ -411,8 +424,13 @@ std::vector<Violation> rulesOfNodes() {
                               1, 0, 0, 0,    0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
              floatType)},
       {"matrix_with_an_inexact_fourth_row", noted, Three::loads,
-       "skin 0: inverse bind matrix 0: its fourth row is not 0 0 0 1; it is ignored",
+       "skin 0: inverse bind matrix 0: its fourth row is not exactly 0 0 0 1; it is ignored",
        store(matrices, Floats{1, 0, 0, 1e-4f, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,  0, 1.0001f,
+                              1, 0, 0, 0,     0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
+             floatType)},
+      {"matrix_with_nearly_a_fourth_row", noted, Three::loads,
+       "skin 0: inverse bind matrix 0: its fourth row is not exactly 0 0 0 1; it is ignored",
+       store(matrices, Floats{1, 0, 0, 1e-6f, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,  0, 1,
                               1, 0, 0, 0,     0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1},
              floatType)},
       {"skin_without_a_mesh", noted, Three::loads, "node 1: it has skin but no mesh",
@@ -430,6 +448,27 @@ std::vector<Violation> rulesOfNodes() {
        all(push("/nodes",
                 {{"children", {1}}, {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 5}}}),
            set("/scenes/0/nodes", {0, 3}))},
+      {"node_matrix_with_nearly_a_fourth_row", noted, Three::loads,
+       "node 3: the fourth row of its matrix is not 0 0 0 1",
+       addRoot({1, 0, 0, 1e-6, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1})},
+      {"node_matrix_with_shear", noted, Three::loads,
+       "node 3: its matrix is not a translation times a rotation times a scale",
+       addRoot({1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), false},
+      {"node_matrix_with_shear_and_translation", Verdict::remarked, Three::loads,
+       "node 3: its matrix is not a translation times a rotation times a scale",
+       addRoot({1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 100, 0, 0, 1}), false},
+      {"node_matrix_that_is_singular", noted, Three::loads,
+       "node 3: its matrix is not a translation times a rotation times a scale",
+       addRoot({0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), false},
+      {"node_matrix_that_mirrors", Verdict::used, Three::loads, "",
+       addRoot({0, -2, 0, 0, -3, 0, 0, 0, 0, 0, 4, 0, 1, 2, 3, 1}), false},
+      {"node_rotation_of_half_length", noted, Three::loads,
+       "node 1: its rotation has a length of 0.5, not 1", set("/nodes/1/rotation", {0, 0, 0, 0.5})},
+      {"node_rotation_of_bytes", Verdict::used, Three::loads, "",
+       set("/nodes/1/rotation", {0, 0, 0, 0.9925})},
+      {"node_rotation_beyond_1", noted, Three::loads,
+       "node 1: its rotation has the component 1.000001, which is not from -1 to 1",
+       set("/nodes/1/rotation", {0, 0, 0, 1.000001})},
       {"matrix_of_an_animated_node", noted, Three::loads,
        "animation 0 channel 1: node 2 has a matrix, which has been decomposed for the "
        "animation",
@@ -490,6 +529,17 @@ std::vector<Violation> rulesOfAnimations() {
       {"keys_of_another_count", refused, Three::misreads,
        "output: accessor 10 has 3 elements, but there must be 2 for 2 keys",
        setFloats(samplers + "/0/output", {0, 0, 0, 1, 0, 0, 2, 0, 0}, "VEC3")},
+      {"rotation_key_of_length_2", noted, Three::misreads,
+       "animation 0 channel 1 output: the rotation of key 0 has a length of 2, not 1",
+       setFloats(samplers + "/1/output", {0, 0, 0, 2, std::sqrt(0.5f), 0, 0, std::sqrt(0.5f)},
+                 "VEC4")},
+      {"spline_of_rotations_of_length_2", noted, Three::loads,
+       "animation 0 channel 1 output: the rotation of key 1 has a length of 2, not 1",
+       all(setFloats(samplers + "/1/output",
+                     {9, 9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 9, 9, 9, 9},
+                     "VEC4"),
+           set(samplers + "/1/interpolation", "CUBICSPLINE")),
+       false},
       {"translations_of_short", noted, Three::loads,
        "output: accessor 7 is VEC3 of short, not VEC3 of float",
        store(translations, std::vector<std::int16_t>{0, 0, 0, 1, 0, 0}, shortType)},
@@ -518,14 +568,74 @@ std::vector<Violation> rulesOfAnimations() {
   };
 }
 
+// Values of vertices, which `load` does not look at.
+std::vector<Violation> rulesOfVertices() {
+  const auto found = Verdict::found;
+  const auto setWeights = [](const Floats& values) {
+    return setFloats(attributes + "/WEIGHTS_0", values, "VEC4");
+  };
+  const Floats normals{0, 0, 1, 0, 0, 1, 0, 0, 1}, tangents{1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1};
+  const auto setDirections = [=](float normal, float tangent, float sign) {
+    Floats changedNormals = normals, changedTangents = tangents;
+    changedNormals[2] = normal;
+    changedTangents[4] = tangent;
+    changedTangents[7] = sign;
+    return all(setFloats(attributes + "/NORMAL", changedNormals, "VEC3"),
+               setFloats(attributes + "/TANGENT", changedTangents, "VEC4"));
+  };
+  return {
+      {"weights_that_sum_to_less", found, Three::loads,
+       "mesh 'number 0', vertex 1: the weights sum to 0.980000019, not to 1",
+       setWeights({1, 0, 0, 0, 0.98f, 0, 0, 0, 0.2f, 0.8f, 0, 0}), false},
+      {"weights_of_bytes_that_sum_to_less", found, Three::loads,
+       "mesh 'number 0', vertex 0: the weights sum to 0.996078431, not to 1",
+       store(weights, Bytes{254, 0, 0, 0, 255, 0, 0, 0, 51, 204, 0, 0}, unsignedByteType, true),
+       false},
+      {"weights_that_nearly_sum_to_1", Verdict::used, Three::loads, "",
+       setWeights({1, 0, 0, 0, 1, 0, 0, 0, 0.2f, 0.80000037f, 0, 0}), false},
+      {"weights_of_nothing", found, Three::loads,
+       "mesh 'number 0', vertex 0: no joint has a weight; the vertex stays in bind pose",
+       setWeights({0, 0, 0, 0, 1, 0, 0, 0, 0.2f, 0.8f, 0, 0}), false},
+      {"weights_negative", found, Three::loads,
+       "mesh 'number 0', vertex 2: the weight of joint 0 is negative",
+       setWeights({1, 0, 0, 0, 1, 0, 0, 0, -0.25f, 1.25f, 0, 0}), false},
+      {"joint_twice_in_a_vertex", found, Three::loads,
+       "mesh 'number 0', vertex 2: joint 1 occurs twice",
+       store(joints, Bytes{0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0}, unsignedByteType), false},
+      {"joint_twice_without_weight", Verdict::used, Three::loads, "",
+       store(joints, Bytes{0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 1, 1}, unsignedByteType), false},
+      {"joint_255_without_weight", found, Three::loads,
+       "mesh 'number 0', vertex 0: joint 255, with weight 0, is outside the pose of 2 joints",
+       store(joints, Bytes{0, 255, 255, 255, 1, 0, 0, 0, 0, 1, 0, 0}, unsignedByteType), false},
+      {"joint_255", found, Three::refuses,
+       "mesh 'number 0', vertex 1: joint 255 is outside the pose of 2 joints",
+       store(joints, Bytes{0, 0, 0, 0, 255, 0, 0, 0, 0, 1, 0, 0}, unsignedByteType), false},
+      {"normal_of_length_2", found, Three::loads,
+       "mesh 'number 0', vertex 0: the normal has a length of 2, not 1", setDirections(2, 1, 1)},
+      {"normal_of_length_0", found, Three::loads,
+       "mesh 'number 0', vertex 0: the normal has a length of 0, not 1", setDirections(0, 1, 1)},
+      {"normal_of_bytes", Verdict::used, Three::loads, "", setDirections(1.0067f, 0.9933f, -1)},
+      {"tangent_of_length_2", found, Three::loads,
+       "mesh 'number 0', vertex 1: the tangent has a length of 2, not 1", setDirections(1, 2, 1)},
+      {"tangent_without_a_sign", found, Three::loads,
+       "mesh 'number 0', vertex 1: the handedness of the tangent is 0, not 1 or -1",
+       setDirections(1, 1, 0)},
+      {"position_not_a_number", found, Three::misreads,
+       "mesh 'number 0', vertex 0: the position is not finite",
+       setFloats(attributes + "/POSITION",
+                 {std::numeric_limits<float>::quiet_NaN(), 0, 0, 1, 0, 0, 0, 2, 0}, "VEC3"),
+       false},
+  };
+}
+
 std::vector<Violation> rulesOfContainers() {
   const auto noted = Verdict::noted;
   const auto glb = [](auto change) { return std::function<void(std::vector<std::byte>&)>(change); };
   using Glb = std::vector<std::byte>;
   const auto nothing = [](File&) {};
   return {
-      {"glb_followed_by_more", noted, Three::loads, "the GLB header says", nothing, true,
-       glb([](Glb& b) { b.resize(b.size() + 6); })},
+      {"glb_followed_by_more", Verdict::remarked, Three::loads, "the GLB header says", nothing,
+       true, glb([](Glb& b) { b.resize(b.size() + 6); })},
       {"glb_cut_off", Verdict::refused, Three::refuses, "the GLB header says", nothing, true,
        glb([](Glb& b) { b.resize(b.size() - 6); })},
       {"glb_binary_first", noted, Three::loads,
@@ -616,7 +726,7 @@ std::vector<std::byte> bytesOf(const Violation& violation) {
 std::vector<Violation> violations() {
   std::vector<Violation> table;
   for (const auto& rules : {rulesOfStrides(), rulesOfBuffers(), rulesOfMeshes(), rulesOfNodes(),
-                            rulesOfAnimations(), rulesOfContainers()})
+                            rulesOfAnimations(), rulesOfVertices(), rulesOfContainers()})
     table.insert(table.end(), rules.begin(), rules.end());
   return table;
 }

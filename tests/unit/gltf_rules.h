@@ -11,9 +11,11 @@
 namespace dermis::test {
 
 enum class Verdict {
-  used,     ///< without a word: Dermis does not read what is wrong
-  noted,    ///< used with a note, an error where strict
-  refused,  ///< an error
+  used,      ///< without a word: Dermis does not read what is wrong
+  remarked,  ///< used with a note, even where strict: the glTF validator passes it
+  found,     ///< used without a note: `validate` finds it
+  noted,     ///< used with a note, an error where strict
+  refused,   ///< an error
 };
 
 /// What three.js' GLTFLoader does, as tests/gltf_rules/three.mjs found.
@@ -27,7 +29,8 @@ struct Violation {
   std::string name;  ///< of the file
   Verdict verdict;
   Three three;
-  /// In the note or in the error. Where three.js loads what is refused: the reason, after a '|'.
+  /// In the note, in the finding or in the error. Where three.js loads what is refused: the reason,
+  /// after a '|'.
   std::string sentence;
   std::function<void(FileBuilder&)> change;
   /// Whether the same is skinned as by the file that breaks no rule.

@@ -266,7 +266,7 @@ struct LoadOptions {
   /// be read is left out, with a note.
   bool images = false;
   /// Whether a broken rule is an error (`invalidData`) even if the meaning is clear. `load` checks
-  /// only what it reads; it is not a validator.
+  /// only what it reads, and not the values of vertices: `validate` does that.
   bool strict = false;
 };
 

@@ -40,11 +40,6 @@ Interpolation interpolationOf(const std::string& name) {
   return Interpolation::linear;
 }
 
-// Counts over the channels of all clips, for notes.
-struct Tally {
-  std::size_t normalizedKeys = 0, channelsWithNormalizedKeys = 0, unknownPaths = 0;
-};
-
 // Returns 0 if a channel has no effect because there are no weights to animate.
 std::uint32_t componentsOf(const Source& source, const Channel& channel, const std::string& where) {
   switch (channel.path) {
@@ -130,41 +125,27 @@ std::vector<float> readValues(Source& source, int accessor, const Channel& chann
   return values;
 }
 
-// Integers cannot represent unit length exactly: the tolerance is their rounding error.
-double unitLengthTolerance(const Source& source, int accessor) {
-  switch (source.content().accessors[static_cast<std::size_t>(accessor)].componentType) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return 1.0 / 127;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return 1.0 / 32767;
-    default:
-      return 1e-5;
-  }
-}
-
-// Returns how many keys were farther from unit length than the tolerance.
-std::size_t normalizeRotations(Channel& channel, double tolerance) {
+void normalizeRotations(Channel& channel, const std::string& where, Notes& notes) {
   const bool spline = channel.interpolation == Interpolation::cubicSpline;
   const std::size_t stride = spline ? 12 : 4;
-  std::size_t count = 0;
   for (std::size_t offset = spline ? 4 : 0; offset < channel.values.size(); offset += stride) {
     std::array<double, 4> key;
     std::copy_n(channel.values.begin() + static_cast<std::ptrdiff_t>(offset), 4, key.begin());
-    if (normalizeQuaternion(key) > tolerance) ++count;
+    const double length = normalizeQuaternion(key);
     for (std::size_t i = 0; i < 4; ++i) channel.values[offset + i] = static_cast<float>(key[i]);
+    if (isUnitLength(length)) continue;
+    notes.broken(NoteKind::keyLength, where, " output: the rotation of key ", offset / stride,
+                 " has a length of ", length, ", not 1");
   }
-  return count;
 }
 
 // Returns nothing if the channel is left out.
 std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& animation,
                                    const tinygltf::AnimationChannel& from, const std::string& where,
-                                   Tally& tally) {
+                                   std::size_t& unknownPaths) {
   const std::optional<ChannelPath> path = pathOf(from.target_path);
   if (!path) {
-    ++tally.unknownPaths;
+    ++unknownPaths;
     return std::nullopt;
   }
   const tinygltf::AnimationSampler& sampler =
@@ -187,12 +168,7 @@ std::optional<Channel> readChannel(Source& source, const tinygltf::Animation& an
   // There is already a note about an accessor without elements.
   if (channel.times.empty()) return std::nullopt;
   channel.values = readValues(source, sampler.output, channel, where);
-  if (channel.path == ChannelPath::rotation) {
-    const double tolerance = unitLengthTolerance(source, sampler.output);
-    const std::size_t normalized = normalizeRotations(channel, tolerance);
-    tally.normalizedKeys += normalized;
-    tally.channelsWithNormalizedKeys += normalized > 0 ? 1 : 0;
-  }
+  if (channel.path == ChannelPath::rotation) normalizeRotations(channel, where, source.notes());
   return channel;
 }
 
@@ -226,8 +202,8 @@ std::array<double, 4> rotationOf(const std::array<double, 16>& matrix,
   return q;
 }
 
-// Decomposes a node's matrix, so that a channel can replace a part of it. The specification forbids
-// such a node, but three.js accepts it. As there, a mirrored matrix gets a negative x scale.
+}  // namespace
+
 void decompose(Node& node) {
   const std::array<double, 16> matrix = *node.matrix;
   node.matrix.reset();
@@ -246,6 +222,10 @@ void decompose(Node& node) {
   node.rotation = rotationOf(matrix, node.scale);
 }
 
+namespace {
+
+// Decomposes a node's matrix, so that a channel can replace a part of it. The specification forbids
+// such a node, but three.js accepts it.
 void decomposeTarget(Model& model, const Channel& channel, const std::string& where, Notes& notes) {
   Node& node = model.nodes[channel.node];
   if (!node.matrix || channel.path == ChannelPath::weights) return;
@@ -255,7 +235,7 @@ void decomposeTarget(Model& model, const Channel& channel, const std::string& wh
 }
 
 Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t index, Model& model,
-              Tally& tally) {
+              std::size_t& unknownPaths) {
   Clip clip;
   clip.name = animation.name;
   // Nodes and paths. The key has no enumeration: a set of one would be exported, because
@@ -263,7 +243,7 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
   std::set<std::pair<std::uint32_t, std::uint32_t>> targets;
   for (std::size_t i = 0; i < animation.channels.size(); ++i) {
     const std::string where = join("animation ", index, " channel ", i);
-    auto channel = readChannel(source, animation, animation.channels[i], where, tally);
+    auto channel = readChannel(source, animation, animation.channels[i], where, unknownPaths);
     if (!channel) continue;
     if (!targets.emplace(channel->node, static_cast<std::uint32_t>(channel->path)).second) {
       source.notes().broken(NoteKind::channel, where, ": another channel already animates the ",
@@ -283,19 +263,14 @@ Clip readClip(Source& source, const tinygltf::Animation& animation, std::size_t 
 }  // namespace
 
 void readAnimations(Source& source, Model& model) {
-  Tally tally;
+  std::size_t unknownPaths = 0;  // over the channels of all clips
   const auto& animations = source.content().animations;
   for (std::size_t i = 0; i < animations.size(); ++i) {
-    model.clips.push_back(readClip(source, animations[i], i, model, tally));
+    model.clips.push_back(readClip(source, animations[i], i, model, unknownPaths));
   }
-  if (tally.normalizedKeys > 0) {
-    model.notes.push_back(join(counted(tally.normalizedKeys, "rotation key"), " in ",
-                               counted(tally.channelsWithNormalizedKeys, "channel"),
-                               " normalized: not of unit length"));
-  }
-  if (tally.unknownPaths > 0) {
+  if (unknownPaths > 0) {
     model.notes.push_back(
-        join(counted(tally.unknownPaths, "animation channel"), " left out: an unknown target"));
+        join(counted(unknownPaths, "animation channel"), " left out: an unknown target"));
   }
 }
 

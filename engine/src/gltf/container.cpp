@@ -88,7 +88,7 @@ Container openContainer(std::span<const std::byte> bytes, Notes& notes) {
 
   const std::uint32_t size = checkHeader(bytes, bytes.size());
   if (size < bytes.size()) {
-    notes.broken(NoteKind::container, "the GLB header says ", size, " bytes, but the file has ",
+    notes.remark(NoteKind::restOfFile, "the GLB header says ", size, " bytes, but the file has ",
                  bytes.size());
     bytes = bytes.first(size);
   }

@@ -8,30 +8,71 @@
 namespace dermis::gltf {
 namespace {
 
-// Decimal numbers in a JSON text are not exact. Only a length that differs from 1 by more than this
-// gets a note.
-constexpr double unitLengthTolerance = 1e-5;
-
-// Like other programs, Dermis does not use the fourth row.
-void checkMatrix(const std::array<double, 16>& matrix, std::size_t index, Notes& notes) {
-  constexpr double tolerance = 1e-5;
-  const bool affine = std::abs(matrix[3]) <= tolerance && std::abs(matrix[7]) <= tolerance &&
-                      std::abs(matrix[11]) <= tolerance && std::abs(matrix[15] - 1) <= tolerance;
-  if (affine) return;
-  notes.broken(NoteKind::matrix, "node ", index, ": the fourth row of its matrix is not 0 0 0 1");
+// The largest sum of the magnitudes in a column.
+double norm(const GlobalTransform& transform) {
+  double largest = 0;
+  for (std::size_t column = 0; column < 4; ++column) {
+    double sum = column == 3 ? 1 : 0;
+    for (const std::array<double, 4>& row : transform) sum += std::abs(row[column]);
+    largest = std::max(largest, sum);
+  }
+  return largest;
 }
 
-// Returns whether the rotation had to be normalized.
-bool readTransform(const tinygltf::Node& source, std::size_t index, Node& node, Notes& notes) {
+// A node's matrix must be translation × rotation × scale. Like other programs, Dermis uses it as it
+// is. The official validator compares one norm of the matrix and of that product. Shear does not
+// change the norm if another column has the largest sum: then it is not an error, even if strict.
+void checkDecomposition(const Node& node, std::size_t index, Notes& notes) {
+  constexpr double tolerance = 1e-4;
+  Node parts;
+  parts.matrix = node.matrix;
+  decompose(parts);
+  const GlobalTransform transform = localTransform(node), product = localTransform(parts);
+  double difference = 0, largest = 0;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      difference = std::max(difference, std::abs(transform[row][column] - product[row][column]));
+      largest = std::max(largest, std::abs(transform[row][column]));
+    }
+  }
+  const bool isSingular = std::ranges::find(parts.scale, 0.0) != parts.scale.end();
+  const char* sentence = ": its matrix is not a translation times a rotation times a scale";
+  if (isSingular || std::abs(norm(transform) - norm(product)) > tolerance) {
+    notes.broken(NoteKind::decomposition, "node ", index, sentence);
+  } else if (difference > tolerance * largest) {
+    notes.remark(NoteKind::decomposition, "node ", index, sentence);
+  }
+}
+
+// Like other programs, Dermis does not use the fourth row.
+void checkMatrix(const Node& node, std::size_t index, Notes& notes) {
+  for (std::size_t column = 0; column < 4; ++column) {
+    const auto value = static_cast<float>((*node.matrix)[4 * column + 3]);
+    if (value == (column == 3 ? 1.0f : 0.0f)) continue;
+    notes.broken(NoteKind::matrix, "node ", index, ": the fourth row of its matrix is not 0 0 0 1");
+    return;
+  }
+  checkDecomposition(node, index, notes);
+}
+
+void readTransform(const tinygltf::Node& source, std::size_t index, Node& node, Notes& notes) {
   if (!source.matrix.empty()) {
     std::copy(source.matrix.begin(), source.matrix.end(), node.matrix.emplace().begin());
-    checkMatrix(*node.matrix, index, notes);
-    return false;
+    checkMatrix(node, index, notes);
+    return;
   }
   std::copy(source.translation.begin(), source.translation.end(), node.translation.begin());
   std::copy(source.rotation.begin(), source.rotation.end(), node.rotation.begin());
   std::copy(source.scale.begin(), source.scale.end(), node.scale.begin());
-  return normalizeQuaternion(node.rotation) > unitLengthTolerance;
+  for (const double component : node.rotation) {
+    if (std::abs(component) <= 1) continue;
+    notes.broken(NoteKind::rotation, "node ", index, ": its rotation has the component ", component,
+                 ", which is not from -1 to 1");
+  }
+  const double length = normalizeQuaternion(node.rotation);
+  if (isUnitLength(length)) return;
+  notes.broken(NoteKind::rotation, "node ", index, ": its rotation has a length of ", length,
+               ", not 1");
 }
 
 void readParents(const tinygltf::Model& content, Model& model) {
@@ -98,16 +139,15 @@ double normalizeQuaternion(std::array<double, 4>& quaternion) {
   const double length = std::sqrt(square);
   if (!(length > 0) || !std::isfinite(length)) {
     quaternion = {0, 0, 0, 1};
-    return 1;
+    return length;
   }
   for (double& component : quaternion) component /= length;
-  return std::abs(length - 1);
+  return length;
 }
 
 void readNodes(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   model.nodes.resize(content.nodes.size());
-  std::size_t normalized = 0;
   for (std::size_t i = 0; i < content.nodes.size(); ++i) {
     const tinygltf::Node& from = content.nodes[i];
     Node& node = model.nodes[i];
@@ -117,14 +157,10 @@ void readNodes(const Source& source, Model& model) {
     node.morphWeights.assign(from.weights.size(), 0);
     std::transform(from.weights.begin(), from.weights.end(), node.morphWeights.begin(),
                    [](double weight) { return static_cast<float>(weight); });
-    if (readTransform(from, i, node, source.notes())) ++normalized;
+    readTransform(from, i, node, source.notes());
   }
   readParents(content, model);
   orderNodes(source, model);
-  if (normalized > 0) {
-    model.notes.push_back(
-        join(counted(normalized, "node rotation"), " normalized: not of unit length"));
-  }
 }
 
 }  // namespace dermis::gltf

@@ -14,37 +14,43 @@ namespace dermis::gltf {
 
 enum class NoteKind : std::uint8_t {
   // Broken rules. The sentence says what Dermis does about each, unless it simply reads on.
-  container,        ///< GLB lengths, padding and the order of chunks
-  text,             ///< a byte order mark, zero bytes after the JSON
-  version,          ///< asset.version 2 in another notation
-  extensions,       ///< lists of extensions that do not fit together
-  nullProperty,     ///< treated as absent
-  emptyArray,       ///< likewise
-  name,             ///< not a string
-  reference,        ///< to an object that does not exist, if nothing reads it
-  unused,           ///< faults in objects that nothing skinned or animated uses
-  material,         ///< a value of the wrong type: the default is used
-  bufferLength,     ///< more than there are bytes
-  viewLength,       ///< 0, or beyond the buffer
-  stride,           ///< not an allowed number, or in a place where none is allowed
-  alignment,        ///< of components or attributes
-  accessor,         ///< byteOffset without bufferView, normalized floats, count 0
-  sparse,           ///< count 0, or indices that do not ascend
-  format,           ///< of an accessor: not allowed there, but with only one meaning
-  attribute,        ///< left out because of a fault; not one that skinning needs
-  influenceSet,     ///< JOINTS_n without WEIGHTS_n after complete sets
-  targetCount,      ///< primitives of a mesh with different numbers of morph targets
-  weightCount,      ///< too many or too few default weights
-  withoutMesh,      ///< skin or weights on a node without a mesh
-  duplicate,        ///< the same entry twice in a list
-  matrix,           ///< with other transforms, or with a fourth row
-  sceneNode,        ///< listed by a scene though it is not a root
-  skeleton,         ///< joints without a common root
-  keys,             ///< times that are negative or equal, splines of one key
-  channel,          ///< without effect, or a duplicate
-  animatedMatrix,   ///< decomposed
-  restOfTriangles,  ///< indices that do not form a triangle
+  container,       ///< GLB lengths, padding and the order of chunks
+  text,            ///< a byte order mark, zero bytes after the JSON
+  version,         ///< asset.version 2 in another notation
+  extensions,      ///< lists of extensions that do not fit together
+  nullProperty,    ///< treated as absent
+  emptyArray,      ///< likewise
+  name,            ///< not a string
+  reference,       ///< to an object that does not exist, if nothing reads it
+  unused,          ///< faults in objects that nothing skinned or animated uses
+  material,        ///< a value of the wrong type: the default is used
+  bufferLength,    ///< more than there are bytes
+  viewLength,      ///< 0, or beyond the buffer
+  stride,          ///< not an allowed number, or in a place where none is allowed
+  alignment,       ///< of components or attributes
+  accessor,        ///< byteOffset without bufferView, normalized floats, count 0
+  sparse,          ///< count 0, or indices that do not ascend
+  format,          ///< of an accessor: not allowed there, but with only one meaning
+  attribute,       ///< left out because of a fault; not one that skinning needs
+  influenceSet,    ///< JOINTS_n without WEIGHTS_n after complete sets
+  targetCount,     ///< primitives of a mesh with different numbers of morph targets
+  weightCount,     ///< too many or too few default weights
+  withoutMesh,     ///< skin or weights on a node without a mesh
+  duplicate,       ///< the same entry twice in a list
+  matrix,          ///< with other transforms, or with a fourth row
+  decomposition,   ///< a node's matrix with shear, or that is singular
+  rotation,        ///< a node's, not of unit length
+  sceneNode,       ///< listed by a scene though it is not a root
+  skeleton,        ///< joints without a common root, or a `skeleton` that is none
+  jointOutside,    ///< of a skinned node whose scene does not contain the joint
+  withoutJoints,   ///< a mesh of a skinned node
+  keys,            ///< times that are negative or equal, splines of one key
+  keyLength,       ///< a rotation not of unit length
+  channel,         ///< without effect, or a duplicate
+  animatedMatrix,  ///< decomposed
   // Remarks: never errors, even if strict.
+  restOfFile,       ///< bytes after the GLB container
+  restOfTriangles,  ///< indices that do not form a triangle
   noPositions,
   noTimes,
   image,

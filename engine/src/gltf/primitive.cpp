@@ -351,7 +351,7 @@ SharedArray<std::uint32_t> decodeTriangles(Source& source, int accessor, int mod
   switch (mode) {
     case TINYGLTF_MODE_TRIANGLES:
       if (indices.size() % 3 != 0) {
-        source.notes().broken(NoteKind::restOfTriangles, where, ": the last ", indices.size() % 3,
+        source.notes().remark(NoteKind::restOfTriangles, where, ": the last ", indices.size() % 3,
                               " indices do not form a triangle and are left out");
         indices.resize(indices.size() - indices.size() % 3);
       }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -75,8 +76,21 @@ std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh);
 /// Names a primitive in messages: "mesh 3 primitive 0".
 std::string primitivePlace(std::size_t mesh, std::size_t primitive);
 
-/// Divides a quaternion by its length. If that is impossible (length 0 or not finite), it becomes
-/// the identity. Returns how far from 1 the length was, or 1 if it was impossible.
+/// Divides a quaternion by its length, and returns the length. If that is impossible (length 0 or
+/// not finite), it becomes the identity.
 double normalizeQuaternion(std::array<double, 4>& quaternion);
+
+/// Whether the length of a rotation counts as 1. The tolerance is that of the official validator:
+/// the length may differ by so much if the components are rounded to bytes.
+inline bool isUnitLength(double length) {
+  return std::abs(length - 1) <= 0.00769;
+}
+
+/// Replaces the node's matrix by a translation, a rotation and a scale. If it is mirrored, the x
+/// scale is negative, as in three.js. Shear is lost.
+void decompose(Node& node);
+
+/// The local transform of a node in the rest pose.
+GlobalTransform localTransform(const Node& node);
 
 }  // namespace dermis::gltf

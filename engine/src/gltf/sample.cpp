@@ -1,5 +1,6 @@
 #include "dermis/gltf.h"
 #include "gltf/interpolate.h"
+#include "gltf/reader.h"
 #include "strict_floating_point.h"
 
 namespace dermis::gltf {
@@ -69,6 +70,11 @@ void applyChannel(const Channel& channel, double time, LocalTransform& local) {
 
 }  // namespace
 
+GlobalTransform localTransform(const Node& node) {
+  return node.matrix ? fromMatrix(*node.matrix)
+                     : compose({node.translation, node.rotation, node.scale});
+}
+
 std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time) {
   std::vector<LocalTransform> locals;
   locals.reserve(model.nodes.size());
@@ -83,7 +89,7 @@ std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
   std::vector<GlobalTransform> globals(model.nodes.size());
   for (const std::uint32_t index : model.nodeOrder) {
     const Node& node = model.nodes[index];
-    const GlobalTransform local = node.matrix ? fromMatrix(*node.matrix) : compose(locals[index]);
+    const GlobalTransform local = node.matrix ? localTransform(node) : compose(locals[index]);
     globals[index] = node.parent == none ? local : multiply(globals[node.parent], local);
   }
   return globals;

@@ -49,6 +49,20 @@ void readMesh(PrimitiveReader& reader, std::size_t count, Model& model, std::uin
   for (std::uint32_t i = 0; i < count; ++i) mesh.primitives.push_back(reader.read(index, i));
 }
 
+// By skin: whether all its joints are among these nodes.
+std::vector<bool> skinsWithin(const Model& model, const std::vector<bool>& nodes) {
+  std::vector<bool> within;
+  for (const Skin& skin : model.skins)
+    within.push_back(std::ranges::all_of(skin.joints, [&](auto joint) { return nodes[joint]; }));
+  return within;
+}
+
+bool hasNoJoints(const tinygltf::Mesh& mesh) {
+  return std::ranges::none_of(mesh.primitives, [](const tinygltf::Primitive& primitive) {
+    return primitive.attributes.contains("JOINTS_0");
+  });
+}
+
 void addNote(Model& model, std::size_t count, const char* what, const char* rest) {
   if (count > 0) model.notes.push_back(join(counted(count, what), rest));
 }
@@ -68,6 +82,7 @@ void readScene(Source& source, Model& model) {
 
   const std::vector<bool> reachable = findReachable(source, model);
   PrimitiveReader reader(source);
+  const std::vector<bool> jointsReachable = skinsWithin(model, reachable);
   std::size_t outside = 0, notSkinned = 0, inBindPose = 0;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
@@ -75,6 +90,15 @@ void readScene(Source& source, Model& model) {
     if (!reachable[i]) ++outside;
     if (reachable[i] && node.skin == none) ++notSkinned;
     if (!reachable[i] || node.skin == none) continue;
+    if (!jointsReachable[node.skin]) {
+      source.notes().broken(NoteKind::jointOutside, "node ", i, ": its skin, ", node.skin,
+                            ", has joints outside the scene");
+    }
+    const bool withoutJoints = hasNoJoints(content.meshes[node.mesh]);
+    if (withoutJoints) {
+      source.notes().broken(NoteKind::withoutJoints, "node ", i, ": it has a skin, but mesh ",
+                            node.mesh, " has no joints and stays in bind pose");
+    }
     readMesh(reader, content.meshes[node.mesh].primitives.size(), model, node.mesh);
     const std::vector<Primitive>& primitives = model.meshes[node.mesh].primitives;
     // A few nodes and a few primitives can make many pairs.
@@ -82,7 +106,7 @@ void readScene(Source& source, Model& model) {
                  join("node ", i, " and the primitives of mesh ", node.mesh));
     for (std::uint32_t j = 0; j < primitives.size(); ++j) {
       if (primitives[j].vertexCount == 0) continue;
-      if (primitives[j].influences.empty()) ++inBindPose;
+      if (primitives[j].influences.empty() && !withoutJoints) ++inBindPose;
       model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
     }
   }

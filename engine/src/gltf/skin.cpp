@@ -13,8 +13,8 @@ constexpr Format matrixFormat[] = {{TINYGLTF_COMPONENT_TYPE_FLOAT, false}};
 // Converts the file's column-major matrix to rows.
 JointMatrix toJointMatrix(const float* columns, const std::string& where, Notes& notes) {
   // The specification requires an exact fourth row, but exporters that invert in float32 leave
-  // rounding errors in it. A row farther off is noted, and refused if it may mean something.
-  constexpr float tolerance = 1e-5f, refused = 1e-2f;
+  // rounding errors in it. A row farther off may mean something.
+  constexpr float refused = 1e-2f;
   float error = 0;
   JointMatrix matrix;
   for (int column = 0; column < 4; ++column) {
@@ -29,8 +29,8 @@ JointMatrix toJointMatrix(const float* columns, const std::string& where, Notes&
     }
   }
   if (error > refused) failInvalid(where, ": its fourth row is not 0 0 0 1");
-  if (error > tolerance)
-    notes.broken(NoteKind::matrix, where, ": its fourth row is not 0 0 0 1; it is ignored");
+  if (error > 0)
+    notes.broken(NoteKind::matrix, where, ": its fourth row is not exactly 0 0 0 1; it is ignored");
   return matrix;
 }
 
@@ -66,6 +66,32 @@ std::vector<std::uint32_t> findRoots(const Model& model) {
   return roots;
 }
 
+// Tells whether a node is below another, in constant time: its number is in that node's range.
+class Descendants {
+ public:
+  explicit Descendants(const Model& model) : first_(model.nodes.size()), end_(first_) {
+    std::vector<std::uint32_t> size(first_.size(), 1);
+    for (auto node = model.nodeOrder.rbegin(); node != model.nodeOrder.rend(); ++node)
+      if (model.nodes[*node].parent != none) size[model.nodes[*node].parent] += size[*node];
+    std::uint32_t nextRoot = 0;
+    std::vector<std::uint32_t> nextChild(first_.size());
+    for (const std::uint32_t node : model.nodeOrder) {
+      const std::uint32_t parent = model.nodes[node].parent;
+      std::uint32_t& next = parent == none ? nextRoot : nextChild[parent];
+      first_[node] = next;
+      nextChild[node] = next + 1;
+      end_[node] = next += size[node];
+    }
+  }
+
+  bool isOrIsBelow(std::uint32_t node, std::uint32_t ancestor) const {
+    return first_[ancestor] <= first_[node] && first_[node] < end_[ancestor];
+  }
+
+ private:
+  std::vector<std::uint32_t> first_, end_;
+};
+
 Skin readSkin(Source& source, const tinygltf::Skin& from, const std::string& where) {
   if (from.joints.size() > maxPoseJoints) {
     fail(ErrorCode::limitExceeded,
@@ -83,6 +109,7 @@ Skin readSkin(Source& source, const tinygltf::Skin& from, const std::string& whe
 void readSkins(Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   const std::vector<std::uint32_t> roots = findRoots(model);
+  const Descendants descendants(model);
   for (std::size_t i = 0; i < content.skins.size(); ++i) {
     const tinygltf::Skin& from = content.skins[i];
     const std::string where = join("skin ", i);
@@ -95,6 +122,14 @@ void readSkins(Source& source, Model& model) {
     });
     if (!oneRoot)
       source.notes().broken(NoteKind::skeleton, where, ": its joints have no common root");
+    const bool isCommonRoot =
+        from.skeleton < 0 || std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {
+          return descendants.isOrIsBelow(joint, indexOf(from.skeleton));
+        });
+    if (!isCommonRoot) {
+      source.notes().broken(NoteKind::skeleton, where, ": its skeleton, node ", from.skeleton,
+                            ", is not a common root of its joints");
+    }
     model.skins.push_back(std::move(skin));
   }
 }
