@@ -99,9 +99,9 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
   mesh->original_.dualQuaternionWeight = preparation.dualQuaternionWeight;
   mesh->original_.bulgeStrength = preparation.bulgeStrength;
   mesh->report_ = validate(mesh->original_, jointCount);
+  if (preparation.strict && !mesh->report_.findings.empty())
+    return Error{ErrorCode::invalidMesh, mesh->report_.findings.front().message};
   if (!mesh->report_.packable()) {
-    if (preparation.strict)
-      return Error{ErrorCode::invalidMesh, mesh->report_.findings.front().message};
     if (!spendOnMesh(primitive, budget)) return tooLarge(primitive, jointCount);
     Result<RepairedMesh> repaired = repair(mesh->original_, jointCount);
     if (!repaired) return repaired.error();

@@ -21,8 +21,8 @@ namespace dermis::cli {
 
 /// How meshes are prepared.
 struct MeshPreparation {
-  /// Refuse meshes that would have to be repaired, and files that break a rule even if their
-  /// meaning is clear.
+  /// Refuse files that break a rule even if their meaning is clear, and meshes in which `validate`
+  /// finds anything.
   bool strict = false;
   /// Compute centers of rotation, for methods that need them. This may take long.
   bool centersOfRotation = false;
@@ -53,7 +53,7 @@ class NamedJoints {
 
 /// The help text of `--strict`.
 inline constexpr const char* strictHelp =
-    "Refuse a file that breaks a rule of glTF, or a mesh that would have to be repaired";
+    "Refuse a file that breaks a rule of glTF, even if its meaning is clear";
 
 /// Returns the primitive's centers of rotation, 3 floats per vertex, or none.
 using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
@@ -62,8 +62,8 @@ using CentersOfPrimitive = std::function<Result<std::vector<float>>()>;
 class PreparedMesh {
  public:
   /// The primitive must have influences, and outlive this object. Spends what it allocates. Fails
-  /// with `invalidMesh` (if `strict`, also for faults that could be repaired), with `limitExceeded`
-  /// if the budget is too small, or if `centers` does, which is called last.
+  /// with `invalidMesh` (if `strict`, for anything that `validate` finds), with `limitExceeded` if
+  /// the budget is too small, or if `centers` does, which is called last.
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
