@@ -228,6 +228,32 @@ TEST_F(CpuSkinTest, The512BitCodeIsRun) {
 }
 #endif
 
+// For linear blending, matrices with such entries leave the fast path.
+TEST_F(CpuSkinTest, MatricesAtTheEdgesOfFloat32StayInsideTheBounds) {
+  for (const auto& [even, odd] :
+       {std::pair{1e-30f, 1e-30f}, {1e18f, 1e18f}, {1e6f, 1e-6f}, {1e13f, 1}}) {
+    Crowd crowd(203, 4, Rigidity::shear, plainLayout);
+    for (std::vector<JointMatrix>& pose : crowd.poses) {
+      for (std::size_t joint = 0; joint < pose.size(); ++joint) {
+        for (auto& row : pose[joint].m) {
+          for (float& entry : row) entry *= joint % 2 == 0 ? even : odd;
+        }
+      }
+    }
+    for (const Method method : everydayMethods) {
+      crowd.skin(method);
+      for (std::size_t i = 0; i < instanceCount; ++i) {
+        const Comparison comparison = crowd.compared(method, i);
+        EXPECT_TRUE(comparison.passed())
+            << even << ", " << odd << ", " << methodName(method) << ", vertex "
+            << comparison.firstFailure << ": " << comparison.worstPosition << " and "
+            << comparison.worstNormal << " of the bounds";
+        EXPECT_GE(comparison.compared, 190u);
+      }
+    }
+  }
+}
+
 // Four threads skin a quarter each, at the same time.
 TEST_F(CpuSkinTest, ThreadsShareTheVerticesOfOneInstance) {
   Crowd crowd(5000, 4, Rigidity::shear, plainLayout);
@@ -280,7 +306,8 @@ TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
 
 TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
   Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
-  std::vector<InstanceResult> results(instanceCount), parts(instanceCount);
+  std::vector<InstanceResult> results(instanceCount),
+      parts(instanceCount, {{0, 0, 0}, {~0u, ~0u, ~0u}, 9});
   for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &results[i];
   crowd.skin(Method::dualQuaternion);
   for (std::size_t i = 0; i < instanceCount; ++i) {
@@ -299,7 +326,7 @@ TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
       EXPECT_EQ(found.max[axis], greatest[axis]);
     }
   }
-  // By parts.
+  // By parts; what the results were before does not matter.
   std::vector<InstanceResult> sums(instanceCount);
   for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &parts[i];
   for (const std::uint32_t begin : {0u, 77u}) {
@@ -496,7 +523,13 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
        {plainLayout, layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none)}) {
     Crowd crowd(203, 4, Rigidity::rigid, layout);
     const std::uint32_t stride = crowd.places.positions.stride;
-    for (const auto& [begin, end] : {std::pair{13u, 101u}, {16u, 19u}, {5u, 5u}, {200u, 203u}}) {
+    for (const auto& [begin, end] : {std::pair{13u, 101u},
+                                     {16u, 19u},
+                                     {5u, 5u},
+                                     {200u, 203u},
+                                     // inside one block, not at its begin; at the output's end, too
+                                     {18u, 21u},
+                                     {201u, 203u}}) {
       std::ranges::fill(crowd.output, untouched);
       ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
       for (std::size_t byte = 0; byte < crowd.output.size(); byte += stride) {
@@ -592,6 +625,19 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   expectBadInstance([](cpu::Instance& i) { i.restartsMotion = true; },
                     " settles or restarts its motion, but has no previous positions");
   EXPECT_TRUE(cpu::skin(good).ok());
+
+  Crowd moving(
+      203, 4, Rigidity::rigid,
+      layoutOf(VertexFormat::float32x3, VertexFormat::none, VertexFormat::none, Motion::reskinned));
+  for (cpu::Instance& instance : moving.instances) {
+    instance.previousPose = instance.pose;
+    instance.previousMorphs = falling;
+  }
+  const Result<void> done = cpu::skin(moving.job(Method::dualQuaternion));
+  ASSERT_FALSE(done.ok());
+  EXPECT_EQ(done.error().message,
+            "instance 0: its previous morph targets are not in ascending order");
+  EXPECT_TRUE(isUntouched(moving.output));
 }
 
 TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
