@@ -128,10 +128,13 @@ TEST_F(SceneGrowthTest, WhatWouldLieInTwoRangesStaysWhereItIs) {
   const std::uint64_t offset = scene->output(*culled)->offset;
   ASSERT_TRUE(scene->removeInstance(before[2]).ok());
   plannedRuns();
+  plannedRuns();
+  const std::uint64_t used = scene->statistics().outputs.used;
   scene->compact(~std::uint64_t{0});
   plannedRuns();
   plannedRuns();
   EXPECT_EQ(scene->output(*culled)->offset, offset);
+  EXPECT_EQ(scene->statistics().outputs.used, used) << "the place where it cannot stand is free";
   const MorphWeight morph{0, 1};
   const InstanceChange change{.instance = *culled, .morphs = std::span(&morph, 1)};
   EXPECT_TRUE(scene->change(change).ok()) << "it is skinned to where it is";
@@ -193,6 +196,30 @@ TEST_F(SceneGrowthTest, MaximaThatAreNoWholeUnitsEndBeforeThem) {
   EXPECT_EQ(scene->buffer(BufferRole::positions).size, 72'000u);
   description.outputCapacity = {5, 6};
   EXPECT_EQ(Scene::buffer(description, BufferRole::positions).value().size, 8u);
+}
+
+// The device's alignment may be larger than a joint matrix.
+TEST_F(SceneGrowthTest, PosesThatTheGpuWritesCanBeBoundAtTheirOffset) {
+  description.limits.minStorageBufferOffsetAlignment = 256;
+  create();
+  for (const std::uint32_t joints : {5u, 1u, 100u, 7u, 70u}) {
+    const PoseHandle pose = scene->addPose(joints, {.writer = PoseWriter::gpu}).value();
+    EXPECT_EQ(scene->posePlace(pose)->offset % 256, 0u) << joints;
+  }
+}
+
+// Their readers read whole words.
+TEST_F(SceneGrowthTest, OutputsOfHalfWordsHaveRoomForWords) {
+  description.limits.storage16Bit = true;
+  description.outputCapacity = {4};
+  create();
+  MeshInfo odd = meshInfo();
+  odd.vertexCount = 101;
+  instance.mesh = scene->addMesh(odd).value();
+  instance.layout = {.positions = VertexFormat::float16x3, .stride = 6};
+  ASSERT_TRUE(scene->addInstance(instance).ok());
+  EXPECT_EQ(memory.asked.back().role, BufferRole::positions);
+  EXPECT_EQ(memory.asked.back().requirement.size, 608u);
 }
 
 TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {

@@ -30,15 +30,14 @@ SceneDescription smallScene() {
 
 /// One instance of one mesh.
 struct OneInstance {
-  explicit OneInstance(bool isCulled = false) {
-    MeshInfo info;
+  explicit OneInstance(bool isCulled = false, const SceneDescription& wanted = smallScene())
+      : scene(*Scene::create(wanted)) {
     info.vertexCount = 100;
     info.requiredJoints = 4;
     info.maxInfluences = 4;
     info.byteSize = 4096;
     mesh = *scene.addMesh(info);
     pose = *scene.addPose(4);
-    InstanceDescription description;
     description.mesh = mesh;
     description.pose = pose;
     description.bounds = true;
@@ -55,14 +54,33 @@ struct OneInstance {
     must(scene.commit());
   }
 
-  Scene scene = *Scene::create(smallScene());
+  Scene scene;
+  MeshInfo info;
   MeshHandle mesh;
   PoseHandle pose;
+  InstanceDescription description;
   InstanceHandle instance;
   Plan planned;
 };
 
-/// The kinds of a plan's commands, and for copies and clears their buffers.
+std::string nameOf(Access accesses) {
+  std::string name;
+  const auto add = [&](Access read, Access write, const std::string& kind) {
+    if (!includes(accesses, read | write)) return;
+    if (!name.empty()) name += ", ";
+    name += kind;
+    if (!includes(accesses, write)) name += " read";
+    if (!includes(accesses, read)) name += " write";
+  };
+  add(Access::computeRead, Access::computeWrite, "compute");
+  add(Access::copyRead, Access::copyWrite, "copy");
+  if (includes(accesses, Access::indirectRead)) name += ", indirect";
+  if (includes(accesses, Access::hostRead)) name += "host";
+  return name;
+}
+
+/// The kinds of a plan's commands, for copies and clears their buffers, and for barriers their
+/// accesses.
 std::vector<std::string> namesOf(const Plan& plan) {
   const auto roleName = [](BufferRole role) {
     switch (role) {
@@ -96,7 +114,8 @@ std::vector<std::string> namesOf(const Plan& plan) {
     } else if (const auto* clear = std::get_if<ClearCommand>(&command)) {
       names.push_back(std::string("clear ") + roleName(clear->buffer));
     } else {
-      names.emplace_back("barrier");
+      const auto& barrier = std::get<BarrierCommand>(command);
+      names.push_back(nameOf(barrier.before) + " before " + nameOf(barrier.after));
     }
   }
   return names;
@@ -107,8 +126,10 @@ TEST(Scene, AFrameUploadsConvertsSkinsAndReadsBack) {
   one.plan(1, 0);
   EXPECT_EQ(
       namesOf(one.planned),
-      (std::vector<std::string>{"barrier", "upload to tables", "barrier", "palette", "clear",
-                                "barrier", "skin", "barrier", "results to read-back", "barrier"}));
+      (std::vector<std::string>{
+          "compute, copy, indirect before compute, copy", "upload to tables",
+          "copy write before compute", "palette", "clear", "compute write before compute", "skin",
+          "compute write before copy read", "results to read-back", "copy write before host"}));
 }
 
 /// Every variant that the plans of one instance use, with and without active morph targets.
@@ -184,23 +205,23 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
 
 TEST(Scene, TheGpuChoosesBeforeItSkins) {
   OneInstance one(true);
-  const std::vector<std::string> first{"barrier",
+  const std::vector<std::string> first{"compute, copy, indirect before compute, copy",
                                        "upload to tables",
                                        "clear counters",
                                        "clear history",  //
-                                       "barrier",
+                                       "copy write before compute",
                                        "visibility",
-                                       "barrier",
+                                       "compute write before compute",
                                        "visibility",  //
-                                       "barrier",
+                                       "compute write before compute, indirect",
                                        "palette",
                                        "clear",  //
-                                       "barrier",
+                                       "compute write before compute",
                                        "indirect skin",  //
-                                       "barrier",
+                                       "compute write before copy read",
                                        "counters to read-back",
                                        "results to read-back",
-                                       "barrier"};
+                                       "copy write before host"};
   one.plan(1, 0);
   EXPECT_EQ(namesOf(one.planned), first);
   // History is cleared until a frame that does so is recorded, and never again.
@@ -210,6 +231,33 @@ TEST(Scene, TheGpuChoosesBeforeItSkins) {
   one.plan(2, 1);
   EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 0);
   EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear counters"), 1);
+}
+
+// What other frames have written to the history before stays.
+TEST(Scene, TheNewPartOfAHistoryThatHasGrownIsCleared) {
+  SceneDescription description = smallScene();
+  description.instanceCapacity = {16, 64};
+  description.growth = {nullptr, [](void*, const BufferGrowth&) { return Result<void>(); }};
+  OneInstance one(true, description);
+  one.record(1, 0);
+  const std::uint64_t before = one.planned.buffer(BufferRole::history).size;
+  InstanceDescription next = one.description;
+  next.bounds = false;
+  for (int i = 0; i < 16; ++i) ASSERT_TRUE(one.scene.addInstance(next).ok());
+  one.record(2, 1);
+  const std::uint64_t size = one.planned.buffer(BufferRole::history).size;
+  EXPECT_GT(size, before);
+  std::uint32_t clears = 0;
+  for (const Command& command : one.planned.commands()) {
+    const auto* clear = std::get_if<ClearCommand>(&command);
+    if (clear == nullptr || clear->buffer != BufferRole::history) continue;
+    ++clears;
+    EXPECT_EQ(clear->offset, before);
+    EXPECT_EQ(clear->offset + clear->size, size);
+  }
+  EXPECT_EQ(clears, 1u);
+  one.record(3, 2);
+  EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 0);
 }
 
 TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
@@ -263,31 +311,201 @@ TEST(Scene, AnAbandonedFrameClearsNothing) {
   EXPECT_EQ(std::ranges::count(namesOf(one.planned), "clear history"), 0);
 }
 
-// The frame in which it was hidden was never displayed: it moved in the frame before, and rests.
-TEST(Scene, WhatWasHiddenInAnAbandonedFrameOnlySettles) {
-  OneInstance one;
-  InstanceDescription description;
-  description.mesh = one.mesh;
-  description.pose = *one.scene.addPose(4);
-  description.layout.motion = Motion::kept;
-  const InstanceHandle moving = *one.scene.addInstance(description);
-  const auto runFrame = [&](std::uint64_t frame) {
-    ASSERT_TRUE(one.scene.plan(one.planned).ok());
-    ASSERT_TRUE(one.scene.commit().ok()) << frame;
-  };
-  for (std::uint64_t frame = 1; frame < 3; ++frame) {
-    ASSERT_TRUE(one.scene.beginFrame(frame, frame - 1).ok());
-    ASSERT_TRUE(one.scene.writePose(description.pose).ok());
-    runFrame(frame);
+/// A moving instance, shown and hidden by `change` or by `setVisibility`.
+class SceneVisibility : public ::testing::TestWithParam<bool> {
+ protected:
+  SceneVisibility() {
+    InstanceDescription description = one_.description;
+    description.pose = pose_ = *scene_.addPose(4);
+    description.bounds = false;
+    description.layout.motion = Motion::kept;
+    instance_ = *scene_.addInstance(description);
   }
-  ASSERT_TRUE(one.scene.beginFrame(3, 2).ok());
-  ASSERT_TRUE(one.scene.change({.instance = moving, .visible = false}).ok());
-  runFrame(3);
-  ASSERT_TRUE(one.scene.abandonFrame(3).ok());
-  ASSERT_TRUE(one.scene.change({.instance = moving, .visible = true}).ok());
-  runFrame(3);
-  ASSERT_EQ(one.scene.settledInstances().size(), 1u);
-  EXPECT_EQ(one.scene.settledInstances()[0], moving);
+  void show(bool isVisible) {
+    const InstanceVisibility visibility{instance_, isVisible, 1};
+    ASSERT_TRUE((GetParam() ? scene_.setVisibility({&visibility, 1})
+                            : scene_.change({.instance = instance_, .visible = isVisible}))
+                    .ok());
+  }
+  void begin() {
+    ++frame_;
+    ASSERT_TRUE(scene_.beginFrame(frame_, frame_ - 1).ok());
+  }
+  void record() {
+    ASSERT_TRUE(scene_.plan(one_.planned).ok());
+    ASSERT_TRUE(scene_.commit().ok()) << frame_;
+  }
+  /// A frame in which its pose changes.
+  void move() {
+    begin();
+    ASSERT_TRUE(scene_.writePose(pose_).ok());
+    record();
+  }
+  void abandon() { ASSERT_TRUE(scene_.abandonFrame(frame_).ok()); }
+  bool isSkinned() const { return contains(scene_.skinnedInstances()); }
+  bool isSettled() const { return contains(scene_.settledInstances()); }
+  bool contains(std::span<const InstanceHandle> list) const {
+    return std::ranges::count(list, instance_) == 1;
+  }
+
+  OneInstance one_;
+  Scene& scene_ = one_.scene;
+  PoseHandle pose_;
+  InstanceHandle instance_;
+  std::uint64_t frame_ = 0;
+};
+
+// Its vertices are those of the frame in which it moved.
+TEST_P(SceneVisibility, WhatIsShownAgainUnchangedSettles) {
+  move();
+  move();
+  for (const bool isVisible : {false, true}) {
+    begin();
+    show(isVisible);
+    record();
+    EXPECT_FALSE(isSkinned());
+    EXPECT_EQ(isSettled(), isVisible);
+  }
+  begin();
+  record();
+  EXPECT_FALSE(isSettled()) << "once";
+}
+
+// The frame in which it was hidden was never displayed: it moved in the frame before, and rests.
+TEST_P(SceneVisibility, WhatWasHiddenInAnAbandonedFrameOnlySettles) {
+  move();
+  move();
+  begin();
+  show(false);
+  record();
+  abandon();
+  show(true);
+  record();
+  EXPECT_TRUE(isSettled());
+}
+
+// Nor was a frame displayed before which it was shown and hidden again.
+TEST_P(SceneVisibility, WhatWasShownBetweenFramesComesBackAsWhatWasNot) {
+  for (const bool isShownBetween : {false, true}) {
+    move();
+    move();
+    begin();
+    show(false);
+    record();
+    begin();
+    if (isShownBetween) {
+      show(true);
+      show(false);
+    }
+    record();
+    show(true);
+    abandon();
+    ASSERT_TRUE(scene_.writePose(pose_).ok());
+    record();
+    EXPECT_TRUE(isSkinned());
+    begin();
+    record();
+    EXPECT_FALSE(isSettled()) << "its motion was restarted";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Calls, SceneVisibility, ::testing::Bool(), [](const auto& call) {
+  return std::string(call.param ? "SetVisibility" : "Change");
+});
+
+TEST(Scene, NothingIsDueBetweenFrames) {
+  OneInstance one;
+  EXPECT_FALSE(*one.scene.isDue(one.instance));
+  must(one.scene.beginFrame(1, 0));
+  EXPECT_TRUE(*one.scene.isDue(one.instance));
+  must(one.scene.plan(one.planned));
+  must(one.scene.commit());
+  EXPECT_FALSE(*one.scene.isDue(one.instance));
+}
+
+TEST(Scene, AMeshWithOtherTargetsTakesNoMorphWeights) {
+  OneInstance one;
+  std::vector<MeshHandle> meshes;
+  for (const std::uint32_t targets : {5u, 2u, 5u}) {
+    MeshInfo info = one.info;
+    info.morphTargetCount = targets;
+    meshes.push_back(*one.scene.addMesh(info));
+  }
+  const auto isMorphed = [&](std::uint64_t frame) {
+    one.record(frame, frame - 1);
+    for (const PlannedDispatch& dispatch : dispatchesOf(one.planned)) {
+      if (dispatch.variant.kernel == Kernel::skin) return dispatch.variant.morphs;
+    }
+    ADD_FAILURE() << "not skinned";
+    return false;
+  };
+  for (const std::uint32_t target : {4u, 0u}) {
+    const MorphWeight weight{target, 1};
+    const std::uint64_t frame = target == 4 ? 1 : 4;
+    must(one.scene.change(
+        {.instance = one.instance, .mesh = meshes[0], .morphs = std::span(&weight, 1)}));
+    EXPECT_TRUE(isMorphed(frame));
+    must(one.scene.change({.instance = one.instance, .mesh = meshes[2]}));
+    EXPECT_TRUE(isMorphed(frame + 1)) << "they have as many";
+    must(one.scene.change({.instance = one.instance, .mesh = meshes[1]}));
+    EXPECT_FALSE(isMorphed(frame + 2));
+  }
+}
+
+TEST(Scene, WhatIsRemovedIsFreeWhenItsFrameIsComplete) {
+  OneInstance one;
+  one.record(1, 0);
+  must(one.scene.removeInstance(one.instance));
+  must(one.scene.removePose(one.pose));
+  EXPECT_GT(one.scene.statistics().palettes.used, 0u);
+  EXPECT_GT(one.scene.statistics().outputs.used, 0u);
+  one.record(2, 1);
+  must(one.scene.beginFrame(3, 2));
+  EXPECT_EQ(one.scene.statistics().palettes.used, 0u);
+  EXPECT_EQ(one.scene.statistics().outputs.used, 0u);
+}
+
+// Its mesh was changed after a frame that is then abandoned: two places are free, not one.
+TEST(Scene, ThePlaceOfAnAbandonedFrameIsFree) {
+  OneInstance one;
+  const MeshHandle other = *one.scene.addMesh(one.info);
+  one.record(1, 0);
+  must(one.scene.change({.instance = one.instance, .mesh = other}));
+  must(one.scene.abandonFrame(1));
+  must(one.scene.plan(one.planned));
+  must(one.scene.commit());
+  must(one.scene.beginFrame(2, 1));
+  EXPECT_EQ(one.scene.statistics().outputs.used, 100u * 12u);
+}
+
+TEST(Scene, PosesHaveUpToTheMaximumOfJoints) {
+  SceneDescription description = smallScene();
+  description.jointCapacity = Capacity::fixed(maxPoseJoints);
+  OneInstance one;
+  Scene scene = *Scene::create(description);
+  EXPECT_TRUE(scene.addPose(maxPoseJoints).ok());
+  for (const std::uint32_t count : {0u, maxPoseJoints + 1}) {
+    const Result<PoseHandle> refused = scene.addPose(count);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().message, "a pose has 1 to " + std::to_string(maxPoseJoints) +
+                                           " joints, not " + std::to_string(count));
+  }
+}
+
+// An engine with buffers of its own has no others.
+TEST(Scene, PalettesSufficeForAllJoints) {
+  SceneDescription description = smallScene();
+  description.jointCapacity = Capacity::fixed(9);
+  OneInstance one(false, description);
+  InstanceDescription next = one.description;
+  MeshInfo info = one.info;
+  info.requiredJoints = 1;
+  next.mesh = *one.scene.addMesh(info);
+  for (std::uint32_t joint = 4; joint < 9; ++joint) {
+    next.pose = *one.scene.addPose(1);
+    const Result<InstanceHandle> added = one.scene.addInstance(next);
+    EXPECT_TRUE(added.ok()) << added.error().message;
+  }
 }
 
 TEST(Scene, OnlyTheFrameCommittedLastIsAbandoned) {
@@ -376,6 +594,41 @@ TEST(Scene, ReadsBackOnlyWhatWasRecorded) {
   EXPECT_TRUE(one.scene.bounds(one.instance)->has_value());
 }
 
+// Bounds of a frame that has not been displayed, or whose results are not read yet, are not there.
+TEST(Scene, BoundsAreThoseOfAFrameThatWasReadBack) {
+  OneInstance one;
+  std::vector<std::byte> bytes(one.scene.buffer(BufferRole::readBack).size);
+  const InstanceHandle second = *one.scene.addInstance(one.description);
+  one.record(1, 0);
+  must(one.scene.readBack(1, bytes));
+  EXPECT_TRUE(one.scene.bounds(one.instance)->has_value());
+  // Two others with their results.
+  for (const InstanceHandle instance : {one.instance, second})
+    must(one.scene.removeInstance(instance));
+  const InstanceHandle hidden = *one.scene.addInstance(one.description);
+  const InstanceHandle shown = *one.scene.addInstance(one.description);
+  one.record(2, 1);
+  must(one.scene.abandonFrame(2));
+  must(one.scene.change({.instance = hidden, .visible = false}));
+  must(one.scene.plan(one.planned));
+  must(one.scene.commit());
+  one.record(3, 1);  // has no results
+  must(one.scene.readBack(3, bytes));
+  EXPECT_FALSE(one.scene.bounds(shown)->has_value()) << "only frame 2 has them";
+  must(one.scene.readBack(2, bytes));
+  EXPECT_TRUE(one.scene.bounds(shown)->has_value());
+  EXPECT_FALSE(one.scene.bounds(hidden)->has_value()) << "it was never displayed";
+}
+
+// There is no binding for them.
+TEST(Scene, DevicesWithFourBuffersHaveNoResults) {
+  SceneDescription description = smallScene();
+  EXPECT_GT(Scene::buffer(description, BufferRole::results)->size, 0u);
+  description.limits.maxStorageBuffersPerStage = 4;
+  EXPECT_EQ(Scene::buffer(description, BufferRole::results)->size, 0u);
+  EXPECT_EQ(Scene::create(description)->buffer(BufferRole::results).size, 0u);
+}
+
 TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   const auto expectRefused = [](const SceneDescription& description, ErrorCode code,
                                 const std::string& text) {
@@ -411,6 +664,9 @@ TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   bad = smallScene();
   bad.limits.minStorageBufferOffsetAlignment = 48;
   expectRefused(bad, ErrorCode::invalidArgument, "must be a power of two");
+  bad = smallScene();
+  bad.outputOffset = 2;
+  expectRefused(bad, ErrorCode::invalidArgument, "the scene's outputOffset");
 }
 
 }  // namespace
