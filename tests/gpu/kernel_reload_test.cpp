@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -132,6 +134,23 @@ TEST_F(KernelReloadTest, AFileThatIsMissingForAWhileOrOfAnotherVersionIsNotUsed)
   const KernelReload again = reload();
   EXPECT_EQ(again.changed, 1u);
   EXPECT_TRUE(again.replaced.empty());
+}
+
+// The compiler may have read what it held before.
+TEST_F(KernelReloadTest, AFileThatIsWrittenDuringItsFirstCompilationIsReadAgain) {
+  namespace fs = std::filesystem;
+  const auto now = fs::file_time_type::clock::now();
+  for (const auto& file : fs::directory_iterator(folder_->path()))
+    fs::last_write_time(file, now - std::chrono::hours(1));
+  Variant variant;
+  variant.kernel = Kernel::clear;
+  must(context_->prepare({&variant, 1}));
+  EXPECT_EQ(reload().changed, 0u);
+  fs::last_write_time(folder_->path() / "palette.comp", now + std::chrono::hours(1));
+  variant.kernel = Kernel::palette;
+  must(context_->prepare({&variant, 1}));
+  EXPECT_EQ(reload().changed, 1u);
+  EXPECT_EQ(reload().changed, 0u);
 }
 
 // Tier 2, with a frame under way that uses the old pipelines. The validation layer says where one

@@ -368,6 +368,20 @@ TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
   }
   EXPECT_TRUE(mock.modules.empty()) << "a module needs the feature, too";
   EXPECT_EQ(mock.alive["Pipeline"], 0);
+
+  VkPhysicalDevice16BitStorageFeatures halves{};
+  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+  halves.storageBuffer16BitAccess = VK_TRUE;
+  vulkan::DeviceDescription description = mock.description();
+  description.enabledFeatures = &halves;
+  context = vulkan::Context::create(description);
+  Variant variant;
+  variant.units[0] = 2;
+  EXPECT_TRUE(context->prepare({&variant, 1}).ok());
+  variant.units[0] = 1;
+  const Result<void> prepared = context->prepare({&variant, 1});
+  ASSERT_FALSE(prepared.ok());
+  EXPECT_NE(prepared.error().message.find("storageBuffer8BitAccess"), std::string::npos);
 }
 
 // ---- Kernels as data

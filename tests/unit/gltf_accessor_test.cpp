@@ -251,6 +251,15 @@ TEST(GltfAccessor, RefusesBadDescriptions) {
   expectAfter("bufferView", -1, "accessor 0: bufferView is not an integer");
   expectAfter("normalized", 1, "accessor 0: normalized is neither true nor false");
   expectAfter("byteOffset", "4", "accessor 0: byteOffset is not an integer");
+  // Not of one that only the triangles use.
+  file = skinnedTriangle();
+  const std::size_t view = file.addView(bytesOf(std::vector<std::uint32_t>{0, 1, 2}));
+  file.primitive()["indices"] = file.addAccessor({{"bufferView", view},
+                                                  {"componentType", unsignedIntType},
+                                                  {"normalized", true},
+                                                  {"count", 3},
+                                                  {"type", "SCALAR"}});
+  expectInvalid(file, "accessor 3: unsigned int may not be normalized");
 
   file = skinnedTriangle();
   file.json["bufferViews"][0]["buffer"] = 1;

@@ -63,7 +63,8 @@ TEST(VertexInput, AnInterleavedLayoutHasOneBinding) {
                   places.tangents.offset - start);
   expectAttribute(input.attributes[3], 1, 2, VertexFormat::snorm16x4,
                   places.previousPositions.offset - start);
-  EXPECT_EQ(vulkan::vertexBufferOffsets(everything, places)[0], start);
+  EXPECT_EQ(vulkan::vertexBufferOffsets(everything, places),
+            (std::array<VkDeviceSize, 4>{start, 0, 0, 0}));
 }
 
 TEST(VertexInput, APlanarLayoutHasABindingForEachAttribute) {
