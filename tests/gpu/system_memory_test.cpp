@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cstring>
+#include <set>
+#include <string>
 
 #include "command_log.h"
 #include "system_test.h"
@@ -150,9 +150,6 @@ TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
   EXPECT_TRUE(SkinningSystem::create(system).ok());
 }
 
-// An allocator that fails in the middle of a game, at each allocation for a frame whose tables have
-// outgrown their buffers, and which is the first of its slot: nothing is recorded, and all is tried
-// again.
 TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   static int destroyed;
   destroyed = 0;
@@ -166,6 +163,9 @@ TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   EXPECT_EQ(destroyed, 0);
 }
 
+// An allocator that fails in the middle of a game, at each allocation for a frame whose tables have
+// outgrown their buffers, and which is the first of its slot: nothing is recorded, and all is tried
+// again.
 TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
@@ -260,109 +260,6 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
   EXPECT_EQ(statistics.outputs.used, 0u);
   for (const StoreStatistics& store : {statistics.meshes, statistics.palettes, statistics.outputs})
     EXPECT_EQ(store.largestFree, store.capacity);
-}
-
-/// A GPU in a PC: device memory, host memory, a little that is both, and a type that needs a
-/// feature. All of it is the device's first type that the CPU can write.
-struct PretendedHeaps {
-  static constexpr std::uint32_t deviceType = 0, hostType = 1, mappedDeviceType = 2, oddType = 3;
-
-  explicit PretendedHeaps(InterceptedDevice& device) {
-    const vulkan::DeviceDescription description = device.description();
-    const auto find = [&](const char* name) {
-      return description.getInstanceProcAddr(description.instance, name);
-    };
-    current = this;
-    allocateMemory = reinterpret_cast<PFN_vkAllocateMemory>(find("vkAllocateMemory"));
-    getBufferMemoryRequirements =
-        reinterpret_cast<PFN_vkGetBufferMemoryRequirements>(find("vkGetBufferMemoryRequirements"));
-    reinterpret_cast<PFN_vkGetPhysicalDeviceMemoryProperties>(
-        find("vkGetPhysicalDeviceMemoryProperties"))(description.physicalDevice, &real);
-    device.replace("vkGetPhysicalDeviceMemoryProperties", &getProperties);
-    device.replace("vkAllocateMemory", &allocate);
-    device.replace("vkGetBufferMemoryRequirements", &getRequirements);
-  }
-
-  static constexpr std::uint64_t plenty = std::uint64_t{8} << 30;
-  std::array<std::uint64_t, 4> free{plenty, plenty, 0, plenty};  ///< bytes, by type
-  std::array<std::uint64_t, 4> taken{};
-
- private:
-  static constexpr VkMemoryPropertyFlags mapped =
-      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-
-  static void VKAPI_CALL getProperties(VkPhysicalDevice,
-                                       VkPhysicalDeviceMemoryProperties* properties) {
-    constexpr VkMemoryPropertyFlags local = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    *properties = {};
-    properties->memoryTypeCount = properties->memoryHeapCount = 4;
-    properties->memoryTypes[deviceType] = {local, 0};
-    properties->memoryTypes[hostType] = {mapped, 1};
-    properties->memoryTypes[mappedDeviceType] = {local | mapped, 2};
-    properties->memoryTypes[oddType] = {local | mapped | VK_MEMORY_PROPERTY_DEVICE_COHERENT_BIT_AMD,
-                                        3};
-  }
-  static void VKAPI_CALL getRequirements(VkDevice device, VkBuffer buffer,
-                                         VkMemoryRequirements* requirements) {
-    current->getBufferMemoryRequirements(device, buffer, requirements);
-    current->realType = 0;
-    while ((requirements->memoryTypeBits >> current->realType & 1) == 0 ||
-           (current->real.memoryTypes[current->realType].propertyFlags & mapped) != mapped)
-      ++current->realType;
-    requirements->memoryTypeBits = 15;
-  }
-  static VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateInfo* info,
-                                      const VkAllocationCallbacks* callbacks,
-                                      VkDeviceMemory* memory) {
-    const std::uint32_t type = info->memoryTypeIndex;
-    if (info->allocationSize > current->free[type]) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
-    current->free[type] -= info->allocationSize;
-    current->taken[type] += info->allocationSize;
-    VkMemoryAllocateInfo real = *info;
-    real.memoryTypeIndex = current->realType;
-    return current->allocateMemory(device, &real, callbacks, memory);
-  }
-
-  static inline PretendedHeaps* current = nullptr;
-  VkPhysicalDeviceMemoryProperties real{};
-  std::uint32_t realType = 0;  ///< for the buffer whose requirements were asked for last
-  PFN_vkAllocateMemory allocateMemory = nullptr;
-  PFN_vkGetBufferMemoryRequirements getBufferMemoryRequirements = nullptr;
-};
-
-// Where the mapped memory of the device is full, or fills up, host memory serves as well.
-TEST_F(SystemMemoryTest, AFullHeapLeavesTheOthers) {
-  using Heaps = PretendedHeaps;
-  const PackedMesh packed = systemMesh(1, 200);
-  for (const std::uint32_t mapped : {0u, 400u << 10, 1u << 30}) {
-    SCOPED_TRACE(mapped);
-    InterceptedDevice intercepted(device().description());
-    Heaps heaps(intercepted);
-    heaps.free[Heaps::mappedDeviceType] = mapped;
-    vulkan::Context pretended = must(vulkan::Context::create(intercepted.description()));
-    vulkan::SkinningSystemDescription system = description();
-    system.context = &pretended;
-    SkinningSystem made = must(SkinningSystem::create(system));
-    for (int mesh = 0; mesh < 10; ++mesh) must(made.addMesh(packed));
-    EXPECT_GT(heaps.taken[Heaps::deviceType], system.outputCapacity.initial);
-    EXPECT_EQ(heaps.taken[Heaps::mappedDeviceType] != 0, mapped != 0) << "preferred for uploads";
-    EXPECT_EQ(heaps.taken[Heaps::oddType], 0u);
-  }
-}
-
-TEST_F(SystemMemoryTest, WhereEveryHeapIsFullTheDriversErrorIsGivenOn) {
-  InterceptedDevice intercepted(device().description());
-  PretendedHeaps heaps(intercepted);
-  heaps.free[PretendedHeaps::hostType] = 0;
-  vulkan::Context pretended = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &pretended;
-  const Result<SkinningSystem> made = SkinningSystem::create(system);
-  ASSERT_FALSE(made.ok());
-  EXPECT_EQ(made.error().code, ErrorCode::vulkanError);
-  EXPECT_EQ(made.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY);
-  EXPECT_GT(heaps.taken[PretendedHeaps::deviceType], 0u);
-  EXPECT_EQ(heaps.taken[PretendedHeaps::oddType], 0u);
 }
 
 TEST_F(SystemMemoryTest, StatisticsAddUp) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace dermis::test {
 namespace {
@@ -98,6 +99,79 @@ void VKAPI_CALL updateDescriptorSets(VkDevice, std::uint32_t count,
   for (std::uint32_t i = 0; i < count; ++i) write(writes[i], mock->sets[writes[i].dstSet]);
 }
 
+// -- Memory.
+
+VkResult VKAPI_CALL createBuffer(VkDevice, const VkBufferCreateInfo* info,
+                                 const VkAllocationCallbacks* allocator, VkBuffer* buffer) {
+  const VkResult result = create("vkCreateBuffer", "Buffer", allocator, buffer);
+  if (result == VK_SUCCESS) mock->buffers[*buffer] = {info->size, info->usage, VK_NULL_HANDLE};
+  return result;
+}
+void VKAPI_CALL destroyBuffer(VkDevice, VkBuffer buffer, const VkAllocationCallbacks* allocator) {
+  destroy("Buffer", allocator, buffer);
+  mock->buffers.erase(buffer);
+}
+void VKAPI_CALL getBufferMemoryRequirements(VkDevice, VkBuffer buffer,
+                                            VkMemoryRequirements* requirements) {
+  *requirements = {(mock->buffers.at(buffer).size + 255) / 256 * 256, 256,
+                   (1u << mock->memoryTypes.memoryTypeCount) - 1};
+}
+VkResult VKAPI_CALL allocateMemory(VkDevice, const VkMemoryAllocateInfo* info,
+                                   const VkAllocationCallbacks* allocator, VkDeviceMemory* memory) {
+  VkDeviceSize& left = mock->freeMemory.at(info->memoryTypeIndex);
+  if (info->allocationSize > std::min(left, mock->largestAllocation))
+    return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+  const VkResult result = create("vkAllocateMemory", "Memory", allocator, memory);
+  if (result != VK_SUCCESS) return result;
+  left -= info->allocationSize;
+  MockMemory& made = mock->memories[*memory];
+  made.type = info->memoryTypeIndex;
+  made.bytes.assign(info->allocationSize, std::byte{0xa5});
+  const auto* flags = static_cast<const VkMemoryAllocateFlagsInfo*>(info->pNext);
+  made.hasAddress = flags != nullptr && (flags->flags & VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT) != 0;
+  return result;
+}
+void VKAPI_CALL freeMemory(VkDevice, VkDeviceMemory memory,
+                           const VkAllocationCallbacks* allocator) {
+  destroy("Memory", allocator, memory);
+  const auto freed = mock->memories.find(memory);
+  if (freed == mock->memories.end()) return;
+  mock->freeMemory.at(freed->second.type) += freed->second.bytes.size();
+  mock->memories.erase(freed);
+}
+VkResult VKAPI_CALL mapMemory(VkDevice, VkDeviceMemory memory, VkDeviceSize, VkDeviceSize,
+                              VkMemoryMapFlags, void** mapped) {
+  if (mock->failing == "vkMapMemory") return mock->failure;
+  *mapped = mock->memories.at(memory).bytes.data();
+  return VK_SUCCESS;
+}
+VkResult VKAPI_CALL bindBufferMemory(VkDevice, VkBuffer buffer, VkDeviceMemory memory,
+                                     VkDeviceSize) {
+  if (mock->failing == "vkBindBufferMemory" && mock->failAfter-- <= 0) return mock->failure;
+  mock->buffers.at(buffer).memory = memory;
+  return VK_SUCCESS;
+}
+void VKAPI_CALL getPhysicalDeviceMemoryProperties(VkPhysicalDevice,
+                                                  VkPhysicalDeviceMemoryProperties* properties) {
+  *properties = mock->memoryTypes;
+}
+
+VkResult VKAPI_CALL createQueryPool(VkDevice, const VkQueryPoolCreateInfo*,
+                                    const VkAllocationCallbacks* allocator, VkQueryPool* pool) {
+  return create("vkCreateQueryPool", "QueryPool", allocator, pool);
+}
+void VKAPI_CALL destroyQueryPool(VkDevice, VkQueryPool pool,
+                                 const VkAllocationCallbacks* allocator) {
+  destroy("QueryPool", allocator, pool);
+}
+VkResult VKAPI_CALL getQueryPoolResults(VkDevice, VkQueryPool, std::uint32_t, std::uint32_t,
+                                        std::size_t, void*, VkDeviceSize, VkQueryResultFlags) {
+  return VK_NOT_READY;
+}
+void VKAPI_CALL cmdResetQueryPool(VkCommandBuffer, VkQueryPool, std::uint32_t, std::uint32_t) {}
+void VKAPI_CALL cmdWriteTimestamp(VkCommandBuffer, VkPipelineStageFlagBits, VkQueryPool,
+                                  std::uint32_t) {}
+
 void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
                                             VkPhysicalDeviceProperties* properties) {
   *properties = {};
@@ -130,13 +204,16 @@ void VKAPI_CALL cmdPushConstants(VkCommandBuffer, VkPipelineLayout, VkShaderStag
               std::min<std::size_t>(size, sizeof(mock->next.constants)));
   mock->commands.push_back("push constants");
 }
-void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags, VkPipelineStageFlags,
-                                   VkDependencyFlags, std::uint32_t memoryCount,
-                                   const VkMemoryBarrier* memory, std::uint32_t bufferCount,
-                                   const VkBufferMemoryBarrier* buffers, std::uint32_t,
-                                   const VkImageMemoryBarrier*) {
+void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags before,
+                                   VkPipelineStageFlags after, VkDependencyFlags,
+                                   std::uint32_t memoryCount, const VkMemoryBarrier* memory,
+                                   std::uint32_t bufferCount, const VkBufferMemoryBarrier* buffers,
+                                   std::uint32_t, const VkImageMemoryBarrier*) {
   mock->commands.push_back("barrier");
-  mock->memoryBarriers.insert(mock->memoryBarriers.end(), memory, memory + memoryCount);
+  for (std::uint32_t i = 0; i < memoryCount; ++i) {
+    mock->memoryBarriers.push_back(
+        {{before, memory[i].srcAccessMask}, {after, memory[i].dstAccessMask}});
+  }
   mock->bufferBarriers.insert(mock->bufferBarriers.end(), buffers, buffers + bufferCount);
 }
 void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t x, std::uint32_t y, std::uint32_t) {
@@ -149,8 +226,9 @@ void VKAPI_CALL cmdDispatch(VkCommandBuffer, std::uint32_t x, std::uint32_t y, s
 void VKAPI_CALL cmdDispatchIndirect(VkCommandBuffer, VkBuffer, VkDeviceSize) {
   mock->commands.push_back("indirect dispatch");
 }
-void VKAPI_CALL cmdCopyBuffer(VkCommandBuffer, VkBuffer, VkBuffer, std::uint32_t,
-                              const VkBufferCopy*) {
+void VKAPI_CALL cmdCopyBuffer(VkCommandBuffer, VkBuffer from, VkBuffer to, std::uint32_t count,
+                              const VkBufferCopy* regions) {
+  mock->copies.push_back({from, to, {regions, regions + count}});
   mock->commands.push_back("copy");
 }
 void VKAPI_CALL cmdFillBuffer(VkCommandBuffer, VkBuffer, VkDeviceSize, VkDeviceSize,
@@ -188,6 +266,19 @@ PFN_vkVoidFunction find(const char* name) {
       MOCK_FUNCTION("vkCmdDispatchIndirect", cmdDispatchIndirect),
       MOCK_FUNCTION("vkCmdCopyBuffer", cmdCopyBuffer),
       MOCK_FUNCTION("vkCmdFillBuffer", cmdFillBuffer),
+      MOCK_FUNCTION("vkGetPhysicalDeviceMemoryProperties", getPhysicalDeviceMemoryProperties),
+      MOCK_FUNCTION("vkAllocateMemory", allocateMemory),
+      MOCK_FUNCTION("vkFreeMemory", freeMemory),
+      MOCK_FUNCTION("vkMapMemory", mapMemory),
+      MOCK_FUNCTION("vkCreateBuffer", createBuffer),
+      MOCK_FUNCTION("vkDestroyBuffer", destroyBuffer),
+      MOCK_FUNCTION("vkGetBufferMemoryRequirements", getBufferMemoryRequirements),
+      MOCK_FUNCTION("vkBindBufferMemory", bindBufferMemory),
+      MOCK_FUNCTION("vkCreateQueryPool", createQueryPool),
+      MOCK_FUNCTION("vkDestroyQueryPool", destroyQueryPool),
+      MOCK_FUNCTION("vkGetQueryPoolResults", getQueryPoolResults),
+      MOCK_FUNCTION("vkCmdResetQueryPool", cmdResetQueryPool),
+      MOCK_FUNCTION("vkCmdWriteTimestamp", cmdWriteTimestamp),
   };
   const auto found = functions.find(name);
   return found == functions.end() ? nullptr : found->second;
@@ -212,6 +303,11 @@ MockVulkan::MockVulkan() {
   limits.minStorageBufferOffsetAlignment = 256;
   limits.maxComputeWorkGroupCount[0] = limits.maxComputeWorkGroupCount[1] = 65535;
   limits.maxPerStageDescriptorStorageBuffers = 8;
+  memoryTypes.memoryTypeCount = memoryTypes.memoryHeapCount = 1;
+  memoryTypes.memoryTypes[0].propertyFlags =
+      VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+      VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+  freeMemory.fill(VkDeviceSize{1} << 30);
 }
 
 MockVulkan::~MockVulkan() {
@@ -227,6 +323,12 @@ vulkan::DeviceDescription MockVulkan::description() const {
   description.enabledExtensions = extensions;
   description.allocator = allocator;
   return description;
+}
+
+VkDeviceSize MockVulkan::memoryBytes() const {
+  VkDeviceSize bytes = 0;
+  for (const auto& [handle, memory] : memories) bytes += memory.bytes.size();
+  return bytes;
 }
 
 int MockVulkan::aliveObjects() const {

@@ -1,9 +1,10 @@
 // A Vulkan driver that does nothing but count and remember: for what Dermis asks of a device, in
-// which order, and what it leaves behind when a call fails. It has no function to submit, wait, map
-// or allocate memory with.
+// which order, and what it leaves behind when a call fails. It has no function to submit or wait.
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
@@ -12,6 +13,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scope.h"
 
 namespace dermis::test {
 
@@ -37,6 +39,23 @@ struct MockSetLayout {
   std::vector<VkDescriptorSetLayoutBinding> bindings;
 };
 
+struct MockBuffer {
+  VkDeviceSize size = 0;
+  VkBufferUsageFlags usage = 0;
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+};
+
+struct MockMemory {
+  std::uint32_t type = 0;
+  bool hasAddress = false;       ///< for VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT
+  std::vector<std::byte> bytes;  ///< not zero
+};
+
+struct MockCopy {
+  VkBuffer from = VK_NULL_HANDLE, to = VK_NULL_HANDLE;
+  std::vector<VkBufferCopy> regions;
+};
+
 struct MockVulkan {
   MockVulkan();
   ~MockVulkan();
@@ -57,8 +76,9 @@ struct MockVulkan {
   std::set<std::string> requested;    ///< every entry point that was asked for
   std::map<std::string, int> alive;   ///< objects by kind, created and not destroyed
   std::vector<std::string> commands;  ///< what was recorded
-  std::vector<VkMemoryBarrier> memoryBarriers;
+  std::vector<vulkan::Dependency> memoryBarriers;
   std::vector<VkBufferMemoryBarrier> bufferBarriers;
+  std::vector<MockCopy> copies;
   bool wrongAllocator = false;  ///< an object came or went without the engine's allocator
 
   std::vector<const std::uint32_t*> modules;       ///< the code of each that was created
@@ -68,6 +88,15 @@ struct MockVulkan {
   std::map<VkDescriptorSet, MockDescriptors> sets;
   std::uint32_t setsInPool = 0, descriptorsInPool = 0, texelDescriptorsInPool = 0;
   std::map<VkBufferView, VkBufferViewCreateInfo> views;
+
+  /// One type that the CPU can write, as a CPU device has it, unless a test says otherwise.
+  VkPhysicalDeviceMemoryProperties memoryTypes{};
+  std::array<VkDeviceSize, 4> freeMemory{};  ///< bytes, by type
+  VkDeviceSize largestAllocation = ~VkDeviceSize{0};
+  std::map<VkBuffer, MockBuffer> buffers;         ///< alive
+  std::map<VkDeviceMemory, MockMemory> memories;  ///< alive
+
+  VkDeviceSize memoryBytes() const;
 
   // The state of the command buffer, and what handles stand for.
   std::map<VkShaderModule, const std::uint32_t*> codeOfModule;

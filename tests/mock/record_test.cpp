@@ -513,10 +513,9 @@ TEST_F(RecordTest, RecordsTheBarrierBetweenItsPassesAndNoOther) {
     EXPECT_TRUE(mock.bufferBarriers.empty());
     ASSERT_EQ(mock.memoryBarriers.size(), 1u);
     // The skin kernel reads palettes, and adds to results, that the palette kernel wrote.
-    EXPECT_EQ(mock.memoryBarriers[0].srcAccessMask,
-              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_WRITE_BIT));
-    EXPECT_EQ(mock.memoryBarriers[0].dstAccessMask,
-              static_cast<VkAccessFlags>(VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT));
+    constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    expectDependency(mock.memoryBarriers[0], {compute, VK_ACCESS_SHADER_WRITE_BIT},
+                     {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT});
   }
 }
 
