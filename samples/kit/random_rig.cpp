@@ -42,6 +42,13 @@ glm::dmat3 diagonal(double x, double y, double z) {
 glm::dmat3 scaleShear(Random& random, Rigidity rigidity) {
   if (rigidity == Rigidity::rigid) return glm::dmat3(1.0);
   if (rigidity == Rigidity::uniformScale) return glm::dmat3(random.between(0.5, 100));
+  if (rigidity == Rigidity::mirrored && random.below(2) == 0) {
+    // A reflection and nothing else, the commonest mirror: its columns are orthonormal.
+    glm::dmat3 mirror(1.0);
+    const auto axis = static_cast<int>(random.below(3));
+    mirror[axis][axis] = -1;
+    return mirror;
+  }
   const glm::dmat3 frame = glm::mat3_cast(random.rotation());
   const glm::dmat3 stretch =
       diagonal(random.between(0.5, 2), random.between(0.5, 2), random.between(0.5, 2));

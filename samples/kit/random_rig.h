@@ -48,7 +48,8 @@ void addTangents(OwnedMesh& mesh, std::uint32_t seed);
 void addMorphs(OwnedMesh& mesh, std::uint32_t seed, std::uint32_t count);
 
 /// Returns joint matrices with random rotations, translations within `reach`, and the scale, shear
-/// or mirroring of `rigidity`. In a mirrored pose every joint is mirrored.
+/// or mirroring of `rigidity`. In a mirrored pose every joint is mirrored; about half of the joints
+/// of `mirrored` have no scale besides.
 std::vector<JointMatrix> randomPose(std::uint32_t seed, std::uint32_t jointCount, Rigidity rigidity,
                                     double reach = 1);
 
