@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 #include <string>
 
@@ -81,6 +82,14 @@ class SystemMemoryTest : public SystemTest {
     engine.finish();
   }
 };
+
+// Otherwise no test would notice what is not cleared.
+TEST_F(SystemMemoryTest, NewMemoryIsNotZero) {
+  if (device().info().type != "CPU") GTEST_SKIP() << "the CPU cannot write all of it";
+  SystemEngine engine(device(), description());
+  const std::vector<std::byte> bytes = engine.readOutput();
+  EXPECT_TRUE(std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0xa5}; }));
+}
 
 TEST_F(SystemMemoryTest, AllThatTheEngineGivesComesBack) {
   CountingMemory memory(device());

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstdlib>
+#include <cstring>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 namespace dermis::test {
@@ -27,14 +29,63 @@ class DestroyDevices : public ::testing::Environment {
 [[maybe_unused]] const ::testing::Environment* const destroyDevices =
     ::testing::AddGlobalTestEnvironment(new DestroyDevices);
 
+/// The same for all devices of the process.
+PFN_vkGetInstanceProcAddr realInstanceProcAddr = nullptr;
+PFN_vkGetDeviceProcAddr realDeviceProcAddr = nullptr;
+VkPhysicalDeviceMemoryProperties memoryProperties{};
+
+/// What a driver gives may hold anything. Lavapipe's is zero, which hides what is not cleared.
+VkResult VKAPI_CALL allocateFilled(VkDevice device, const VkMemoryAllocateInfo* info,
+                                   const VkAllocationCallbacks* allocator, VkDeviceMemory* memory) {
+  const auto call = [&]<typename Function>(Function, const char* name, auto... arguments) {
+    return reinterpret_cast<Function>(realDeviceProcAddr(device, name))(device, arguments...);
+  };
+  const VkResult result = call(PFN_vkAllocateMemory{}, "vkAllocateMemory", info, allocator, memory);
+  if (result != VK_SUCCESS) return result;
+  const VkMemoryPropertyFlags flags =
+      memoryProperties.memoryTypes[info->memoryTypeIndex].propertyFlags;
+  void* mapped = nullptr;
+  if ((flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT) == 0 ||
+      call(PFN_vkMapMemory{}, "vkMapMemory", *memory, VkDeviceSize{0}, VK_WHOLE_SIZE,
+           VkMemoryMapFlags{0}, &mapped) != VK_SUCCESS)
+    return result;
+  std::memset(mapped, 0xa5, static_cast<std::size_t>(info->allocationSize));
+  call(PFN_vkUnmapMemory{}, "vkUnmapMemory", *memory);
+  return result;
+}
+PFN_vkVoidFunction VKAPI_CALL getDeviceProcAddr(VkDevice device, const char* name) {
+  if (std::string_view(name) == "vkAllocateMemory")
+    return reinterpret_cast<PFN_vkVoidFunction>(allocateFilled);
+  return realDeviceProcAddr(device, name);
+}
+PFN_vkVoidFunction VKAPI_CALL getInstanceProcAddr(VkInstance instance, const char* name) {
+  if (std::string_view(name) == "vkGetDeviceProcAddr")
+    return reinterpret_cast<PFN_vkVoidFunction>(getDeviceProcAddr);
+  return realInstanceProcAddr(instance, name);
+}
+
+Result<vulkan::Context> createContext(const samples::Device& device) {
+  vulkan::DeviceDescription description = device.description();
+  realInstanceProcAddr = std::exchange(description.getInstanceProcAddr, getInstanceProcAddr);
+  realDeviceProcAddr = reinterpret_cast<PFN_vkGetDeviceProcAddr>(
+      realInstanceProcAddr(description.instance, "vkGetDeviceProcAddr"));
+  device.functions().GetPhysicalDeviceMemoryProperties(device.physicalDevice(), &memoryProperties);
+  return vulkan::Context::create(description);
+}
+
 void tryToCreate(bool pushDescriptors, Attempt& attempt) {
   samples::DeviceOptions options = testDeviceOptions();
   options.pushDescriptors = pushDescriptors;
-  Result<samples::OpenDevice> device = samples::openDevice(options);
-  if (device) {
-    attempt.device.emplace(std::move(*device));
-  } else {
+  Result<std::unique_ptr<samples::Device>> device = samples::Device::create(options);
+  if (!device) {
     attempt.reason = device.error().message;
+    return;
+  }
+  Result<vulkan::Context> context = createContext(**device);
+  if (context) {
+    attempt.device.emplace(std::move(*device), std::move(*context));
+  } else {
+    attempt.reason = context.error().message;
   }
 }
 

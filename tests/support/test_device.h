@@ -21,7 +21,8 @@ samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason);
 /// Whether a missing device must fail.
 bool isContinuousIntegration();
 
-/// A test on the device. After each test the validation layer must have been silent.
+/// A test on the device. After each test the validation layer must have been silent. Memory that
+/// the context allocates is not zero.
 class DeviceTest : public ::testing::Test {
  protected:
   void SetUp() override { useDevice(true); }
