@@ -212,7 +212,7 @@ part_speed() {
 }
 
 part_gpu() {
-  build ci gpu_test dermis_gpu_benchmark
+  build ci gpu_test system_test dermis_gpu_benchmark
   tests ci -R '^profile\.'
   ./tests/bench/gpu.sh build/nightly/gpu build/ci
   # Without the environment variables of this build.
