@@ -573,6 +573,8 @@ TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
     EXPECT_FALSE(isDone(Method::linear, vertices, 1)) << "too little room";
     EXPECT_FALSE(isDone(Method::logMatrix, std::array{200u}, 1)) << "a method for comparison";
     EXPECT_TRUE(isDone(Method::linear, {}, 0)) << "none";
+    EXPECT_FALSE(isDone(Method::logMatrix, {}, 0)) << "none, by a method for comparison";
+    EXPECT_FALSE(cpu::skinVertices(*crowd.mesh, Method::linear, {}, {}, {}).ok()) << "no pose";
   }
 }
 

@@ -101,11 +101,12 @@ TEST_P(MockProfileTest, DispatchesOfMillionsOfWorkgroupsKeepItsLimits) {
   // Nobody reads the mesh: a plan takes no more than these numbers.
   batch.addMesh(meshOf(100, 4, 4, MeshParts{true, false, 0}));
   batch.addPose(4, false);
-  for (int number = 0; number < 200; ++number) batch.addJob(0, 0, Method::dualQuaternion, true);
-  constexpr std::uint32_t vertices = 1u << 22;
+  for (int number = 0; number < 400; ++number) batch.addJob(0, 0, Method::dualQuaternion, true);
+  constexpr std::uint32_t vertices = 1u << 21;
   std::uint64_t size = 0;
   for (Job& job : batch.jobs) {
     job.mesh.vertexCount = vertices;
+    job.mesh.byteSize = (vertices + 4) * 3 * std::uint64_t{16};
     job.positions.offset = size;
     job.normals.offset = size + 12;
     size += std::uint64_t{vertices} * 24;
@@ -124,7 +125,7 @@ TEST_P(MockProfileTest, DispatchesOfMillionsOfWorkgroupsKeepItsLimits) {
     EXPECT_LE(dispatch.variant.workgroupSize, mock.limits.maxComputeWorkGroupInvocations);
     if (dispatch.variant.kernel == Kernel::skin) workgroups += dispatch.workgroupCount;
   }
-  EXPECT_GE(workgroups, 200ull * vertices / (64 * 4));
+  EXPECT_GE(workgroups, 400ull * vertices / (64 * 4));
 }
 
 // The defaults of the class, as docs/gpus.md lists them.

@@ -459,7 +459,7 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     ASSERT_TRUE(made.ok());
     KnownLayouts known(seed, description.promises);
     for (const Job& layout : known.layouts)
-      ASSERT_TRUE(made->prepare(everyVariant(layout, made->limits(), made->tuning())).ok());
+      ASSERT_TRUE(made->prepare(*everyVariant(layout, made->limits(), made->tuning())).ok());
     const int pipelines = mock.alive["Pipeline"];
     for (int number = 0; number < 30; ++number) {
       const MockBatch batch = known.batch(made->limits());

@@ -167,7 +167,7 @@ TEST_F(TexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
     batch.jobs = {&job, 1};
     Plan plan;
     EXPECT_TRUE(dermis::makePlan(batch, changed, {}, plan).ok());
-    const std::vector<Variant> foreseen = everyVariant(job, changed, {});
+    const std::vector<Variant> foreseen = *everyVariant(job, changed, {});
     for (const Variant& variant : plan.variants())
       EXPECT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
     return plan.variants().back().pairs;
@@ -195,7 +195,7 @@ TEST_F(TexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize)
   const auto variantOf = [&](const VertexLayout& layout, std::uint64_t offset = 0) {
     Job job = plain;
     job.place(*placeVertices(layout, 7, offset));
-    const Variant variant = everyVariant(job, limits, {}).back();
+    const Variant variant = everyVariant(job, limits, {})->back();
     EXPECT_TRUE(variant.wideStores == limits.scalarBlockLayout || !variant.texels);
     return variant;
   };

@@ -74,7 +74,7 @@ TEST(Layout, RefusesWhatCannotStandSo) {
   EXPECT_FALSE(everyVariant(PipelineNeeds{.layout = bad}, {}, {}).ok());
   bad = {};
   bad.positions = VertexFormat::none;  // nothing at all
-  expectRefused(bad, 0, "positions cannot be in the format");
+  expectRefused(bad, 0, "positions cannot be stored as none");
   bad.positions = VertexFormat::snorm8x4;
   expectRefused(bad, 0, "snorm8x4");
 }
@@ -103,11 +103,11 @@ TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
             job.place(*placeVertices(needs.layout, 7, place * alignment));
             for (OutputAttribute* attribute : {&job.positions, &job.normals})
               attribute->offset -= attribute->format != VertexFormat::none ? outputOffset : 0;
-            job.mesh.byteSize = 16;
+            job.mesh.byteSize = 512;
             job.mesh.vertexCount = 7;
             job.mesh.hasNormals = true;
             const PoseDescription pose{1};
-            const Batch batch{{&pose, 1}, {&job, 1}, 16, 48, OutputSizes::oneBuffer(1 << 16)};
+            const Batch batch{{&pose, 1}, {&job, 1}, 512, 48, OutputSizes::oneBuffer(1 << 16)};
             Plan plan;
             ASSERT_TRUE(makePlan(batch, limits, {}, plan).ok());
             for (const Variant& variant : plan.variants()) {

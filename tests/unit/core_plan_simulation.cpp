@@ -363,7 +363,7 @@ class Simulation {
     ASSERT_TRUE(!variant.fullInfluences || (variant.influences == job.mesh.maxInfluences &&
                                             variant.influences == job.mesh.minInfluences));
     ASSERT_TRUE(variant.scales || !mayScale(job));
-    const std::vector<Variant> foreseen = everyVariant(job, limits_, tuning_);
+    const std::vector<Variant> foreseen = *everyVariant(job, limits_, tuning_);
     ASSERT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
     const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {

@@ -249,7 +249,7 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
       for (const Method method : allMethods) {
         Job job = layout;
         job.method = method;
-        const std::vector<Variant> all = everyVariant(job, limits, tuning);
+        const std::vector<Variant> all = *everyVariant(job, limits, tuning);
         std::set<std::uint64_t> unused;
         for (const Variant& variant : all) unused.insert(variant.key());
         EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
@@ -287,13 +287,13 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
     OwnedBatch batch = randomRichBatch(seed, 20, false);
     batch.outputSize += 96;
     for (const Job& job : batch.jobs) {
-      const std::vector<Variant> all = everyVariant(job, limits, {});
+      const std::vector<Variant> all = *everyVariant(job, limits, {});
       for (std::uint64_t moved = 0; moved < 96; moved += 8) {
         Job elsewhere = job;
         for (OutputAttribute* attribute : {&elsewhere.positions, &elsewhere.normals,
                                            &elsewhere.tangents, &elsewhere.previousPositions})
           attribute->offset += moved;
-        EXPECT_EQ(keysOf(everyVariant(elsewhere, limits, {})), keysOf(all));
+        EXPECT_EQ(keysOf(*everyVariant(elsewhere, limits, {})), keysOf(all));
         Batch alone = batch.batch();
         alone.jobs = {&elsewhere, 1};
         Plan plan;
@@ -343,7 +343,7 @@ TEST(Plan, EachPromiseLeavesPipelinesOut) {
     job.method = method;
     DeviceLimits limits;
     limits.promises = promises;
-    const std::vector<Variant> all = everyVariant(job, limits, {});
+    const std::vector<Variant> all = *everyVariant(job, limits, {});
     return static_cast<std::size_t>(std::ranges::count(all, Kernel::skin, &Variant::kernel));
   };
   for (const Method method : allMethods) {

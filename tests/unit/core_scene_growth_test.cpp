@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::uint64_t range = 65536;
 constexpr std::uint32_t vertices = 1000;  ///< of 24 bytes: three outputs in 65536 bytes, not more
+/// Of a packed mesh: header, and positions and normals.
+constexpr std::uint32_t meshBytes = 80 + 16 + 2 * 16 * vertices;
 
 MeshInfo meshInfo() {
   MeshInfo info;
@@ -22,7 +24,7 @@ MeshInfo meshInfo() {
   info.maxInfluences = 4;
   info.morphTargetCount = 2;
   info.hasNormals = true;
-  info.byteSize = 4096;
+  info.byteSize = meshBytes;
   return info;
 }
 
@@ -46,7 +48,7 @@ class SceneGrowthTest : public ::testing::Test {
   SceneGrowthTest() {
     description.limits.maxStorageBufferRange = range;
     description.limits.maxStorageBuffersPerStage = storageBuffersWanted;
-    description.meshCapacity = {4096};
+    description.meshCapacity = {meshBytes};
     description.outputCapacity = {range};
     description.growth = memory.callback();
   }
@@ -185,14 +187,14 @@ TEST_F(SceneGrowthTest, TheLeastIsAskedForWhereThereIsNoMemoryForTwice) {
 }
 
 TEST_F(SceneGrowthTest, MaximaThatAreNoWholeUnitsEndBeforeThem) {
-  description.meshCapacity = {4096, 3 * 4096 + 9};
+  description.meshCapacity = {meshBytes, 2 * meshBytes + 9};
   description.outputCapacity = {24'000, 72'003};
   create();
-  for (int i = 0; i < 2; ++i) EXPECT_TRUE(scene->addMesh(meshInfo()).ok());
-  expectRefused(scene->addMesh(meshInfo()), ErrorCode::limitExceeded, "of 12288 bytes");
+  EXPECT_TRUE(scene->addMesh(meshInfo()).ok());
+  expectRefused(scene->addMesh(meshInfo()), ErrorCode::limitExceeded, "of 64192 bytes");
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene->addInstance(instance).ok());
   expectRefused(scene->addInstance(instance), ErrorCode::limitExceeded, "of 72000 bytes");
-  EXPECT_EQ(scene->buffer(BufferRole::meshes).size, 12'288u);
+  EXPECT_EQ(scene->buffer(BufferRole::meshes).size, 2u * meshBytes);
   EXPECT_EQ(scene->buffer(BufferRole::positions).size, 72'000u);
   description.outputCapacity = {5, 6};
   EXPECT_EQ(Scene::buffer(description, BufferRole::positions).value().size, 8u);
@@ -237,10 +239,17 @@ TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
 
 TEST_F(SceneGrowthTest, MeshesThatAreNotPackedAreRefused) {
   create();
-  for (const std::uint32_t size : {0u, 8u, 4095u}) {
+  for (const std::uint32_t size : {0u, 8u, meshBytes + 8, meshBytes - 16}) {
     MeshInfo info = meshInfo();
     info.byteSize = size;
-    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument, std::to_string(size));
+    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument,
+                  "no packed mesh has 1000 vertices in " + std::to_string(size) + " bytes");
+  }
+  for (const std::uint32_t count : {0u, 1001u, 0xffffffffu}) {
+    MeshInfo info = meshInfo();
+    info.vertexCount = count;
+    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument,
+                  "no packed mesh has " + std::to_string(count) + " vertices");
   }
 }
 

@@ -82,7 +82,7 @@ struct VertexPlaces {
 };
 
 /// Places `vertexCount` vertices at byte `offset` of a buffer. Fails with `invalidArgument`
-/// - if the positions are not `isPositionFormat`;
+/// - if a member of the layout is none of the values that it may have;
 /// - if the stride is too small, or the layout is planar and has a stride;
 /// - if `offset` is not a multiple of `VertexPlaces::alignment`.
 DERMIS_CORE_API Result<VertexPlaces> placeVertices(const VertexLayout& layout,

@@ -272,7 +272,7 @@ struct Variant {
   std::uint16_t workgroupSize = 64;
 
   friend bool operator==(const Variant&, const Variant&) = default;
-  /// A number that differs between any two variants.
+  /// A number that differs between any two variants of plans or `everyVariant`.
   DERMIS_CORE_API std::uint64_t key() const;
 };
 
@@ -290,8 +290,12 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 /// fewer. `Promises` reduce the number further. With `scalarBlockLayout` and `texelBuffers` each
 /// skin kernel may be listed twice: with stores of up to 32 bytes, for jobs whose attributes are
 /// all aligned to the size of their stores, and with narrower stores, for all other jobs.
-DERMIS_CORE_API std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
-                                                  const Tuning& tuning);
+///
+/// Fails with `invalidArgument` if the job's method, motion or formats, the limits or the tuning
+/// are not valid.
+DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const Job& job,
+                                                          const DeviceLimits& limits,
+                                                          const Tuning& tuning);
 
 /// What pipelines depend on. It is known while loading.
 struct PipelineNeeds {
@@ -308,7 +312,8 @@ struct PipelineNeeds {
 };
 
 /// All variants for instances with these needs, at any offset that `placeVertices` accepts. With
-/// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does.
+/// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does, and with
+/// `invalidArgument` if the method, the limits or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);

@@ -286,7 +286,7 @@ class DERMIS_CORE_API Scene {
   /// Reserves memory for a packed mesh. The engine copies the bytes to `meshOffset` of the mesh
   /// buffer before the commands of the next plan, on the same queue. The first barrier of the plan
   /// covers the copy. Fails with `limitExceeded` if there is no room, with `invalidArgument` if a
-  /// promise is broken or `info` is not of a packed mesh, and with the errors of
+  /// promise is broken or no packed mesh has the sizes of `info`, and with the errors of
   /// `GrowthCallback::grow`.
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes into the mesh buffer
@@ -295,7 +295,8 @@ class DERMIS_CORE_API Scene {
 
   /// Reserves memory for a pose. Its contents are undefined: the engine must write identity
   /// matrices to `posePlace`, or write the pose before the next `plan`. Fails with
-  /// `invalidArgument` if `jointCount` is not from 1 to `maxPoseJoints`, and as `addMesh` does.
+  /// `invalidArgument` if `jointCount` is not from 1 to `maxPoseJoints` or the writer is not valid,
+  /// and as `addMesh` does.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
   /// writes are consecutive: each begins `jointCount` matrices after the one before it. If it
@@ -317,7 +318,7 @@ class DERMIS_CORE_API Scene {
   /// What `prepare` needs for such an instance with this mesh, pose and method. `everyVariant` then
   /// lists two kernels for most instances, instead of up to nine. Another mesh with the same
   /// minimum and maximum of influences, or another pose with the same `mayScale`, needs nothing
-  /// more.
+  /// more. Fails with `invalidArgument` if the method is not valid, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);

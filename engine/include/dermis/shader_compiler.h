@@ -64,8 +64,8 @@ class DERMIS_SHADER_COMPILER_API ShaderCompiler {
   /// - `shaderError` if it does not compile. The message is the first error of the compiler, as
   ///   "FILE:LINE: text", or "FILE: text" if it belongs to no line. FILE is the included file if
   ///   the error is in one;
-  /// - `invalidArgument` if a define is not a name and one line of text, or if the name of the
-  ///   source is not valid.
+  /// - `invalidArgument` if a define is not a name and one line of text, or if the name or stage of
+  ///   the source is not valid.
   Result<std::vector<std::uint32_t>> compile(const ShaderSource& source);
 
   /// Reads a file and compiles it. The extension selects the stage: .comp, .vert or .frag. Fails as

@@ -74,10 +74,10 @@ Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t ver
     return notAValue("the layout's arrangement", layout.arrangement, "Arrangement");
   if (layout.motion > Motion::reskinned)
     return notAValue("the layout's motion", layout.motion, "Motion");
-  if (!isPositionFormat(layout.positions)) {
-    return invalid("the layout's positions cannot be in the format " +
-                   std::string(formatName(layout.positions)));
-  }
+  if (Result<void> good =
+          checkFormats(layout.positions, layout.normals, layout.tangents, {"the layout"});
+      !good)
+    return good.error();
   const bool isPlanar = layout.arrangement == Arrangement::planar;
   if (isPlanar && layout.stride != 0) {
     return invalid("the layout is planar and has a stride; only interleaved layouts may have one");

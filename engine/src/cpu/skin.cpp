@@ -170,12 +170,12 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
                  " vertices need three floats each, but there are " +
                  std::to_string(positions.size()) + " floats");
   }
-  if (vertices.empty()) return {};
   Instance own;
   own.pose = instance.pose;
   own.mayScale = instance.mayScale;
   own.morphs = instance.morphs;
-  own.output = positions.data();
+  float none = 0;  // of an empty list
+  own.output = positions.empty() ? &none : positions.data();
   Job job;
   job.mesh = &mesh;
   job.method = method;
@@ -185,6 +185,7 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
   if (!places) return places.error();
   job.places = *places;
   if (Result<void> good = check(job); !good) return good;
+  if (vertices.empty()) return {};
   const MeshData selected = dataOf(mesh).select(vertices, own.morphs);
   own.morphs = {};
   job.vertexEnd = static_cast<std::uint32_t>(vertices.size());

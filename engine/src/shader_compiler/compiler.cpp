@@ -42,6 +42,10 @@ Result<void> checkSource(const ShaderSource& source) {
   if (source.name.find('"') != std::string::npos || hasLineBreak(source.name)) {
     return invalidArgument("a shader's name contains a quotation mark or a line break");
   }
+  if (source.stage > ShaderStage::fragment) {
+    return invalidArgument("the stage of shader '" + source.name +
+                           "' is not a value of ShaderStage");
+  }
   if (source.text.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return invalidArgument("shader '" + source.name + "' is longer than 2 GiB");
   }

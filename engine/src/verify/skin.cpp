@@ -73,6 +73,11 @@ Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> 
   const MeshReport report =
       validate(mesh, static_cast<std::uint32_t>(std::min<std::size_t>(pose.size(), maxPoseJoints)));
   if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
+  if (method > allMethods.back()) {
+    return Error{ErrorCode::invalidArgument, "the number " +
+                                                 std::to_string(static_cast<unsigned>(method)) +
+                                                 " is not a value of Method"};
+  }
   if (needsCentersOfRotation(method) && !mesh.centersOfRotation) {
     return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": " +
                                                  std::string(methodName(method)) +

@@ -6,6 +6,7 @@
 
 #include "abi.h"
 #include "dermis_kernels.h"
+#include "plan/check.h"
 
 namespace dermis::vulkan {
 
@@ -80,6 +81,7 @@ bool isAgainstBulge(Method method) {
 
 /// Must match the names in shaders/CMakeLists.txt.
 std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
+  if (!checkVariant(variant)) return {};
   const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   if (variant.kernel == Kernel::palette) {
     return variant.method == Method::linear      ? "palette_matrices"

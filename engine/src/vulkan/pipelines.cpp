@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "plan/check.h"
+
 namespace dermis::vulkan {
 
 namespace {
@@ -37,6 +39,7 @@ Pipelines::~Pipelines() {
 }
 
 Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
+  if (Result<void> good = checkVariant(variant); !good) return good;  // before `key`
   if (find(variant) != VK_NULL_HANDLE) return {};
   if (Result<void> good = checkFeatures(variant, limits_); !good) return good;
   while (true) {

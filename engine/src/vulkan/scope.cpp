@@ -9,6 +9,10 @@ namespace {
 
 constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 
+/// Of a number that is no value of its enum: a barrier with it is right for any use.
+constexpr Scope anyUse{VK_PIPELINE_STAGE_ALL_COMMANDS_BIT,
+                       VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT};
+
 Scope scopeOf(Consumer consumer) {
   switch (consumer) {
     case Consumer::vertexInput:
@@ -33,7 +37,7 @@ Scope scopeOf(Consumer consumer) {
     case Consumer::hostRead:
       return {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT};
   }
-  return {};
+  return anyUse;
 }
 
 // The structures of Vulkan 1.0 and of synchronization2 have the same members, except for the
@@ -101,14 +105,19 @@ Dependency inputScope(PreviousUse use) {
     case PreviousUse::previousRecord:
       return {{compute, VK_ACCESS_SHADER_WRITE_BIT}, uses};
   }
-  return {};
+  return {anyUse, uses};
 }
 
 // The kernels only read, so the source needs no access. The barrier before that `record` made the
 // earlier writes available. To write after them, the destination needs an access.
 Dependency overwriteScope(Writer writer) {
-  if (writer == Writer::compute) return {{compute, 0}, {compute, VK_ACCESS_SHADER_WRITE_BIT}};
-  return {{compute, 0}, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}};
+  switch (writer) {
+    case Writer::compute:
+      return {{compute, 0}, {compute, VK_ACCESS_SHADER_WRITE_BIT}};
+    case Writer::transfer:
+      return {{compute, 0}, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}};
+  }
+  return {{compute, 0}, anyUse};
 }
 
 Dependency outputScope(Consumer consumer, QueueTransfer transfer) {

@@ -64,8 +64,8 @@ struct SkinnedMesh {
 ///   handedness is multiplied by the sign of the determinant.
 ///
 /// Fails with `invalidMesh` if `pack` refuses the mesh for `pose.size()` joints, and with
-/// `invalidArgument` if the mesh lacks a morph target or the centers of rotation that the method
-/// needs.
+/// `invalidArgument` if the method is not valid, or if the mesh lacks a morph target or the centers
+/// of rotation that the method needs.
 DERMIS_VERIFY_API Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose,
                                            Method method, std::span<const MorphWeight> morphs = {});
 

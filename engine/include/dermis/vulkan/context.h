@@ -105,7 +105,8 @@ class DERMIS_VULKAN_API Context {
   Result<void> prepare(const PipelineNeeds& needs) const;
 
   /// Builds the pipelines of these variants. Pipelines that exist are skipped. For jobs whose
-  /// attributes are not placed by a `VertexLayout`: `everyVariant` lists their variants.
+  /// attributes are not placed by a `VertexLayout`: `everyVariant` lists their variants. Fails as
+  /// the other does, with `invalidArgument` for a variant that no plan uses.
   Result<void> prepare(std::span<const Variant> variants) const;
 
   /// Swaps kernels between two frames: creates every existing pipeline of these modules again, and

@@ -33,7 +33,8 @@
 
 namespace dermis::vulkan {
 
-/// The name of the module for a variant, on a device with these limits: "skin_texels".
+/// The name of the module for a variant, on a device with these limits: "skin_texels". Empty if the
+/// variant has a member that no plan uses.
 DERMIS_VULKAN_API std::string kernelName(const Variant& variant, const DeviceLimits& limits);
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The

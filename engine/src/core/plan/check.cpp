@@ -1,10 +1,13 @@
 #include "plan/check.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <string>
 
+#include "abi.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
@@ -13,19 +16,10 @@ namespace {
 constexpr std::uint64_t matrixAlignment = 16;
 
 Error wrongFormat(VertexFormat format, const char* name, const Subject& subject) {
+  if (format > allVertexFormats.back())
+    return notAValue(subject.name() + ": the format of its " + name, format, "VertexFormat");
   return invalid(subject.name() + ": its " + name + " cannot be stored as " +
                  std::string(formatName(format)));
-}
-
-Result<void> checkFormats(const Job& job, const Subject& subject) {
-  const VertexFormat positions = job.positions.format, normals = job.normals.format,
-                     tangents = job.tangents.format;
-  if (!isPositionFormat(positions)) return wrongFormat(positions, "positions", subject);
-  if (normals != VertexFormat::none && !isNormalFormat(normals))
-    return wrongFormat(normals, "normals", subject);
-  if (tangents != VertexFormat::none && !isTangentFormat(tangents))
-    return wrongFormat(tangents, "tangents", subject);
-  return {};
 }
 
 std::string placeOf(const OutputStreams& streams, std::size_t index, const Subject& subject) {
@@ -160,6 +154,17 @@ Error breaksPromise(const char* what, const char* promise, const Subject& subjec
 
 }  // namespace
 
+Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject) {
+  const std::uint64_t attributes =
+      std::uint64_t{1} + mesh.hasNormals + mesh.hasTangents + mesh.hasCentersOfRotation;
+  const std::uint64_t least = sizeof(abi::MeshHeader) + sizeof(abi::PositionRecord) +
+                              mesh.vertexCount * attributes * sizeof(abi::PositionRecord);
+  if (mesh.vertexCount != 0 && mesh.byteSize >= least && mesh.byteSize % packedMeshAlignment == 0)
+    return {};
+  return invalid(subject.name() + ": no packed mesh has " + std::to_string(mesh.vertexCount) +
+                 " vertices in " + std::to_string(mesh.byteSize) + " bytes");
+}
+
 Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
                                const Subject& subject) {
   if (promises.maxInfluences != 0 && mesh.maxInfluences > promises.maxInfluences)
@@ -190,9 +195,13 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
   return {};
 }
 
+Result<void> checkMotion(Motion motion, const Subject& subject) {
+  if (motion <= Motion::reskinned) return {};
+  return notAValue(subject.name() + ": its motion", motion, "Motion");
+}
+
 Result<void> checkMotion(const Batch& batch, const Job& job, const Subject& subject) {
-  if (job.motion > Motion::reskinned)
-    return notAValue(subject.name() + ": its motion", job.motion, "Motion");
+  if (Result<void> good = checkMotion(job.motion, subject); !good) return good;
   if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
     return invalid(subject.name() +
                    " settles or restarts its motion, but has no previous positions");
@@ -226,9 +235,52 @@ std::string Subject::name() const {
   return text;
 }
 
+Result<void> checkMethod(Method method, const Subject& subject) {
+  if (method <= allMethods.back()) return {};
+  return notAValue(subject.name() + ": its method", method, "Method");
+}
+
+Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
+                          const Subject& subject) {
+  if (!isPositionFormat(positions)) return wrongFormat(positions, "positions", subject);
+  if (normals != VertexFormat::none && !isNormalFormat(normals))
+    return wrongFormat(normals, "normals", subject);
+  if (tangents != VertexFormat::none && !isTangentFormat(tangents))
+    return wrongFormat(tangents, "tangents", subject);
+  return {};
+}
+
+Result<void> checkVariant(const Variant& variant) {
+  constexpr Subject subject{"the variant"};
+  if (variant.kernel > Kernel::clear)
+    return notAValue("the variant: its kernel", variant.kernel, "Kernel");
+  if (Result<void> good = checkMethod(variant.method, subject); !good) return good;
+  if (Result<void> good = checkMotion(variant.motion, subject); !good) return good;
+  if (Result<void> good =
+          checkFormats(variant.positions, variant.normals, variant.tangents, subject);
+      !good)
+    return good;
+  const auto isOneOf = [](std::uint32_t value, std::initializer_list<std::uint32_t> values) {
+    return std::ranges::find(values, value) != values.end();
+  };
+  const bool hasUnits = std::ranges::all_of(variant.units, [&](std::uint8_t unit) {
+    return isOneOf(unit, {1, 2, 4, 8, 12, 16});
+  });
+  if (!hasUnits || !isOneOf(variant.recordBytes, {0, 8, 12, 16, 24, 32}) ||
+      !isOneOf(variant.influences, {0, 1, 2, 4}))
+    return invalid("the variant's units, recordBytes or influences are none that a plan uses");
+  return checkTuning({variant.workgroupSize, variant.instancesPerInvocation});
+}
+
+Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
+  if (Result<void> good = checkMethod(needs.method, {"the instance"}); !good) return good.error();
+  return placeVertices(needs.layout, 1);
+}
+
 Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
                       const Subject& subject, const DeviceLimits& limits) {
   if (job.mesh.vertexCount == 0) return invalid(subject.name() + " has no mesh");
+  if (Result<void> good = checkMeshInfo(job.mesh, subject); !good) return good;
   if (job.meshOffset % packedMeshAlignment != 0)
     return notAMultiple(subject.name() + ": its meshOffset", job.meshOffset, packedMeshAlignment);
   if (job.meshOffset > batch.meshesSize || job.mesh.byteSize > batch.meshesSize - job.meshOffset) {
@@ -238,8 +290,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
   if (Result<void> good = checkPoseOf(batch, job, job.pose, subject); !good) return good;
-  if (job.method > allMethods.back())
-    return notAValue(subject.name() + ": its method", job.method, "Method");
+  if (Result<void> good = checkMethod(job.method, subject); !good) return good;
   if (isForComparison(job.method) && !limits.comparisonMethods) {
     return Error{ErrorCode::missingFeature,
                  subject.name() +
@@ -251,7 +302,10 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
     return invalid(subject.name() + ": " + std::string(methodName(job.method)) +
                    " needs centers of rotation, but its mesh has none");
   }
-  if (Result<void> good = checkFormats(job, subject); !good) return good;
+  if (Result<void> good =
+          checkFormats(job.positions.format, job.normals.format, job.tangents.format, subject);
+      !good)
+    return good;
   if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
     return invalid(subject.name() + " has normals in its output, but its mesh has none");
   if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)

@@ -36,8 +36,20 @@ struct Subject {
 
 Result<void> checkLimits(const DeviceLimits& limits);
 
+/// Whether the number is a value of `Method`.
+DERMIS_CORE_API Result<void> checkMethod(Method method, const Subject& subject);
+/// Whether positions, normals and tangents may have these formats.
+Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
+                          const Subject& subject);
+/// Whether all members have values that plans use. `Variant::key` is then unique.
+DERMIS_CORE_API Result<void> checkVariant(const Variant& variant);
+/// Where one vertex is placed with this layout. Fails unless all members are valid.
+Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs);
+
 /// Whether the values are allowed.
 DERMIS_CORE_API Result<void> checkPromises(const Promises& promises);
+/// Whether a packed mesh can have these sizes.
+Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject);
 /// Whether a mesh or a pose keeps the promises.
 Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
                                const Subject& subject);

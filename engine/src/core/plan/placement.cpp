@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "plan/check.h"
+
 namespace dermis {
 
 const char* streamName(std::size_t stream) {
@@ -342,8 +344,11 @@ void appendForms(Variant variant, const FormRanges& ranges, const Promises& prom
 
 }  // namespace
 
-std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
-                                  const Tuning& tuning) {
+Result<std::vector<Variant>> everyVariant(const Job& job, const DeviceLimits& limits,
+                                          const Tuning& tuning) {
+  if (Result<void> good = checkLimits(limits); !good) return good.error();
+  if (Result<void> good = checkTuning(tuning); !good) return good.error();
+  if (Result<void> good = checkVariant(outputVariant(job)); !good) return good.error();
   const FormRanges ranges({}, {}, limits.promises);
   std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   for (const bool areAligned : {false, true})
@@ -353,7 +358,9 @@ std::vector<Variant> everyVariant(const Job& job, const DeviceLimits& limits,
 
 Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
                                           const Tuning& tuning) {
-  const Result<VertexPlaces> places = placeVertices(needs.layout, 1);
+  if (Result<void> good = checkLimits(limits); !good) return good.error();
+  if (Result<void> good = checkTuning(tuning); !good) return good.error();
+  const Result<VertexPlaces> places = checkNeeds(needs);
   if (!places) return places.error();
   Job job;
   job.method = needs.method;

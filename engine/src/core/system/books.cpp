@@ -85,11 +85,7 @@ PlanSizes sceneSizes(const SceneDescription& description) {
 // -- Meshes and poses.
 
 Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info) {
-  if (info.byteSize == 0 || info.byteSize % packedMeshAlignment != 0) {
-    return invalid("the mesh has " + std::to_string(info.byteSize) +
-                   " bytes; a packed mesh has a multiple of " +
-                   std::to_string(packedMeshAlignment));
-  }
+  if (Result<void> good = checkMeshInfo(info, {"the mesh"}); !good) return good.error();
   if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
       !kept)
     return kept.error();
@@ -117,6 +113,8 @@ Result<void> SceneBooks::addPoses(std::span<PoseHandle> poses, std::uint32_t joi
     return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
+  if (options.writer > PoseWriter::gpu)
+    return notAValue("the writer of the pose", options.writer, "PoseWriter");
   if (Result<void> kept =
           checkPromisedPose(options.mayScale, description_.limits.promises, {"the pose"});
       !kept)

@@ -98,6 +98,8 @@ BufferRequirement Scene::buffer(BufferRole role) const {
 Result<BufferRequirement> Scene::buffer(const SceneDescription& description, BufferRole role) {
   const SceneDescription usual = rounded(description);
   if (Result<void> good = checkDescription(usual); !good) return good.error();
+  if (static_cast<std::size_t>(role) >= bufferRoleCount)
+    return notAValue("the role of the buffer", role, "BufferRole");
   return sceneSizes(usual).requirement(role, 0, usual.limits);
 }
 std::uint32_t Scene::poseBufferCount() const {
@@ -151,6 +153,7 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
   const ScenePose* pose = books_->poses().find(description.pose);
   if (pose == nullptr) return unknownHandle("pose", description.pose);
   PipelineNeeds needs = dermis::pipelineNeeds(description);
+  if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   needs.mesh = mesh->info;
   needs.mayScale = pose->mayScale;
   return needs;

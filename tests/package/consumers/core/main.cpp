@@ -208,7 +208,7 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   // What an engine prepares that knows nothing but its vertex and the methods that it uses.
   std::vector<Variant> foreseen;
   for (const Job& job : jobs) {
-    const std::vector<Variant> ofMethod = everyVariant(job, {}, tuning);
+    const std::vector<Variant> ofMethod = *everyVariant(job, {}, tuning);
     foreseen.insert(foreseen.end(), ofMethod.begin(), ofMethod.end());
   }
   for (const Variant& variant : plan.variants()) {

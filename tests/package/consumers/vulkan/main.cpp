@@ -36,7 +36,7 @@ bool hasKernels() {
   job.positions = {0, 16, VertexFormat::float16x4};
   job.normals = {8, 16, VertexFormat::octahedral16x2};
   job.tangents = {12, 16, VertexFormat::octahedral16x2};
-  const std::vector<Variant> variants = everyVariant(job, DeviceLimits{}, Tuning{});
+  const std::vector<Variant> variants = *everyVariant(job, DeviceLimits{}, Tuning{});
   std::printf("%zu variants\n", variants.size());
   for (const std::uint32_t buffers : {storageBuffersWanted, 4u}) {
     DeviceLimits limits;

@@ -1,0 +1,518 @@
+// Every public function that takes an enum, with every number that the enum can hold: a number that
+// is no value is refused, and leaves nothing behind. An engine may read enums from a file.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core_plan_simulation.h"
+#include "dermis/bounds.h"
+#include "dermis/centers_of_rotation.h"
+#include "dermis/cpu/skin.h"
+#include "dermis/cpu/skinning_system.h"
+#include "dermis/gltf.h"
+#include "dermis/shader_compiler.h"
+#include "dermis/validate.h"
+#include "dermis/verify/accuracy.h"
+#include "dermis/vulkan/acceleration_structure.h"
+#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/vulkan.h"
+#include "mock_batch.h"
+#include "scene_meshes.h"
+#include "test_paths.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint32_t vertexCount = 20, jointCount = 4;
+
+template <typename Enum>
+Enum number(std::uint32_t value) {
+  return static_cast<Enum>(value);
+}
+
+template <typename T>
+bool isInvalid(const Result<T>& result) {
+  return !result.ok() && result.error().code == ErrorCode::invalidArgument;
+}
+
+/// What one instance is skinned with: the enums that most functions take.
+struct Choice {
+  Method method = Method::dualQuaternion;
+  /// Strides that are large enough for every format.
+  VertexLayout layout{VertexFormat::float32x4, VertexFormat::float32x4, VertexFormat::float32x4,
+                      Motion::kept, dermis::Arrangement::planar};
+};
+
+class EnumValuesTest : public MockContextTest {
+ protected:
+  void SetUp() override {
+    VkPhysicalDevice8BitStorageFeatures bytes{};
+    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+    VkPhysicalDevice16BitStorageFeatures halves{};
+    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
+    halves.pNext = &bytes;
+    bytes.storageBuffer8BitAccess = halves.storageBuffer16BitAccess = VK_TRUE;
+    create(true, {}, &halves);
+    SceneDescription ofScene;
+    ofScene.limits = richLimits();
+    scene_.emplace(must(Scene::create(ofScene)));
+    instance_.mesh = must(scene_->addMesh(packed_.info()));
+    instance_.pose = must(scene_->addPose(jointCount));
+    instance_.box = box_;
+    system_.emplace(must(cpu::SkinningSystem::create({})));
+    ofSystem_ = instance_;
+    ofSystem_.mesh = must(system_->addMesh(packed_));
+    ofSystem_.pose = must(system_->addPose(jointCount));
+  }
+
+  InstanceDescription chosen(InstanceDescription instance, const Choice& choice) const {
+    instance.method = choice.method;
+    instance.layout = choice.layout;
+    return instance;
+  }
+  PipelineNeeds needs(const Choice& choice) const {
+    return {.method = choice.method, .layout = choice.layout, .mesh = packed_.info()};
+  }
+  static VertexPlaces places(const Choice& choice) {
+    VertexPlaces places = must(placeVertices(Choice().layout, vertexCount));
+    places.positions.format = choice.layout.positions;
+    places.normals.format = choice.layout.normals;
+    places.tangents.format = choice.layout.tangents;
+    places.motion = choice.layout.motion;
+    return places;
+  }
+  Job job(const Choice& choice) const {
+    Job job;
+    job.mesh = packed_.info();
+    job.method = choice.method;
+    job.place(places(choice));
+    job.box = box_;
+    return job;
+  }
+  Result<void> plan(const Job& job) const {
+    const PoseDescription pose{jointCount};
+    Plan plan;
+    return makePlan({{&pose, 1},
+                     {&job, 1},
+                     job.mesh.byteSize,
+                     jointCount * sizeof(JointMatrix),
+                     OutputSizes::oneBuffer(1 << 16)},
+                    richLimits(), {}, plan);
+  }
+  static Variant variant(const Choice& choice) {
+    Variant variant;
+    variant.method = choice.method;
+    variant.positions = choice.layout.positions;
+    variant.normals = choice.layout.normals;
+    variant.tangents = choice.layout.tangents;
+    variant.motion = choice.layout.motion;
+    return variant;
+  }
+  Result<void> skin(const Choice& choice) {
+    cpu::Instance instance;
+    instance.pose = pose_;
+    instance.output = output_.data();
+    instance.box = box_;
+    instance.restartsMotion = choice.layout.motion == Motion::reskinned;
+    cpu::Job job;
+    job.mesh = &mesh_;
+    job.method = choice.method;
+    job.places = places(choice);
+    job.instances = {&instance, 1};
+    return cpu::skin(job);
+  }
+  template <typename System>
+  static Result<void> add(System& system, const InstanceDescription& instance) {
+    const Result<InstanceHandle> added = system.addInstance(instance);
+    return added ? system.removeInstance(*added) : added.error();
+  }
+  Result<void> change(const Choice& choice) {
+    const InstanceHandle handle = must(scene_->addInstance(instance_));
+    Result<void> changed = scene_->change({.instance = handle, .method = choice.method});
+    must(scene_->removeInstance(handle));
+    return changed;
+  }
+
+  template <typename T>
+  static Result<void> verdict(const Result<T>& result) {
+    return result ? Result<void>() : result.error();
+  }
+
+  /// A function, what it reads of a choice, and what it refuses although it is valid.
+  struct Entry {
+    std::string name;
+    std::function<Result<void>(const Choice&)> call;
+    std::set<std::string> reads;
+    std::function<bool(const Choice&)> excepts = [](const Choice&) { return false; };
+  };
+  std::vector<Entry> entries() {
+    const std::set<std::string> formats{"positions", "normals", "tangents"};
+    std::set<std::string> layout = formats, attributes = formats;
+    layout.insert({"motion", "arrangement"});
+    attributes.insert({"motion", "method"});
+    std::set<std::string> all = layout;
+    all.insert("method");
+    const auto isReskinned = [](const Choice& choice) {
+      return choice.layout.motion == Motion::reskinned;
+    };
+    const auto isForComparison = [](const Choice& choice) {
+      return dermis::isForComparison(choice.method);
+    };
+    return {
+        {"placeVertices",
+         [](const Choice& choice) { return verdict(placeVertices(choice.layout, vertexCount)); },
+         layout},
+        {"vulkan::vertexInput",
+         [](const Choice& choice) { return verdict(vulkan::vertexInput(choice.layout)); }, layout,
+         [](const Choice& choice) {
+           return std::ranges::any_of(
+               std::array{choice.layout.positions, choice.layout.normals, choice.layout.tangents},
+               [](VertexFormat format) {
+                 return format != VertexFormat::none &&
+                        vulkan::vertexInputFormat(format) == VK_FORMAT_UNDEFINED;
+               });
+         }},
+        {"everyVariant of needs",
+         [this](const Choice& choice) {
+           return verdict(everyVariant(needs(choice), richLimits(), {}));
+         },
+         all},
+        {"everyVariant of a job",
+         [this](const Choice& choice) {
+           return verdict(everyVariant(job(choice), richLimits(), {}));
+         },
+         attributes},
+        {"Context::prepare of needs",
+         [this](const Choice& choice) { return context->prepare(needs(choice)); }, all},
+        {"Context::prepare of variants",
+         [this](const Choice& choice) {
+           const Variant one = variant(choice);
+           return context->prepare({&one, 1});
+         },
+         attributes},
+        {"makePlan", [this](const Choice& choice) { return plan(job(choice)); }, attributes},
+        {"Scene::pipelineNeeds",
+         [this](const Choice& choice) {
+           return verdict(scene_->pipelineNeeds(chosen(instance_, choice)));
+         },
+         all},
+        {"Scene::addInstance",
+         [this](const Choice& choice) { return add(*scene_, chosen(instance_, choice)); }, all,
+         isReskinned},
+        {"Scene::change", [this](const Choice& choice) { return change(choice); }, {"method"}},
+        {"cpu::SkinningSystem::addInstance",
+         [this](const Choice& choice) { return add(*system_, chosen(ofSystem_, choice)); }, all,
+         [=](const Choice& choice) { return isReskinned(choice) || isForComparison(choice); }},
+        {"cpu::skin", [this](const Choice& choice) { return skin(choice); }, attributes,
+         isForComparison},
+        {"cpu::skinVertices",
+         [this](const Choice& choice) {
+           cpu::Instance instance;
+           instance.pose = pose_;
+           return cpu::skinVertices(mesh_, choice.method, instance, {}, {});
+         },
+         {"method"},
+         isForComparison},
+        {"reference::skin",
+         [this](const Choice& choice) {
+           return verdict(reference::skin(source_.view(), pose_, choice.method));
+         },
+         {"method"}},
+        {"compareWithReference",
+         [this](const Choice& choice) { return compare(choice); },
+         {"positions", "normals", "tangents"},
+         [](const Choice& choice) {
+           return choice.layout.normals == VertexFormat::none ||
+                  choice.layout.tangents == VertexFormat::none;
+         }},
+    };
+  }
+  Result<void> compare(const Choice& choice) {
+    const auto attribute = [&](VertexFormat format) {
+      return SkinnedAttribute{output_.data(), vertexCount, 16, format};
+    };
+    SkinnedView view{attribute(choice.layout.positions), attribute(choice.layout.normals),
+                     attribute(choice.layout.tangents), box_};
+    return verdict(
+        compareWithReference(must(reference::skin(source_.view(), pose_, Method::linear)), view));
+  }
+
+  /// Passes 0 to 255 in one member of the choice to every function that reads it.
+  void expectChecked(const std::string& member,
+                     const std::function<void(Choice&, std::uint32_t)>& set,
+                     const std::function<bool(std::uint32_t)>& isValue) {
+    for (std::uint32_t value = 0; value < 256; ++value) {
+      Choice choice;
+      set(choice, value);
+      for (const Entry& entry : entries()) {
+        if (!entry.reads.contains(member)) continue;
+        SCOPED_TRACE(entry.name + ", " + member + " " + std::to_string(value));
+        const int pipelines = mock.alive["Pipeline"];
+        const Result<void> done = entry.call(choice);
+        if (isValue(value) && entry.excepts(choice)) continue;
+        EXPECT_EQ(isInvalid(done), !isValue(value)) << (done ? "ok" : done.error().message);
+        EXPECT_TRUE(isValue(value) || mock.alive["Pipeline"] == pipelines);
+      }
+    }
+  }
+
+  OwnedMesh source_ = [] {
+    OwnedMesh mesh = randomMesh(1, vertexCount, jointCount, 4);
+    addTangents(mesh, 2);
+    return mesh;
+  }();
+  PackedMesh packed_ = must(pack(source_.view(), jointCount));
+  cpu::Mesh mesh_ = must(cpu::Mesh::create(packed_));
+  Pose pose_ = systemPose(1, jointCount);
+  Box box_{{-100, -100, -100}, {100, 100, 100}};
+  std::vector<std::byte> output_{4 * 16 * (vertexCount + 3)};
+  std::optional<Scene> scene_;
+  std::optional<cpu::SkinningSystem> system_;
+  InstanceDescription instance_, ofSystem_;
+};
+
+TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
+  const auto isFormat = [](bool (*allows)(VertexFormat), bool mayBeNone) {
+    return [=](std::uint32_t value) {
+      return allows(number<VertexFormat>(value)) || (mayBeNone && value == 0);
+    };
+  };
+  expectChecked(
+      "method", [](Choice& choice, std::uint32_t value) { choice.method = number<Method>(value); },
+      [](std::uint32_t value) { return value < allMethods.size(); });
+  expectChecked(
+      "positions",
+      [](Choice& choice, std::uint32_t value) {
+        choice.layout.positions = number<VertexFormat>(value);
+      },
+      isFormat(isPositionFormat, false));
+  expectChecked(
+      "normals",
+      [](Choice& choice, std::uint32_t value) {
+        choice.layout.normals = number<VertexFormat>(value);
+      },
+      isFormat(isNormalFormat, true));
+  expectChecked(
+      "tangents",
+      [](Choice& choice, std::uint32_t value) {
+        choice.layout.tangents = number<VertexFormat>(value);
+      },
+      isFormat(isTangentFormat, true));
+  expectChecked(
+      "motion",
+      [](Choice& choice, std::uint32_t value) { choice.layout.motion = number<Motion>(value); },
+      [](std::uint32_t value) { return value <= 2; });
+  expectChecked(
+      "arrangement",
+      [](Choice& choice, std::uint32_t value) {
+        choice.layout.arrangement = number<dermis::Arrangement>(value);
+      },
+      [](std::uint32_t value) { return value <= 1; });
+}
+
+// A key of a variant has few bits for each member. A number that spills into the next member would
+// stand for another variant, whose instances would then be skinned by the wrong pipeline.
+TEST_F(EnumValuesTest, NoVariantPoisonsThePipelinesOfAnother) {
+  const auto expectOnly = [&](auto member, std::set<std::uint32_t> good, const char* name) {
+    for (std::uint32_t value = 0; value < 256; ++value) {
+      SCOPED_TRACE(name + (" " + std::to_string(value)));
+      Variant variant;
+      variant.*member = static_cast<std::remove_reference_t<decltype(variant.*member)>>(value);
+      const int pipelines = mock.alive["Pipeline"];
+      EXPECT_EQ(isInvalid(context->prepare({&variant, 1})), !good.contains(value));
+      EXPECT_EQ(vulkan::kernelName(variant, context->limits()).empty(), !good.contains(value));
+      EXPECT_TRUE(good.contains(value) || mock.alive["Pipeline"] == pipelines);
+    }
+  };
+  expectOnly(&Variant::kernel, {0, 1, 2, 3}, "kernel");
+  expectOnly(&Variant::recordBytes, {0, 8, 12, 16, 24, 32}, "recordBytes");
+  expectOnly(&Variant::influences, {0, 1, 2, 4}, "influences");
+  expectOnly(&Variant::workgroupSize, {8, 16, 32, 64, 128}, "workgroupSize");
+  std::set<std::uint32_t> upTo32;
+  for (std::uint32_t instances = 1; instances <= 32; ++instances) upTo32.insert(instances);
+  expectOnly(&Variant::instancesPerInvocation, upTo32, "instancesPerInvocation");
+  for (const std::uint8_t unit : std::array<std::uint8_t, 6>{0, 3, 5, 20, 32, 255}) {
+    Variant variant;
+    variant.units[2] = unit;
+    EXPECT_TRUE(isInvalid(context->prepare({&variant, 1}))) << int{unit};
+  }
+  // Tunings that plans refuse have no variants, for the same reason.
+  for (const Tuning& tuning : {Tuning{.workgroupSize = 65600}, Tuning{.workgroupSize = 256},
+                               Tuning{.instancesPerInvocation = 64}}) {
+    EXPECT_TRUE(isInvalid(everyVariant(needs({}), {}, tuning)));
+    EXPECT_TRUE(isInvalid(everyVariant(job({}), {}, tuning)));
+  }
+}
+
+TEST_F(EnumValuesTest, RolesAndWritersAreChecked) {
+  vulkan::SkinningSystemDescription ofSystem;
+  ofSystem.context = &*context;
+  Plan plan;
+  for (std::uint32_t value = 0; value < 256; ++value) {
+    SCOPED_TRACE(value);
+    const auto role = number<BufferRole>(value);
+    const bool isRole = value < bufferRoleCount;
+    EXPECT_EQ(isInvalid(Scene::buffer(SceneDescription{}, role)), !isRole);
+    EXPECT_EQ(isInvalid(vulkan::SkinningSystem::requirement(ofSystem, role)), !isRole);
+    if (!isRole) {
+      EXPECT_EQ(scene_->buffer(role).size, 0u);
+      EXPECT_EQ(plan.buffer(role).size, 0u);
+    }
+
+    const PoseOptions options{.writer = number<PoseWriter>(value)};
+    const std::uint32_t buffers = scene_->poseBufferCount();
+    EXPECT_EQ(isInvalid(scene_->addPose(jointCount, options)), value > 1);
+    EXPECT_EQ(isInvalid(system_->addPose(jointCount, options)), value > 0);
+    EXPECT_TRUE(value < 2 || scene_->poseBufferCount() == buffers);
+  }
+}
+
+TEST_F(EnumValuesTest, ComponentTypesAreChecked) {
+  struct Member {
+    std::function<AttributeView&(MeshView&, InfluenceSet&)> of;
+    std::set<ComponentType> allowed;
+  };
+  using enum ComponentType;
+  const std::set<ComponentType> directions{float32, float16, snorm8, snorm16};
+  const std::set<ComponentType> shares{float32, unorm8, unorm16};
+  const std::array<Member, 8> members{
+      {{[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.positions; },
+        {float32, float16, snorm16, unorm16}},
+       {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.normals; }, directions},
+       {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.tangents; }, directions},
+       {[](MeshView&, InfluenceSet& set) -> AttributeView& { return set.joints; },
+        {uint8, uint16, uint32}},
+       {[](MeshView&, InfluenceSet& set) -> AttributeView& { return set.weights; }, shares},
+       {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.dualQuaternionWeights; },
+        shares},
+       {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.bulgeStrengths; },
+        shares},
+       {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.centersOfRotation; },
+        {float32}}}};
+  const std::array<std::uint32_t, 3> triangle{0, 1, 2};
+  for (std::size_t index = 0; index < members.size(); ++index) {
+    for (std::uint32_t value = 0; value < 256; ++value) {
+      MeshView view = source_.view();
+      InfluenceSet set = view.influenceSets[0];
+      view.influenceSets = {&set, 1};
+      members[index].of(view, set).type = number<ComponentType>(value);
+      if (members[index].allowed.contains(number<ComponentType>(value))) continue;
+      SCOPED_TRACE("attribute " + std::to_string(index) + ", type " + std::to_string(value));
+      EXPECT_FALSE(validate(view, jointCount).repairable());
+      EXPECT_FALSE(repair(view, jointCount).ok());
+      EXPECT_FALSE(pack(view, jointCount).ok());
+      EXPECT_FALSE(jointBounds(view, jointCount).ok());
+      EXPECT_FALSE(reference::skin(view, pose_, Method::linear).ok());
+      const bool isCenter = index + 1 == members.size();  // which the solver ignores
+      EXPECT_EQ(CenterOfRotationSolver::make(view, jointCount, triangle).ok(), isCenter);
+    }
+  }
+}
+
+TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
+  const std::array<std::byte, 16> bytes{};
+  for (std::uint32_t value = 0; value < 256; ++value) {
+    SCOPED_TRACE(value);
+    const auto method = number<Method>(value);
+    const auto format = number<VertexFormat>(value);
+    if (value >= allMethods.size()) {
+      EXPECT_EQ(methodName(method), "unknown");
+      EXPECT_FALSE(isForComparison(method) || needsCentersOfRotation(method));
+      EXPECT_EQ(skinnedBounds({}, pose_, method).max[0], INFINITY);
+    }
+    if (value > allVertexFormats.size()) {
+      EXPECT_EQ(formatSize(format), 0u);
+      EXPECT_EQ(formatAlignment(format), 1u);
+      EXPECT_EQ(formatName(format), formatName(VertexFormat::none));
+      EXPECT_FALSE(isPositionFormat(format) || isNormalFormat(format) || isTangentFormat(format));
+      EXPECT_EQ(decodePosition(format, bytes.data(), box_), (std::array<double, 3>{}));
+      EXPECT_EQ(decodeNormal(format, bytes.data()), (std::array<double, 3>{}));
+      EXPECT_EQ(decodeTangent(format, bytes.data()), (std::array<double, 4>{}));
+      EXPECT_EQ(vulkan::vertexInputFormat(format), VK_FORMAT_UNDEFINED);
+      EXPECT_EQ(vulkan::buildInputFormat(format), VK_FORMAT_UNDEFINED);
+      EXPECT_FALSE(vulkan::buildInput({0, 16, format}, 1, 16).ok());
+      EXPECT_EQ(positionFormatBound(format, {1, 1, 1}, box_), 0);
+      EXPECT_EQ(normalFormatBound(format), 0);
+      EXPECT_EQ(tangentFormatBound(format), 0);
+    }
+    VertexLayout layout;
+    layout.arrangement = number<dermis::Arrangement>(value);
+    const VertexPlaces places = must(placeVertices({}, vertexCount));
+    EXPECT_EQ(vulkan::vertexBufferOffsets(layout, places)[0], places.positions.offset);
+    EXPECT_EQ(componentSize(number<ComponentType>(value)) == 0, value > 8);
+    EXPECT_EQ(errorCodeName(number<ErrorCode>(value)) == "unknown", value > 11);
+    const auto problem = number<MeshProblem>(value);
+    EXPECT_EQ(meshProblemName(problem) == std::string("unknown"), value > 17);
+    EXPECT_TRUE(value < 18 || !refusedByPack(problem));
+    EXPECT_EQ(MeshReport().find(problem), nullptr);
+
+    // Barriers that Vulkan accepts: with stages on both sides.
+    for (const vulkan::Dependency& dependency :
+         {vulkan::inputScope(number<vulkan::PreviousUse>(value)),
+          vulkan::overwriteScope(number<vulkan::Writer>(value)),
+          vulkan::outputScope(number<vulkan::Consumer>(value)),
+          vulkan::outputScope(vulkan::Consumer::compute, number<vulkan::QueueTransfer>(value))}) {
+      EXPECT_NE(dependency.source.stages, 0u);
+      EXPECT_NE(dependency.destination.stages, 0u);
+    }
+    if (value > 1) {
+      EXPECT_EQ(vulkan::overwriteScope(number<vulkan::Writer>(value)).destination.stages,
+                VkPipelineStageFlags{VK_PIPELINE_STAGE_ALL_COMMANDS_BIT});
+    }
+
+    ShaderCompiler compiler;
+    ShaderSource shader{"s", "void main() {}", number<ShaderStage>(value), {}};
+    EXPECT_TRUE(value <= 2 || isInvalid(compiler.compile(shader)));
+
+    gltf::Model model;
+    model.nodes.resize(1);
+    model.nodeOrder = {0};
+    gltf::Channel channel{
+        0,      gltf::ChannelPath::translation, number<gltf::Interpolation>(value), 3,
+        {0, 1}, std::vector<float>(18, 1.0f)};
+    model.clips.resize(1);
+    model.clips[0].channels = {channel};
+    EXPECT_EQ(gltf::nodeGlobals(model, 0, 0.5)[0][0][3], 1);
+    model.clips[0].channels[0].path = number<gltf::ChannelPath>(value);
+    if (value > 3) {
+      EXPECT_EQ(gltf::nodeGlobals(model, 0, 0.5), gltf::nodeGlobals(model, gltf::none, 0));
+      EXPECT_TRUE(gltf::morphWeights(model, 0, 0, 0.5).empty());
+    }
+  }
+}
+
+/// A new enum is missing here, and so are the functions that take it.
+TEST_F(EnumValuesTest, NoEnumIsMissing) {
+  const std::set<std::string> known{
+      "Method", "VertexFormat", "Motion", "Arrangement", "Kernel", "BufferRole", "PoseWriter",
+      "ComponentType", "MeshProblem", "ErrorCode", "PreviousUse", "Writer", "Consumer",
+      "QueueTransfer", "ShaderStage", "Interpolation", "ChannelPath",
+      // No function reads one: an index of arrays, and what functions return.
+      "Stream", "Access", "BufferUse", "AlphaMode", "Wrap"};
+  std::set<std::string> found;
+  const std::regex declaration("enum class (\\w+)");
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+           std::filesystem::path(sourceFolder) / "engine/include")) {
+    std::ifstream file(entry.path());
+    for (std::string line; std::getline(file, line);) {
+      std::smatch match;
+      if (std::regex_search(line, match, declaration)) found.insert(match[1]);
+    }
+  }
+  EXPECT_EQ(found, known);
+}
+
+}  // namespace
+}  // namespace dermis::test
