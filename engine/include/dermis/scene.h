@@ -398,10 +398,12 @@ class DERMIS_CORE_API Scene {
   Result<void> abandonFrame(std::uint64_t frame);
 
   /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
-  /// frame in ascending order, before the buffer is used again. Fails with `invalidArgument` if the
-  /// frame is not one of the last `framesInFlight` that were committed, or if `bytes` is smaller
-  /// than what the frame copied there; `Plan::buffer(BufferRole::readBack)` returned that size. For
-  /// frames that copied nothing, `bytes` may be empty.
+  /// frame in ascending order, before the buffer is used again. Boxes of a frame that is left out
+  /// are missing until the instance is skinned again. Fails with `invalidArgument` if the frame is
+  /// not complete, not newer than the last one that was read back, or not one of the last
+  /// `framesInFlight` that were committed, and if `bytes` is smaller than what the frame copied
+  /// there; `Plan::buffer(BufferRole::readBack)` returned that size. For frames that copied
+  /// nothing, `bytes` may be empty.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits. Spans are valid

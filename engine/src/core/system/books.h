@@ -107,8 +107,8 @@ struct SceneInstance {
   std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
 
   // Of those culled on the GPU.
-  std::uint32_t version = 0;         ///< of what it should show
-  std::uint32_t restartVersion = 0;  ///< the one that restarts its motion
+  std::uint32_t version = 0;     ///< of what it should show, as of the last record
+  bool versionRestarts = false;  ///< whether that version restarts its motion
   std::uint32_t culledIndex = notUsed;
 
   // Rarely read.
@@ -239,7 +239,8 @@ class SceneBooks {
   std::uint32_t slotsOf(PoseWriter writer) const {
     return writer == PoseWriter::cpu ? description_.framesInFlight : 1;
   }
-  bool makeSlot();
+  bool hasSlot() const;
+  void makeSlot();
 
   // gather.cpp
   void gatherPoses();
@@ -295,7 +296,10 @@ class SceneBooks {
   std::uint64_t planNumber_ = 0;
   std::vector<std::uint32_t> due_;
   std::vector<std::uint32_t> settling_;
-  std::vector<std::uint32_t> versioned_;  ///< culled, with something new to show
+  struct Versioned {
+    std::uint32_t index, version;
+  };
+  std::vector<Versioned> versioned_;  ///< culled, with something new to show
   struct Conversion {
     PoseHandle pose;
     std::size_t form;
@@ -327,6 +331,8 @@ class SceneBooks {
     struct Instance {
       InstanceHandle handle;
       bool restartsMotion, isUrgent, isMoving, isFirst;
+      bool versionRestarts;
+      std::uint32_t version;
     };
     struct Shift {
       InstanceHandle handle;
@@ -343,8 +349,8 @@ class SceneBooks {
   std::uint32_t clearHistory_ = 0;   ///< records of the history that are clear, or in use
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
   CullingStatistics culling_;
-  std::vector<InstanceResult> latestResults_;  ///< each of the newest complete frame that wrote it
-  std::uint64_t latestResultsFrame_ = 0;
+  std::vector<InstanceResult> latestResults_;  ///< by number, as they were last read back …
+  std::vector<std::uint64_t> resultFrames_;    ///< … in these frames
 };
 
 }  // namespace dermis

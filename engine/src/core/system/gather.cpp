@@ -10,11 +10,11 @@
 namespace dermis {
 namespace {
 
-std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion) {
+std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion, bool restarts) {
   std::uint32_t flags = instance.extras.result != notUsed ? abi::INSTANCE_HAS_RESULT : 0u;
   if (hasMotion) {
     flags |= abi::INSTANCE_HAS_MOTION;
-    if (instance.restartVersion == instance.version) flags |= abi::INSTANCE_RESTARTS;
+    if (restarts) flags |= abi::INSTANCE_RESTARTS;
   }
   return flags;
 }
@@ -130,10 +130,11 @@ void SceneBooks::gatherCulled() {
     SceneInstance& instance = instances_.at(index);
     const InstanceState& state = states_[index];
     if (!state.isVisible) continue;
-    if (instance.version == 0 || (state.isStale && isDue(state, instance.pose))) {
-      instance.version = ++nextVersion_;
-      if (state.restartsMotion) instance.restartVersion = instance.version;
-      versioned_.push_back(index);
+    std::uint32_t version = instance.version;
+    const bool isNew = version == 0 || (state.isStale && isDue(state, instance.pose));
+    if (isNew) {
+      version = ++nextVersion_;
+      versioned_.push_back({index, version});
     }
     // There is no box until the GPU skins it for the first time, and the CPU does not know when
     // that is.
@@ -142,8 +143,9 @@ void SceneBooks::gatherCulled() {
       plannedResults_.push_back(instance.extras.result);
     }
     convertPalette(instance);
-    const Candidate candidate{index, instance.version};
-    addRuns(instance, culledFlags(instance, state.hasMotion), &candidate);
+    const Candidate candidate{index, version};
+    const bool restarts = isNew ? state.restartsMotion : instance.versionRestarts;
+    addRuns(instance, culledFlags(instance, state.hasMotion, restarts), &candidate);
   }
 }
 
@@ -258,7 +260,9 @@ void SceneBooks::commitInstance(std::uint32_t index) {
                                     state.restartsMotion,
                                     state.isUrgent,
                                     state.isMoving,
-                                    instance.firstFrame == 0});
+                                    instance.firstFrame == 0,
+                                    instance.versionRestarts,
+                                    instance.version});
   state.isStale = state.isUrgent = state.restartsMotion = false;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
 }
@@ -302,7 +306,12 @@ Result<void> SceneBooks::commit() {
     states_[index].isMoving = false;
     settled_.push_back(instances_.handleOf(index));
   }
-  for (const std::uint32_t index : versioned_) commitInstance(index);
+  for (const auto& [index, version] : versioned_) {
+    const bool restarts = states_[index].restartsMotion;
+    commitInstance(index);
+    instances_.at(index).version = version;
+    instances_.at(index).versionRestarts = restarts;
+  }
   std::erase_if(shifting_, [this](InstanceHandle handle) {
     SceneInstance* instance = instances_.find(handle);
     return instance == nullptr || commitShift(*instance, handle);
@@ -318,7 +327,10 @@ void SceneBooks::abandonInstances() {
     state->restartsMotion |= before.restartsMotion;
     state->isUrgent |= before.isUrgent;
     state->isMoving = before.isMoving;
-    if (before.isFirst) instances_.at(before.handle.index).firstFrame = 0;
+    SceneInstance& instance = instances_.at(before.handle.index);
+    if (before.isFirst) instance.firstFrame = 0;
+    instance.version = before.version;
+    instance.versionRestarts = before.versionRestarts;
     makeStale(before.handle.index);
   }
   for (const InstanceHandle handle : settled_) {
@@ -340,22 +352,23 @@ void SceneBooks::abandonInstances() {
 /// The output of the frame before is displayed again. `commit` retired its place, and no other
 /// instance can have taken it: places are reused after `beginFrame` only.
 void SceneBooks::abandonShifts() {
+  std::vector<std::uint64_t> shownAgain;  // offsets of places
   for (const Abandonable::Shift& shifted : abandonable_.shifts) {
     SceneInstance* instance = instances_.find(shifted.handle);
     if (instance == nullptr) continue;
     const Place abandoned = *instance->shown;
     instance->shown = shifted.shown;
-    if (shifted.shown && shifted.shown != abandoned) {
-      const auto isIts = [&](const Retired& retired) {
-        return retired.store == &outputStore_.ranges && retired.range == shifted.shown->bytes;
-      };
-      // The newest: an older one of the same range would have been freed before this one was taken.
-      const auto found = std::find_if(retired_.rbegin(), retired_.rend(), isIts);
-      if (found != retired_.rend()) retired_.erase(std::next(found).base());
-    }
+    if (shifted.shown && shifted.shown != abandoned)
+      shownAgain.push_back(shifted.shown->bytes.offset);
     if (instance->target != abandoned) retire(outputStore_.ranges, abandoned.bytes);
     if (instance->shown != instance->target) shift(shifted.handle);
   }
+  // Retired places do not overlap, so the offset tells which one it is.
+  std::ranges::sort(shownAgain);
+  std::erase_if(retired_, [&](const Retired& retired) {
+    return retired.store == &outputStore_.ranges &&
+           std::ranges::binary_search(shownAgain, retired.range.offset);
+  });
 }
 
 Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
@@ -390,6 +403,12 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
                    " cannot be read back: it is not one of the last " +
                    std::to_string(readBacks_.size()) + " frames that were committed");
   }
+  if (frame > completed_ || frame <= culling_.frame) {
+    return invalid("frame " + std::to_string(frame) +
+                   " cannot be read back: it must be complete, which frames up to " +
+                   std::to_string(completed_) + " are, and newer than the last that was, " +
+                   std::to_string(culling_.frame));
+  }
   std::uint64_t needed = found->hasCounters ? readBackResults : 0;
   for (const CopyCommand& copy : found->results)
     needed = std::max(needed, copy.toOffset + copy.size);
@@ -408,14 +427,15 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     culling_.settledInstances = counted.settled;
     culling_.workgroups = counted.workgroups;
   }
-  // A frame without results keeps those of earlier frames.
-  if (!found->results.empty()) latestResultsFrame_ = frame;
   for (const CopyCommand& copy : found->results) {
     // All of it is in `bytes`.
     const auto first = static_cast<std::size_t>(copy.fromOffset / sizeof(InstanceResult));
     const auto size = static_cast<std::size_t>(copy.size);
-    latestResults_.resize(std::max(latestResults_.size(), first + size / sizeof(InstanceResult)));
+    const std::size_t count = size / sizeof(InstanceResult);
+    latestResults_.resize(std::max(latestResults_.size(), first + count));
+    resultFrames_.resize(latestResults_.size());
     std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
+    std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
   return {};
 }
@@ -423,9 +443,12 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
 Result<std::optional<Box>> SceneBooks::bounds(InstanceHandle handle) const {
   const SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
-  if (!instance->bounds || instance->firstFrame == 0 || instance->firstFrame > latestResultsFrame_)
+  if (!instance->bounds || instance->firstFrame == 0) return std::optional<Box>();
+  // Not read back since the instance was first skinned: what is there is of another instance.
+  const std::uint32_t result = instance->extras.result;
+  if (result >= resultFrames_.size() || resultFrames_[result] < instance->firstFrame)
     return std::optional<Box>();
-  return latestResults_[instance->extras.result].box();
+  return latestResults_[result].box();
 }
 
 }  // namespace dermis

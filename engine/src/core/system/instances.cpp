@@ -209,19 +209,24 @@ Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& descri
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
   if (Result<void> good = check(instance, description.updateInterval); !good) return good.error();
-  if (!makeSlot()) {
+  if (!hasSlot()) {
     return Error{ErrorCode::limitExceeded, "there are " + std::to_string(slotCapacity_) +
                                                " instances already: the maximum of "
                                                "instanceCapacity"};
   }
-  if (Result<void> good = reserveUnits(instance); !good) return good.error();
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);
   if (Result<void> taken = takeResult(instance); !taken) return taken.error();
   if (Result<void> found = findRoom(instance, isCulled); !found) {
     freeResult(instance);
     return found.error();
   }
+  if (Result<void> reserved = reserveUnits(instance); !reserved) {
+    freeResult(instance);
+    releaseTarget(instance);
+    return reserved.error();
+  }
 
+  makeSlot();
   ++meshes_.at(instance.mesh.index).users;
   const InstanceHandle handle = instances_.add(std::move(instance));
   if (handle.index >= states_.size()) states_.resize(handle.index + std::size_t{1});
@@ -302,20 +307,26 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
   }
   InstanceState& state = states_[handle.index];
   if (Result<void> good = check(changed, state.updateInterval); !good) return good;
-  if (Result<void> good = reserveUnits(changed); !good) return good;
   if (Result<void> room = hasNewMesh ? takeBackOrFindRoom(changed, state.isCulled)
                                      : makeRuns(changed, state.isCulled);
       !room)
     return room;
+  const auto release = [&](SceneInstance& superseded) {
+    if (hasNewMesh) {
+      releaseTarget(superseded);
+    } else {
+      releaseRuns(superseded);
+    }
+  };
+  if (Result<void> reserved = reserveUnits(changed); !reserved) {
+    release(changed);
+    return reserved;
+  }
 
   --meshes_.at(instance.mesh.index).users;
   ++meshes_.at(changed.mesh.index).users;
   unlink(handle.index);
-  if (hasNewMesh) {
-    releaseTarget(instance);
-  } else {
-    releaseRuns(instance);
-  }
+  release(instance);
   const bool hasNewBox = change.box && isSnormPosition(changed.layout.positions);
   state.restartsMotion |= hasNewMesh || hasNewBox;
   state.isUrgent = true;

@@ -163,14 +163,17 @@ Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, PoseWriter wr
               std::to_string(capacity.maximum)};
 }
 
-/// Makes room for one more instance; false at the maximum. Allocates nothing: the next plan sets
-/// the sizes of the history and visibility buffers.
-bool SceneBooks::makeSlot() {
-  if (instances_.hasHole() || instances_.capacity() < slotCapacity_) return true;
-  if (slotCapacity_ >= description_.instanceCapacity.maximum) return false;
+/// Whether one more instance is below the maximum.
+bool SceneBooks::hasSlot() const {
+  return instances_.hasHole() || instances_.capacity() < description_.instanceCapacity.maximum;
+}
+
+/// Makes room for one more instance. Allocates nothing: the next plan sets the sizes of the history
+/// and visibility buffers.
+void SceneBooks::makeSlot() {
+  if (instances_.hasHole() || instances_.capacity() < slotCapacity_) return;
   slotCapacity_ = std::min(std::max<std::uint64_t>(slotCapacity_ * 2, 16),
                            description_.instanceCapacity.maximum);
-  return true;
 }
 
 }  // namespace dermis
