@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <vector>
 
 #include "dermis/scene.h"
@@ -98,6 +99,79 @@ void planFrames(benchmark::State& state, bool moves) {
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 
+/// Instances of two sizes that take turns. All of one size are removed, so that there is a gap
+/// between any two others. Before them are two small ones, and a gap that is too small for these.
+struct Gaps {
+  Gaps(std::uint32_t count, std::uint32_t kept, std::uint32_t removed) {
+    instance.pose = *scene.addPose(1);
+    add(2);
+    std::vector<InstanceHandle> holes{add(1)};
+    add(2);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      add(kept);
+      holes.push_back(add(removed));
+    }
+    for (const InstanceHandle hole : holes) {
+      if (!scene.removeInstance(hole)) std::abort();
+    }
+    if (!scene.beginFrame(1, 0) || !scene.plan(plan) || !scene.commit() || !scene.beginFrame(2, 1))
+      std::abort();
+  }
+  static SceneDescription description() {
+    SceneDescription description;
+    description.meshCapacity = Capacity::fixed(1 << 20);
+    description.instanceCapacity = Capacity::fixed(400'000);
+    description.outputCapacity = Capacity::fixed(std::uint64_t{1} << 26);
+    description.limits.maxStorageBufferRange = 1u << 30;
+    return description;
+  }
+  MeshHandle meshOf(std::uint32_t vertexCount) {
+    MeshHandle& mesh = meshes[vertexCount];
+    MeshInfo info;
+    info.vertexCount = vertexCount;
+    info.requiredJoints = info.maxInfluences = 1;
+    info.byteSize = 1024;
+    if (!mesh) mesh = *scene.addMesh(info);
+    return mesh;
+  }
+  InstanceHandle add(std::uint32_t vertexCount) {
+    instance.mesh = meshOf(vertexCount);
+    return *scene.addInstance(instance);
+  }
+
+  Scene scene = *Scene::create(description());
+  std::map<std::uint32_t, MeshHandle> meshes;
+  InstanceDescription instance;
+  Plan plan;
+};
+
+/// No instance fits a gap before it. But for two, they are a little larger than every gap, and
+/// these two fit every gap after them: the worst case.
+void compactNothing(benchmark::State& state) {
+  Gaps gaps(static_cast<std::uint32_t>(state.range(0)), 5, 4);
+  for ([[maybe_unused]] auto iteration : state) {
+    if (gaps.scene.compact(1 << 16) != 0) return state.SkipWithError("something moved");
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+
+/// Gaps of 48 bytes hold 44 bytes at a multiple of 44 in few cases, and these are taken.
+void addWithAnotherStride(benchmark::State& state) {
+  Gaps gaps(static_cast<std::uint32_t>(state.range(0)), 5, 4);
+  gaps.instance.layout.stride = 44;
+  for (std::int64_t i = 0; i < state.range(0); ++i) gaps.add(1);
+  for ([[maybe_unused]] auto iteration : state) {
+    const InstanceHandle added = gaps.add(1);
+    if (!gaps.scene.removeInstance(added)) return state.SkipWithError("it was not added");
+  }
+}
+
+BENCHMARK(compactNothing)->Name("scene/compact_nothing")->Arg(1000)->Arg(10'000)->Arg(100'000);
+BENCHMARK(addWithAnotherStride)
+    ->Name("scene/add_with_another_stride")
+    ->Arg(1000)
+    ->Arg(10'000)
+    ->Arg(100'000);
 BENCHMARK(changeOneByOne)->Name("scene/change_one_by_one")->Arg(10'000);
 BENCHMARK(setVisibility)->Name("scene/set_visibility")->Arg(10'000);
 BENCHMARK_CAPTURE(planFrames, all, true)

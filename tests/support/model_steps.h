@@ -84,7 +84,7 @@ class ModelSteps {
     EXPECT_GT(movedInstances_, 20u);
     EXPECT_GT(refusals_, 20u);
     EXPECT_GT(abandonedFrames_, 50u);
-    EXPECT_GT(growths_, 100u);
+    EXPECT_GT(growths_, 80u);
   }
   void makeSystem() {
     model_.reset();

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <map>
+#include <random>
 #include <set>
 #include <span>
 #include <string>
@@ -747,6 +750,69 @@ TEST(Scene, AnInstanceThatIsRefusedLeavesNothingBehind) {
   must(scene.addInstance(instance));
   instance.layout.positions = VertexFormat::float16x4;
   expectRefused(instance, 1, 1, "the maximum of boundsCapacity");
+}
+
+// Instances of several strides, of which many go. `compact` moves at most what it may, and ends
+// only once no instance fits a gap before it.
+TEST(Scene, CompactionFillsEveryGapThatFits) {
+  OneInstance one;
+  std::mt19937 random(3);
+  struct Shown {
+    InstanceHandle handle;
+    std::uint32_t stride;
+  };
+  std::vector<Shown> all;
+  Scene& scene = one.scene = must(Scene::create([] {
+    SceneDescription description = smallScene();
+    description.instanceCapacity = Capacity::fixed(400);
+    return description;
+  }()));
+  const PoseHandle pose = must(scene.addPose(4));
+  std::vector<MeshHandle> meshes;
+  for (std::uint32_t vertices = 1; vertices < 8; ++vertices) {
+    MeshInfo info;
+    info.byteSize = 512;
+    info.vertexCount = vertices;
+    meshes.push_back(must(scene.addMesh(info)));
+  }
+  for (int count = 0; count < 400; ++count) {
+    InstanceDescription description;
+    description.mesh = meshes[random() % meshes.size()];
+    description.pose = pose;
+    description.layout.stride = std::array{12u, 20u, 28u, 44u}[random() % 4];
+    all.push_back({must(scene.addInstance(description)), description.layout.stride});
+  }
+  one.record(1, 0);
+  std::ranges::shuffle(all, random);
+  for (; all.size() > 150; all.pop_back()) must(scene.removeInstance(all.back().handle));
+  std::uint64_t frame = 1, moved = 1;
+  for (; moved != 0; ++frame) {
+    must(scene.beginFrame(frame + 1, frame));
+    EXPECT_EQ(scene.compact(0), 0u);
+    EXPECT_EQ(scene.compact(11), 0u) << "less than any instance has";
+    moved = scene.compact(1000);
+    EXPECT_LE(moved, 1000u);
+    must(scene.plan(one.planned));
+    EXPECT_EQ(moved != 0, !one.planned.commands().empty());
+    must(scene.commit());
+    EXPECT_EQ(scene.statistics().lastFrame.movedBytes, moved);
+  }
+  EXPECT_GT(frame, 5u);
+  std::map<std::uint64_t, Shown> byOffset;
+  for (const Shown& shown : all) byOffset[must(scene.output(shown.handle)).offset] = shown;
+  ASSERT_EQ(byOffset.size(), all.size());
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> gaps;  // begin, end
+  std::uint64_t end = 0;
+  for (const auto& [offset, shown] : byOffset) {
+    const std::uint64_t size = must(scene.output(shown.handle)).size;
+    ASSERT_GE(offset, end);
+    gaps.emplace_back(end, offset);
+    end = offset + size;
+    for (const auto& [begin, gapEnd] : gaps) {
+      const std::uint64_t first = (begin + shown.stride - 1) / shown.stride * shown.stride;
+      EXPECT_GT(first + size, gapEnd) << "the instance at " << offset << " fits at " << first;
+    }
+  }
 }
 
 /// The version of the only candidate of a plan.

@@ -476,36 +476,51 @@ Result<bool> SceneBooks::isDue(InstanceHandle handle) const {
 }
 
 std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
-  std::vector<InstanceHandle> fromEnd;
-  for (std::uint32_t index = 0; index < instances_.capacity(); ++index) {
+  RangeAllocator& ranges = outputStore_.ranges;
+  const std::uint64_t most = std::min(maxBytes, ranges.largestFree());
+  struct Movable {
+    std::uint64_t offset, size;
+    std::uint32_t index;
+  };
+  std::vector<Movable> movable;
+  std::uint64_t smallest = ~std::uint64_t{0};
+  for (std::uint32_t index = 0; most != 0 && index < instances_.capacity(); ++index) {
     if (!instances_.isUsed(index)) continue;
     const SceneInstance& instance = instances_.at(index);
-    if (instance.shown == instance.target) fromEnd.push_back(instances_.handleOf(index));
+    const Range& bytes = instance.target.bytes;
+    if (instance.shown != instance.target || bytes.size > most) continue;
+    movable.push_back({bytes.offset, bytes.size, index});
+    smallest = std::min(smallest, bytes.size);
   }
-  const auto offsetOf = [this](InstanceHandle handle) {
-    return instances_.at(handle.index).target.bytes.offset;
-  };
-  std::sort(fromEnd.begin(), fromEnd.end(),
-            [&](InstanceHandle a, InstanceHandle b) { return offsetOf(a) > offsetOf(b); });
+  // The last one first. A heap, since most calls move few.
+  const auto isBefore = [](const Movable& a, const Movable& b) { return a.offset < b.offset; };
+  std::make_heap(movable.begin(), movable.end(), isBefore);
   std::uint64_t moved = 0;
-  for (const InstanceHandle handle : fromEnd) {
-    SceneInstance& instance = instances_.at(handle.index);
+  std::uint64_t tooLarge = ~std::uint64_t{0};  // for every gap before the instance
+  while (!movable.empty() && smallest < tooLarge && smallest <= maxBytes - moved) {
+    std::pop_heap(movable.begin(), movable.end(), isBefore);
+    const auto [offset, size, index] = movable.back();
+    movable.pop_back();
+    if (size >= tooLarge || size > maxBytes - moved) continue;
+    SceneInstance& instance = instances_.at(index);
     const Range from = instance.target.bytes;
-    if (moved + from.size > maxBytes) continue;
     const Result<VertexPlaces> laidOut = placeVertices(instance.layout, instance.vertexCount);
-    const std::optional<Range> to =
-        outputStore_.ranges.allocateBelow(from.size, laidOut->alignment, from.offset);
-    if (!to) continue;
+    const std::optional<Range> to = ranges.allocateBelow(size, laidOut->alignment, offset);
+    if (!to) {
+      if (!ranges.hasBelow(size, offset)) tooLarge = size;
+      continue;
+    }
     instance.target.bytes = *to;
-    if (!remakeRuns(instance, states_[handle.index].isCulled)) {
+    if (!remakeRuns(instance, states_[index].isCulled)) {
       // It would lie in two storage buffer ranges, and must not.
-      outputStore_.ranges.free(*to);
+      ranges.free(*to);
       instance.target.bytes = from;
       continue;
     }
-    shift(handle);
-    moved += from.size;
+    shift(instances_.handleOf(index));
+    moved += size;
   }
+  ranges.endMoves();
   return moved;
 }
 

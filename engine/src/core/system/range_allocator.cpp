@@ -1,5 +1,6 @@
 #include "system/range_allocator.h"
 
+#include <algorithm>
 #include <iterator>
 
 namespace dermis {
@@ -14,14 +15,39 @@ std::uint64_t RangeAllocator::aligned(std::uint64_t offset, std::uint64_t alignm
   return over == 0 ? offset : offset + alignment - over;
 }
 
+/// 0 if the gap ends before it.
+std::uint64_t RangeAllocator::usable(const Index& index, const Gaps::value_type& gap) const {
+  const std::uint64_t lost = aligned(gap.first, index.alignment) - gap.first;
+  return gap.second - std::min(gap.second, lost);
+}
+
 void RangeAllocator::addGap(std::uint64_t offset, std::uint64_t size) {
-  gaps_.emplace(offset, size);
-  bySize_.emplace(size, offset);
+  const auto gap = gaps_.emplace(offset, size).first;
+  for (Index& index : indices_) {
+    if (const std::uint64_t left = usable(index, *gap); left != 0) index.gaps.emplace(left, offset);
+  }
 }
 
 void RangeAllocator::removeGap(Gaps::iterator gap) {
-  bySize_.erase({gap->second, gap->first});
+  for (Index& index : indices_) index.gaps.erase({usable(index, *gap), gap->first});
   gaps_.erase(gap);
+}
+
+RangeAllocator::Index& RangeAllocator::indexOf(std::uint64_t alignment) {
+  const auto found = std::ranges::find(indices_, alignment, &Index::alignment);
+  if (found != indices_.end()) return *found;
+  const bool isFull = indices_.size() == maxAlignments;
+  nextIndex_ = isFull ? nextIndex_ % (maxAlignments - 1) + 1 : indices_.size();
+  Index& index = isFull ? indices_[nextIndex_] : indices_.emplace_back();
+  index.alignment = alignment;
+  index.gaps.clear();
+  index.aside.clear();
+  for (const Gaps::value_type& gap : gaps_) {
+    if (const std::uint64_t left = usable(index, gap); left != 0)
+      index.gaps.emplace(left, gap.first);
+  }
+  visitedGaps_ += gaps_.size();
+  return index;
 }
 
 /// What an alignment leaves before the range stays a gap.
@@ -36,22 +62,42 @@ Range RangeAllocator::take(Gaps::iterator gap, std::uint64_t offset, std::uint64
 }
 
 std::optional<Range> RangeAllocator::allocate(std::uint64_t size, std::uint64_t alignment) {
-  for (auto entry = bySize_.lower_bound({size, 0}); entry != bySize_.end(); ++entry) {
-    const auto [gapSize, gapOffset] = *entry;
-    const std::uint64_t offset = aligned(gapOffset, alignment);
-    if (offset - gapOffset <= gapSize - size) return take(gaps_.find(gapOffset), offset, size);
+  return allocateBelow(size, alignment, capacity_);
+}
+
+RangeAllocator::Gaps::iterator RangeAllocator::findBelow(Index& index, std::uint64_t size,
+                                                         std::uint64_t end) {
+  if (gaps_.empty() || gaps_.begin()->first >= end) return gaps_.end();
+  auto entry = index.gaps.lower_bound({size, 0});
+  while (entry != index.gaps.end()) {
+    ++visitedGaps_;
+    if (entry->second < end) return gaps_.find(entry->second);
+    index.aside.push_back(*entry);
+    entry = index.gaps.erase(entry);
   }
-  return std::nullopt;
+  return gaps_.end();
 }
 
 std::optional<Range> RangeAllocator::allocateBelow(std::uint64_t size, std::uint64_t alignment,
                                                    std::uint64_t end) {
-  for (auto gap = gaps_.begin(); gap != gaps_.end() && gap->first + size <= end; ++gap) {
-    const std::uint64_t offset = aligned(gap->first, alignment);
-    if (offset + size <= end && gap->second >= size && offset - gap->first <= gap->second - size)
-      return take(gap, offset, size);
+  const auto gap = findBelow(indexOf(alignment), size, end);
+  if (gap == gaps_.end()) return std::nullopt;
+  return take(gap, aligned(gap->first, alignment), size);
+}
+
+bool RangeAllocator::hasBelow(std::uint64_t size, std::uint64_t end) {
+  return findBelow(indices_.front(), size, end) != gaps_.end();
+}
+
+void RangeAllocator::endMoves() {
+  for (Index& index : indices_) {
+    for (const Index::Entry& entry : index.aside) {
+      const auto gap = gaps_.find(entry.second);
+      // What has become another gap is in all indices.
+      if (gap != gaps_.end() && usable(index, *gap) == entry.first) index.gaps.insert(entry);
+    }
+    index.aside.clear();
   }
-  return std::nullopt;
 }
 
 void RangeAllocator::free(const Range& range) {
@@ -91,7 +137,8 @@ void RangeAllocator::grow(std::uint64_t capacity) {
 }
 
 std::uint64_t RangeAllocator::largestFree() const {
-  return bySize_.empty() ? 0 : bySize_.rbegin()->first;
+  const auto& gaps = indices_.front().gaps;
+  return gaps.empty() ? 0 : gaps.rbegin()->first;
 }
 
 }  // namespace dermis
