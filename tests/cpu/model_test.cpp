@@ -21,8 +21,8 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
   void makeEngine() override {
     cpu::SkinningSystemDescription small;
     small.jointCapacity = {8, 8 * 40};
-    small.instanceCapacity = {4, 200};
-    small.boundsCapacity = {1};
+    small.instanceCapacity = instanceCapacity;
+    small.boundsCapacity = Capacity::fixed(1);
     small.outputCapacity = outputCapacity;
     engine_.emplace(small);
     engine_->verticesPerJob = GetParam() % 2 == 0 ? 1 << 16 : 24;
@@ -30,10 +30,34 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     generation_ = 0;
   }
   void prepare(const InstanceDescription&) override {}
-  void submit() override {
+  Result<void> trySubmit() override {
     engine_->submit();
     const std::byte* const now = system().outputBytes().data();
     generation_ += std::exchange(output_, now) != now;
+    return {};
+  }
+  void addRefusedCalls(std::vector<RefusedCall>& calls) override {
+    const auto add = [&](auto set) {
+      InstanceDescription wrong = anyInstance().description;
+      set(wrong);
+      calls.push_back({[this, wrong] { return withoutValue(system().addInstance(wrong)); }});
+    };
+    add([](InstanceDescription& wrong) { wrong.culledOnGpu = true; });
+    add([](InstanceDescription& wrong) { wrong.method = Method::logMatrix; });
+    const InstanceChange wrong{.instance = anyInstance().handle, .method = Method::logMatrix};
+    calls.push_back({[this, wrong] { return system().change(wrong); }});
+    calls.push_back({[this, wrong] { return system().change({&wrong, 1}); }});
+    calls.push_back(
+        {[this] { return withoutValue(system().addPose(8, {.writer = PoseWriter::gpu})); }});
+    calls.push_back({[this] { return system().abandonFrame(); }});
+    calls.push_back({[] {
+      static std::array<std::byte, 3> few;
+      return withoutValue(cpu::SkinningSystem::create({.output = few}));
+    }});
+  }
+  std::vector<RefusedCall> callsBetweenFrames() override {
+    return {{[this] { return withoutValue(system().jobs()); }},
+            {[this] { return withoutValue(system().writePose({})); }}};
   }
   void abandon() override {
     engine_->abandon([this] { changeMeanwhile(); });
@@ -65,6 +89,9 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
 
 TEST_P(CpuModelTest, EveryStepGivesWhatTheModelSays) {
   run();
+  std::set<std::string> texts = errorTexts("cpu/skinning_system.cpp");
+  EXPECT_GE(texts.size(), 3u);
+  expectAllGiven(texts);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, CpuModelTest, ::testing::Values(1u, 2u, 3u));
 

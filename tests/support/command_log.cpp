@@ -24,11 +24,13 @@ struct RealFunctions {
   PFN_vkBindBufferMemory BindBufferMemory;
   PFN_vkMapMemory MapMemory;
   PFN_vkCreateQueryPool CreateQueryPool;
+  PFN_vkCreateBufferView CreateBufferView;
 } real;
 
 /// Counts the call; what it fails with, if it does.
 std::optional<VkResult> failureOf(const char* name) {
   ++commandLog->calls[name];
+  if (commandLog->failsAt >= 0 && commandLog->failsAt-- == 0) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
   const auto failure = commandLog->failures.find(name);
   if (failure == commandLog->failures.end()) return std::nullopt;
   return failure->second;
@@ -123,6 +125,11 @@ VkResult VKAPI_CALL createQueryPool(VkDevice device, const VkQueryPoolCreateInfo
   if (const auto failure = failureOf("vkCreateQueryPool")) return *failure;
   return real.CreateQueryPool(device, info, allocator, pool);
 }
+VkResult VKAPI_CALL createBufferView(VkDevice device, const VkBufferViewCreateInfo* info,
+                                     const VkAllocationCallbacks* allocator, VkBufferView* view) {
+  if (const auto failure = failureOf("vkCreateBufferView")) return *failure;
+  return real.CreateBufferView(device, info, allocator, view);
+}
 
 }  // namespace
 
@@ -150,6 +157,7 @@ CommandLog::CommandLog(InterceptedDevice& device) {
   intercept("vkBindBufferMemory", real.BindBufferMemory, bindBufferMemory);
   intercept("vkMapMemory", real.MapMemory, mapMemory);
   intercept("vkCreateQueryPool", real.CreateQueryPool, createQueryPool);
+  intercept("vkCreateBufferView", real.CreateBufferView, createBufferView);
 }
 
 CommandLog::~CommandLog() {

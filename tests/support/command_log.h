@@ -45,6 +45,8 @@ class CommandLog {
 
   /// Results that a function gives instead of what it would do.
   std::map<std::string, VkResult> failures;
+  /// The number, from now on, of the call that fails among those that can; none if it is negative.
+  int failsAt = -1;
 };
 
 }  // namespace dermis::test

@@ -1,7 +1,8 @@
 // Thousands of random steps of a scene beside a model of it: meshes, palettes and instances come
 // and go, move, hide, find no room and are moved about while frames are under way, buffers grow,
 // frames are abandoned, the GPU writes some poses, and every instance's output stays, bit for bit,
-// what it would be alone. On the CPU, the same steps without those that are the GPU's.
+// what it would be alone. On the CPU, the same steps without those that are the GPU's. Calls with
+// bad arguments, and Vulkan calls that fail, change nothing.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "refused_calls.h"
 #include "scene_meshes.h"
 #include "system_model.h"
 
@@ -26,7 +28,8 @@ inline constexpr std::uint32_t stepCount = 10'000;
 inline constexpr std::uint32_t systemSteps = 500;  // then another system begins to grow
 inline constexpr std::uint32_t poseCount = 12;
 inline constexpr std::uint32_t meshKinds = 8;
-inline constexpr Capacity outputCapacity{1024, 100 << 10};  // so small that it is full at times
+// So small that they are full at times.
+inline constexpr Capacity outputCapacity{1024, 100 << 10}, instanceCapacity{4, 32};
 
 inline const std::array<std::vector<MorphWeight>, 3> morphSets{
     std::vector<MorphWeight>{}, {{0, 0.5f}}, {{1, 0.25f}, {2, 1.0f}}};
@@ -57,8 +60,14 @@ class ModelSteps {
   /// An engine without anything, of which everything has to grow.
   virtual void makeEngine() = 0;
   virtual void prepare(const InstanceDescription& instance) = 0;
-  virtual void submit() = 0;
+  virtual Result<void> trySubmit() = 0;
   virtual void abandon() = 0;
+  /// Of all Vulkan calls that can fail from now on, that one does; none if it is negative.
+  virtual void failAt(int /*call*/) {}
+  /// More calls that are refused in the middle of a frame.
+  virtual void addRefusedCalls(std::vector<RefusedCall>& /*calls*/) {}
+  /// The same between the end of a frame and the begin of the next.
+  virtual std::vector<RefusedCall> callsBetweenFrames() = 0;
   /// Counts up when the output grows.
   virtual std::uint64_t outputGeneration() = 0;
   /// An instance skinned alone.
@@ -85,6 +94,17 @@ class ModelSteps {
     EXPECT_GT(refusals_, 20u);
     EXPECT_GT(abandonedFrames_, 50u);
     EXPECT_GT(growths_, 80u);
+    EXPECT_GT(failedCalls_, 500u);
+    EXPECT_TRUE(!hasGpu || failedFrames_ > 20u);
+  }
+  /// Every one of these texts was in the message of an error.
+  void expectAllGiven(const std::set<std::string>& texts) const {
+    for (const std::string& text : texts) {
+      EXPECT_TRUE(std::ranges::any_of(
+          messages_,
+          [&](const std::string& message) { return message.find(text) != std::string::npos; }))
+          << "no error said: " << text;
+    }
   }
   void makeSystem() {
     model_.reset();
@@ -105,6 +125,9 @@ class ModelSteps {
   // The steps.
   void addMesh() {
     if (meshes_.size() >= 12) return;
+    if (chance(30))
+      tryToAdd([&] { return system().addMesh(kinds_[below(meshKinds)]); },
+               [&](MeshHandle mesh) { must(system().removeMesh(mesh)); });
     const std::uint32_t kind = below(meshKinds);
     kindOf_[nextNumber_] = kind;
     meshes_[nextNumber_++] = {engine_->addMesh(kinds_[kind]), kind};
@@ -120,8 +143,14 @@ class ModelSteps {
     if (model_->poses.size() >= 30) return;
     const std::uint32_t pose = below(poseCount);
     const PoseWriter writer = hasGpu && chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
+    if (chance(30))
+      tryToAdd([&] { return system().addPose(8, {.writer = writer}); },
+               [&](PoseHandle added) { must(system().removePose(added)); });
     const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
-    if (!added) return;  // places of palettes that went are not free yet
+    if (!added) {  // places of palettes that went are not free yet
+      messages_.insert(added.error().message);
+      return;
+    }
     model_->poses[nextNumber_++] = {*added, pose};
     engine_->writePose(*added, systemPose(pose));
   }
@@ -148,6 +177,9 @@ class ModelSteps {
     description.culledOnGpu = hasGpu && chance(25);
     if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
     prepare(description);
+    if (chance(30))
+      tryToAdd([&] { return system().addInstance(description); },
+               [&](InstanceHandle added) { must(system().removeInstance(added)); });
     const Result<InstanceHandle> added = system().addInstance(description);
     if (!added) {
       expectRoomIsMissing(added.error(), std::uint64_t{instance.vertexCount} * 44);
@@ -254,15 +286,6 @@ class ModelSteps {
     }
     must(system().setVisibility(wanted));
   }
-  void tryStaleHandle() {
-    if (gone_.empty()) return;
-    const InstanceHandle stale = gone_[below(gone_.size())];
-    EXPECT_FALSE(system().removeInstance(stale).ok());
-    EXPECT_FALSE(system().change({.instance = stale, .visible = true}).ok());
-    EXPECT_FALSE(system().output(stale).ok());
-    const InstanceVisibility shown{stale, true, 1};
-    EXPECT_FALSE(system().setVisibility({&shown, 1}).ok());
-  }
   void runFrame() {
     for (auto& [number, palette] : model_->poses) {
       if (!chance(60)) continue;
@@ -276,7 +299,15 @@ class ModelSteps {
       ++abandonedFrames_;
       if (chance(50)) return beginFrame();
     }
-    submit();
+    const SeenScene before = seen();
+    if (chance(15)) failAt(static_cast<int>(below(4)));
+    const Result<void> submitted = trySubmit();
+    failAt(-1);
+    if (!submitted) {
+      expectFailed(submitted, before);
+      ++failedFrames_;
+      return beginFrame();
+    }
     ++submittedFrames_;
     model_->afterRecord();
     movedInstances_ += system().movedInstances().size();
@@ -291,8 +322,66 @@ class ModelSteps {
     }
     model_->beginFrame();
   }
+  // -- What fails.
+
+  /// What a caller sees of a scene.
+  struct SeenScene {
+    std::vector<std::uint64_t> numbers;
+    friend bool operator==(const SeenScene&, const SeenScene&) = default;
+  };
+  SeenScene seen(bool countsSlots = true) {
+    const auto now = system().statistics();
+    SeenScene scene{{now.outputs.used, now.palettes.used, now.meshes.used,
+                     now.lastFrame.skinnedInstances, now.lastFrame.instances,
+                     system().skinnedInstances().size(), system().settledInstances().size(),
+                     system().movedInstances().size()}};
+    if constexpr (hasGpu) scene.numbers.push_back(countsSlots ? system().visibilityCount() : 0);
+    for (const ModelInstance& instance : model_->instances) {
+      const InstanceOutput output = must(system().output(instance.handle));
+      scene.numbers.insert(scene.numbers.end(),
+                           {output.offset, output.size, output.mesh.index,
+                            std::uint64_t{must(system().isDue(instance.handle))}});
+    }
+    return scene;
+  }
+  /// The call failed and the scene is as it was `before`.
+  void expectFailed(const Result<void>& done, const SeenScene& before, bool countsSlots = true) {
+    ASSERT_FALSE(done.ok());
+    EXPECT_TRUE(seen(countsSlots) == before) << done.error().message;
+    messages_.insert(done.error().message);
+    ++failedCalls_;
+  }
+  /// Adds something while a Vulkan call fails, and removes it where none did.
+  void tryToAdd(auto add, auto remove) {
+    const SeenScene before = seen();
+    failAt(static_cast<int>(below(3)));
+    const auto added = add();
+    failAt(-1);
+    if (added) return remove(*added);
+    expectFailed(added.error(), before);
+  }
+  void refuseOne(const std::vector<RefusedCall>& calls) {
+    const std::uint32_t number = below(calls.size());
+    SCOPED_TRACE("refused call " + std::to_string(number));
+    const RefusedCall& call = calls[number];
+    const SeenScene before = seen(!call.addsForAWhile);
+    expectFailed(call.call(), before, !call.addsForAWhile);
+  }
+  void tryWhatIsRefused() {
+    if (model_->instances.empty()) return;
+    const ModelInstance& instance = anyInstance();
+    InstanceDescription description = instance.description;
+    description.updateInterval = 1;
+    std::vector<RefusedCall> calls =
+        refusedCalls(system(), {description, instance.handle,
+                                gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())]});
+    addRefusedCalls(calls);
+    refuseOne(calls);
+  }
+
   /// Between `record` and `abandonFrame`, when poses cannot be written.
   void changeMeanwhile() {
+    if (chance(30)) refuseOne(callsBetweenFrames());
     for (std::uint32_t count = below(6); count != 0; --count) {
       switch (below(6)) {
         case 0:
@@ -328,7 +417,7 @@ class ModelSteps {
     if (kind < 65) return changeInstance();
     if (kind < 73) return changeSeveral();
     if (kind < 75) return setVisibility();
-    if (kind < 78) return tryStaleHandle();
+    if (kind < 81) return tryWhatIsRefused();
     runFrame();
   }
 
@@ -336,6 +425,8 @@ class ModelSteps {
   void expectRoomIsMissing(const Error& error, std::uint64_t size) {
     EXPECT_EQ(error.code, ErrorCode::limitExceeded) << error.message;
     ++refusals_;
+    messages_.insert(error.message);
+    if (model_->instances.size() == instanceCapacity.maximum) return;
     EXPECT_LT(system().statistics().outputs.largestFree, size + 256) << error.message;
   }
   const Streams& expected(const ModelInstance& instance, const ShownPose& shown) {
@@ -377,7 +468,8 @@ class ModelSteps {
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
   std::map<std::pair<ShownPose, VertexFormat>, Streams> expected_;
-  std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0;
+  std::set<std::string> messages_;  ///< of all errors
+  std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;
   std::uint64_t growths_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };

@@ -152,15 +152,13 @@ Result<BufferRequirement> SkinningSystem::requirement(const SkinningSystemDescri
 // -- Meshes, poses, instances.
 
 Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
-  Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
-  if (!handle) return handle;
+  // First, since a mesh that is removed again would keep its place until the frame is complete.
   Result<SystemBuffer> staging =
       SystemBuffer::create(state_->source, {mesh.bytes().size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                             BufferUse::upload, "dermis mesh upload"});
-  if (!staging) {
-    static_cast<void>(state_->scene.removeMesh(*handle).ok());
-    return staging.error();
-  }
+  if (!staging) return staging.error();
+  Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
+  if (!handle) return handle;
   std::memcpy(staging->bytes().data(), mesh.bytes().data(), mesh.bytes().size());
   state_->uploads.push_back({*handle, *state_->scene.meshOffset(*handle), std::move(*staging)});
   return handle;

@@ -1,0 +1,131 @@
+// Calls that a scene refuses, each for another reason, and the sentences that it gives as reasons.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dermis/scene.h"
+
+namespace dermis::test {
+
+/// What the calls are made with.
+struct SceneObjects {
+  InstanceDescription description;  ///< one that is accepted
+  InstanceHandle instance;          ///< of the same mesh and pose
+  InstanceHandle removed;           ///< null if none was removed yet
+  std::uint32_t morphTargets = 3;
+};
+
+struct RefusedCall {
+  std::function<Result<void>()> call;
+  bool addsForAWhile = false;  ///< it adds an instance and removes it; there may be more slots
+};
+
+template <typename T>
+Result<void> withoutValue(const Result<T>& result) {
+  return result ? Result<void>() : result.error();
+}
+
+/// Of vulkan::SkinningSystem and cpu::SkinningSystem.
+template <typename System>
+std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& objects) {
+  std::vector<RefusedCall> calls;
+  const auto add = [&](auto set) {
+    InstanceDescription wrong = objects.description;
+    set(wrong);
+    calls.push_back({[&system, wrong] { return withoutValue(system.addInstance(wrong)); }});
+  };
+  add([](InstanceDescription& wrong) { wrong.mesh = {}; });
+  add([](InstanceDescription& wrong) { wrong.pose = {}; });
+  add([](InstanceDescription& wrong) { wrong.updateInterval = 0; });
+  add([](InstanceDescription& wrong) { wrong.layout.motion = Motion::reskinned; });
+  add([](InstanceDescription& wrong) { wrong.method = static_cast<Method>(9); });
+  add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::none; });
+  add([](InstanceDescription& wrong) { wrong.layout.tangents = VertexFormat::float16x3; });
+  add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1}; });
+  add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1 << 20}; });
+  add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::snorm16x4; });
+
+  const auto change = [&](auto set) {
+    InstanceChange wrong{.instance = objects.instance};
+    set(wrong);
+    calls.push_back({[&system, wrong] { return system.change(wrong); }});
+    calls.push_back({[&system, wrong] {
+      const std::array<InstanceChange, 2> both{InstanceChange{.instance = wrong.instance}, wrong};
+      return system.change(both);
+    }});
+  };
+  static const std::array<MorphWeight, 1> none{{{7, 1}}}, notFinite{{{0, NAN}}};
+  static const std::array<MorphWeight, 2> twice{{{0, 1}, {0, 1}}};
+  change([](InstanceChange& wrong) { wrong.instance = {}; });
+  change([&](InstanceChange& wrong) { wrong.instance = objects.removed; });
+  change([](InstanceChange& wrong) { wrong.mesh = MeshHandle(); });
+  change([](InstanceChange& wrong) { wrong.pose = PoseHandle(); });
+  change([](InstanceChange& wrong) { wrong.method = static_cast<Method>(255); });
+  change([](InstanceChange& wrong) { wrong.updateInterval = 0; });
+  change([](InstanceChange& wrong) { wrong.morphs = none; });
+  change([](InstanceChange& wrong) { wrong.morphs = notFinite; });
+  change([](InstanceChange& wrong) { wrong.morphs = twice; });
+  calls.push_back({[&system, instance = objects.instance] {
+    const InstanceVisibility wrong{instance, true, 0};
+    return system.setVisibility({&wrong, 1});
+  }});
+
+  // Objects that are in use, were removed, or never were.
+  const InstanceHandle removed = objects.removed;
+  const InstanceDescription used = objects.description;
+  calls.push_back({[&system, used] { return system.removeMesh(used.mesh); }});
+  calls.push_back({[&system, used] { return system.removePose(used.pose); }});
+  calls.push_back({[&system] { return system.removeMesh({}); }});
+  calls.push_back({[&system] { return system.removePose({5000, 1}); }});
+  calls.push_back({[&system, removed] { return system.removeInstance(removed); }});
+  calls.push_back({[&system, removed] { return withoutValue(system.output(removed)); }});
+  calls.push_back({[&system, removed] { return withoutValue(system.isDue(removed)); }});
+  calls.push_back({[&system, removed] { return withoutValue(system.bounds(removed)); }});
+  calls.push_back({[&system] { return withoutValue(system.writePose({})); }});
+
+  const auto addPose = [&](std::uint32_t joints, PoseWriter writer) {
+    calls.push_back({[&system, joints, writer] {
+      return withoutValue(system.addPose(joints, {.writer = writer}));
+    }});
+  };
+  addPose(0, PoseWriter::cpu);
+  addPose(maxPoseJoints + 1, PoseWriter::cpu);
+  addPose(maxPoseJoints, PoseWriter::cpu);  // more than the maximum
+  addPose(8, static_cast<PoseWriter>(2));
+  calls.push_back({[&system] {
+    std::vector<PoseHandle> poses(100);
+    return system.addPoses(poses, 1000);
+  }});
+
+  // Of an instance with a box, of which there may be one.
+  InstanceDescription boxed = objects.description;
+  boxed.layout = {.positions = VertexFormat::snorm16x4};
+  boxed.box = {{-1, -1, -1}, {1, 1, 1}};
+  const auto withBoxed = [&](auto refused) {
+    calls.push_back({[&system, boxed, refused]() -> Result<void> {
+                       const Result<InstanceHandle> added = system.addInstance(boxed);
+                       if (!added) return added.error();  // there is no room
+                       const Result<void> result = refused(*added);
+                       if (Result<void> gone = system.removeInstance(*added); !gone) return {};
+                       return result;
+                     },
+                     true});
+  };
+  withBoxed([&system, boxed](InstanceHandle) { return withoutValue(system.addInstance(boxed)); });
+  withBoxed([&system](InstanceHandle instance) {
+    return system.change({.instance = instance, .box = Box{{0, 0, 0}, {0, 1, 1}}});
+  });
+  return calls;
+}
+
+/// The texts of at least 12 characters that the errors of a source file are made of, or of a
+/// folder's files, in `engine/src`.
+std::set<std::string> errorTexts(const std::string& path);
+
+}  // namespace dermis::test
