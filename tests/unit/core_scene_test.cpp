@@ -637,11 +637,9 @@ struct SeveralInstances : OneInstance {
     for (std::size_t index = 0; index < count; ++index) all.push_back(add());
   }
   InstanceHandle add() {
-    InstanceDescription description;
-    description.mesh = mesh;
-    description.pose = *scene.addPose(4);
-    description.bounds = true;
-    return must(scene.addInstance(description));
+    InstanceDescription added = description;
+    added.pose = *scene.addPose(4);
+    return must(scene.addInstance(added));
   }
   void skin(InstanceHandle which) {
     must(scene.change({.instance = which, .teleports = true}));
