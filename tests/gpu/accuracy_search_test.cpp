@@ -15,8 +15,7 @@
 
 #include "dermis/pack.h"
 #include "dermis/verify/accuracy.h"
-#include "inexact_arithmetic.h"
-#include "intercepted_device.h"
+#include "inexact_context.h"
 #include "kit/batch_runner.h"
 #include "test_device.h"
 #include "worst_rig.h"
@@ -24,54 +23,13 @@
 namespace dermis::test {
 namespace {
 
-Inexactness inexactness;
-std::size_t changedOperations = 0;
-PFN_vkCreateShaderModule createExactModule = nullptr;
-
-VkResult VKAPI_CALL createInexactModule(VkDevice device, const VkShaderModuleCreateInfo* info,
-                                        const VkAllocationCallbacks* callbacks,
-                                        VkShaderModule* module) {
-  const std::vector<std::uint32_t> words =
-      makeInexact({info->pCode, info->codeSize / 4}, inexactness, &changedOperations);
-  VkShaderModuleCreateInfo changed = *info;
-  changed.pCode = words.data();
-  changed.codeSize = words.size() * 4;
-  return createExactModule(device, &changed, callbacks, module);
-}
-
-struct Arithmetic {
-  const char* name;
-  Inexactness inexactness;
-};
-
 constexpr Arithmetic exact{"exact", {}};
 constexpr Arithmetic mixed{"mixed", {Side::mixed, Side::mixed}};
 constexpr std::array allInexact{Arithmetic{"up", {Side::up, Side::up}},
                                 Arithmetic{"down", {Side::down, Side::down}}, mixed};
 
-/// A context whose kernels compute so.
 class InexactTest : public DeviceTest {
  protected:
-  struct Inexact {
-    Inexact(const vulkan::DeviceDescription& description, const Arithmetic& arithmetic)
-        : gpu(description), context(create(description, arithmetic)) {}
-
-    Result<vulkan::Context> create(const vulkan::DeviceDescription& description,
-                                   const Arithmetic& arithmetic) {
-      const auto getDeviceProcAddr = reinterpret_cast<PFN_vkGetDeviceProcAddr>(
-          description.getInstanceProcAddr(description.instance, "vkGetDeviceProcAddr"));
-      createExactModule = reinterpret_cast<PFN_vkCreateShaderModule>(
-          getDeviceProcAddr(description.device, "vkCreateShaderModule"));
-      inexactness = arithmetic.inexactness;
-      changedOperations = 0;
-      gpu.replace("vkCreateShaderModule", &createInexactModule);
-      return vulkan::Context::create(gpu.description());
-    }
-
-    InterceptedDevice gpu;
-    Result<vulkan::Context> context;
-  };
-
   Result<samples::BatchResult> skin(vulkan::Context& context, OwnedMesh& mesh,
                                     std::span<const JointMatrix> pose, Method method) {
     const Result<PackedMesh> packed = pack(mesh.view(), static_cast<std::uint32_t>(pose.size()));

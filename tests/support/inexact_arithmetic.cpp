@@ -19,7 +19,10 @@ enum Opcode : std::uint32_t {
   opConstant = 43,
   opConstantComposite = 44,
   opFunction = 54,
+  opLoad = 61,
+  opDecorate = 71,
   opBitcast = 124,
+  opSNegate = 126,
   opFNegate = 127,
   opFAdd = 129,
   opFSub = 131,
@@ -33,10 +36,12 @@ enum Opcode : std::uint32_t {
   opDot = 148,
   opIsNan = 156,
   opIsSignBitSet = 160,
+  opShiftRightLogical = 194,
   opBitwiseXor = 198,
   opBitwiseAnd = 199,
 };
 constexpr std::uint32_t glslSqrt = 31, glslInverseSqrt = 32, glslUMin = 38;
+constexpr std::uint32_t noContraction = 42;
 constexpr std::size_t headerWords = 5;
 
 using Words = std::span<const std::uint32_t>;
@@ -77,13 +82,31 @@ class Patcher {
     if (opcode == opExtInstImport) glsl_ = words[1];
     if (opcode == opTypeFloat && words[2] == 32) types_[float_ = words[1]].components = 1;
     if (opcode == opTypeInt && words[2] == 32 && words[3] == 0) integer_ = words[1];
-    if (opcode != opTypeVector) return;
-    if (words[2] == float_) types_[words[1]].components = words[3];
-    if (words[2] == integer_) integerVectors_[words[3]] = words[1];
+    if (opcode == opTypeVector && words[2] == float_) types_[words[1]].components = words[3];
+    if (opcode == opTypeVector && words[2] == integer_) integerVectors_[words[3]] = words[1];
+    if (inexactness_.flushesDenormals && mayBeDenormal(opcode, words))
+      unflushed_[words[2]] = bound_++;
+  }
+
+  /// Whether the instruction loads or computes a float. Maxima, negations and the like have
+  /// operands that were flushed.
+  bool mayBeDenormal(std::uint32_t opcode, Words words) const {
+    const bool computes = opcode >= opFAdd && opcode <= opVectorTimesScalar && opcode != opIMul;
+    return (computes || opcode == opLoad || opcode == opBitcast || opcode == opExtInst) &&
+           types_.contains(words[1]);
   }
 
   void copy(std::uint32_t opcode, Words words) {
     if (opcode == opFunction && !declared_) declare();
+    if (opcode == opDecorate && words[2] == noContraction && unflushed_.contains(words[1])) {
+      out_.insert(out_.end(), {words[0], unflushed_[words[1]], noContraction});
+      return;
+    }
+    if (declared_ && words.size() > 2 && unflushed_.contains(words[2]) &&
+        mayBeDenormal(opcode, words)) {
+      flush(words);
+      return;
+    }
     const bool known = declared_ && types_.contains(words.size() > 2 ? words[1] : 0);
     const bool isGlsl = opcode == opExtInst && words[3] == glsl_;
     if (known && opcode == opFDiv) {
@@ -123,7 +146,8 @@ class Patcher {
         declareType(opTypeVector, {vector, integer_, type.components});
       }
       type.integer = vector;
-      for (const std::uint32_t value : {0x7f800000u, 0x7f000000u, 0x80000000u, 0u, multiplier}) {
+      for (const std::uint32_t value :
+           {0x7f800000u, 0x7f000000u, 0x80000000u, 0x00800000u, 23u, 0u, multiplier}) {
         type.integers[value] = constant(integer_, type.integer, type.components, value);
       }
       for (const float value : {1.0f, 0x1p-22f}) {
@@ -154,6 +178,25 @@ class Patcher {
     out_.insert(out_.end(), words.begin(), words.end());
     out_[out_.size() - words.size() + 2] = exact;
     move(words[1], exact, side, words[2]);
+    ++patched_;
+  }
+
+  /// The instruction, and after it its result with all bits 0 if those of its exponent are.
+  void flush(Words words) {
+    Type& type = types_[words[1]];
+    const std::uint32_t exact = unflushed_[words[2]];
+    out_.insert(out_.end(), words.begin(), words.end());
+    out_[out_.size() - words.size() + 2] = exact;
+    const std::uint32_t bits = emit(opBitcast, type.integer, {exact});
+    const std::uint32_t exponent =
+        emit(opBitwiseAnd, type.integer, {bits, type.integers[0x7f800000]});
+    const std::uint32_t least =
+        emit(opExtInst, type.integer, {glsl_, glslUMin, exponent, type.integers[0x00800000]});
+    const std::uint32_t isNormal =
+        emit(opShiftRightLogical, type.integer, {least, type.integers[23]});
+    const std::uint32_t mask = emit(opSNegate, type.integer, {isNormal});
+    const std::uint32_t flushed = emit(opBitwiseAnd, type.integer, {bits, mask});
+    emit(opBitcast, words[1], {flushed}, words[2]);
     ++patched_;
   }
 
@@ -201,6 +244,7 @@ class Patcher {
   std::uint32_t bound_, glsl_ = 0, float_ = 0, integer_ = 0;
   std::map<std::uint32_t, Type> types_;
   std::map<std::uint32_t, std::uint32_t> integerVectors_;
+  std::map<std::uint32_t, std::uint32_t> unflushed_;  ///< ids of results before they are flushed
   std::vector<std::uint32_t> out_;
   std::size_t patched_ = 0;
   bool declared_ = false;

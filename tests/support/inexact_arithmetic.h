@@ -19,6 +19,8 @@ enum class Side { none, up, down, mixed };
 struct Inexactness {
   Side division = Side::none;
   Side inverseRoot = Side::none;
+  /// Denormals become 0 when they are loaded or computed. Not together with the others.
+  bool flushesDenormals = false;
 };
 
 /// A module with that arithmetic. `patched`, if not null, is increased by the operations changed.
