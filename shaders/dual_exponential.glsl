@@ -12,7 +12,8 @@ struct Screw {
   vec3 dual;
 };
 
-// θ / sin θ for the angle θ from 0 to π with this sine and cosine. If the cosine is not negative, tan(θ/4) is at most √2 − 1.
+// θ / sin θ for the angle θ from 0 to π with this sine and cosine. If the cosine is not negative, tan(θ/4) is at most √2 − 1. Close to π
+// the logarithm has no limit, and only has to be finite: sines there count as 1/16.
 float angleOverSine(float sine, float cosine) {
   float upright = abs(cosine);
   precise float halfway = quotient(sine, 1.0 + upright);
@@ -26,7 +27,7 @@ float angleOverSine(float sine, float cosine) {
                 z * (1.0 / 7.0 - z * (1.0 / 9.0 - z * (1.0 / 11.0 - z * (1.0 / 13.0 - z * (1.0 / 15.0 - z * (1.0 / 17.0))))))));
   precise float factor = quotient(4.0 * series, (1.0 + upright) * root);
   if (cosine >= 0.0) return factor;
-  precise float obtuse = quotient(3.14159265358979 - sine * factor, sine == 0.0 ? 1.0 : sine);
+  precise float obtuse = quotient(3.14159265358979 - sine * factor, max(sine, 0.0625));
   return obtuse;
 }
 
@@ -50,7 +51,7 @@ Screw screwOf(vec4 real, vec4 dual) {
                                                                                      (1.0 + (16.0 / 19.0) * s *
                                                                                                 (1.0 + (18.0 / 21.0) * s)))))))));
   } else {
-    slope = quotient(1.0 - factor * real.w, square == 0.0 ? 1.0 : square);
+    slope = quotient(1.0 - factor * real.w, max(square, 0.00390625));
   }
   precise vec3 turn = factor * real.xyz;
   precise vec3 shift = factor * dual.xyz - (slope * dual.w) * real.xyz;

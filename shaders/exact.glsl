@@ -49,7 +49,7 @@ float inversePowerScale(float largest) {
 
 // Vulkan permits an error of 2.5 units in the last place for a division, of 2 for an inverse square root, and of both together for
 // a square root. A step of Newton's method reduces each to about one rounding on any device. A zero divisor, the inverse root of
-// zero, and infinite arguments give NaN. `squareRoot(0)` is 0.
+// zero, and infinite arguments give NaN, and denormals may. `squareRoot` of zero or of a denormal is 0.
 
 float quotient(float a, float b) {
   precise float guess = a / b;
@@ -66,7 +66,7 @@ float inverseRoot(float square) {
 float squareRoot(float square) {
   float guess = sqrt(square);
   precise float better = guess + 0.5 * (square - guess * guess) / guess;
-  return square == 0.0 ? 0.0 : better;
+  return square < 1e-37 ? 0.0 : better;
 }
 
 // v with length 1, or `fallback` if v is zero. Works at any scale.

@@ -91,14 +91,16 @@ void main() {
 
     vec4 rotation;
     ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
+    // If an entry is larger than 2, products in isRigid may overflow, and comparisons with NaN may give any result.
+    float largest = max(largestComponent(r0.xyz), max(largestComponent(r1.xyz), largestComponent(r2.xyz)));
     if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
       atomicAdd(nonFiniteJoints, 1u);
       rotation = vec4(uintBitsToFloat(0x7fc00000u));
-    } else if (isRigid(r0.xyz, r1.xyz, r2.xyz)) {
+    } else if (largest <= 2.0 && isRigid(r0.xyz, r1.xyz, r2.xyz)) {
       rotation = quaternionOfRows(r0.xyz, r1.xyz, r2.xyz);
     } else {
       atomicAdd(nonRigidJoints, 1u);
-      polarParts(r0.xyz, r1.xyz, r2.xyz, rotation, scaleShear);
+      polarParts(r0.xyz, r1.xyz, r2.xyz, largest, rotation, scaleShear);
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
 #ifdef LOGARITHMS

@@ -7,12 +7,13 @@
 #include "scale_shear.glsl"
 
 // One rotation of Jacobi's method: makes the entry pq of a symmetric 4×4 matrix zero. j and k are the other two indices, vp and vq
-// the eigenvectors so far. It uses scalars, since drivers put indexed arrays into memory.
+// the eigenvectors so far. It uses scalars, since drivers put indexed arrays into memory. The largest entries are about 1. A
+// denormal entry counts as zero, since it is not defined whether a GPU flushes it.
 void turnJacobi(inout float app, inout float aqq, inout float apq, inout float ajp, inout float ajq, inout float akp,
                 inout float akq, inout vec4 vp, inout vec4 vq) {
   precise float theta = (aqq - app) / (2.0 * apq);
   precise float tangent = (theta < 0.0 ? -1.0 : 1.0) / (abs(theta) + sqrt(1.0 + theta * theta));
-  if (apq == 0.0 || abs(theta) > 1e18) tangent = 0.0;
+  if (abs(apq) < 1e-37 || abs(theta) > 1e18) tangent = 0.0;
   float cosine = inverseRoot(1.0 + tangent * tangent);
   precise float sine = tangent * cosine;
   precise float p = app - tangent * apq;
@@ -180,11 +181,12 @@ float determinantOf(vec3 r0, vec3 r1, vec3 r2, out float magnitude) {
   return dot3(r0, c);
 }
 
-// The polar decomposition of C, given by its rows. If the determinant is negative, R is the rotation of −C, and S is negated. A
-// determinant whose absolute value is at most 1.43e-6 × `magnitude` (24 roundings of 2^-24 each) counts as 0, because rounding can
-// give the determinant of a singular matrix either sign.
-void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear scaleShear) {
-  float largest = max(largestComponent(r0), max(largestComponent(r1), largestComponent(r2)));
+// The polar decomposition of C, given by its rows and its largest entry. If the determinant is negative, R is the rotation of −C, and
+// S is negated. A determinant counts as 0 if rounding or flushed denormals can give that of a singular matrix either sign: if its
+// absolute value is at most 1.43e-6 × `magnitude` (24 roundings of 2^-24 each), plus 1e-33 (about 2^-110) if C is scaled to entries
+// of about 1, or 1e-33 times this scale if that is more. Flushing changes such a determinant by at most 32 × 2^-126 (1 + scale): its
+// products, and the entries of C before they are scaled (docs/accuracy.md).
+void polarParts(vec3 r0, vec3 r1, vec3 r2, float largest, out vec4 rotation, out ScaleShear scaleShear) {
   if (largest == 0.0) {
     rotation = vec4(0.0, 0.0, 0.0, 1.0);
     scaleShear = ScaleShear(vec3(0.0), vec3(0.0));
@@ -196,7 +198,8 @@ void polarParts(vec3 r0, vec3 r1, vec3 r2, out vec4 rotation, out ScaleShear sca
   precise vec3 n2 = r2 * scale;
   float magnitude;
   float determinant = determinantOf(n0, n1, n2, magnitude);
-  float side = determinant < -1.43e-6 * magnitude ? -1.0 : 1.0;
+  precise float limit = -1.43e-6 * magnitude - 1e-33 * max(1.0, scale);
+  float side = determinant < limit ? -1.0 : 1.0;
   rotation = nearestRotation(side * n0, side * n1, side * n2);
   ScaleShear scaled = refineRotation(rotation, side * n0, side * n1, side * n2);
   float back = side * inversePowerScale(largest);

@@ -17,10 +17,11 @@ struct System {
   vec4 r2;
 };
 
-// A Givens rotation of two rows that makes a component of the second row 0.
+// A Givens rotation of two rows that makes a component of the second row 0. Components below 1e-18 count as 0: they are far below
+// LEAST_SINGULAR_VALUE, and their squares may be denormal.
 void eliminate(inout vec4 upper, inout vec4 row, uint component) {
   precise float square = upper[component] * upper[component] + row[component] * row[component];
-  if (square == 0.0) return;
+  if (square < 1e-36) return;
   precise float inverse = inverseRoot(square);
   precise float cosine = upper[component] * inverse;
   precise float sine = row[component] * inverse;

@@ -75,6 +75,8 @@ std::string exceptions(const Summary& summary) {
     text += fmt::format(", {} only required to be finite", summary.exempt.onlyFinite);
   if (summary.exempt.skipped != 0)
     text += fmt::format(", {} skipped: a joint is not finite", summary.exempt.skipped);
+  if (summary.exempt.outOfRange != 0)
+    text += fmt::format(", {} outside the range of the contract", summary.exempt.outOfRange);
   if (summary.onlyUnitNormals != 0)
     text += fmt::format(", {} normals only required to have unit length", summary.onlyUnitNormals);
   if (summary.onlyUnitTangents != 0)
@@ -95,6 +97,7 @@ Json describe(const VerifiedCase& verified) {
   json["vertices"] = comparison.compared;
   json["onlyFinite"] = comparison.exempt.onlyFinite;
   json["skipped"] = comparison.exempt.skipped;
+  json["outOfRange"] = comparison.exempt.outOfRange;
   json["onlyUnitNormals"] = comparison.onlyUnitNormals;
   json["onlyUnitTangents"] = comparison.onlyUnitTangents;
   json["failures"] = comparison.failures;
@@ -123,6 +126,7 @@ void printReport(const std::vector<ModelVerification>& models) {
       summary.vertices += verified.comparison.compared;
       summary.exempt.onlyFinite += verified.comparison.exempt.onlyFinite;
       summary.exempt.skipped += verified.comparison.exempt.skipped;
+      summary.exempt.outOfRange += verified.comparison.exempt.outOfRange;
       summary.onlyUnitNormals += verified.comparison.onlyUnitNormals;
       summary.onlyUnitTangents += verified.comparison.onlyUnitTangents;
       summary.worstPosition = std::max(summary.worstPosition, verified.comparison.worstPosition);

@@ -291,9 +291,10 @@ std::string VerifiedCase::failure() const {
   if (comparison.exempt != comparison.expectedExempt) {
     add(
         fmt::format("{} vertices were checked only for being finite (expected {}), {} were skipped "
-                    "(expected {})",
+                    "(expected {}), {} were out of range (expected {})",
                     comparison.exempt.onlyFinite, comparison.expectedExempt.onlyFinite,
-                    comparison.exempt.skipped, comparison.expectedExempt.skipped));
+                    comparison.exempt.skipped, comparison.expectedExempt.skipped,
+                    comparison.exempt.outOfRange, comparison.expectedExempt.outOfRange));
   }
   if (!wrong.empty()) add(wrong);
   if (text.empty() && !passed()) text = "no vertex could be compared";

@@ -61,7 +61,7 @@ Box storageBox(const std::vector<reference::Double3>& positions, bool clamps) {
 
 /// Whether the position has a bound, and not only to be finite, if that.
 bool hasBound(const reference::VertexBounds& bounds) {
-  return !bounds.undefined && !bounds.onlyFinite;
+  return !bounds.undefined && !bounds.outOfRange && !bounds.onlyFinite;
 }
 
 class BatchVerifier {
@@ -204,7 +204,10 @@ class BatchVerifier {
                       " were checked only for being finite (expected " +
                       std::to_string(comparison->expectedExempt.onlyFinite) + "), " +
                       std::to_string(comparison->exempt.skipped) + " were skipped (expected " +
-                      std::to_string(comparison->expectedExempt.skipped) + ")");
+                      std::to_string(comparison->expectedExempt.skipped) + "), " +
+                      std::to_string(comparison->exempt.outOfRange) +
+                      " were out of range (expected " +
+                      std::to_string(comparison->expectedExempt.outOfRange) + ")");
     if (comparison->failures != 0) {
       fail(index, std::to_string(comparison->failures) +
                       " previous positions are outside their bound; the first is vertex " +

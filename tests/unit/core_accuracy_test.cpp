@@ -66,11 +66,12 @@ TEST_F(Accuracy, QuaternionsThatCancelByMoreThanAQuarterAreLessCertain) {
 
 TEST_F(Accuracy, WhatAGpuMayFlushToZeroCounts) {
   conditioning.distance = 3;
-  EXPECT_EQ(positionBound(Method::linear, conditioning), 0x1p-118);
-  EXPECT_EQ(positionBound(Method::dualQuaternion, conditioning), 0x1p-118);
-  conditioning.stretch = 0x1p-110;  // 2^-10 of M
+  conditioning.stretch = 4;
+  EXPECT_EQ(positionBound(Method::linear, conditioning), 0x1p-113);
+  EXPECT_EQ(positionBound(Method::dualQuaternion, conditioning), 0x1p-113);
+  conditioning.stretch = 0x1p-106;  // 2^-10 of M
   EXPECT_NEAR(normalBound(Method::linear, conditioning), 0x1p-10, 1e-6);
-  conditioning.stretch = 0x1p-116;
+  conditioning.stretch = 0x1p-112;
   EXPECT_LT(tangentBound(Method::linear, conditioning), 0) << "more than a twentieth";
 }
 
@@ -360,6 +361,30 @@ TEST_F(CompareTest, VerticesWithoutAnAnswerAreNotLookedAt) {
     EXPECT_EQ(comparison.exempt, exemptionsOf(bounded(method)));
     EXPECT_EQ(comparison.compared, count - 1);
     expectOtherExemptionsToFail({0, 1}, method);
+  }
+}
+
+TEST_F(CompareTest, VerticesOutOfRangeAreCounted) {
+  positions[6 * 3] = std::numeric_limits<float>::infinity();
+  for (const Method method : allMethods) {
+    for (double reference::Conditioning::*number :
+         {&reference::Conditioning::scale, &reference::Conditioning::distance,
+          &reference::Conditioning::stretch, &reference::Conditioning::positionRounding}) {
+      const double before = expected.conditioning[6].*number;
+      expected.conditioning[6].*number = 0x1p100;
+      expectOneFailure(6, method);
+      expected.conditioning[6].*number = 1.001 * 0x1p100;
+      EXPECT_TRUE(compared(method, {0, 0, 1}).passed());
+      EXPECT_EQ(compared(method).exempt, (Exemptions{0, 0, 1}));
+      EXPECT_EQ(compared(method).exempt, exemptionsOf(bounded(method)));
+      EXPECT_EQ(compared(method).compared, count - 1);
+      EXPECT_FALSE(compared(method).passed());
+      EXPECT_FALSE(compared(method, {0, 1}).passed());
+      expected.conditioning[6].*number = before;
+    }
+    expected.conditioning[6].directionOutOfRange = true;
+    EXPECT_TRUE(compared(method, {0, 0, 1}).passed());
+    expected.conditioning[6].directionOutOfRange = false;
   }
 }
 

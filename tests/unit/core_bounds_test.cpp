@@ -617,6 +617,27 @@ TEST(Bounds, NeverHaveANaN) {
   }
 }
 
+// Kernels take such a mirror for flat, the reference does not.
+TEST(Bounds, ContainBothResultsOfAMirrorBelowTheRange) {
+  for (std::uint32_t seed = 1; seed < 20; ++seed) {
+    OwnedMesh mesh = test::randomMesh(seed, 50, 2, 2, false);
+    for (std::size_t slot = 0; slot < mesh.joints.size(); ++slot) {
+      mesh.joints[slot] = static_cast<std::uint32_t>(slot % 2);
+      mesh.weights[slot] = 0.5f;
+    }
+    std::vector<JointMatrix> mirrored = test::randomPose(seed, 2, Rigidity::rigid);
+    for (int column = 0; column < 3; ++column) mirrored[1].m[2][column] *= -0x1p-105f;
+    std::vector<JointMatrix> flat = mirrored;
+    for (int column = 0; column < 3; ++column) flat[1].m[2][column] = 0;
+    const Box box = skinnedBounds(boundsOf(mesh.view(), 2), mirrored, Method::dualQuaternion);
+    for (const std::vector<JointMatrix>& pose : {mirrored, flat}) {
+      const auto skinned = reference::skin(mesh.view(), pose, Method::dualQuaternion);
+      for (const reference::Double3& position : skinned->positions)
+        EXPECT_LE(overhang(box, position), 0) << seed;
+    }
+  }
+}
+
 bool isProven(Method method) {
   return std::find(provenMethods.begin(), provenMethods.end(), method) != provenMethods.end();
 }

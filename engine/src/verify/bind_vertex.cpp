@@ -153,6 +153,11 @@ struct Sum {
     roundings += isFloat32(displacement) ? 2u : 3u;  // the product and the sum
   }
   double rounding() const { return roundings * magnitude; }
+  /// Whether, as a direction, it exceeds the range of the contract.
+  bool outOfRange() const {
+    const double length = glm::length(value);
+    return magnitude > 0x1p100 || (length > 0 && length < 0x1p-100);
+  }
   double relativeRounding() const { return rounding() == 0 ? 0 : rounding() / glm::length(value); }
 };
 
@@ -224,6 +229,7 @@ BindVertex bindVertex(const MeshView& mesh, std::size_t vertex, std::span<const 
   conditioning.positionRounding = position.rounding();
   conditioning.normalRounding = normal.relativeRounding();
   conditioning.tangentRounding = tangent.relativeRounding();
+  conditioning.directionOutOfRange = normal.outOfRange() || tangent.outOfRange();
   return bind;
 }
 

@@ -198,6 +198,10 @@ struct Checker {
       fail(vertex);  // the reference is at fault
       return;
     }
+    if (bounds.outOfRange) {
+      ++result.exempt.outOfRange;
+      return;
+    }
     const PositionCheck position = checkPosition(expected.positions[vertex], actual, vertex, bound);
     result.clamped += position.clamped ? 1 : 0;
     const Double4 tangent = tangentAt(vertex);
@@ -256,6 +260,8 @@ Exemptions exemptionsOf(const SkinnedMesh& expected) {
   for (const VertexBounds& bounds : expected.bounds) {
     if (bounds.undefined) {
       ++exemptions.skipped;
+    } else if (bounds.outOfRange) {
+      ++exemptions.outOfRange;
     } else if (bounds.onlyFinite) {
       ++exemptions.onlyFinite;
     }

@@ -9,9 +9,8 @@
 namespace dermis::reference {
 namespace {
 
-/// Effect of denormals that a GPU flushes to 0: 64 results per vertex below 2^-126, the least
-/// normal number.
-constexpr double flushed = 0x1p-120;
+/// The upper end of the range of the contract (docs/accuracy.md).
+constexpr double greatest = 0x1p100;
 
 /// A: the factor by which dividing by |b| increases errors if |b| is less than a quarter.
 double amplification(Method method, const Conditioning& conditioning) {
@@ -49,7 +48,7 @@ double directionBound(Method method, const Conditioning& conditioning, const Dir
 
 double positionBound(Method method, const Conditioning& conditioning) {
   const double given = floatRounding * conditioning.positionRounding * conditioning.stretch +
-                       flushed * (1 + conditioning.distance);
+                       flushed * (1 + conditioning.distance + conditioning.stretch);
   if (method == Method::linear) return 6 * floatRounding * conditioning.scale + given;
   const double amplified = amplification(method, conditioning);
   return 24 * floatRounding * amplified * amplified * (conditioning.scale + conditioning.leverage) +
@@ -78,6 +77,12 @@ VertexBounds boundsOf(Method method, const Conditioning& conditioning) {
   bounds.onlyFinite =
       method != Method::linear && (conditioning.signAmbiguous || conditioning.degenerate);
   bounds.undefined = conditioning.undefined;
+  const double reach =
+      std::max({conditioning.scale, conditioning.distance, conditioning.stretch,
+                conditioning.stretch * conditioning.distance, conditioning.positionRounding});
+  // No float32 input makes it infinite; a faulty reference excuses nothing.
+  bounds.outOfRange =
+      conditioning.directionOutOfRange || (reach > greatest && std::isfinite(reach));
   // If the bind pose nearly cancels, rounding decides whether anything is left.
   bounds.normalMayVanish = floatRounding * conditioning.normalRounding >= 1;
   bounds.tangentMayVanish = floatRounding * conditioning.tangentRounding >= 1;

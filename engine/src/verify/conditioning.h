@@ -13,6 +13,10 @@
 
 namespace dermis::reference {
 
+/// Effect of denormals that a GPU flushes to 0: 1024 numbers per vertex below 2^-126, the least
+/// normal number.
+inline constexpr double flushed = 0x1p-116;
+
 /// p, n and t are the position, normal and tangent in bind pose after morphing; u = 2^-24.
 struct Conditioning {
   double scale = 0;     ///< max |t_j| + max σ_j |p| over the influences; σ_j the largest singular
@@ -50,7 +54,8 @@ struct Conditioning {
   bool normalRotatedOnly =
       true;  ///< directions are only rotated: all joints of the vertex count as rigid in the
              ///< kernels, and the method is neither `linear` nor `blended`
-  bool handednessAmbiguous = false;  ///< |det M| ≤ 1e-5 max σ_j σ_max²: rounding decides its sign
+  bool handednessAmbiguous = false;  ///< |det M| ≤ (1e-5 max σ_j + 2^-116) σ_max²: rounding or
+                                     ///< flushed denormals decide its sign
   /// The result is discontinuous here, and rounding decides between its values: |dot| with the
   /// pivot below 1e-5; `logMatrix`: a joint rotated by 180° within 2e-5; `dualQuaternionIterative`:
   /// a joint nearly opposite to the blend; `sphericalBlend`: a singular value within 1e-5 of the
@@ -59,6 +64,9 @@ struct Conditioning {
   bool degenerate = false;  ///< a joint is degenerate (`Joint::degenerate`) or not finite: a result
                             ///< only has to be finite
   bool undefined = false;   ///< a joint is not finite: no result is defined
+  /// The normal or tangent, before it is normalized, or a summand of it is longer than 2^100; or
+  /// its length is not 0, but below 2^-100.
+  bool directionOutOfRange = false;
 };
 
 /// Maximum distance of a float32 position from the reference's: 6 u · scale for `linear`, 24 u · A²
@@ -66,7 +74,7 @@ struct Conditioning {
 /// `blendLength`. The kernels do not decompose a joint that is rigid except for rounding (det > 0,
 /// ‖CᵀC − 1‖∞ ≤ 8e-6); except for `linear`, this adds `rigidShortcut` · `distance`. Inputs that are
 /// not float32, and morph targets, add u · `positionRounding` · `stretch`. A GPU may flush
-/// denormals to 0, which adds 2^-120 (1 + `distance`).
+/// denormals to 0, which adds 2^-116 (1 + `distance` + `stretch`).
 ///
 /// Holds for every device that computes as Vulkan requires, with division, `sqrt` and `inversesqrt`
 /// as inaccurate as it permits. docs/accuracy.md says which parts are derived and which are fitted.
@@ -75,7 +83,7 @@ double positionBound(Method method, const Conditioning& conditioning);
 /// Maximum distance between a float32 unit normal and the reference's. Negative if a normal only
 /// has to be finite and of unit length. With turn = 1.5e-6 · `turning` · A, bind = u ·
 /// `normalRounding`, a = `normalAlignment`, l = `normalLength` (1 except for `blended`), and f =
-/// 2^-120 / `stretch` for the change of M by flushed denormals:
+/// 2^-116 / `stretch` for the change of M by flushed denormals:
 /// - blended rotations of rigid joints: turn + `rigidShortcut` + bind; negative if bind > 0.05;
 /// - the blended 3×3 M of `linear`: (6 u + bind + f) / a + 2 u;
 /// - two phases, M and then a rotation: ((6 u + 2 `rigidShortcut` + bind + f) / a + turn) / l.
@@ -87,7 +95,8 @@ double normalBound(Method method, const Conditioning& conditioning);
 /// `rigidShortcut` once instead of twice.
 double tangentBound(Method method, const Conditioning& conditioning);
 
-/// All bounds of a vertex.
+/// All bounds of a vertex. It is out of range if a direction is, or if `scale`, `distance`,
+/// `stretch`, `stretch` · `distance` or `positionRounding` exceeds 2^100.
 VertexBounds boundsOf(Method method, const Conditioning& conditioning);
 
 /// A skinned mesh and the conditioning that its bounds follow from, one entry per vertex.

@@ -94,7 +94,9 @@ PolarParts polarParts(const glm::dmat3& matrix) {
   const double determinant = glm::determinant(matrix);
   const double rounding = 16 * 0x1p-24 * uncancelledDeterminant(matrix);
   const bool mirrored = determinant < -rounding;
-  parts.degenerate |= mirrored && determinant >= -2 * rounding;
+  // A GPU may flush entries of the matrix and, once they are scaled to 1, products of entries.
+  const double flushing = 0x1p-100 * parts.largest * parts.largest * std::max(1.0, parts.largest);
+  parts.degenerate |= mirrored && determinant >= -2 * rounding - flushing;
 
   glm::dmat3 left = mirrored ? -svd.left : svd.left;
   // If the matrix is singular, the last axis may have either sign. Choose the one that makes a

@@ -26,9 +26,9 @@ struct PolarParts {
   double largest = 0;     ///< the largest singular value
   double distanceFromRotation =
       0;  ///< largest |singular value - 1|: how far it moves a point at distance 1
-  bool degenerate =
-      false;  ///< rank ≤ 1; or so close to a singular mirror that rounding decides the sign; or σ₂
-              ///< + σ₃ < 2^-100, so that flushing denormals to 0 on a GPU would turn it
+  /// Rank ≤ 1; or so close to a singular mirror that rounding, or flushing denormals to 0 on a GPU,
+  /// decides the sign; or σ₂ + σ₃ < 2^-100, so that flushing would turn it.
+  bool degenerate = false;
 };
 
 /// If the determinant is negative, the rotation is that of −matrix, and scaleShear has a negative

@@ -65,7 +65,7 @@ BlendedMatrix::BlendedMatrix(const dmat3& matrix, double largestOfJoints)
       stretch(largestOfJoints) {}
 
 bool BlendedMatrix::isFlat() const {
-  return std::abs(determinant) <= 1e-5 * stretch * largest * largest;
+  return std::abs(determinant) <= (1e-5 * stretch + flushed) * largest * largest;
 }
 
 BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,

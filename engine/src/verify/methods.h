@@ -62,7 +62,8 @@ struct BlendedMatrix {
   /// `largestOfJoints` is their largest singular value.
   BlendedMatrix(const glm::dmat3& matrix, double largestOfJoints);
 
-  /// Whether rounding decides the sign of the determinant.
+  /// Whether rounding or flushed denormals decide the sign of the determinant: whether they may be
+  /// as large as the smallest singular value, which is at least |det| / σ_max².
   bool isFlat() const;
 
   glm::dmat3 m;

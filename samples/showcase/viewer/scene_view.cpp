@@ -99,7 +99,7 @@ Result<PositionErrors> positionErrors(const cli::Scene& scene, const cli::SceneP
     if (!expected) return expected.error();
     for (std::size_t vertex = 0; vertex < errors.size(); ++vertex) {
       const reference::VertexBounds& bounds = expected->bounds[vertex];
-      if (bounds.onlyFinite || bounds.undefined) continue;
+      if (bounds.onlyFinite || bounds.outOfRange || bounds.undefined) continue;
       // A value that is not finite counts as the largest possible error.
       constexpr double most = static_cast<double>(std::numeric_limits<float>::max());
       const reference::Double3& right = expected->positions[vertex];

@@ -43,6 +43,7 @@ DERMIS_VERIFY_API double tangentFormatBound(VertexFormat format);
 struct Exemptions {
   std::uint64_t onlyFinite = 0;  ///< `VertexBounds::onlyFinite`: must be finite, nothing more
   std::uint64_t skipped = 0;     ///< `VertexBounds::undefined`: not checked
+  std::uint64_t outOfRange = 0;  ///< `VertexBounds::outOfRange`, if not `undefined`: not checked
 
   friend bool operator==(const Exemptions&, const Exemptions&) = default;
 };

@@ -31,10 +31,12 @@ struct VertexBounds {
   /// the influences. t_j is the translation and σ_j the largest singular value of joint j, p is the
   /// position in bind pose.
   double scale = 0;
-  /// Rounding decides the answer: rotations are antipodal, or a joint's 3×3 matrix has rank 1 or is
-  /// nearly a singular mirror. The result must be finite, nothing more.
+  /// Rounding or flushed denormals decide the answer: rotations are antipodal, or a joint's 3×3
+  /// matrix has rank 1, is nearly a singular mirror, or is below the range of the contract. The
+  /// result must be finite, nothing more.
   bool onlyFinite = false;
   bool undefined = false;         ///< a joint is not finite: there is no answer
+  bool outOfRange = false;        ///< numbers exceed the range of the contract: any result is right
   bool normalMayVanish = false;   ///< morph targets cancel the normal: zero is right, too
   bool tangentMayVanish = false;  ///< the same for the tangent
   bool eitherHandedness = false;  ///< the blended matrix is singular: both handednesses are right

@@ -97,10 +97,11 @@ math::Vec4 nearestRotation(const math::Mat3& c) {
 
 enum class Sense { upright, mirrored, ambiguous };
 
-/// Which way round a matrix is. The reference and the kernels draw the line between flat and
-/// mirrored at 16 and 24 roundings of float32 and call a matrix of rank 1 where σ₂ ≤ 1e-5 σ₁;
-/// within twice that, one may decide this way and another that way.
-Sense senseOf(const math::Mat3& m) {
+/// Which way round a matrix is; `size` is what it was divided by. The reference and the kernels
+/// draw the line between flat and mirrored at 16 and 24 roundings of float32 and call a matrix of
+/// rank 1 where σ₂ ≤ 1e-5 σ₁; within twice that, one may decide this way and another that way.
+/// Kernels take a mirror for flat if flushed denormals could make it one.
+Sense senseOf(const math::Mat3& m, double size) {
   double cofactors = 0, squares = 0, uncancelled = 0;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -113,7 +114,8 @@ Sense senseOf(const math::Mat3& m) {
   if (cofactors <= 1e-9 * squares * squares) return Sense::ambiguous;
   const double determinant = math::determinant(m), rounding = 0x1p-24 * uncancelled;
   if (determinant >= -8 * rounding) return Sense::upright;
-  return determinant <= -64 * rounding ? Sense::mirrored : Sense::ambiguous;
+  const double flushing = 0x1p-98 * std::max(1.0, 1 / size);
+  return determinant <= -64 * rounding - flushing ? Sense::mirrored : Sense::ambiguous;
 }
 
 /// By the rules of the reference: the polar decomposition, R being that of −C where C mirrors. The
@@ -137,7 +139,7 @@ Parts partsOf(const math::Mat3& matrix) {
 
   const double size = std::sqrt(squares / 3);
   const math::Mat3 unit = matrix / size;
-  const Sense sense = senseOf(unit);
+  const Sense sense = senseOf(unit, size);
   // Entries below 2^-126 may be flushed to 0; `reference::PolarParts` has the same line.
   parts.ambiguous = sense == Sense::ambiguous || size < 0x1p-98;
   if (parts.ambiguous) return parts;
