@@ -9,7 +9,10 @@
 #endif
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -36,6 +39,55 @@ std::optional<Place> nextPlace(std::string_view name, std::size_t from) {
       return Place{from - 1, end + 1, name.substr(from, end - from)};
   }
   return std::nullopt;
+}
+
+/// The place that `frameName` replaces.
+std::optional<Place> framePlace(std::string_view pattern) {
+  std::optional<Place> place = nextPlace(pattern, 0);
+  while (place && !place->isRight()) place = nextPlace(pattern, place->end);
+  return place;
+}
+
+/// The number of the frame whose file or folder may have this name, if there is one: a number with
+/// so many characters before and after it. Which ones is left to the file system, since it may
+/// ignore case.
+std::optional<std::uint32_t> frameNumber(std::string_view name, std::size_t before,
+                                         std::size_t after) {
+  if (name.size() <= before + after) return std::nullopt;
+  const char* const end = name.data() + name.size() - after;
+  std::uint32_t frame = 0;
+  const auto [stop, error] = std::from_chars(name.data() + before, end, frame);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return frame;
+}
+
+/// Calls `check` with the name of each frame that may exist, until it fails. Lists the folder of
+/// the placeholder, since most frames do not exist yet, and there may be billions of them.
+Result<void> forEachFrame(const std::string& pattern, std::uint32_t frames,
+                          const std::function<Result<void>(const std::string&)>& check) {
+#ifdef _WIN32
+  constexpr std::string_view separators = "/\\";
+#else
+  constexpr std::string_view separators = "/";
+#endif
+  const Place place = *framePlace(pattern);
+  const std::size_t begin = pattern.find_last_of(separators, place.begin) + 1;
+  const std::size_t end = std::min(pattern.find_first_of(separators, place.end), pattern.size());
+  std::error_code error;
+  std::filesystem::directory_iterator entry(
+      begin == 0 ? "." : pathOf(std::string_view(pattern).substr(0, begin)), error);
+  if (error == std::errc::no_such_file_or_directory) return {};
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const std::u8string name = entry->path().filename().u8string();
+    const auto frame =
+        frameNumber(std::string(name.begin(), name.end()), place.begin - begin, end - place.end);
+    if (!frame || *frame >= frames) continue;
+    if (Result<void> good = check(*frameName(pattern, *frame)); !good) return good;
+  }
+  // A folder may be writable that cannot be listed.
+  for (std::uint32_t frame = 0; error && frame < frames; ++frame)
+    if (Result<void> good = check(*frameName(pattern, frame)); !good) return good;
+  return {};
 }
 
 /// The device or volume, and the number of the file on it.
@@ -89,8 +141,7 @@ bool hasEnding(std::string_view name, std::string_view ending) {
 }
 
 std::optional<std::string> frameName(const std::string& pattern, std::uint32_t frame) {
-  std::optional<Place> place = nextPlace(pattern, 0);
-  while (place && !place->isRight()) place = nextPlace(pattern, place->end);
+  const std::optional<Place> place = framePlace(pattern);
   if (!place) return std::nullopt;
   return pattern.substr(0, place->begin) + fmt::format("{:0{}}", frame, place->inside[1] - '0') +
          pattern.substr(place->end);
@@ -126,17 +177,18 @@ Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
     if (!isFrame) written.emplace(*file, option);
     return {};
   };
-  // Single files first: frames, of which there may be millions, are then only looked up.
-  for (const auto& [option, output, frames] : outputs) {
-    if (output.empty() || frameName(output, 0)) continue;
-    if (Result<void> good = check(option, output, false); !good) return good;
+  // Single files first: frames are then only looked up.
+  for (const RequestedOutput& output : outputs) {
+    if (output.name.empty() || framePlace(output.name)) continue;
+    if (Result<void> good = check(output.option, output.name, false); !good) return good;
   }
-  for (const auto& [option, output, frames] : outputs) {
-    for (std::uint32_t frame = 0; frame < frames; ++frame) {
-      const std::optional<std::string> name = frameName(output, frame);
-      if (!name) break;
-      if (Result<void> good = check(option, *name, true); !good) return good;
-    }
+  for (const RequestedOutput& output : outputs) {
+    if (!framePlace(output.name)) continue;
+    const auto checkFrame = [&](const std::string& name) {
+      return check(output.option, name, true);
+    };
+    if (Result<void> good = forEachFrame(output.name, output.frames, checkFrame); !good)
+      return good;
   }
   return {};
 }

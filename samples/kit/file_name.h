@@ -37,7 +37,7 @@ struct RequestedOutput {
 
 /// Fails with `invalidArgument` if an output, or one of its frames, would overwrite an input file
 /// or another output. Files are compared by identity, so a link counts as the file that it leads
-/// to. Devices and FIFOs may be named twice.
+/// to. Devices and FIFOs may be named twice. Of frames, only those that exist are looked at.
 Result<void> checkOutputFiles(std::span<const RequestedOutput> outputs,
                               std::span<const std::filesystem::path> inputs);
 

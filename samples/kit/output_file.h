@@ -5,7 +5,8 @@
 // stays, and the file that it names is replaced. A new file gets the permissions that the umask
 // leaves; a replaced file keeps its permissions. Standard output and files that are not regular
 // (devices, FIFOs) are written directly ("written through"). On Windows a replaced file gets the
-// permissions of a new one, and a link is replaced.
+// permissions of a new one, and a link is replaced. A hard link to a replaced file keeps the old
+// contents.
 #pragma once
 
 #ifndef _WIN32
@@ -23,10 +24,10 @@
 
 namespace dermis::samples {
 
-/// SIGINT, SIGTERM and SIGHUP, unless they are ignored already, remove what is registered below and
-/// then end the program as usual. On Windows, Ctrl+C, Ctrl+Break and closing the console do so.
-/// SIGPIPE and SIGXFSZ are ignored: writing then fails as on a full disk. Call it once, when the
-/// program begins.
+/// Every signal that would end the program, unless it is ignored or handled already, removes what
+/// is registered below and then ends the program as usual. On Windows, Ctrl+C, Ctrl+Break and
+/// closing the console do so. SIGPIPE and SIGXFSZ are ignored: writing then fails as on a full
+/// disk. Call it once, when the program begins.
 void handleSignals();
 
 /// A signal removes this file as long as the object lives. At most eight files are removed.

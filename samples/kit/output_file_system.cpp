@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -50,16 +51,19 @@ void removeAndEnd(int signalNumber) {
 }  // namespace
 
 void handleSignals() {
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  constexpr std::array harmless{SIGCHLD, SIGCONT, SIGTSTP, SIGTTIN, SIGTTOU, SIGURG, SIGWINCH};
+  for (int number = 1; number < NSIG; ++number) {
+    if (std::ranges::find(harmless, number) != harmless.end()) continue;
     struct sigaction action {};
-    if (sigaction(number, nullptr, &action) != 0 || action.sa_handler == SIG_IGN) continue;
+    // Fails for signals that nobody can handle.
+    if (sigaction(number, nullptr, &action) != 0 || action.sa_handler != SIG_DFL) continue;
     action = {};
     action.sa_handler = removeAndEnd;
     sigfillset(&action.sa_mask);
     sigaction(number, &action, nullptr);
   }
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 UnfinishedFile::UnfinishedFile(const std::string& path) {

@@ -1,6 +1,7 @@
 // How files are written: whole or not at all, whatever goes wrong, and never over what is read.
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -286,10 +288,55 @@ TEST(FileOutputTest, FilesBesideTheModelAreNotOverwritten) {
   EXPECT_TRUE(textOf(binary) == bytes);
 }
 
+// Billions of names cannot be asked for one by one.
+TEST(FileOutputTest, FramesAreComparedWithTheFilesThatExist) {
+  const std::string folder = emptyFolder();
+  const std::vector<std::filesystem::path> inputs{writeText(folder + "/model_00012345.ply")};
+  std::filesystem::create_directories(folder + "/07");
+  std::filesystem::create_symlink("../model_00012345.ply", folder + "/07/link.ply");
+  const auto refusal = [&](const std::string& pattern, std::uint32_t frames) {
+    const samples::RequestedOutput output{"-o", folder + "/" + pattern, frames};
+    const Result<void> kept = samples::checkOutputFiles({&output, 1}, inputs);
+    return kept ? "" : kept.error().message;
+  };
+  const auto overwrites = [&](const std::string& name) {
+    return "-o " + folder + "/" + name + " would overwrite an input file";
+  };
+  const std::string file = "model_00012345.ply", link = "07/link.ply";
+  EXPECT_EQ(refusal("model_%08d.ply", 0xffffffff), overwrites(file));
+  EXPECT_EQ(refusal("model_%08d.ply", 12346), overwrites(file));
+  EXPECT_EQ(refusal("model_%08d.ply", 12345), "");
+  EXPECT_EQ(refusal("model_000%01d.ply", 0xffffffff), overwrites(file)) << "more digits than one";
+  EXPECT_EQ(refusal("model_%07d.ply", 0xffffffff), "");
+  EXPECT_EQ(refusal("%02d/link.ply", 0xffffffff), overwrites(link));
+  EXPECT_EQ(refusal("%02d/other.ply", 0xffffffff), "");
+  EXPECT_EQ(refusal("none/%02d.ply", 0xffffffff), "");
+}
+
+TEST(FileOutputTest, FramesInAFolderThatCannotBeListedAreCompared) {
+  const std::string folder = emptyFolder();
+  writeText(folder + "/model_12.ply");
+  const pid_t child = fork();
+  if (child == 0) {
+    // Root may list every folder: the child becomes somebody else.
+    if (chdir(folder.c_str()) != 0 || chmod(".", 0111) != 0) _exit(1);
+    if (geteuid() == 0 && setuid(65534) != 0) _exit(2);
+    const std::vector<std::filesystem::path> inputs{"model_12.ply"};
+    const samples::RequestedOutput output{"-o", "model_%02d.ply", 20};
+    _exit(samples::checkOutputFiles({&output, 1}, inputs) ? 3 : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
+}
+
 /// A child that has half written a file when a signal comes. How it ended, as waitpid says.
 int interruptHalfway(const std::string& out, int signal) {
   const pid_t child = fork();
   if (child == 0) {
+    const rlimit noCore{0, 0};
+    setrlimit(RLIMIT_CORE, &noCore);
     samples::handleSignals();
     auto file = samples::OutputFile::create(out);
     if (!file || !(*file)->write(std::as_bytes(std::span(good).first(5)))) _exit(1);
@@ -302,7 +349,17 @@ int interruptHalfway(const std::string& out, int signal) {
 }
 
 TEST(FileOutputTest, ASignalHalfwayRemovesWhatIsUnfinished) {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  std::size_t tried = 0;
+  for (int signal = 1; signal < NSIG; ++signal) {
+    SCOPED_TRACE(signal);
+    const std::set harmless{SIGKILL, SIGSTOP, SIGCHLD, SIGCONT, SIGTSTP, SIGTTIN,
+                            SIGTTOU, SIGURG,  SIGPIPE, SIGXFSZ, SIGWINCH};
+    struct sigaction action {};
+    // A sanitizer handles some.
+    if (harmless.contains(signal) || sigaction(signal, nullptr, &action) != 0 ||
+        action.sa_handler != SIG_DFL)
+      continue;
+    ++tried;
     const std::string folder = emptyFolder();
     const std::string out = writeText(folder + "/out");
     const int status = interruptHalfway(out, signal);
@@ -311,6 +368,7 @@ TEST(FileOutputTest, ASignalHalfwayRemovesWhatIsUnfinished) {
     EXPECT_EQ(namesIn(folder), std::vector<std::string>{"out"});
     EXPECT_EQ(textOf(out), good);
   }
+  EXPECT_GE(tried, 15u);
 }
 
 TEST(FileOutputTest, AnInterruptedCommandLeavesWholeFilesOnly) {
