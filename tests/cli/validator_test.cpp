@@ -68,6 +68,7 @@ const std::multimap<std::string, std::string>& sentences() {
       {"MESH_PRIMITIVE_INDICES_ACCESSOR_WITH_BYTESTRIDE", "which only vertex attributes may have"},
       {"MESH_PRIMITIVE_JOINTS_WEIGHTS_MISMATCH", "has no WEIGHTS_"},
       {"MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT", "elements, but POSITION has"},
+      {"NODE_LOOP", "a cycle of nodes"},
       {"NODE_MATRIX_NON_TRS", "its matrix is not a translation times"},
       {"NODE_MATRIX_NON_TRS", "the fourth row of its matrix"},
       {"NODE_MATRIX_TRS", "it has both matrix and"},

@@ -58,11 +58,10 @@ TEST(GltfNode, MultipliesParentsFirstWhateverTheOrder) {
 }
 
 TEST(GltfNode, NormalizesRotations) {
-  const gltf::Model model =
-      expectNoted(withNodes({{{"rotation", {0, 0, 0.3, 0.4}}},
-                             {{"rotation", {0, 0, 0, 0}}},
-                             {{"rotation", {0, 0, 0, 1}}}}),
-                  "node 0: its rotation has a length of 0.5, not 1");
+  const gltf::Model model = expectNoted(withNodes({{{"rotation", {0, 0, 0.3, 0.4}}},
+                                                   {{"rotation", {0, 0, 0, 0}}},
+                                                   {{"rotation", {0, 0, 0, 1}}}}),
+                                        "node 0: its rotation has a length of 0.5, not 1");
   EXPECT_NEAR(model.nodes[0].rotation[2], 0.6, 1e-15);
   EXPECT_EQ(model.nodes[1].rotation, (std::array<double, 4>{0, 0, 0, 1}));
 }
@@ -344,8 +343,9 @@ TEST(GltfSkin, RefusesBadMatrices) {
   expectInvalid(withMatrices(two(19, 0.5f)),
                 "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1");
   loaded(withMatrices(two(19, 1e-7f)));
-  expectNoted(withMatrices(two(19, 1e-4f)),
-              "skin 0: inverse bind matrix 1: its fourth row is not 0 0 0 1; it is ignored");
+  expectNoted(
+      withMatrices(two(19, 1e-4f)),
+      "skin 0: inverse bind matrix 1: its fourth row is not exactly 0 0 0 1; it is ignored");
 }
 
 }  // namespace
