@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <string>
 
 #include "system_test.h"
 
@@ -26,28 +27,37 @@ class SystemHandlesTest : public SystemTest {
   SystemEngine& engine() { return one_->engine; }
 
   template <typename T>
-  static void expectRefused(const Result<T>& result, ErrorCode code, const char* what) {
-    ASSERT_FALSE(result.ok()) << what;
-    EXPECT_EQ(result.error().code, code) << what << ": " << result.error().message;
-    EXPECT_FALSE(result.error().message.empty()) << what;
+  static void expectRefused(const Result<T>& result, ErrorCode code, const std::string& text) {
+    ASSERT_FALSE(result.ok()) << text;
+    EXPECT_EQ(result.error().code, code) << text << ": " << result.error().message;
+    EXPECT_NE(result.error().message.find(text), std::string::npos)
+        << text << ": " << result.error().message;
   }
   template <typename T>
-  static void expectInvalid(const Result<T>& result, const char* what) {
-    expectRefused(result, ErrorCode::invalidArgument, what);
+  static void expectInvalid(const Result<T>& result, const std::string& text) {
+    expectRefused(result, ErrorCode::invalidArgument, text);
   }
 
+  /// What is said of a handle that nothing has.
+  template <typename Handle>
+  static std::string unknown(const std::string& kind, Handle handle) {
+    if (!handle) return "the " + kind + " handle is null";
+    return "there is no " + kind + " " + std::to_string(handle.index) + " of generation " +
+           std::to_string(handle.generation);
+  }
   void expectStaleInstance(InstanceHandle instance) {
     SkinningSystem& system = engine().system();
-    expectInvalid(system.removeInstance(instance), "removeInstance");
-    expectInvalid(system.change({.instance = instance, .visible = false}), "visible");
-    expectInvalid(system.change({.instance = instance, .updateInterval = 2}), "updateInterval");
-    expectInvalid(system.change({.instance = instance, .teleports = true}), "teleports");
+    const std::string text = unknown("instance", instance);
+    expectInvalid(system.removeInstance(instance), text);
+    expectInvalid(system.change({.instance = instance, .visible = false}), text);
+    expectInvalid(system.change({.instance = instance, .updateInterval = 2}), text);
+    expectInvalid(system.change({.instance = instance, .teleports = true}), text);
     expectInvalid(system.change({.instance = instance, .morphs = std::span<const MorphWeight>()}),
-                  "morphs");
-    expectInvalid(system.change({.instance = instance, .mesh = one_->description.mesh}), "mesh");
-    expectInvalid(system.output(instance), "output");
-    expectInvalid(system.bounds(instance), "bounds");
-    expectInvalid(system.visibilityIndex(instance), "visibilityIndex");
+                  text);
+    expectInvalid(system.change({.instance = instance, .mesh = one_->description.mesh}), text);
+    expectInvalid(system.output(instance), text);
+    expectInvalid(system.bounds(instance), text);
+    expectInvalid(system.visibilityIndex(instance), text);
   }
 
   std::optional<SingleInstance> one_;
@@ -84,9 +94,10 @@ TEST_F(SystemHandlesTest, MeshesThatAreGoneAreNoticed) {
     for (const MeshHandle mesh : {old, MeshHandle{}, MeshHandle{1000, 1}}) {
       InstanceDescription instance = one_->description;
       instance.mesh = mesh;
-      expectInvalid(engine()->addInstance(instance), "addInstance");
-      expectInvalid(engine()->change({.instance = one_->instance, .mesh = mesh}), "mesh");
-      expectInvalid(engine()->removeMesh(mesh), "removeMesh");
+      const std::string text = unknown("mesh", mesh);
+      expectInvalid(engine()->addInstance(instance), text);
+      expectInvalid(engine()->change({.instance = one_->instance, .mesh = mesh}), text);
+      expectInvalid(engine()->removeMesh(mesh), text);
     }
     engine().submit();
     engine().begin();
@@ -101,9 +112,10 @@ TEST_F(SystemHandlesTest, PosesThatAreGoneAreNoticed) {
     for (const PoseHandle palette : {old, PoseHandle{}, PoseHandle{1000, 1}}) {
       InstanceDescription instance = one_->description;
       instance.pose = palette;
-      expectInvalid(engine()->addInstance(instance), "addInstance");
-      expectInvalid(engine()->writePose(palette), "writePose");
-      expectInvalid(engine()->removePose(palette), "removePose");
+      const std::string text = unknown("pose", palette);
+      expectInvalid(engine()->addInstance(instance), text);
+      expectInvalid(engine()->writePose(palette), text);
+      expectInvalid(engine()->removePose(palette), text);
     }
     engine().submit();
     engine().begin();
@@ -113,12 +125,13 @@ TEST_F(SystemHandlesTest, PosesThatAreGoneAreNoticed) {
 
 TEST_F(SystemHandlesTest, WhatAnInstanceUsesStays) {
   const MeshHandle first = one_->description.mesh;
-  expectInvalid(engine()->removeMesh(first), "removeMesh");
-  expectInvalid(engine()->removePose(one_->description.pose), "removePose");
+  const std::string used = " is used by 1 instance";
+  expectInvalid(engine()->removeMesh(first), "mesh " + std::to_string(first.index) + used);
+  expectInvalid(engine()->removePose(one_->description.pose), "pose 0" + used);
   const MeshHandle second = engine().addMesh(systemMesh(2, 30));
   must(engine()->change({.instance = one_->instance, .mesh = second}));
   must(engine()->removeMesh(first));
-  expectInvalid(engine()->removeMesh(second), "removeMesh");
+  expectInvalid(engine()->removeMesh(second), "mesh " + std::to_string(second.index) + used);
   must(engine()->removeInstance(one_->instance));
   must(engine()->removeMesh(second));
   must(engine()->removePose(one_->description.pose));
@@ -134,18 +147,19 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
   const PoseHandle narrow = must(engine()->addPose(1));
   const float infinity = std::numeric_limits<float>::infinity();
   const std::pair<const char*, Change> changes[] = {
-      {"updateInterval", [](InstanceDescription& d) { d.updateInterval = 0; }},
-      {"too few joints", [&](InstanceDescription& d) { d.pose = narrow; }},
-      {"no positions", [](InstanceDescription& d) { d.layout.positions = VertexFormat::none; }},
-      {"octahedral positions",
+      {"update interval must be at least 1", [](InstanceDescription& d) { d.updateInterval = 0; }},
+      {"its mesh needs a pose of 8 joints", [&](InstanceDescription& d) { d.pose = narrow; }},
+      {"positions cannot be in the format none",
+       [](InstanceDescription& d) { d.layout.positions = VertexFormat::none; }},
+      {"positions cannot be in the format octahedral16x2",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::octahedral16x2; }},
-      {"tangents of three components",
+      {"tangents cannot be stored as float32x3",
        [](InstanceDescription& d) { d.layout.tangents = VertexFormat::float32x3; }},
-      {"normals of a mesh without", [&](InstanceDescription& d) { d.mesh = bare; }},
-      {"stride", [](InstanceDescription& d) { d.layout.stride = 32; }},
-      {"a box without extent",
+      {"its mesh has none", [&](InstanceDescription& d) { d.mesh = bare; }},
+      {"stride of 32 bytes is less than", [](InstanceDescription& d) { d.layout.stride = 32; }},
+      {"the box of its snorm16 positions must be finite, with sides longer than 0",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::snorm16x4; }},
-      {"an infinite box",
+      {"the box of its snorm16 positions must be finite, with sides longer than 0",
        [&](InstanceDescription& d) {
          d.layout.positions = VertexFormat::snorm16x4;
          d.box = {{-1, -1, -1}, {1, 1, infinity}};
@@ -172,16 +186,17 @@ TEST_F(SystemHandlesTest, ChangesThatBreakARuleAreRefused) {
   const MorphWeight infinite{0, std::numeric_limits<float>::infinity()};
   expectInvalid(engine()->change({.instance = one_->instance,
                                   .morphs = std::span<const MorphWeight>(&missing, 1)}),
-                "target");
-  expectInvalid(engine()->change({.instance = one_->instance, .morphs = twice}), "a target twice");
+                "there is no morph target 3 among the 3 of its mesh");
+  expectInvalid(engine()->change({.instance = one_->instance, .morphs = twice}),
+                "has morph target 1 twice");
   expectInvalid(engine()->change({.instance = one_->instance,
                                   .morphs = std::span<const MorphWeight>(&infinite, 1)}),
                 "weight");
-  expectInvalid(engine()->change({.instance = one_->instance, .updateInterval = 0}), "interval");
-  expectInvalid(engine()->addPose(0), "addPose");
-  EXPECT_FALSE(engine()->addPose(maxPoseJoints + 1).ok());
+  expectInvalid(engine()->change({.instance = one_->instance, .updateInterval = 0}),
+                "the update interval must be at least 1 frame, not 0");
   const MeshHandle wide = engine().addMesh(systemMesh(2, 30, 50));
-  expectInvalid(engine()->change({.instance = one_->instance, .mesh = wide}), "mesh");
+  expectInvalid(engine()->change({.instance = one_->instance, .mesh = wide}),
+                "needs a pose of 50 joints");
   engine().submit();
   expectSkinned(engine().read(one_->instance),
                 alone(one_->packed, systemPose(1), one_->description));
@@ -195,9 +210,9 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
   SystemEngine full(device(), small);
   full.begin();
   const MeshHandle first = full.addMesh(mesh);
-  expectRefused(full->addMesh(mesh), ErrorCode::limitExceeded, "addMesh");
+  expectRefused(full->addMesh(mesh), ErrorCode::limitExceeded, "bytes of meshes only 16 are free");
   const PoseHandle palette = must(full->addPose(12));
-  expectRefused(full->addPose(12), ErrorCode::limitExceeded, "addPose");
+  expectRefused(full->addPose(12), ErrorCode::limitExceeded, "their maximum is 20");
   must(full->removeMesh(first));
   must(full->removePose(palette));
   full.submit();
@@ -248,10 +263,11 @@ TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
   InstanceDescription bounded = first.description;
   bounded.bounds = true;
   const InstanceHandle second = first.engine.addInstance(bounded);
-  expectRefused(first.engine->addInstance(bounded), ErrorCode::limitExceeded, "bounds");
+  expectRefused(first.engine->addInstance(bounded), ErrorCode::limitExceeded,
+                "the maximum of boundsCapacity");
   first.engine.addInstance(first.description);
   expectRefused(first.engine->addInstance(first.description), ErrorCode::limitExceeded,
-                "instances");
+                "the maximum of instanceCapacity");
   must(first.engine->removeInstance(second));
   first.engine.addInstance(bounded);
   first.engine.submit();
@@ -260,27 +276,28 @@ TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
 
 TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
   SkinningSystem system = must(SkinningSystem::create(description()));
-  expectInvalid(system.record(VK_NULL_HANDLE), "record before any frame");
+  expectInvalid(system.record(VK_NULL_HANDLE), "beginFrame must be called before each frame");
   const PoseHandle palette = must(system.addPose(4));
-  expectInvalid(system.writePose(palette), "writePose before any frame");
-  expectInvalid(system.beginFrame(0, 0), "frames count from 1");
+  expectInvalid(system.writePose(palette), "only between beginFrame and record");
+  expectInvalid(system.beginFrame(0, 0), "the frame must be larger than 0");
   must(system.beginFrame(1, 0));
-  expectInvalid(system.beginFrame(1, 0), "the same frame");
+  expectInvalid(system.beginFrame(1, 0), "the frame must be larger than 1");
   must(system.record(VK_NULL_HANDLE));  // nothing to do
-  expectInvalid(system.beginFrame(2, 2), "complete before it began");
+  expectInvalid(system.beginFrame(2, 2), "less than the frame");
   must(system.beginFrame(2, 0));
   must(system.record(VK_NULL_HANDLE));
-  expectInvalid(system.beginFrame(3, 0), "a third frame of two in flight");
-  must(system.beginFrame(3, 1));
-  expectInvalid(system.beginFrame(4, 0), "what was complete is so no longer");
-  expectInvalid(system.beginFrame(2, 1), "backwards");
+  expectInvalid(system.beginFrame(3, 0),
+                "more frames are in flight than framesInFlight, which is 2");
+  must(system.beginFrame(3, 2));
+  expectInvalid(system.beginFrame(4, 1), "the completed frame at least 2");
+  expectInvalid(system.beginFrame(2, 1), "the frame must be larger than 3");
   must(system.beginFrame(4, 3));
 }
 
 TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
   engine().submit();
-  expectInvalid(engine()->record(VK_NULL_HANDLE), "record without another beginFrame");
-  expectInvalid(engine()->writePose(one_->description.pose), "writePose after record");
+  expectInvalid(engine()->record(VK_NULL_HANDLE), "beginFrame must be called before each frame");
+  expectInvalid(engine()->writePose(one_->description.pose), "only between beginFrame and record");
 }
 
 TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
@@ -369,7 +386,8 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   instance.mesh = unprepared.addMesh(one_->packed);
   instance.pose = unprepared.addPose(systemPose(2));
   const InstanceHandle handle = must(unprepared->addInstance(instance));
-  expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared, "record");
+  expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared,
+                "call Context::prepare for it first");
   must(unprepared->prepare(pipelineNeeds(instance)));
   unprepared.runFrame();
   EXPECT_EQ(unprepared.lastFrame().skinnedInstances, 1u);
@@ -384,7 +402,7 @@ TEST_F(SystemHandlesTest, ASystemCanBeMoved) {
   must(second.beginFrame(1, 0));
   EXPECT_EQ(must(second.writePose(palette)).size(), 4u);
   second = must(SkinningSystem::create(description()));
-  expectInvalid(second.removePose(palette), "a handle of another system");
+  expectInvalid(second.removePose(palette), "belongs to another system");
 }
 
 }  // namespace
