@@ -58,7 +58,7 @@ double number(const Compared& compared, Method method, const char* group, const 
 }
 
 // TRUTHS.md, lines 9 to 11. Rings and sides are fine enough for 2e-4 of the volume.
-TEST(CompareTest, TheTubeKeepsWhatTheorySays) {
+TEST(CompareCommandTest, TheTubeKeepsWhatTheorySays) {
   const Compared compared = compare({bar, "--device", "cpu"});
   ASSERT_EQ(compared.result.status, 0) << compared.result.errors;
   ASSERT_EQ(compared.methods.size(), allMethods.size());
@@ -91,7 +91,7 @@ TEST(CompareTest, TheTubeKeepsWhatTheorySays) {
   EXPECT_LT(bend(Method::bulgeControlled, "reach"), bulge - 0.1);
 }
 
-TEST(CompareTest, SharesOfTheWholeMeshMoveTheirMethodsOnly) {
+TEST(CompareCommandTest, SharesOfTheWholeMeshMoveTheirMethodsOnly) {
   const Compared none = compare({arm, "--time", "0.5", "--device", "cpu",
                                  "--dual-quaternion-weight", "0", "--bulge-strength", "0"});
   const Compared all = compare({arm, "--time", "0.5", "--device", "cpu", "--dual-quaternion-weight",
@@ -113,7 +113,7 @@ TEST(CompareTest, SharesOfTheWholeMeshMoveTheirMethodsOnly) {
   EXPECT_NEAR(number(all, Method::blended, "difference", "largest"), 0, 1e-12);
 }
 
-TEST(CompareTest, TheReferenceIsNotTimed) {
+TEST(CompareCommandTest, TheReferenceIsNotTimed) {
   // It needs no driver.
   const CommandResult result =
       dermis({"compare", bar, "--device", "reference"},
@@ -127,7 +127,7 @@ TEST(CompareTest, TheReferenceIsNotTimed) {
   }
 }
 
-TEST(CompareTest, TheCpuTimesTheEverydayMethods) {
+TEST(CompareCommandTest, TheCpuTimesTheEverydayMethods) {
   const std::vector<std::string> noDriver{"VK_DRIVER_FILES=/nonexistent.json",
                                           "VK_ICD_FILENAMES=/nonexistent.json"};
   const CommandResult result = dermis(
@@ -144,7 +144,7 @@ TEST(CompareTest, TheCpuTimesTheEverydayMethods) {
   }
 }
 
-TEST(CompareTest, WhatIsWrongHasItsStatus) {
+TEST(CompareCommandTest, WhatIsWrongHasItsStatus) {
   const std::string broken = outFile("broken.glb");
   std::ofstream(broken, std::ios::binary) << "glTF is not what this is";
   const std::string noSkin = outFile("noskin.gltf");
@@ -176,21 +176,21 @@ TEST(CompareTest, WhatIsWrongHasItsStatus) {
   }
 }
 
-TEST(CompareTest, AnUnknownDeviceEndsWithFour) {
+TEST(CompareCommandTest, AnUnknownDeviceEndsWithFour) {
   REQUIRE_DEVICE();
   const CommandResult result = dermis({"compare", bar, "--device", "no such device"});
   EXPECT_EQ(result.status, 4);
   expectOneErrorLine(result);
 }
 
-TEST(CompareTest, TooManyVerticesAreWrongUsage) {
+TEST(CompareCommandTest, TooManyVerticesAreWrongUsage) {
   REQUIRE_DEVICE();
   const CommandResult result = dermis({"compare", bar, "--instances", "4000000"});
   EXPECT_EQ(result.status, 2);
   expectOneErrorLine(result);
 }
 
-TEST(CompareTest, SkinTakesEveryMethodAndNamesThemAll) {
+TEST(CompareCommandTest, SkinTakesEveryMethodAndNamesThemAll) {
   const CommandResult unknown =
       dermis({"skin", bar, "-o", outFile("a.ply"), "--device", "cpu", "--method", "cubic"});
   EXPECT_EQ(unknown.status, 2);
@@ -209,7 +209,7 @@ TEST(CompareTest, SkinTakesEveryMethodAndNamesThemAll) {
 }
 
 // `verify` does not try every method with every way to store.
-TEST(CompareTest, EveryMethodMeetsEveryValueOfEveryParameter) {
+TEST(CompareCommandTest, EveryMethodMeetsEveryValueOfEveryParameter) {
   DeviceLimits all;
   all.maxStorageBuffersPerStage = storageBuffersWanted;
   all.storage16Bit = all.storage8Bit = true;

@@ -117,19 +117,6 @@ TEST_F(BatchTest, TuningAndDescriptorsChangeNoBit) {
   }
 }
 
-TEST_F(BatchTest, TheVariantForFewerInfluencesChangesNoBit) {
-  // Alone, a mesh of up to two influences gets a kernel for two; beside one of nine, the kernel for
-  // any number.
-  OwnedMesh two = randomMesh(1, 500, 10, 2), nine = randomMesh(2, 500, 10, 9);
-  const PackedMesh packedTwo = packed(two, 10), packedNine = packed(nine, 10);
-  const std::vector<JointMatrix> pose = randomPose(3, 10, Rigidity::rigid);
-  for (const Method method : allMethods) {
-    const std::vector<samples::SkinRequest> requests{{&packedTwo, pose, true, method},
-                                                     {&packedNine, pose, true, method}};
-    expectSameBits(run(requests).instances[0], run({&requests[0], 1}).instances[0]);
-  }
-}
-
 TEST_F(BatchTest, BytesBetweenTheAttributesAreNeverTouched) {
   const Crowd crowd = makeCrowd(9);
   for (const std::uint32_t gap : {0u, 4u, 8u, 76u}) {
@@ -154,25 +141,6 @@ TEST_F(BatchTest, NanInAPoseAffectsThatInstanceAlone) {
     const bool isDualQuaternion = crowd.requests[instance].method == Method::dualQuaternion;
     EXPECT_EQ(after.instances[instance].status->nonFiniteJoints,
               isDualQuaternion && (instance == 4 || instance == 6) ? 1u : 0u);
-  }
-}
-
-// TRUTHS 14: a slot of weight 0 has no effect on any bit, whatever its palette entry.
-TEST_F(BatchTest, AnInfluenceOfWeightZeroHasNoEffect) {
-  OwnedMesh mesh = randomMesh(5, 300, 8, 4);
-  // Joint 7 loses all its weight.
-  for (std::size_t slot = 0; slot < mesh.joints.size(); ++slot) {
-    if (mesh.joints[slot] == 7) mesh.weights[slot] = 0;
-  }
-  const PackedMesh packedMesh = packed(mesh, 8);
-  std::vector<JointMatrix> pose = randomPose(6, 8, Rigidity::rigid), broken = pose;
-  for (auto& row : broken[7].m) {
-    for (float& value : row) value = std::numeric_limits<float>::quiet_NaN();
-  }
-  for (const Method method : allMethods) {
-    const samples::SkinRequest good{&packedMesh, pose, true, method},
-        bad{&packedMesh, broken, true, method};
-    expectSameBits(run({&good, 1}).instances[0], run({&bad, 1}).instances[0]);
   }
 }
 

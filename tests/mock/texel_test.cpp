@@ -17,14 +17,14 @@
 namespace dermis::test {
 namespace {
 
-struct TexelTest : public MockContextTest {
-  TexelTest() {
+struct MockTexelTest : public MockContextTest {
+  MockTexelTest() {
     mock.limits.maxTexelBufferElements = 1 << 27;
     mock.limits.minTexelBufferOffsetAlignment = 16;
   }
 };
 
-TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
+TEST_F(MockTexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
   for (const bool push : {false, true}) {
     ASSERT_NO_FATAL_FAILURE(create(push, true));
     mock.texelDescriptorsInPool = 0;
@@ -56,7 +56,7 @@ TEST_F(TexelTest, KernelsSeeTheirBuffersThroughViewsToo) {
   }
 }
 
-TEST_F(TexelTest, LayoutsHaveTexelBuffersWhereTheDeviceReadsThem) {
+TEST_F(MockTexelTest, LayoutsHaveTexelBuffersWhereTheDeviceReadsThem) {
   for (const bool texelBuffers : {false, true}) {
     mock.setLayouts.clear();
     ASSERT_NO_FATAL_FAILURE(create(false, texelBuffers));
@@ -73,7 +73,7 @@ TEST_F(TexelTest, LayoutsHaveTexelBuffersWhereTheDeviceReadsThem) {
 }
 
 // Measured on lavapipe; that GPUs do without is a guess.
-TEST_F(TexelTest, CpuDevicesReadThroughTexelBuffersUnlessTheEngineSaysOtherwise) {
+TEST_F(MockTexelTest, CpuDevicesReadThroughTexelBuffersUnlessTheEngineSaysOtherwise) {
   for (const VkPhysicalDeviceType type :
        {VK_PHYSICAL_DEVICE_TYPE_OTHER, VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU,
         VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU, VK_PHYSICAL_DEVICE_TYPE_CPU}) {
@@ -91,7 +91,7 @@ TEST_F(TexelTest, CpuDevicesReadThroughTexelBuffersUnlessTheEngineSaysOtherwise)
   }
 }
 
-TEST_F(TexelTest, ScalarBlockLayoutIsReadFromBothOfItsStructures) {
+TEST_F(MockTexelTest, ScalarBlockLayoutIsReadFromBothOfItsStructures) {
   VkPhysicalDeviceScalarBlockLayoutFeatures own{};
   own.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
   VkPhysicalDeviceVulkan12Features vulkan12{};
@@ -108,7 +108,7 @@ TEST_F(TexelTest, ScalarBlockLayoutIsReadFromBothOfItsStructures) {
   EXPECT_TRUE(has());
 }
 
-TEST_F(TexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
+TEST_F(MockTexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
   ASSERT_NO_FATAL_FAILURE(create(false, false));
   EXPECT_FALSE(context->limits().texelBuffers);
   const MockBatch batch = MockBatch::withAllMethods(context->limits());
@@ -120,7 +120,7 @@ TEST_F(TexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
 
 // A kernel reads through texels on a device if whatever a storage buffer may hold fits: it never
 // depends on the batch. Vulkan guarantees 65,536 texels of 4 bytes and ranges of 128 MiB.
-TEST_F(TexelTest, ADeviceWithFewTexelsReadsStorageBuffers) {
+TEST_F(MockTexelTest, ADeviceWithFewTexelsReadsStorageBuffers) {
   const std::uint64_t range = mock.limits.maxStorageBufferRange;
   for (const std::uint64_t texels : {std::uint64_t{65536}, range / 4 - 1}) {
     mock.limits.maxTexelBufferElements = static_cast<std::uint32_t>(texels);
@@ -136,7 +136,7 @@ TEST_F(TexelTest, ADeviceWithFewTexelsReadsStorageBuffers) {
   EXPECT_TRUE(context->limits().texelBuffers);
 }
 
-TEST_F(TexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
+TEST_F(MockTexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
   DeviceLimits limits = richLimits();
   limits.texelBuffers = true;
   MockBatch batch;
@@ -150,7 +150,7 @@ TEST_F(TexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
 }
 
 // Positions and normals that stand together are stored together.
-TEST_F(TexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
+TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
   DeviceLimits limits = richLimits();
   limits.texelBuffers = true;
   limits.shaderInt64 = true;
@@ -185,7 +185,7 @@ TEST_F(TexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
 }
 
 // An attribute, or all of a vertex, by one store, where the engine enabled scalarBlockLayout.
-TEST_F(TexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize) {
+TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize) {
   using enum VertexFormat;
   DeviceLimits limits = richLimits();
   limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
@@ -238,7 +238,7 @@ TEST_F(TexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize)
   EXPECT_TRUE(pairs.pairs && pairs.recordBytes == 0 && pairs.units[0] == 4);
 }
 
-TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
+TEST_F(MockTexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   VkPhysicalDeviceFeatures2 features{};
   features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features.features.shaderInt64 = VK_TRUE;
@@ -260,7 +260,7 @@ TEST_F(TexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   expectRefused(batch, buffers, ErrorCode::invalidArgument, "one buffer");
 }
 
-TEST_F(TexelTest, AlignmentIsTheGreaterOfBoth) {
+TEST_F(MockTexelTest, AlignmentIsTheGreaterOfBoth) {
   mock.limits.minTexelBufferOffsetAlignment = 1024;
   ASSERT_NO_FATAL_FAILURE(create(false, true));
   EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 1024u);
@@ -268,7 +268,7 @@ TEST_F(TexelTest, AlignmentIsTheGreaterOfBoth) {
   EXPECT_EQ(context->limits().minStorageBufferOffsetAlignment, 256u);
 }
 
-TEST_F(TexelTest, AFailedViewIsAnErrorAndLeaksNothing) {
+TEST_F(MockTexelTest, AFailedViewIsAnErrorAndLeaksNothing) {
   const VkAllocationCallbacks callbacks{};
   mock.allocator = &callbacks;
   for (const bool push : {false, true}) {

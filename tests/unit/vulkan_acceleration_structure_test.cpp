@@ -25,7 +25,7 @@ void expectRefused(const OutputAttribute& positions, std::uint32_t vertexCount,
   EXPECT_NE(triangles.error().message.find(part), std::string::npos) << triangles.error().message;
 }
 
-TEST(AccelerationStructureTest, FormatsThatEveryDeviceReadsAreTold) {
+TEST(BuildGeometryTest, FormatsThatEveryDeviceReadsAreTold) {
   for (const VertexFormat format : allVertexFormats) {
     SCOPED_TRACE(formatName(format));
     VkFormat expected = VK_FORMAT_UNDEFINED;
@@ -40,7 +40,7 @@ TEST(AccelerationStructureTest, FormatsThatEveryDeviceReadsAreTold) {
   expectRefused({0, 6, VertexFormat::float16x3}, 3, address, "float16x3");
 }
 
-TEST(AccelerationStructureTest, TheVertexPartIsFilled) {
+TEST(BuildGeometryTest, TheVertexPartIsFilled) {
   const auto triangles = buildInput({40, 24, VertexFormat::float32x3}, 1234, address);
   ASSERT_TRUE(triangles.ok()) << triangles.error().message;
   EXPECT_EQ(triangles->sType, VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_TRIANGLES_DATA_KHR);
@@ -54,7 +54,7 @@ TEST(AccelerationStructureTest, TheVertexPartIsFilled) {
   EXPECT_EQ(triangles->transformData.deviceAddress, 0u);
 }
 
-TEST(AccelerationStructureTest, AddressAndStrideAreMultiplesOfAComponent) {
+TEST(BuildGeometryTest, AddressAndStrideAreMultiplesOfAComponent) {
   // 2 bytes are enough where a component has 2, whatever the size of the whole.
   EXPECT_TRUE(buildInput({2, 10, VertexFormat::float16x4}, 3, address).ok());
   EXPECT_TRUE(buildInput({2, 10, VertexFormat::snorm16x4}, 3, address).ok());
@@ -67,7 +67,7 @@ TEST(AccelerationStructureTest, AddressAndStrideAreMultiplesOfAComponent) {
   EXPECT_TRUE(buildInput({2, 12, VertexFormat::float32x3}, 3, address + 2).ok());
 }
 
-TEST(AccelerationStructureTest, WhatCannotBeBuiltFromIsRefused) {
+TEST(BuildGeometryTest, WhatCannotBeBuiltFromIsRefused) {
   expectRefused({0, 12, VertexFormat::float32x3}, 0, address, "no vertices");
   expectRefused({0, 12, VertexFormat::float32x3}, 3, 0, "device address");
   expectRefused({0, 12, VertexFormat::none}, 3, address, "none");
@@ -76,7 +76,7 @@ TEST(AccelerationStructureTest, WhatCannotBeBuiltFromIsRefused) {
   EXPECT_TRUE(buildInput({0, 12, VertexFormat::float32x3}, 1, address).ok());
 }
 
-TEST(AccelerationStructureTest, TheBoxBecomesATransform) {
+TEST(BuildGeometryTest, TheBoxBecomesATransform) {
   const Box box{{-1, 2, -0.5f}, {3, 2.5f, 4}};
   const auto transform = boxTransform(box);
   ASSERT_TRUE(transform.ok());
@@ -87,7 +87,7 @@ TEST(AccelerationStructureTest, TheBoxBecomesATransform) {
   }
 }
 
-TEST(AccelerationStructureTest, TheTransformPutsPositionsWhereTheFormatSaysTheyAre) {
+TEST(BuildGeometryTest, TheTransformPutsPositionsWhereTheFormatSaysTheyAre) {
   const Box box{{-1.1f, 20.3f, -0.7f}, {3.3f, 21.9f, 1e-3f}};
   const auto transform = boxTransform(box);
   ASSERT_TRUE(transform.ok());
@@ -101,7 +101,7 @@ TEST(AccelerationStructureTest, TheTransformPutsPositionsWhereTheFormatSaysTheyA
   }
 }
 
-TEST(AccelerationStructureTest, ABoxWithoutExtentHasNoTransform) {
+TEST(BuildGeometryTest, ABoxWithoutExtentHasNoTransform) {
   EXPECT_FALSE(boxTransform({{0, 0, 0}, {1, 0, 1}}).ok());
   EXPECT_FALSE(boxTransform({{0, 2, 0}, {1, 1, 1}}).ok());
   EXPECT_FALSE(boxTransform({{0, 0, 0}, {1, std::numeric_limits<float>::infinity(), 1}}).ok());
@@ -114,7 +114,7 @@ TEST(AccelerationStructureTest, ABoxWithoutExtentHasNoTransform) {
 
 // Vulkan 1.3, "Acceleration Structure Builds": vertices are read as shader reads in the stage of
 // the build.
-TEST(AccelerationStructureTest, TheScopesAreThoseOfABuildsInput) {
+TEST(BuildGeometryTest, TheScopesAreThoseOfABuildsInput) {
   const Dependency after = outputScope(Consumer::accelerationStructureBuild);
   EXPECT_EQ(after.source.stages, VkPipelineStageFlags{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT});
   EXPECT_EQ(after.source.accesses, VkAccessFlags{VK_ACCESS_SHADER_WRITE_BIT});
@@ -129,7 +129,7 @@ TEST(AccelerationStructureTest, TheScopesAreThoseOfABuildsInput) {
   EXPECT_EQ(before.destination.stages, VkPipelineStageFlags{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT});
 }
 
-TEST(AccelerationStructureTest, TheUsageIsThatOfABuildsInput) {
+TEST(BuildGeometryTest, TheUsageIsThatOfABuildsInput) {
   EXPECT_EQ(
       buildInputUsage,
       VkBufferUsageFlags{VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR |

@@ -78,7 +78,7 @@ TEST(OrbitCameraTest, MovesAsItIsTold) {
   EXPECT_LT(camera.camera(box, 1).towardsEye.y, 1);
 }
 
-TEST(JointsTest, HasEveryJointOnceBelowOneRoot) {
+TEST(ViewerJointsTest, HasEveryJointOnceBelowOneRoot) {
   const cli::Scene scene = figure();
   const std::vector<Joint> joints = jointsOf(scene);
   EXPECT_EQ(joints.size(), scene.model->skins[0].joints.size());
@@ -93,7 +93,7 @@ TEST(JointsTest, HasEveryJointOnceBelowOneRoot) {
   EXPECT_EQ(nodes.size(), joints.size());
 }
 
-TEST(JointsTest, TheWeightsOfAllJointsAreOne) {
+TEST(ViewerJointsTest, TheWeightsOfAllJointsAreOne) {
   const cli::Scene scene = figure();
   const std::vector<Joint> joints = jointsOf(scene);
   for (const cli::ScenePart& part : scene.parts) {
