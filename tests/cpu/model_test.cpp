@@ -71,6 +71,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     cpu::Instance instance;
     instance.pose = pose;
     instance.morphs = morphs;
+    instance.box = description.box;
     const std::vector<std::byte> bytes = skinOne(mesh, description.method, layout, instance);
     const VertexPlaces places = must(placeVertices(layout, mesh.vertexCount()));
     const std::array<OutputAttribute, streamCount> attributes{

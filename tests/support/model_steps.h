@@ -13,6 +13,7 @@
 #include <optional>
 #include <random>
 #include <span>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -35,11 +36,16 @@ inline const std::array<std::vector<MorphWeight>, 3> morphSets{
     std::vector<MorphWeight>{}, {{0, 0.5f}}, {{1, 0.25f}, {2, 1.0f}}};
 inline const std::array<Method, 3> methods{Method::linear, Method::dualQuaternion, Method::blended};
 
-/// Layouts of several strides, with and without previous positions.
-inline std::array<VertexLayout, 3> someLayouts() {
-  std::array<VertexLayout, 3> layouts{plainLayout(), motionLayout(), motionLayout()};
+inline constexpr std::array<Box, 2> boxes{
+    {{{-4, -4, -4}, {4, 4, 4}}, {{-8, -1, -8}, {8, 8, 0.5f}}}};
+
+/// Layouts of several strides, with and without previous positions. Only the last needs a box.
+inline std::array<VertexLayout, 4> someLayouts() {
+  std::array<VertexLayout, 4> layouts{plainLayout(), motionLayout(), motionLayout(),
+                                      motionLayout()};
   layouts[2].arrangement = Arrangement::planar;
   layouts[2].tangents = VertexFormat::octahedral16x2;
+  layouts[3].positions = VertexFormat::snorm16x4;
   return layouts;
 }
 
@@ -77,7 +83,7 @@ class ModelSteps {
 
   void run() {
     for (std::uint32_t kind = 0; kind < meshKinds; ++kind)
-      kinds_.push_back(systemMesh(kind, 10 + 17 * kind));
+      kinds_.push_back(systemMesh(kind, 10 + 17 * kind, 8, 4, 3 + kind % 2));
     makeSystem();
     for (std::uint32_t number = 0; number < stepCount && !::testing::Test::HasFailure(); ++number) {
       SCOPED_TRACE("step " + std::to_string(number));
@@ -173,7 +179,10 @@ class ModelSteps {
     description.mesh = mesh->second.handle;
     description.pose = palette->second.handle;
     description.method = methods[below(methods.size())];
-    description.layout = someLayouts()[below(3)];
+    // Boxes and bounds are the same on the GPU, which would need many more pipelines for them.
+    description.layout = someLayouts()[below(hasGpu ? 3 : 4)];
+    description.box = boxes[instance.box];
+    description.bounds = !hasGpu && description.layout.positions == VertexFormat::float32x3;
     description.culledOnGpu = hasGpu && chance(25);
     if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
     prepare(description);
@@ -198,7 +207,7 @@ class ModelSteps {
   void changeInstance() {
     if (model_->instances.empty()) return;
     ModelInstance& instance = anyInstance();
-    switch (below(6)) {
+    switch (below(hasGpu ? 6 : 7)) {
       case 0:
       case 1:
         instance.isVisible = !instance.isVisible || chance(30);
@@ -217,8 +226,15 @@ class ModelSteps {
       case 4:
         instance.teleports = instance.isChanged = true;
         return must(system().change({.instance = instance.handle, .teleports = true}));
-      default:
+      case 5:
         return setMesh(instance);
+      default:
+        if (instance.description.layout.positions == VertexFormat::float32x3) return;
+        instance.box = below(boxes.size());
+        instance.description.box = boxes[instance.box];
+        instance.teleports = instance.isChanged = true;
+        return must(
+            system().change({.instance = instance.handle, .box = instance.description.box}));
     }
   }
   void setMesh(ModelInstance& instance) {
@@ -233,6 +249,10 @@ class ModelSteps {
       expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
       return;
     }
+    const auto targetsOf = [&](std::uint32_t number) {
+      return kinds_[kindOf_.at(number)].info().morphTargetCount;
+    };
+    if (targetsOf(instance.mesh) != targetsOf(mesh->first)) instance.morphs = 0;
     instance.mesh = mesh->first;
     instance.description.mesh = mesh->second.handle;
     prepare(instance.description);
@@ -287,8 +307,9 @@ class ModelSteps {
     must(system().setVisibility(wanted));
   }
   void runFrame() {
+    const std::uint32_t moving = below(4) * 30;  // percent of the poses; at times all rest
     for (auto& [number, palette] : model_->poses) {
-      if (!chance(60)) continue;
+      if (!chance(moving)) continue;
       const std::uint32_t pose = below(poseCount);
       engine_->writePose(palette.handle, systemPose(pose));
       model_->writePose(number, pose);
@@ -321,6 +342,9 @@ class ModelSteps {
       engine_->begin();
     }
     model_->beginFrame();
+    for (const ModelInstance& instance : model_->instances) {
+      if (instance.description.bounds) expectBounds(instance);
+    }
   }
   // -- What fails.
 
@@ -415,7 +439,7 @@ class ModelSteps {
     if (kind < 38) return isCrowded ? removeInstance() : addInstance();
     if (kind < 50) return removeInstance();
     if (kind < 65) return changeInstance();
-    if (kind < 73) return changeSeveral();
+    if (kind < 70) return changeSeveral();
     if (kind < 75) return setVisibility();
     if (kind < 81) return tryWhatIsRefused();
     runFrame();
@@ -432,14 +456,30 @@ class ModelSteps {
   const Streams& expected(const ModelInstance& instance, const ShownPose& shown) {
     // Meshes are told apart by what is in them, of which there are few.
     const std::uint32_t kind = kindOf_.at(shown.mesh);
-    const ShownPose content{kind, shown.pose, shown.morphs, shown.method};
+    const ShownPose content{kind, shown.pose, shown.morphs, shown.box, shown.method};
     InstanceDescription description = instance.description;
     description.method = shown.method;
-    Streams& streams = expected_[{content, description.layout.tangents}];
+    description.box = boxes[shown.box];
+    Streams& streams =
+        expected_[{content, description.layout.positions, description.layout.tangents}];
     if (streams[positionStream].empty())
       streams =
           skinAlone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
     return streams;
+  }
+  void expectBounds(const ModelInstance& instance) {
+    const std::optional<Box> box = must(system().bounds(instance.handle));
+    ASSERT_EQ(box.has_value(), instance.bounded.has_value()) << instance.handle.index;
+    if (!box) return;
+    const std::vector<std::byte>& positions = expected(instance, *instance.bounded)[positionStream];
+    Box wanted;
+    for (std::size_t i = 0; i < positions.size() / sizeof(float); ++i) {
+      float value;
+      std::memcpy(&value, positions.data() + i * sizeof(float), sizeof(value));
+      wanted.min[i % 3] = i < 3 ? value : std::min(wanted.min[i % 3], value);
+      wanted.max[i % 3] = i < 3 ? value : std::max(wanted.max[i % 3], value);
+    }
+    EXPECT_EQ(std::memcmp(&*box, &wanted, sizeof(wanted)), 0) << instance.handle.index;
   }
   void expectOutputs() {
     const std::vector<std::byte> bytes = engine_->readOutput();
@@ -467,7 +507,7 @@ class ModelSteps {
   std::uint32_t nextNumber_ = 0;
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
-  std::map<std::pair<ShownPose, VertexFormat>, Streams> expected_;
+  std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;
   std::set<std::string> messages_;  ///< of all errors
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;
   std::uint64_t growths_ = 0;

@@ -50,10 +50,10 @@ Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& outp
 }
 
 PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount,
-                      std::uint32_t influences) {
+                      std::uint32_t influences, std::uint32_t morphTargets) {
   OwnedMesh mesh = randomMesh(seed, vertexCount, jointCount, influences);
   addTangents(mesh, seed + 1);
-  addMorphs(mesh, seed + 2, 3);
+  addMorphs(mesh, seed + 2, morphTargets);
   PackedMesh packed = must(pack(mesh.view(), jointCount));
   sources().try_emplace(blobOf(packed), std::move(mesh));
   return packed;

@@ -50,7 +50,7 @@ using Pose = std::vector<JointMatrix>;
 /// A random mesh with every attribute that methods and layouts use, for poses of `jointCount`
 /// joints.
 PackedMesh systemMesh(std::uint32_t seed, std::uint32_t vertexCount, std::uint32_t jointCount = 8,
-                      std::uint32_t influences = 4);
+                      std::uint32_t influences = 4, std::uint32_t morphTargets = 3);
 
 inline Pose systemPose(std::uint32_t seed, std::uint32_t jointCount = 8) {
   return randomPose(seed, jointCount, seed % 5 == 4 ? Rigidity::shear : Rigidity::rigid);

@@ -18,10 +18,10 @@
 
 namespace dermis::test {
 
-/// What positions are made of. Numbers count meshes, poses and sets of morph weights that the test
-/// can look up.
+/// What positions are made of. Numbers count meshes, poses, sets of morph weights and boxes that
+/// the test can look up.
 struct ShownPose {
-  std::uint32_t mesh = 0, pose = 0, morphs = 0;
+  std::uint32_t mesh = 0, pose = 0, morphs = 0, box = 0;
   Method method = Method::dualQuaternion;
   friend auto operator<=>(const ShownPose&, const ShownPose&) = default;
 };
@@ -34,15 +34,15 @@ struct ModelPose {
 struct ModelInstance {
   InstanceHandle handle;
   InstanceDescription description;
-  std::uint32_t mesh = 0, pose = 0, morphs = 0;
+  std::uint32_t mesh = 0, pose = 0, morphs = 0, box = 0;
   std::uint32_t vertexCount = 0;
   bool isVisible = true;
   bool isShownByGpu = true;  ///< the word of the frame, where it is culled on the GPU
 
   // Since the last `record`.
-  bool isChanged = true;  ///< its positions are not what they should be
-  bool isUrgent = false;  ///< it changed in a way that no interval holds back
-  bool teleports = false;
+  bool isChanged = true;   ///< its positions are not what they should be
+  bool isUrgent = false;   ///< it changed in a way that no interval holds back
+  bool teleports = false;  ///< or has a new box
   bool changesMesh = true;
   std::uint32_t waitedFrames = 0;  ///< in which it was changed, but skipped for its interval
 
@@ -51,6 +51,7 @@ struct ModelInstance {
   bool wasDisplayed = false;
   bool isMoving = false;  ///< its previous positions are not its positions
   std::optional<ShownPose> shown, before;
+  std::optional<ShownPose> bounded;  ///< as it was last skinned
 
   bool hasPlace() const { return output.size != 0; }
   bool isDisplayed() const { return isVisible && (!description.culledOnGpu || isShownByGpu); }
@@ -131,7 +132,7 @@ class SystemModel {
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> beats;
   };
   ShownPose wantedPose(const ModelInstance& instance) const {
-    return {instance.mesh, poses.at(instance.pose).pose, instance.morphs,
+    return {instance.mesh, poses.at(instance.pose).pose, instance.morphs, instance.box,
             instance.description.method};
   }
   void lock(const InstanceOutput& output) {
@@ -199,7 +200,7 @@ class SystemModel {
       const bool restarts = isPlaced || instance.teleports || comesBack;
       const ShownPose now = wantedPose(instance);
       instance.before = restarts ? now : instance.shown;
-      instance.shown = now;
+      instance.shown = instance.bounded = now;
       instance.isMoving = hasPrevious && !restarts;
       instance.isChanged = instance.isUrgent = false;
       instance.waitedFrames = 0;
