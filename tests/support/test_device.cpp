@@ -83,7 +83,7 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
   }
   Result<vulkan::Context> context = createContext(**device);
   if (context) {
-    attempt.device.emplace(std::move(*device), std::move(*context));
+    attempt.device = samples::OpenDevice{std::move(*device), std::move(*context)};
   } else {
     attempt.reason = context.error().message;
   }
