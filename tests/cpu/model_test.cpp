@@ -22,7 +22,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     cpu::SkinningSystemDescription small;
     small.jointCapacity = {8, 8 * 40};
     small.instanceCapacity = instanceCapacity;
-    small.boundsCapacity = Capacity::fixed(1);
+    small.boundsCapacity = Capacity::fixed(boundsCapacity);
     small.outputCapacity = outputCapacity;
     engine_.emplace(small);
     engine_->verticesPerJob = GetParam() % 2 == 0 ? 1 << 16 : 24;

@@ -149,9 +149,9 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
   const std::pair<const char*, Change> changes[] = {
       {"update interval must be at least 1", [](InstanceDescription& d) { d.updateInterval = 0; }},
       {"its mesh needs a pose of 8 joints", [&](InstanceDescription& d) { d.pose = narrow; }},
-      {"positions cannot be in the format none",
+      {"positions cannot be stored as none",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::none; }},
-      {"positions cannot be in the format octahedral16x2",
+      {"positions cannot be stored as octahedral16x2",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::octahedral16x2; }},
       {"tangents cannot be stored as float32x3",
        [](InstanceDescription& d) { d.layout.tangents = VertexFormat::float32x3; }},

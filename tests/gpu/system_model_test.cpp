@@ -51,7 +51,7 @@ class GpuModelTest : public SystemTest,
     small.jointCapacity = {8, 8 * 40};
     small.gpuJointCapacity = {0, 8 * 40};
     small.instanceCapacity = instanceCapacity;
-    small.boundsCapacity = Capacity::fixed(1);
+    small.boundsCapacity = Capacity::fixed(boundsCapacity);
     small.outputCapacity = outputCapacity;
     for (samples::MappedBuffer& words : words_)
       words = must(

@@ -49,7 +49,10 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   add([](InstanceDescription& wrong) { wrong.layout.tangents = VertexFormat::float16x3; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1}; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1 << 20}; });
-  add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::snorm16x4; });
+  add([](InstanceDescription& wrong) {
+    wrong.layout.positions = VertexFormat::snorm16x4;
+    wrong.box = {{0, 0, 0}, {0, 1, 1}};
+  });
 
   const auto change = [&](auto set) {
     InstanceChange wrong{.instance = objects.instance};
@@ -103,22 +106,29 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
     return system.addPoses(poses, 1000);
   }});
 
-  // Of an instance with a box, of which there may be one.
+  // Of instances with a box.
   InstanceDescription boxed = objects.description;
   boxed.layout = {.positions = VertexFormat::snorm16x4};
   boxed.box = {{-1, -1, -1}, {1, 1, 1}};
-  const auto withBoxed = [&](auto refused) {
-    calls.push_back({[&system, boxed, refused]() -> Result<void> {
-                       const Result<InstanceHandle> added = system.addInstance(boxed);
-                       if (!added) return added.error();  // there is no room
-                       const Result<void> result = refused(*added);
-                       if (Result<void> gone = system.removeInstance(*added); !gone) return {};
-                       return result;
+  const auto addBoxed = [&](std::uint32_t count, auto refused) {
+    calls.push_back({[&system, boxed, count, refused]() -> Result<void> {
+                       std::vector<InstanceHandle> all;
+                       Result<void> error = {};
+                       while (error.ok() && all.size() < count) {
+                         const Result<InstanceHandle> added = system.addInstance(boxed);
+                         if (added) all.push_back(*added);
+                         if (!added) error = added.error();  // there is no room
+                       }
+                       if (error.ok()) error = refused(all.back());
+                       for (const InstanceHandle instance : all)
+                         if (!system.removeInstance(instance)) return {};
+                       return error;
                      },
                      true});
   };
-  withBoxed([&system, boxed](InstanceHandle) { return withoutValue(system.addInstance(boxed)); });
-  withBoxed([&system](InstanceHandle instance) {
+  const std::uint32_t more = 40;  // than there may be
+  addBoxed(more, [](InstanceHandle) { return Result<void>(); });
+  addBoxed(1, [&system](InstanceHandle instance) {
     return system.change({.instance = instance, .box = Box{{0, 0, 0}, {0, 1, 1}}});
   });
   return calls;

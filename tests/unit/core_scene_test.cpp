@@ -603,6 +603,7 @@ TEST(Scene, BoundsAreThoseOfAFrameThatWasReadBack) {
   std::vector<std::byte> bytes(one.scene.buffer(BufferRole::readBack).size);
   const InstanceHandle second = *one.scene.addInstance(one.description);
   one.record(1, 0);
+  must(one.scene.beginFrame(2, 1));
   must(one.scene.readBack(1, bytes));
   EXPECT_TRUE(one.scene.bounds(one.instance)->has_value());
   // Two others with their results.
@@ -610,12 +611,14 @@ TEST(Scene, BoundsAreThoseOfAFrameThatWasReadBack) {
     must(one.scene.removeInstance(instance));
   const InstanceHandle hidden = *one.scene.addInstance(one.description);
   const InstanceHandle shown = *one.scene.addInstance(one.description);
-  one.record(2, 1);
+  must(one.scene.plan(one.planned));
+  must(one.scene.commit());
   must(one.scene.abandonFrame(2));
   must(one.scene.change({.instance = hidden, .visible = false}));
   must(one.scene.plan(one.planned));
   must(one.scene.commit());
-  one.record(3, 1);  // has no results
+  one.record(3, 2);  // has no results
+  must(one.scene.beginFrame(4, 3));
   must(one.scene.readBack(3, bytes));
   EXPECT_FALSE(one.scene.bounds(shown)->has_value()) << "only frame 2 has them";
   EXPECT_FALSE(one.scene.bounds(hidden)->has_value()) << "it was never displayed";

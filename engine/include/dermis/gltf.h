@@ -107,14 +107,15 @@ class SharedArray {
     static const std::vector<T> noValues;
     return values_ ? *values_ : noValues;
   }
-  operator const std::vector<T>&() const { return values(); }
+  operator const std::vector<T>&() const { return values(); }  ///< `values`
 
-  const T* data() const { return values().data(); }
-  std::size_t size() const { return values().size(); }
-  bool empty() const { return values().empty(); }
-  const T& operator[](std::size_t index) const { return values()[index]; }
-  auto begin() const { return values().begin(); }
-  auto end() const { return values().end(); }
+  // As of a vector.
+  const T* data() const { return values().data(); }     ///< the first value
+  std::size_t size() const { return values().size(); }  ///< number of values
+  bool empty() const { return values().empty(); }       ///< whether there are none
+  const T& operator[](std::size_t index) const { return values()[index]; }  ///< a value
+  auto begin() const { return values().begin(); }                           ///< of the values
+  auto end() const { return values().end(); }                               ///< of the values
 
   /// Compares the values.
   friend bool operator==(const SharedArray& a, const SharedArray& b) {
