@@ -13,7 +13,7 @@ cmake ninja-build g++
 libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
 glslang-dev glslang-tools spirv-tools
 libhwy-dev
-libglm-dev libtinygltf-dev nlohmann-json3-dev
+libglm-dev libtinygltf-dev nlohmann-json3-dev libmeshoptimizer-dev libdraco-dev
 libcli11-dev libfmt-dev
 pkg-config libvulkan-volk-dev dpkg-dev file
 libstb-dev fonts-dejavu-core

@@ -158,14 +158,12 @@ TEST(GltfContainer, RefusesOtherVersions) {
 }
 
 TEST(GltfContainer, RefusesRequiredExtensionsThatItDoesNotKnow) {
-  for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "ACME_new"}) {
-    FileBuilder file = skinnedTriangle();
-    file.json["extensionsUsed"] = {name};
-    loaded(file);
-    file.json["extensionsRequired"] = {name};
-    expectError(file.load(), ErrorCode::unsupportedFeature,
-                std::string("requires the extension '") + name + "'");
-  }
+  FileBuilder file = skinnedTriangle();
+  file.json["extensionsUsed"] = {"ACME_new"};
+  loaded(file);
+  file.json["extensionsRequired"] = {"ACME_new"};
+  expectError(file.load(), ErrorCode::unsupportedFeature,
+              "requires the extension 'ACME_new', which is not supported");
 }
 
 TEST(GltfContainer, ReadsPastExtensionsThatOnlyConcernAppearance) {

@@ -146,8 +146,8 @@ struct Influences {
 
 /// One decoded primitive of a mesh. Attributes are float32 whatever the file stores: normalized
 /// integers are divided by their maximum. Influences keep their types. Vertices are in the order of
-/// the accessors. Values are those of the file, so they may be NaN, and joint indices may be
-/// outside the skin: `validate` checks both.
+/// the accessors, or of the decoder if Draco compresses the primitive. Values are those of the
+/// file, so they may be NaN, and joint indices may be outside the skin: `validate` checks both.
 struct Primitive {
   /// For messages, which put it in quotes: "Fox" if its mesh has no other primitive, otherwise "Fox
   /// primitive 1". "number 3" instead of "Fox" if mesh 3 has no name. Short, and on one line
@@ -286,8 +286,9 @@ struct LoadOptions {
 /// - `ioError` if a file cannot be read, or is outside the folder;
 /// - `invalidData` if the file is invalid. The message names the accessor, node or skin at fault.
 ///   An error in a part that nothing skinned or animated uses is a note instead;
-/// - `unsupportedFeature` if the file requires an unknown extension (for example mesh compression),
-///   or is glTF 1.0;
+/// - `unsupportedFeature` if the file requires an unknown extension, or one that this build does
+/// not
+///   decode (`DERMIS_MESHOPTIMIZER`, `DERMIS_DRACO`), or is glTF 1.0;
 /// - `limitExceeded` if more than 4 GiB of a file are needed, if a skin has more than
 ///   `maxPoseJoints` joints, if the model needs more memory than the files' sizes justify
 ///   (memory_budget.h), or if there is not enough memory.

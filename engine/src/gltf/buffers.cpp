@@ -93,6 +93,19 @@ class SideBuffers {
 
 }  // namespace
 
+std::span<const std::byte> bytesIn(const std::vector<Buffer>& buffers, std::size_t buffer,
+                                   std::uint64_t byteOffset, std::uint64_t byteLength,
+                                   const std::string& where) {
+  const std::uint64_t size = buffer < buffers.size() ? buffers[buffer].bytes.size() : 0;
+  const std::uint64_t end = byteOffset + byteLength;
+  if (end > size) {
+    failInvalid(where, ": the compressed bytes ", byteOffset, " to ", end, " are outside buffer ",
+                buffer, " of ", size, " bytes");
+  }
+  return buffers[buffer].bytes.subspan(static_cast<std::size_t>(byteOffset),
+                                       static_cast<std::size_t>(byteLength));
+}
+
 bool isDataUri(std::string_view uri) {
   return lowerCase(uri.substr(0, 5)) == "data:";
 }

@@ -29,6 +29,12 @@ std::vector<Buffer> loadBuffers(const Document& document,
                                 std::optional<std::span<const std::byte>> binaryChunk,
                                 SideFiles& files, MemoryBudget& budget, Notes& notes);
 
+/// A range of bytes in a buffer. Throws `Failure` if the buffer does not have them. No sum of
+/// offset and length may overflow.
+std::span<const std::byte> bytesIn(const std::vector<Buffer>& buffers, std::size_t buffer,
+                                   std::uint64_t byteOffset, std::uint64_t byteLength,
+                                   const std::string& where);
+
 /// Whether this is a data URI, in any case: "DATA:" too.
 bool isDataUri(std::string_view uri);
 

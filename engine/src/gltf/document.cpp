@@ -6,6 +6,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "gltf/compression.h"
 #include "gltf/failure.h"
 #include "gltf/images.h"
 #include "gltf/notes.h"
@@ -152,8 +153,14 @@ bool usesQuantization(const json& root, Notes& notes) {
                    ", which extensionsUsed does not");
     }
     if (name == quantization || concernsOnlyAppearance(name)) continue;
+    const bool isDraco = name == dracoExtension;
+    const bool isMeshopt =
+        std::ranges::find(meshoptExtensions, name) != std::end(meshoptExtensions);
+    if ((isDraco && decodesDraco) || (isMeshopt && decodesMeshopt)) continue;
     fail(ErrorCode::unsupportedFeature,
-         join("the file requires the extension ", inQuotes(name), ", which is not supported"));
+         join("the file requires the extension ",
+              isDraco || isMeshopt ? notDecoded(name)
+                                   : join(inQuotes(name), ", which is not supported")));
   }
   return std::find(used.begin(), used.end(), quantization) != used.end() ||
          std::find(required.begin(), required.end(), quantization) != required.end();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,12 +27,36 @@ struct BufferDescription {
   std::optional<std::string> uri;
 };
 
+/// A bufferView that a meshopt extension compresses.
+struct CompressedView {
+  enum class Mode : std::uint8_t { attributes, triangles, indices };
+  enum class Filter : std::uint8_t { unfiltered, octahedral, quaternion, exponential };
+
+  std::size_t view = 0;
+  std::string_view extension;
+  std::size_t buffer = 0;                        ///< of the compressed bytes
+  std::uint64_t byteOffset = 0, byteLength = 0;  ///< of the compressed bytes
+  std::uint64_t count = 0;                       ///< elements, at least 1
+  std::uint32_t stride = 0;                      ///< of an element; mode and filter allow it
+  Mode mode = Mode::attributes;
+  Filter filter = Filter::unfiltered;
+};
+
+/// A primitive of a skinned mesh that KHR_draco_mesh_compression compresses.
+struct CompressedPrimitive {
+  std::size_t mesh = 0, primitive = 0;
+  std::size_t view = 0;                             ///< bufferView of the compressed bytes
+  std::map<std::string, std::uint32_t> attributes;  ///< their ids there, by name
+};
+
 /// Which objects are read for skinning or animation, by index.
 struct Usage {
   std::vector<bool> meshes;  ///< of nodes with a skin
   std::vector<bool> skins;   ///< of nodes with a mesh
   std::vector<bool> accessors, views, buffers;
   std::vector<std::uint32_t> strides;  ///< byteStride by bufferView; 0: none
+  std::vector<CompressedView> compressedViews;
+  std::vector<CompressedPrimitive> compressedPrimitives;
 };
 
 /// A file's structure. Every index in it is in range, and every property that is read has its type.

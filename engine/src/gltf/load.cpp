@@ -5,6 +5,7 @@
 #include "dermis/gltf.h"
 #include "gltf/accessor.h"
 #include "gltf/buffers.h"
+#include "gltf/compression.h"
 #include "gltf/container.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
@@ -29,6 +30,8 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   SideFiles files(folder, model.budget);
   std::vector<Buffer> buffers =
       loadBuffers(document, container.binaryChunk, files, model.budget, notes);
+  decodeViews(document, buffers, model.budget, notes);
+  decodePrimitives(document, buffers, model.budget);
   Source source(std::move(document), std::move(buffers), model.budget, notes);
 
   readNodes(source, model);

@@ -21,6 +21,7 @@
 
 #include "dermis/gltf.h"
 #include "gltf/buffers.h"
+#include "gltf/compression.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
 #include "gltf/notes.h"
@@ -79,10 +80,9 @@ class ReferenceCheck {
     forEach("materials", [&](json& material, const std::string& where, std::size_t) {
       checkMaterial(material, where);
     });
-    checkUsed("meshes", usage_.meshes, {{"primitives", json::array()}},
-              [&](json& mesh, const std::string& where, std::size_t i) {
-                checkMesh(mesh, where, usage_.meshes[i]);
-              });
+    checkUsed(
+        "meshes", usage_.meshes, {{"primitives", json::array()}},
+        [&](json& mesh, const std::string& where, std::size_t i) { checkMesh(mesh, where, i); });
     forEach("nodes", [&](json& node, const std::string& where, std::size_t) {
       checkNodeWeights(node, where);
     });
@@ -103,9 +103,10 @@ class ReferenceCheck {
         "bufferViews", usage_.views,
         {{"buffer", std::numeric_limits<std::int32_t>::max()}, {"byteLength", 0}},
         [&](json& view, const std::string& where, std::size_t i) { checkView(view, where, i); });
-    checkUsed(
-        "buffers", usage_.buffers, {{"byteLength", 0}},
-        [&](json& buffer, const std::string& where, std::size_t) { checkBuffer(buffer, where); });
+    checkUsed("buffers", usage_.buffers, {{"byteLength", 0}},
+              [&](json& buffer, const std::string& where, std::size_t i) {
+                checkBuffer(buffer, where, i);
+              });
     return std::move(usage_);
   }
 
@@ -367,11 +368,17 @@ class ReferenceCheck {
                 ", which the specification does not define");
   }
 
-  void checkBuffer(json& buffer, const std::string& where) const {
+  void checkBuffer(json& buffer, const std::string& where, std::size_t index) const {
     if (requireInteger(buffer, "byteLength", where) == 0)
       notes_.broken(NoteKind::bufferLength, where, ": byteLength is 0");
     const auto uri = buffer.find("uri");
     if (uri != buffer.end() && !uri->is_string()) failInvalid(where, ": uri is not a string");
+    // What a meshopt extension decodes to need not be there.
+    if (!decodesMeshopt || usage_.buffers[index]) return;
+    for (const std::string_view name : meshoptExtensions) {
+      const json* from = extension(buffer, name, where);
+      if (from != nullptr && from->contains("fallback")) buffer.erase("uri");
+    }
   }
 
   void checkView(json& view, const std::string& where, std::size_t index) {
@@ -380,7 +387,11 @@ class ReferenceCheck {
     require(view, "byteLength", where);
     if (byteCount(view, "byteLength", where, 0) == 0)
       notes_.broken(NoteKind::viewLength, where, ": byteLength is 0");
-    if (usage_.views[index]) usage_.buffers[view["buffer"].get<std::size_t>()] = true;
+    const bool isDecoded = checkMeshopt(view, where, index) && decodesMeshopt;
+    if (usage_.views[index]) {
+      usage_.buffers[isDecoded ? usage_.compressedViews.back().buffer
+                               : view["buffer"].get<std::size_t>()] = true;
+    }
     const std::uint64_t stride = integer(view, "byteStride", where, 4);
     if (stride > std::numeric_limits<std::int32_t>::max())
       failInvalid(where, ": byteStride is ", stride, ", more than 2 GiB");
@@ -391,6 +402,84 @@ class ReferenceCheck {
     // tinygltf refuses strides that break the rule.
     if (view.contains("byteStride")) usage_.strides[index] = static_cast<std::uint32_t>(stride);
     view.erase("byteStride");
+  }
+
+  // The extension of an object, or null if it has none of this name.
+  static json* extension(json& object, std::string_view name, const std::string& where) {
+    const auto extensions = object.find("extensions");
+    if (extensions == object.end() || !extensions->is_object()) return nullptr;
+    const auto found = extensions->find(name);
+    if (found == extensions->end()) return nullptr;
+    if (!found->is_object()) failInvalid(where, ": ", name, " is not an object");
+    return &*found;
+  }
+
+  template <typename Value>
+  static Value valueOf(const json& object, const char* property, const std::string& where,
+                       std::initializer_list<std::pair<const char*, Value>> names) {
+    const json& name = require(object, property, where);
+    for (const auto& [known, value] : names) {
+      if (name == known) return value;
+    }
+    failInvalid(where, ": ", property, " is ",
+                inQuotes(name.is_string() ? name.get<std::string>() : name.dump()),
+                ", which is not supported");
+  }
+
+  // Returns whether the view is compressed. The extension's rules are those of
+  // EXT_meshopt_compression.
+  bool checkMeshopt(json& view, const std::string& viewPlace, std::size_t index) {
+    using Mode = CompressedView::Mode;
+    using Filter = CompressedView::Filter;
+    CompressedView compressed;
+    json* from = nullptr;
+    for (const std::string_view name : meshoptExtensions) {
+      if (from == nullptr) from = extension(view, name, viewPlace);
+      if (from != nullptr && compressed.extension.empty()) compressed.extension = name;
+    }
+    if (from == nullptr) return false;
+    const std::string where = join(viewPlace, " ", compressed.extension);
+    compressed.view = index;
+    requireReference(*from, "buffer", "buffers", where);
+    compressed.buffer = (*from)["buffer"].get<std::size_t>();
+    compressed.byteOffset = byteCount(*from, "byteOffset", where, 0);
+    require(*from, "byteLength", where);
+    compressed.byteLength = byteCount(*from, "byteLength", where, 0);
+    compressed.count = requireInteger(*from, "count", where);
+    if (compressed.count == 0) failInvalid(where, ": count is 0");
+    compressed.mode = valueOf<Mode>(*from, "mode", where,
+                                    {{"ATTRIBUTES", Mode::attributes},
+                                     {"TRIANGLES", Mode::triangles},
+                                     {"INDICES", Mode::indices}});
+    if (from->contains("filter")) {
+      compressed.filter = valueOf<Filter>(*from, "filter", where,
+                                          {{"NONE", Filter::unfiltered},
+                                           {"OCTAHEDRAL", Filter::octahedral},
+                                           {"QUATERNION", Filter::quaternion},
+                                           {"EXPONENTIAL", Filter::exponential}});
+    }
+    const std::uint64_t stride = requireInteger(*from, "byteStride", where);
+    const bool isVertices = compressed.mode == Mode::attributes;
+    const bool isAllowed =
+        (isVertices ? stride % 4 == 0 && stride >= 4 && stride <= 256
+                    : stride == 2 || stride == 4) &&
+        (compressed.filter != Filter::octahedral || stride == 4 || stride == 8) &&
+        (compressed.filter != Filter::quaternion || stride == 8);
+    if (!isAllowed) failInvalid(where, ": its mode and filter do not allow byteStride ", stride);
+    if (integer(view, "byteStride", viewPlace, stride) != stride)
+      failInvalid(where, ": byteStride is ", stride, ", but that of the bufferView is not");
+    compressed.stride = static_cast<std::uint32_t>(stride);
+    if (!isVertices && compressed.filter != Filter::unfiltered)
+      failInvalid(where, ": only mode ATTRIBUTES may have a filter");
+    if (compressed.mode == Mode::triangles && compressed.count % 3 != 0)
+      failInvalid(where, ": count ", compressed.count, " is not a multiple of 3");
+    if (view["byteLength"] != compressed.count * stride) {
+      notes_.broken(NoteKind::viewLength, where, ": ", compressed.count, " elements of ", stride,
+                    " bytes are not the byteLength of the bufferView");
+    }
+    spend(budget_, 2, sizeof compressed, where);
+    usage_.compressedViews.push_back(compressed);
+    return true;
   }
 
   void checkAccessor(json& accessor, const std::string& where, bool used) {
@@ -479,7 +568,8 @@ class ReferenceCheck {
     material = std::move(lean);
   }
 
-  void checkMesh(json& mesh, const std::string& where, bool used) {
+  void checkMesh(json& mesh, const std::string& where, std::size_t index) {
+    const bool used = usage_.meshes[index];
     json& primitives = requireArray(mesh, "primitives", where);
     if (primitives.empty())
       notes_.broken(NoteKind::emptyArray, where, ": primitives is an empty array");
@@ -491,6 +581,7 @@ class ReferenceCheck {
       attributes(requireObject(primitive, "attributes", place), place + " attributes", used);
       reference(primitive, "indices", "accessors", place);
       if (used) use(primitive, "indices");
+      if (used) checkDraco(primitive, place, index, i);
       idleReference(primitive, "material", "materials", place);
       if (integer(primitive, "mode", place, 4) > 6) {
         failInvalid(place, ": mode is not from 0 to 6");
@@ -508,6 +599,25 @@ class ReferenceCheck {
       }
     }
     checkWeights(mesh, targetsOf(mesh), where);
+  }
+
+  void checkDraco(json& primitive, const std::string& place, std::size_t mesh, std::size_t index) {
+    json* from = extension(primitive, dracoExtension, place);
+    if (from == nullptr) return;
+    const std::string where = join(place, " ", dracoExtension);
+    CompressedPrimitive compressed{mesh, index, 0, {}};
+    requireReference(*from, "bufferView", "bufferViews", where);
+    compressed.view = (*from)["bufferView"].get<std::size_t>();
+    usage_.views[compressed.view] = true;
+    json& attributes = requireObject(*from, "attributes", where);
+    spend(budget_, attributes.size() + 1, sizeof compressed + bytesPerAttribute, where);
+    for (auto entry = attributes.begin(); entry != attributes.end(); ++entry) {
+      const std::uint64_t id =
+          integer(entry.value(), join(where, ": the id of ", inQuotes(entry.key())));
+      if (id >= none) failInvalid(where, ": there is no attribute ", id);
+      compressed.attributes.emplace(entry.key(), static_cast<std::uint32_t>(id));
+    }
+    usage_.compressedPrimitives.push_back(std::move(compressed));
   }
 
   static std::size_t targetCount(const json& primitive) {
