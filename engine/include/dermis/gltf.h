@@ -225,7 +225,7 @@ struct Channel {
 /// An animation.
 struct Clip {
   std::string name;
-  double duration = 0;            ///< seconds: the time of the last key, at least 0
+  double duration = 0;            ///< seconds: the time of the last key in its file, at least 0
   std::vector<Channel> channels;  ///< by ascending node, then path
 };
 
@@ -305,6 +305,28 @@ DERMIS_GLTF_API Result<Model> loadFromMemory(std::span<const std::byte> bytes,
 /// Empty if there is neither.
 DERMIS_GLTF_API std::optional<std::uint32_t> findClip(const Model& model,
                                                       std::string_view numberOrName);
+
+/// Adds the clips of another model after those of `model`, so that they move its nodes. The other
+/// model is often a file of animations: it needs neither meshes nor skins, and its nodes may have
+/// another order.
+///
+/// A channel animates the node of `model` that has the name of the channel's node. If several have
+/// it, that is the first joint of a skin among them, or the first node if none is a joint; for
+/// weights it is the first with morph targets. If two animated nodes have one name, joints are used
+/// first. If distances between nodes and their parents differ by a factor of more than 3 (the
+/// median over all nodes with a common name), the other model has another unit of length, and its
+/// translations are scaled.
+///
+/// Channels without such a node, and weights for another number of morph targets, are left out. A
+/// clip of which nothing is left is added, too, so that clips keep their order. The function also
+/// adds the other model's side files.
+///
+/// Returns notes about all this, in the form of `Model::notes`. They speak of `model` as "the
+/// model". Fails with
+/// - `invalidData` if the other model has no clips, or if no channel finds a node;
+/// - `limitExceeded` if matching needs more memory than the budget of the other model has left.
+/// `model` is then unchanged.
+DERMIS_GLTF_API Result<std::vector<std::string>> addClips(Model& model, Model from);
 
 /// An affine transform as a row-major 3×4 matrix in double precision: `[row][column]`, column 3 is
 /// the translation.

@@ -53,6 +53,11 @@ enum class NoteKind : std::uint8_t {
   restOfTriangles,  ///< indices that do not form a triangle
   noPositions,
   noTimes,
+  unmatched,      ///< of clips that are added: no node of the model has the name
+  ambiguousName,  ///< several nodes have it
+  otherTargets,   ///< weights for another number of morph targets
+  unit,           ///< translations are scaled
+  rigid,          ///< a mesh that hangs on a joint cannot be read
   image,
 };
 
