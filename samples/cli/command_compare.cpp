@@ -255,6 +255,7 @@ struct CompareOptions {
   std::string output;
   std::vector<std::string> methods;
   std::uint32_t width = 1800;
+  std::vector<std::string> clips;
   std::optional<std::string> animation;
   double time = 0;
   std::string device = "auto";
@@ -268,8 +269,8 @@ struct CompareOptions {
 ExitStatus checkPicture(const CompareOptions& options) {
   if (options.model.empty() && options.output.empty())
     return reportWrongUsage("compare needs MODEL, or -o OUT.png to draw the built-in models");
-  if (options.model.empty() && (options.animation || options.time != 0))
-    return reportWrongUsage("--animation and --time need a MODEL");
+  if (options.model.empty() && (options.animation || options.time != 0 || !options.clips.empty()))
+    return reportWrongUsage("--clips, --animation and --time need a MODEL");
   if (options.output.empty()) return ExitStatus::done;
   if (samples::render::pictureKind(options.output) != samples::render::PictureKind::png)
     return reportWrongUsage(fmt::format("-o OUT must end in .png; it is '{}'", options.output));
@@ -313,6 +314,7 @@ std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) 
 MeshPreparation preparationFor(const CompareOptions& options) {
   MeshPreparation preparation;
   preparation.strict = options.strict;
+  preparation.clips = options.clips;
   preparation.images = !options.output.empty();
   preparation.centersOfRotation = true;
   const bool asked = std::ranges::any_of(options.methods, [](const std::string& name) {
@@ -329,13 +331,14 @@ ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) 
   Result<Scene> scene = loadScene(samples::pathOf(options.model), preparationFor(options));
   if (!scene) return reportModelError(scene.error());
   for (const std::string& warning : scene->warnings) reportWarning(warning);
+  for (const std::string& note : scene->notes) reportNote(note);
   if (std::ranges::none_of(scene->parts,
                            [](const ScenePart& part) { return part.mesh != nullptr; })) {
     return reportError(
         ExitStatus::badInput,
         fmt::format("{} has no skinned mesh with joints and weights in its scene", options.model));
   }
-  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
+  const Result<std::uint32_t> clip = chooseClip(*scene, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
   subject.name = options.model;
   subject.poseName = poseName(*scene->model, *clip, options.time);
@@ -404,7 +407,8 @@ ExitStatus compare(const CompareOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   const std::array<samples::RequestedOutput, 2> outputs{
       {{"-o", options.output}, {"--json", options.json}}};
-  if (const ExitStatus kept = checkInput(options.model, outputs); kept != ExitStatus::done)
+  if (const ExitStatus kept = checkInput(options.model, outputs, options.clips);
+      kept != ExitStatus::done)
     return kept;
   ComparisonSubject subject;
   if (const ExitStatus loaded = loadSubject(options, subject); loaded != ExitStatus::done)
@@ -482,8 +486,8 @@ Run addCompare(CLI::App& app) {
   command
       ->add_option("--width", options->width, fmt::format("Width in pixels [{}]", options->width))
       ->needs(output);
-  command->add_option("--animation", options->animation,
-                      "A clip's number or name, or none for the rest pose [the first]");
+  addClipFiles(*command, options->clips);
+  command->add_option("--animation", options->animation, animationHelp);
   command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   command->add_option("--device", options->device,
                       "auto, cpu (SIMD on one thread), reference (nothing is timed), a number from "

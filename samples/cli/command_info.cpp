@@ -14,6 +14,7 @@ using Json = nlohmann::ordered_json;
 
 struct InfoOptions {
   std::string model;
+  std::vector<std::string> clips;
   bool json = false;
   bool strict = false;
 };
@@ -46,7 +47,7 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   return json;
 }
 
-Json describe(const Scene& scene) {
+Json describe(const Scene& scene, const InfoOptions& options) {
   Json json;
   json["meshes"] = Json::array();
   for (const ScenePart& part : scene.parts) json["meshes"].push_back(describePart(scene, part));
@@ -55,9 +56,12 @@ Json describe(const Scene& scene) {
     json["skins"].push_back({{"name", skin.name}, {"joints", skin.joints.size()}});
   }
   json["clips"] = Json::array();
-  for (const gltf::Clip& clip : scene.model->clips) {
-    json["clips"].push_back(
-        {{"name", clip.name}, {"seconds", clip.duration}, {"channels", clip.channels.size()}});
+  for (std::uint32_t number = 0; number < scene.model->clips.size(); ++number) {
+    const gltf::Clip& clip = scene.model->clips[number];
+    Json& entry = json["clips"].emplace_back();
+    entry = {{"name", clip.name}, {"seconds", clip.duration}, {"channels", clip.channels.size()}};
+    if (const std::size_t file = fileOfClip(scene, number); file > 0)
+      entry["file"] = options.clips[file - 1];
   }
   json["warnings"] = scene.warnings;
   json["notes"] = scene.notes;
@@ -84,17 +88,20 @@ void printText(const Json& json) {
   }
   std::size_t number = 0;
   for (const Json& clip : json["clips"]) {
-    fmt::print("clip   {} {}: {:.3f} s, {} channels\n", number++,
-               inQuotes(clip["name"].get_ref<const std::string&>()), clip["seconds"].get<double>(),
-               clip["channels"].get<int>());
+    const std::string file =
+        clip.contains("file") ? " of " + inQuotes(clip["file"].get_ref<const std::string&>()) : "";
+    fmt::print("clip   {} {}{}: {:.3f} s, {} channels\n", number++,
+               inQuotes(clip["name"].get_ref<const std::string&>()), file,
+               clip["seconds"].get<double>(), clip["channels"].get<int>());
   }
   for (const Json& note : json["notes"]) fmt::print("note   {}\n", text(note));
 }
 
 ExitStatus info(const InfoOptions& options) {
-  const Result<Scene> scene = loadScene(samples::pathOf(options.model), {.strict = options.strict});
+  const Result<Scene> scene = loadScene(samples::pathOf(options.model),
+                                        {.strict = options.strict, .clips = options.clips});
   if (!scene) return reportModelError(scene.error());
-  const Json json = describe(*scene);
+  const Json json = describe(*scene, options);
   if (options.json) {
     // Names come from a file: invalid UTF-8 in them is replaced.
     fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
@@ -111,6 +118,7 @@ Run addInfo(CLI::App& app) {
       app.add_subcommand("info", "List meshes, skins, influences, clips and all problems");
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
+  addClipFiles(*command, options->clips);
   command->add_flag("--json", options->json, "Print JSON");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return info(*options); };

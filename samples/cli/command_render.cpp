@@ -116,6 +116,7 @@ using samples::render::PictureWriter;
 struct RenderOptions {
   std::string model;
   std::string output;
+  std::vector<std::string> clips;
   std::optional<std::string> animation;
   double time = 0;
   std::optional<std::uint32_t> frames;
@@ -447,7 +448,8 @@ samples::RequestedOutput requestedOutput(const RenderOptions& options) {
 /// Checks the output files before anything is drawn.
 ExitStatus checkOutput(const RenderOptions& options) {
   const samples::RequestedOutput output = requestedOutput(options);
-  if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips);
+      kept != ExitStatus::done)
     return kept;
   if (*samples::render::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
   const Result<void> film = samples::render::checkFilmProgram(options.output);
@@ -459,6 +461,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   if (const ExitStatus checked = checkOutput(options); checked != ExitStatus::done) return checked;
   MeshPreparation preparation;
   preparation.strict = options.strict;
+  preparation.clips = options.clips;
   preparation.images = true;
   preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
   preparation.mostCenterTerms = mostCenterTermsAsked;
@@ -471,7 +474,7 @@ ExitStatus renderModel(const RenderOptions& options) {
     return kept;
   if (const ExitStatus checked = checkScene(options, *scene); checked != ExitStatus::done)
     return checked;
-  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
+  const Result<std::uint32_t> clip = chooseClip(*scene, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
 
   // Opened first, so that an output that cannot be written fails before anything is prepared.
@@ -502,10 +505,10 @@ Run addRender(CLI::App& app) {
                    "The picture to write: .png; with --frames, a name with %04d in it, or a film: "
                    ".mp4, .gif, .apng (with ffmpeg)")
       ->required();
-  command->add_option(
-      "--animation", options->animation,
-      "A clip's number or name, or none for the rest pose [the first; a crowd plays "
-      "all of them]");
+  addClipFiles(*command, options->clips);
+  command->add_option("--animation", options->animation,
+                      "A clip's number, name or FILE:NAME, or none for the rest pose [the first; a "
+                      "crowd plays all of them]");
   command->add_option("--time", options->time, "Seconds into the clip [0]");
   CLI::Option* frames = command->add_option(
       "--frames", options->frames, "Number of pictures, from --time on; the clip is repeated");

@@ -23,6 +23,7 @@ namespace {
 struct SkinOptions {
   std::string model;
   std::string output;
+  std::vector<std::string> clips;
   std::optional<std::string> animation;
   double time = 0;
   std::optional<std::uint32_t> frames;
@@ -121,11 +122,13 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
 ExitStatus skin(const SkinOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   const samples::RequestedOutput output{"-o", options.output, options.frames.value_or(1)};
-  if (const ExitStatus kept = checkInput(options.model, {&output, 1}); kept != ExitStatus::done)
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips);
+      kept != ExitStatus::done)
     return kept;
   const Method method = *methodFromName(options.method);
   MeshPreparation preparation;
   preparation.strict = options.strict;
+  preparation.clips = options.clips;
   preparation.centersOfRotation = needsCentersOfRotation(method);
   preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
@@ -147,7 +150,7 @@ ExitStatus skin(const SkinOptions& options) {
         fmt::format("{}: {} needs centers of rotation, which would take too long to compute",
                     options.model, options.method));
   }
-  const Result<std::uint32_t> clip = chooseClip(*scene->model, options.animation);
+  const Result<std::uint32_t> clip = chooseClip(*scene, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
 
   if (options.device == "reference")
@@ -175,8 +178,8 @@ Run addSkin(CLI::App& app) {
       ->add_option("-o,--output", options->output,
                    "The file to write: .ply, .obj or .glb; with --frames, a name with %04d in it")
       ->required();
-  command->add_option("--animation", options->animation,
-                      "A clip's number or name, or none for the rest pose [the first]");
+  addClipFiles(*command, options->clips);
+  command->add_option("--animation", options->animation, animationHelp);
   command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   CLI::Option* frames =
       command->add_option("--frames", options->frames, "Number of poses to write, from --time on");

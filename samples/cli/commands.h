@@ -8,6 +8,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "dermis/gltf.h"
 #include "kit/file_name.h"
@@ -23,15 +24,32 @@ using samples::reportNote;
 using samples::reportWarning;
 using samples::reportWrongUsage;
 
-/// Reports wrong usage if an output would overwrite the model.
+/// The help text of `--animation`.
+inline constexpr const char* animationHelp =
+    "A clip's number, name or FILE:NAME, or none for the rest pose [the first]";
+
+/// Adds --clips.
+inline void addClipFiles(CLI::App& command, std::vector<std::string>& files) {
+  command
+      .add_option("--clips", files,
+                  "A .gltf or .glb file whose clips are added to the model's, matched by node "
+                  "name; may be repeated")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);  // A model may follow.
+}
+
+/// Reports wrong usage if an output would overwrite the model or a file of --clips.
 inline ExitStatus checkInput(const std::string& model,
-                             std::span<const samples::RequestedOutput> outputs) {
-  const std::filesystem::path input = samples::pathOf(model);
-  const Result<void> kept = samples::checkOutputFiles(outputs, {&input, 1});
+                             std::span<const samples::RequestedOutput> outputs,
+                             const std::vector<std::string>& clips = {}) {
+  std::vector<std::filesystem::path> inputs{samples::pathOf(model)};
+  for (const std::string& file : clips) inputs.push_back(samples::pathOf(file));
+  const Result<void> kept = samples::checkOutputFiles(outputs, inputs);
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);
 }
 
-/// The same if it would overwrite a file that the model names.
+/// The same if it would overwrite a file that one of them names.
 inline ExitStatus checkSideFiles(const gltf::Model& model,
                                  std::span<const samples::RequestedOutput> outputs) {
   const Result<void> kept = samples::checkOutputFiles(outputs, model.sideFiles);

@@ -19,7 +19,7 @@
 
 namespace dermis::cli {
 
-/// How meshes are prepared.
+/// What is read, and how meshes are prepared.
 struct MeshPreparation {
   /// Refuse files that break a rule even if their meaning is clear, and meshes in which `validate`
   /// finds anything.
@@ -32,6 +32,8 @@ struct MeshPreparation {
   float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< for every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
   bool images = false;                                           ///< read the images of base colors
+  /// Names of files whose clips are added to those of the model.
+  std::vector<std::string> clips = {};
 };
 
 /// The limit if the user named a method that needs centers of rotation.

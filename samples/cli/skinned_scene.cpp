@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dermis/text.h"
+#include "kit/file_name.h"
 #include "prepared_mesh.h"
 
 namespace dermis::cli {
@@ -32,6 +33,12 @@ std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& so
   const std::string& node = model.nodes[source.node].name;
   const std::string name = node.empty() ? "" : fmt::format(" {}", inQuotes(node));
   return fmt::format("node {}{}, mesh '{}'", source.node, name, primitive.name);
+}
+
+/// For messages: a path in UTF-8, without its folder.
+std::string nameOf(const std::filesystem::path& path) {
+  const std::u8string name = path.filename().u8string();
+  return {name.begin(), name.end()};
 }
 
 void addFindings(Scene& scene, const MeshReport& report) {
@@ -153,13 +160,61 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
   return scene;
 }
 
+Result<void> addClips(Scene& scene, const MeshPreparation& preparation) {
+  for (const std::string& name : preparation.clips) {
+    const std::filesystem::path path = samples::pathOf(name);
+    Result<gltf::Model> loaded = gltf::load(path, {.strict = preparation.strict});
+    if (!loaded) return loaded.error();
+    const std::string file = inQuotes(nameOf(path));
+    const auto add = [&](const std::vector<std::string>& notes) {
+      for (const std::string& note : notes)
+        scene.notes.push_back(fmt::format("{}: {}", file, note));
+    };
+    add(loaded->notes);
+    scene.clipFiles.push_back({path, static_cast<std::uint32_t>(scene.model->clips.size())});
+    const Result<std::vector<std::string>> notes = gltf::addClips(*scene.model, std::move(*loaded));
+    if (!notes)
+      return Error{notes.error().code, fmt::format("{}: {}", file, notes.error().message)};
+    add(*notes);
+  }
+  return {};
+}
+
+/// The first clip with this name in each file that is called `file`, or in all if it is empty.
+std::vector<std::uint32_t> clipsNamed(const Scene& scene, std::string_view name,
+                                      const std::filesystem::path& file) {
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t clip = 0; clip < scene.model->clips.size(); ++clip) {
+    if (scene.model->clips[clip].name != name) continue;
+    const std::size_t source = fileOfClip(scene, clip);
+    const std::filesystem::path& path = scene.clipFiles[source].path;
+    if (!file.empty() && path != file && path.filename() != file) continue;
+    if (found.empty() || fileOfClip(scene, found.back()) != source) found.push_back(clip);
+  }
+  return found;
+}
+
+/// The clips that a name or FILE:NAME may mean. Names may have colons, too.
+std::vector<std::uint32_t> clipsCalled(const Scene& scene, std::string_view wanted) {
+  std::vector<std::uint32_t> found = clipsNamed(scene, wanted, {});
+  for (std::size_t colon = wanted.find(':'); found.empty() && colon != std::string_view::npos;
+       colon = wanted.find(':', colon + 1)) {
+    found = clipsNamed(scene, wanted.substr(colon + 1), samples::pathOf(wanted.substr(0, colon)));
+  }
+  return found;
+}
+
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
   Result<gltf::Model> loaded =
       gltf::load(path, {.images = preparation.images, .strict = preparation.strict});
   if (!loaded) return loaded.error();
-  return prepareScene(std::move(*loaded), path.filename().string(), preparation);
+  Result<Scene> scene = prepareScene(std::move(*loaded), nameOf(path), preparation);
+  if (!scene) return scene;
+  scene->clipFiles.push_back({path});
+  if (Result<void> added = addClips(*scene, preparation); !added) return added.error();
+  return scene;
 }
 
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
@@ -167,7 +222,9 @@ Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name
   Result<gltf::Model> loaded =
       gltf::loadFromMemory(file, {}, {.images = preparation.images, .strict = preparation.strict});
   if (!loaded) return loaded.error();
-  return prepareScene(std::move(*loaded), name, preparation);
+  Result<Scene> scene = prepareScene(std::move(*loaded), name, preparation);
+  if (scene) scene->clipFiles.push_back({name});
+  return scene;
 }
 
 bool allows(const Scene& scene, Method method) {
@@ -176,15 +233,35 @@ bool allows(const Scene& scene, Method method) {
   });
 }
 
-Result<std::uint32_t> chooseClip(const gltf::Model& model,
-                                 const std::optional<std::string>& wanted) {
+std::size_t fileOfClip(const Scene& scene, std::uint32_t clip) {
+  const auto next = std::ranges::upper_bound(scene.clipFiles, clip, {}, &ClipFile::firstClip);
+  return static_cast<std::size_t>(next - scene.clipFiles.begin()) - 1;
+}
+
+Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::string>& wanted) {
+  const gltf::Model& model = *scene.model;
   if (!wanted) return model.clips.empty() ? gltf::none : 0u;
   if (*wanted == "none") return gltf::none;
-  if (const std::optional<std::uint32_t> clip = gltf::findClip(model, *wanted)) return *clip;
+  const std::optional<std::uint32_t> numbered = gltf::findClip(model, *wanted);
+  const bool isNumber = numbered && std::to_string(*numbered) == *wanted;
+  if (numbered && (isNumber || model.clips[*numbered].name != *wanted)) return *numbered;
+  const std::vector<std::uint32_t> found = clipsCalled(scene, *wanted);
+  if (found.size() == 1) return found[0];
+  if (found.empty()) {
+    return Error{ErrorCode::invalidArgument,
+                 fmt::format("--animation: there is no clip {}; there {} {} clip{}",
+                             inQuotes(*wanted), model.clips.size() == 1 ? "is" : "are",
+                             model.clips.size(), model.clips.size() == 1 ? "" : "s")};
+  }
+  std::string all;
+  for (const std::uint32_t clip : found) {
+    all += fmt::format("{}{} of {}", all.empty() ? "" : ", ", clip,
+                       inQuotes(nameOf(scene.clipFiles[fileOfClip(scene, clip)].path)));
+  }
   return Error{
       ErrorCode::invalidArgument,
-      fmt::format("--animation: there is no clip {}; the file has {} clip{}", inQuotes(*wanted),
-                  model.clips.size(), model.clips.size() == 1 ? "" : "s")};
+      fmt::format("--animation: several clips are called {}: {}; give a number or FILE:NAME",
+                  inQuotes(*wanted), all)};
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {

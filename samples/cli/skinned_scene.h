@@ -25,8 +25,15 @@ struct ScenePart {
                                              ///< pose
 };
 
+/// A file whose clips the model has.
+struct ClipFile {
+  std::filesystem::path path;   ///< as given
+  std::uint32_t firstClip = 0;  ///< its clips end where those of the next file begin
+};
+
 struct Scene {
   std::unique_ptr<gltf::Model> model;
+  std::vector<ClipFile> clipFiles;  ///< the model's own file, then those of `--clips`
   std::vector<ScenePart> parts;
   std::vector<std::string> warnings;  ///< repairs, and centers of rotation that were not computed
   std::vector<std::string> remarks;   ///< problems that `validate` counts and `pack` handles
@@ -37,20 +44,23 @@ struct Scene {
 /// Whether every part has the data that the method needs.
 bool allows(const Scene& scene, Method method);
 
-/// Reads a model and packs its skinned primitives. Invalid values are repaired with a warning, and
-/// broken rules give a note; if the preparation is strict, both are refused. Fails with
-/// `limitExceeded` if the combinations of nodes, primitives and skins need more memory than the
-/// size of the file justifies.
+/// Reads a model, packs its skinned primitives, and adds the clips of other files. Invalid values
+/// are repaired with a warning, and broken rules give a note; if the preparation is strict, both
+/// are refused. Fails with `limitExceeded` if the combinations of nodes, primitives and skins need
+/// more memory than the size of the file justifies.
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation);
-/// The same for a binary glTF file in memory; messages call it `name`.
+/// The same for a binary glTF file in memory, without other files; messages call it `name`.
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
                         const MeshPreparation& preparation);
 
-/// The clip that the value of `--animation` selects: an index, a name, or "none" for the rest pose.
-/// Without a value: clip 0, or the rest pose if there is no clip. Fails with `invalidArgument` if
-/// there is no such clip.
-Result<std::uint32_t> chooseClip(const gltf::Model& model,
-                                 const std::optional<std::string>& wanted);
+/// The number of the file that a clip comes from.
+std::size_t fileOfClip(const Scene& scene, std::uint32_t clip);
+
+/// The clip that the value of `--animation` selects: an index, a name, FILE:NAME with a file as
+/// given or without its folder, or "none" for the rest pose. Without a value: clip 0, or the rest
+/// pose if there is no clip. Fails with `invalidArgument` if there is no such clip, or if several
+/// files have it.
+Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::string>& wanted);
 
 /// The pose of a scene at one time.
 struct ScenePose {

@@ -109,7 +109,7 @@ TEST(CommandTest, WrongUsageNamesTheOptionAndTheSubcommandsHelp) {
   expectComplaint({"skin", bar, "-o", outFile("a%04d.ply")},
                   "-o OUT has a placeholder for a number, so --frames is required");
   expectComplaint({"skin", bar, "-o", out, "--device", "cpu", "--animation", "zzz"},
-                  "--animation: there is no clip 'zzz'; the file has 1 clip");
+                  "--animation: there is no clip 'zzz'; there is 1 clip");
   expectComplaint({"render", bar, "-o", "a.png", "--elevation", "91"},
                   "--elevation must be from -90 to 90 degrees");
   expectComplaint({"compare", bar, "--repetitions", "0"}, "--repetitions must be from 1 to 10000");

@@ -222,6 +222,9 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
       {"-o", "render", model, "-o", folder + "/film.png"},
       {"-o", "compare", model, "-o", folder + "/film.png"},
       {"--json", "compare", model, "--json", folder + "/soft.glb"},
+      {"-o", "skin", bar, "--clips", bar, "--clips", model, "-o", folder + "/soft.glb"},
+      {"-o", "render", bar, "--clips", model, "-o", folder + "/film.png"},
+      {"--json", "compare", bar, "--clips", model, "--json", folder + "/soft.glb"},
       {"--json", "verify", bar, model, "--json", model},
       {"--junit", "verify", model, "--junit", folder + "/hard.glb"},
   };

@@ -124,7 +124,7 @@ class ForeignPosesTest : public SkinnerTest {
           cli::loadScene(std::filesystem::path(sampleModels) / (model + ".glb"), {});
       ASSERT_TRUE(scene.ok()) << scene.error().message;
       expectSameModel(vertices, *scene);
-      const Result<std::uint32_t> clip = cli::chooseClip(*scene->model, clipName);
+      const Result<std::uint32_t> clip = cli::chooseClip(*scene, clipName);
       ASSERT_TRUE(clip.ok()) << clip.error().message;
       for (std::size_t column = 0; column < columns; ++column) {
         const auto skinned = [&](double seconds, Method method) {

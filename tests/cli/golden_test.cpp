@@ -96,7 +96,7 @@ class GoldenTest : public SkinnerTest {
 
   /// All positions of the scene, 3 a vertex.
   std::vector<float> skin(const cli::Scene& scene, const GoldenPose& pose) const {
-    const Result<std::uint32_t> clip = cli::chooseClip(*scene.model, pose.animation);
+    const Result<std::uint32_t> clip = cli::chooseClip(scene, pose.animation);
     EXPECT_TRUE(clip.ok()) << (clip ? "" : clip.error().message);
     if (!clip) return {};
     return skinScene(scene, cli::scenePose(scene, *clip, pose.time),
