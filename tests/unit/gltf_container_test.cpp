@@ -173,6 +173,19 @@ TEST(GltfContainer, ReadsPastExtensionsThatOnlyConcernAppearance) {
   loaded(file);
 }
 
+TEST(GltfContainer, NotesRequiredExtensionsOnWhichNoPositionDepends) {
+  for (const char* name :
+       {"KHR_animation_pointer", "KHR_interactivity", "KHR_node_visibility", "VRM", "VRMC_vrm"}) {
+    FileBuilder file = skinnedTriangle();
+    file.json["extensionsUsed"] = {name};
+    file.json["extensionsRequired"] = {name};
+    EXPECT_TRUE(hasNote(loaded(file.load({}, {.strict = true})),
+                        std::string("requires the extension '") + name + "', which is ignored"));
+    file.json.erase("extensionsRequired");
+    EXPECT_TRUE(loaded(file).notes.empty());
+  }
+}
+
 // Dermis looks at no image, so that one that is missing is no reason to fail.
 TEST(GltfContainer, ReadsPastImages) {
   FileBuilder file = skinnedTriangle();

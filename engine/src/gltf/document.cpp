@@ -124,6 +124,14 @@ bool concernsOnlyAppearance(std::string_view extension) {
                      [&](std::string_view prefix) { return extension.starts_with(prefix); });
 }
 
+// Extensions of an application around the model: what is shown, how it is used. Dermis reads none
+// of them, but their authors may want a reader to notice.
+bool concernsOnlyApplication(std::string_view extension) {
+  constexpr std::array<std::string_view, 5> names = {"KHR_animation_pointer", "KHR_interactivity",
+                                                     "KHR_node_visibility", "VRM", "VRMC_vrm"};
+  return std::ranges::find(names, extension) != names.end();
+}
+
 std::vector<std::string> extensionNames(const json& root, const char* property, Notes& notes) {
   std::vector<std::string> names;
   const auto list = root.find(property);
@@ -153,6 +161,11 @@ bool usesQuantization(const json& root, Notes& notes) {
                    ", which extensionsUsed does not");
     }
     if (name == quantization || concernsOnlyAppearance(name)) continue;
+    if (concernsOnlyApplication(name)) {
+      notes.remark(NoteKind::extension, "the file requires the extension ", inQuotes(name),
+                   ", which is ignored");
+      continue;
+    }
     const bool isDraco = name == dracoExtension;
     const bool isMeshopt =
         std::ranges::find(meshoptExtensions, name) != std::end(meshoptExtensions);

@@ -51,6 +51,7 @@ enum class NoteKind : std::uint8_t {
   // Remarks: never errors, even if strict.
   restOfFile,       ///< bytes after the GLB container
   restOfTriangles,  ///< indices that do not form a triangle
+  extension,        ///< required, and ignored
   noPositions,
   noTimes,
   unmatched,      ///< of clips that are added: no node of the model has the name
