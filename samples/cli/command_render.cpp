@@ -463,6 +463,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   preparation.strict = options.strict;
   preparation.clips = options.clips;
   preparation.images = true;
+  preparation.rigidMeshes = true;
   preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
   preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);

@@ -32,6 +32,7 @@ struct MeshPreparation {
   float dualQuaternionWeight = MeshView().dualQuaternionWeight;  ///< for every vertex
   float bulgeStrength = MeshView().bulgeStrength;                ///< likewise
   bool images = false;                                           ///< read the images of base colors
+  bool rigidMeshes = false;  ///< read rigid meshes that hang on skeletons
   /// Names of files whose clips are added to those of the model.
   std::vector<std::string> clips = {};
 };

@@ -207,8 +207,9 @@ std::vector<std::uint32_t> clipsCalled(const Scene& scene, std::string_view want
 }  // namespace
 
 Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation& preparation) {
-  Result<gltf::Model> loaded =
-      gltf::load(path, {.images = preparation.images, .strict = preparation.strict});
+  Result<gltf::Model> loaded = gltf::load(path, {.images = preparation.images,
+                                                 .rigidMeshes = preparation.rigidMeshes,
+                                                 .strict = preparation.strict});
   if (!loaded) return loaded.error();
   Result<Scene> scene = prepareScene(std::move(*loaded), nameOf(path), preparation);
   if (!scene) return scene;

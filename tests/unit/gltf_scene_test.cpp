@@ -190,6 +190,128 @@ TEST(GltfScene, LeavesOutMeshesWithoutASkin) {
   EXPECT_EQ(model.notes.at(0), "2 nodes left out: a mesh but no skin");
 }
 
+// A hat on node 4, which is below joint 2; an animated node is between them. The ground, node 5, is
+// on no joint.
+FileBuilder withHat() {
+  FileBuilder file = skinnedTriangle();
+  const std::size_t positions = file.addFloats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3");
+  const Json triangle = {{"attributes", {{"POSITION", positions}}}};
+  file.json["meshes"].push_back({{"name", "hat"}, {"primitives", {triangle, triangle}}});
+  file.json["meshes"].push_back({{"name", "ground"}, {"primitives", {triangle}}});
+  file.json["nodes"][2]["children"] = {3};
+  file.json["nodes"].push_back({{"children", {4}}});
+  file.json["nodes"].push_back({{"name", "hat"}, {"mesh", 1}, {"translation", {0, 0.5, 0}}});
+  file.json["nodes"].push_back({{"mesh", 2}});
+  file.json["scenes"][0]["nodes"] = {0, 1, 5};
+  const std::size_t input = file.addFloats({0}, "SCALAR");
+  const std::size_t output = file.addFloats({7, 0, 0}, "VEC3");
+  file.json["animations"] = {
+      {{"samplers", {{{"input", input}, {"output", output}}}},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", 3}, {"path", "translation"}}}}}}}};
+  return file;
+}
+
+gltf::Model loadedWithRigidMeshes(const FileBuilder& file) {
+  return loaded(file.load({}, {.rigidMeshes = true}));
+}
+
+TEST(GltfRigidMesh, IsSkinnedToItsNode) {
+  const gltf::Model model = loadedWithRigidMeshes(withHat());
+  ASSERT_EQ(model.skinnedPrimitives.size(), 3u) << "both primitives of the hat";
+  for (const std::uint32_t primitive : {0u, 1u}) {
+    const gltf::SkinnedPrimitive& hat = model.skinnedPrimitives[1 + primitive];
+    EXPECT_EQ(hat.node, 4u);
+    EXPECT_EQ(hat.mesh, 1u);
+    EXPECT_EQ(hat.primitive, primitive);
+    EXPECT_EQ(hat.skin, 1u);
+    const gltf::Influences set = onlySet(model.meshes[1].primitives[primitive]);
+    EXPECT_EQ(set.jointType, ComponentType::uint8);
+    EXPECT_EQ(set.weightType, ComponentType::unorm8);
+    EXPECT_EQ(componentsOf<std::uint8_t>(set.joints), std::vector<std::uint8_t>(12));
+    EXPECT_EQ(componentsOf<std::uint8_t>(set.weights),
+              (std::vector<std::uint8_t>{255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0}));
+  }
+  ASSERT_EQ(model.skins.size(), 2u);
+  EXPECT_EQ(model.skins[1].name, "hat");
+  EXPECT_EQ(model.skins[1].joints, std::vector<std::uint32_t>{4});
+  const std::vector<JointMatrix> pose = gltf::pose(model, 1, 0, 0);
+  ASSERT_EQ(pose.size(), 1u);
+  EXPECT_EQ(pose[0].m[0][3], 7) << "the node between them moves it";
+  EXPECT_EQ(pose[0].m[1][3], 1.5f);
+  EXPECT_TRUE(hasNote(model, "1 node left out: a mesh but no skin")) << "the ground";
+  EXPECT_EQ(loaded(withHat()).skinnedPrimitives.size(), 1u) << "only if requested";
+  EXPECT_EQ(loaded(withHat()).skins.size(), 1u);
+}
+
+TEST(GltfRigidMesh, MayBeOnAJointAndOnSeveralNodes) {
+  FileBuilder file = withHat();
+  file.json["nodes"][1]["mesh"] = 1;
+  const gltf::Model model = loadedWithRigidMeshes(file);
+  ASSERT_EQ(model.skinnedPrimitives.size(), 5u);
+  EXPECT_EQ(model.skins.at(1).joints, std::vector<std::uint32_t>{1}) << "a joint itself";
+  EXPECT_EQ(model.skins.at(2).joints, std::vector<std::uint32_t>{4});
+  EXPECT_EQ(model.skinnedPrimitives[1].mesh, model.skinnedPrimitives[3].mesh);
+}
+
+TEST(GltfRigidMesh, NeedsAJointOfSomethingSkinned) {
+  FileBuilder file = withHat();
+  file.json["nodes"][0].erase("skin");
+  EXPECT_TRUE(loadedWithRigidMeshes(file).skinnedPrimitives.empty());
+  file = withHat();
+  file.json["scenes"][0]["nodes"] = {0, 5};
+  EXPECT_EQ(loadedWithRigidMeshes(file).skinnedPrimitives.size(), 1u) << "outside the scene";
+}
+
+TEST(GltfRigidMesh, WithASkinElsewhereIsLeftOut) {
+  FileBuilder file = withHat();
+  file.json["nodes"][4]["mesh"] = 0;
+  const gltf::Model model = loadedWithRigidMeshes(file);
+  EXPECT_EQ(model.skinnedPrimitives.size(), 1u);
+  EXPECT_EQ(componentsOf<float>(onlySet(firstPrimitive(model)).weights)[8], 0.25f)
+      << "the skinned mesh keeps its influences";
+  EXPECT_TRUE(hasNote(model, "2 nodes left out: a mesh but no skin"));
+}
+
+TEST(GltfRigidMesh, IsLeftOutIfItIsFaulty) {
+  const auto expectLeftOut = [](const FileBuilder& file, const std::string& fault) {
+    const gltf::Model model = loadedWithRigidMeshes(file);
+    EXPECT_EQ(model.skinnedPrimitives.size(), 1u) << fault;
+    EXPECT_TRUE(hasNote(model, fault)) << testing::PrintToString(model.notes);
+    EXPECT_TRUE(hasNote(model, "2 nodes left out: a mesh but no skin"));
+    expectError(file.load({}, {.rigidMeshes = true, .strict = true}), ErrorCode::invalidData,
+                fault);
+  };
+  FileBuilder file = withHat();
+  Json& hat = file.json["meshes"][1]["primitives"];
+  hat[1]["attributes"]["NORMAL"] = file.addFloats({0, 0, 1}, "VEC3");
+  expectLeftOut(file, "mesh 1 primitive 1 NORMAL: accessor ");
+  file = withHat();
+  file.json["meshes"][1]["primitives"][1]["indices"] =
+      file.add<std::uint16_t>({0, 1, 3}, "SCALAR", unsignedShortType);
+  expectLeftOut(file, "mesh 1 primitive 1: index 2 of accessor ");
+  file = withHat();
+  file.json["meshes"][1]["primitives"][0]["attributes"]["POSITION"] = 99;
+  expectLeftOut(file, "mesh 1 primitive 0");
+}
+
+TEST(GltfRigidMesh, CountsAgainstTheBudget) {
+  FileBuilder file = withHat();
+  constexpr std::uint64_t vertices = 999;
+  const Json hat = {
+      {"attributes", {{"POSITION", file.addFloats(std::vector<float>(3 * vertices), "VEC3")}}}};
+  const auto spent = [&] {
+    return loaded(file).budget.left() - loadedWithRigidMeshes(file).budget.left();
+  };
+  file.json["meshes"][1]["primitives"] = {hat};
+  const std::uint64_t withOne = spent();
+  EXPECT_GE(withOne, vertices * (12 + 4 + 8)) << "positions, triangles and influences";
+  EXPECT_LE(withOne, vertices * (12 + 4 + 8) + 1000);
+  file.json["meshes"][1]["primitives"] = {hat, hat};
+  EXPECT_LE(spent(), withOne + 100) << "influences are shared, too";
+  file.json["nodes"][1]["mesh"] = 1;
+  EXPECT_GE(spent(), withOne + sizeof(gltf::Skin) + sizeof(JointMatrix)) << "a second skin";
+}
+
 TEST(GltfScene, LoadsAFileWithNothingInIt) {
   const gltf::Model model = loaded(FileBuilder());
   EXPECT_TRUE(model.nodes.empty());

@@ -243,12 +243,13 @@ struct Model {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> nodeOrder;  ///< indices of all nodes, parents before their children
   std::vector<Mesh> meshes;
-  std::vector<Skin> skins;
+  std::vector<Skin> skins;  ///< those of the file, then one for each node with a rigid mesh
   std::vector<Material> materials;
   /// An image has no bytes if no base color uses it, or if it is equal to another image.
   std::vector<Image> images;
   std::vector<Clip> clips;
   /// By ascending node index, then primitive index: the order in which `dermis skin` writes them.
+  /// Those of rigid meshes follow.
   std::vector<SkinnedPrimitive> skinnedPrimitives;
   /// What was fixed or left out, and which rules of glTF the file breaks. One sentence for each
   /// kind, with the first place and the number of places. There are about fifty kinds at most.
@@ -266,6 +267,12 @@ struct LoadOptions {
   /// Whether to read the images of base colors, by the same rules as buffers. An image that cannot
   /// be read is left out, with a note.
   bool images = false;
+  /// Whether to read rigid meshes that hang on a skeleton, such as hats and swords: meshes of nodes
+  /// without a skin that are, or are below, joints of something skinned. Each such node gets a skin
+  /// with itself as the only joint, and each vertex one influence; so they are skinned like the
+  /// others. A mesh that cannot be read, or that is also used with a skin, is left out, with a
+  /// note.
+  bool rigidMeshes = false;
   /// Whether a broken rule is an error (`invalidData`) even if the meaning is clear. `load` checks
   /// only what it reads, and not the values of vertices: `validate` does that.
   bool strict = false;
@@ -278,9 +285,9 @@ struct LoadOptions {
 /// may be a link to a file elsewhere; the folder is then that of the link. Each file is read
 /// as far as it is needed, which must be at most 4 GiB.
 ///
-/// Only meshes that a skinned node of the default scene uses are decoded; the others have no
-/// primitives. The default scene is the one that the property `scene` selects, or scene 0. If the
-/// file has no scenes, it consists of all root nodes.
+/// Only meshes that a skinned node of the default scene uses, and rigid meshes if requested, are
+/// decoded; the others have no primitives. The default scene is the one that the property `scene`
+/// selects, or scene 0. If the file has no scenes, it consists of all root nodes.
 ///
 /// Fails with
 /// - `ioError` if a file cannot be read, or is outside the folder;

@@ -37,8 +37,8 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   readNodes(source, model);
   readSkins(source, model);
   readMaterials(source, model);
-  checkPrimitives(source);
-  readScene(source, model);
+  const std::vector<bool> faultyMeshes = checkPrimitives(source);
+  readScene(source, faultyMeshes, options.rigidMeshes, model);
   readAnimations(source, model);
   if (options.images) readImages(appearance, source, files, model);
   model.sideFiles = files.paths();

@@ -379,14 +379,17 @@ std::string primitivePlace(std::size_t mesh, std::size_t primitive) {
   return join("mesh ", mesh, " primitive ", primitive);
 }
 
-void checkPrimitives(Source& source) {
+std::vector<bool> checkPrimitives(Source& source) {
   const auto& meshes = source.content().meshes;
+  std::vector<bool> isFaulty(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     for (std::size_t j = 0; j < meshes[i].primitives.size(); ++j) {
-      source.notes().tolerateUnlessUsed(source.usage().meshes[i],
-                                        [&] { PrimitiveCheck(source, i, j).run(); });
+      const bool isGood = source.notes().tolerateUnlessUsed(
+          source.usage().meshes[i], [&] { PrimitiveCheck(source, i, j).run(); });
+      if (!isGood) isFaulty[i] = true;
     }
   }
+  return isFaulty;
 }
 
 std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh) {
@@ -419,6 +422,17 @@ std::vector<Influences> PrimitiveReader::influences(const std::map<std::string, 
     });
   }
   return sets;
+}
+
+Influences PrimitiveReader::rigidInfluences(std::uint32_t vertexCount) {
+  return once(rigid_, vertexCount, [&] {
+    const std::size_t components = 4 * std::size_t{vertexCount};
+    source_.spend(components, 2, "the influences of a rigid mesh");
+    std::vector<std::byte> joints(components), weights(components);
+    for (std::size_t i = 0; i < components; i += 4) weights[i] = std::byte{255};
+    return Influences{ComponentType::uint8, ComponentType::unorm8, std::move(joints),
+                      std::move(weights)};
+  });
 }
 
 // Reads sets from 0 up to the first missing one.

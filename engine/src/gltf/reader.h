@@ -34,12 +34,14 @@ void readMaterials(const Source& source, Model& model);
 void readAnimations(Source& source, Model& model);
 
 /// Checks the accessors of every primitive of every mesh, but not their bytes. Removes faulty
-/// attributes that skinning does not need.
-void checkPrimitives(Source& source);
+/// attributes that skinning does not need. Returns which meshes must not be read; nothing skinned
+/// uses them.
+std::vector<bool> checkPrimitives(Source& source);
 
 /// Reads meshes, and skinnedPrimitives: what the default scene skins. Reads only the primitives of
-/// those meshes.
-void readScene(Source& source, Model& model);
+/// those meshes. With `rigidMeshes`, adds rigid meshes and their skins.
+void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigidMeshes,
+               Model& model);
 
 /// Reads primitives with all their data. Decodes each accessor once, however many use it.
 class PrimitiveReader {
@@ -47,6 +49,9 @@ class PrimitiveReader {
   explicit PrimitiveReader(Source& source) : source_(source) {}
 
   Primitive read(std::uint32_t mesh, std::uint32_t primitive);
+
+  /// One influence per vertex: joint 0.
+  Influences rigidInfluences(std::uint32_t vertexCount);
 
  private:
   /// The element of `known` with this key; `decode` makes it if there is none.
@@ -68,6 +73,7 @@ class PrimitiveReader {
   /// By the accessor of the indices, mode, and number of vertices.
   std::map<std::tuple<int, int, std::uint32_t>, SharedArray<std::uint32_t>> triangles_;
   std::map<std::array<int, 3>, MorphTarget> targets_;  ///< sparse ones
+  std::map<std::uint32_t, Influences> rigid_;          ///< by number of vertices
 };
 
 /// Number of morph targets of the primitive that has the most.

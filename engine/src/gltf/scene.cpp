@@ -63,13 +63,68 @@ bool hasNoJoints(const tinygltf::Mesh& mesh) {
   });
 }
 
+// Reads the meshes that hang on a skeleton.
+class RigidMeshes {
+ public:
+  RigidMeshes(Source& source, const std::vector<bool>& faultyMeshes, PrimitiveReader& reader,
+              Model& model)
+      : source_(source), reader_(reader), model_(model), mayRead_(model.meshes.size()) {
+    std::vector<bool> isDrawn(model.skins.size());
+    for (const SkinnedPrimitive& skinned : model.skinnedPrimitives) isDrawn[skinned.skin] = true;
+    std::vector<std::uint32_t> joints;
+    for (std::size_t i = 0; i < model.skins.size(); ++i)
+      if (isDrawn[i])
+        joints.insert(joints.end(), model.skins[i].joints.begin(), model.skins[i].joints.end());
+    isCarried_ = nodesBelow(model, joints);
+    for (std::size_t i = 0; i < mayRead_.size(); ++i)
+      mayRead_[i] = !faultyMeshes[i] && model.meshes[i].primitives.empty();
+  }
+
+  // Makes a skin of a node whose mesh has none. Returns whether the mesh can be drawn.
+  bool add(std::uint32_t index) {
+    const Node& node = model_.nodes[index];
+    if (!isCarried_[index] || !mayRead_[node.mesh] || !read(node.mesh)) return false;
+    const std::vector<Primitive>& primitives = model_.meshes[node.mesh].primitives;
+    const std::string where = join("node ", index, " and its rigid mesh");
+    source_.spend(1, 2 * sizeof(Skin) + sizeof(JointMatrix) + node.name.size(), where);
+    source_.spend(primitives.size(), 2 * sizeof(SkinnedPrimitive), where);
+    const auto skin = static_cast<std::uint32_t>(model_.skins.size());
+    model_.skins.push_back({node.name, {index}, {JointMatrix{}}});
+    for (std::uint32_t i = 0; i < primitives.size(); ++i) {
+      if (primitives[i].vertexCount > 0)
+        model_.skinnedPrimitives.push_back({index, node.mesh, i, skin});
+    }
+    return true;
+  }
+
+ private:
+  bool read(std::uint32_t index) {
+    Mesh& mesh = model_.meshes[index];
+    if (!mesh.primitives.empty()) return true;
+    mayRead_[index] = source_.notes().tolerate(NoteKind::rigid, "; it is left out", [&] {
+      readMesh(reader_, source_.content().meshes[index].primitives.size(), model_, index);
+    });
+    if (!mayRead_[index]) mesh.primitives.clear();
+    for (Primitive& primitive : mesh.primitives)
+      primitive.influences = {reader_.rigidInfluences(primitive.vertexCount)};
+    return !mesh.primitives.empty();
+  }
+
+  Source& source_;
+  PrimitiveReader& reader_;
+  Model& model_;
+  std::vector<bool> isCarried_;  ///< by node
+  std::vector<bool> mayRead_;    ///< by mesh
+};
+
 void addNote(Model& model, std::size_t count, const char* what, const char* rest) {
   if (count > 0) model.notes.push_back(join(counted(count, what), rest));
 }
 
 }  // namespace
 
-void readScene(Source& source, Model& model) {
+void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigidMeshes,
+               Model& model) {
   const tinygltf::Model& content = source.content();
   for (const tinygltf::Mesh& from : content.meshes) {
     Mesh& mesh = model.meshes.emplace_back();
@@ -83,12 +138,13 @@ void readScene(Source& source, Model& model) {
   const std::vector<bool> reachable = findReachable(source, model);
   PrimitiveReader reader(source);
   const std::vector<bool> jointsReachable = skinsWithin(model, reachable);
-  std::size_t outside = 0, notSkinned = 0, inBindPose = 0;
+  std::size_t outside = 0, inBindPose = 0;
+  std::vector<std::uint32_t> notSkinned;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
     if (node.mesh == none) continue;
     if (!reachable[i]) ++outside;
-    if (reachable[i] && node.skin == none) ++notSkinned;
+    if (reachable[i] && node.skin == none) notSkinned.push_back(i);
     if (!reachable[i] || node.skin == none) continue;
     if (!jointsReachable[node.skin]) {
       source.notes().broken(NoteKind::jointOutside, "node ", i, ": its skin, ", node.skin,
@@ -110,8 +166,12 @@ void readScene(Source& source, Model& model) {
       model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
     }
   }
+  if (rigidMeshes) {
+    RigidMeshes rigid(source, faultyMeshes, reader, model);
+    std::erase_if(notSkinned, [&](std::uint32_t node) { return rigid.add(node); });
+  }
   addNote(model, outside, "node", " left out: outside the default scene");
-  addNote(model, notSkinned, "node", " left out: a mesh but no skin");
+  addNote(model, notSkinned.size(), "node", " left out: a mesh but no skin");
   addNote(model, inBindPose, "primitive", " left in bind pose: a skinned node, but no joints");
 }
 
