@@ -83,8 +83,9 @@ class ClipMatcher {
   void match(Clip& clip) {
     std::vector<Channel>& channels = clip.channels;
     // A joint wins if another node with its name is animated, too.
-    std::ranges::stable_partition(channels,
-                                  [&](const Channel& c) -> bool { return fromJoints_[c.node]; });
+    std::stable_partition(channels.begin(), channels.end(), [&](const Channel& channel) -> bool {
+      return fromJoints_[channel.node];
+    });
     for (Channel& channel : channels) {
       const auto node = channel.path == ChannelPath::weights ? nodeForWeights(channel)
                                                              : nodeForTransform(channel.node);
@@ -93,13 +94,15 @@ class ClipMatcher {
     }
     std::erase_if(channels, [](const Channel& channel) { return channel.node == none; });
     std::ranges::stable_sort(channels, {}, targetOf);
+    const auto isRepeated = [](const Channel& a, const Channel& b) {
+      return targetOf(a) == targetOf(b);
+    };
     for (std::size_t i = 1; i < channels.size(); ++i) {
-      if (targetOf(channels[i]) != targetOf(channels[i - 1])) continue;
+      if (!isRepeated(channels[i - 1], channels[i])) continue;
       notes_.remark(NoteKind::ambiguousName, "several animated nodes are named ",
                     inQuotes(model_.nodes[channels[i].node].name), ": only one of them is used");
     }
-    const auto repeated = std::ranges::unique(channels, {}, targetOf);
-    channels.erase(repeated.begin(), repeated.end());
+    channels.erase(std::unique(channels.begin(), channels.end(), isRepeated), channels.end());
     for (const Channel& channel : channels) decomposeTarget(channel);
   }
 
