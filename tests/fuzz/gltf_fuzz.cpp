@@ -1,5 +1,5 @@
 // libFuzzer: any bytes as a glTF file, without a folder, so that no file is opened. What loads is
-// sampled, viewed, and packed or repaired as well.
+// sampled, viewed, and packed or repaired as well, and its clips are added to itself.
 #include <dermis/gltf.h>
 #include <dermis/pack.h>
 #include <dermis/validate.h>
@@ -24,7 +24,7 @@ void checkPrimitive(const gltf::Model& model, const gltf::SkinnedPrimitive& skin
   const gltf::PrimitiveView view(mesh.primitives[skinned.primitive]);
   const MeshView bindPose = view.mesh();
   require(bindPose.vertexCount != 0);
-  require(bindPose.morphTargets.size() == mesh.morphTargetCount);
+  require(bindPose.morphTargets.size() <= mesh.morphTargetCount);
   if (bindPose.influenceSets.empty()) return;
   const auto joints = static_cast<std::uint32_t>(model.skins[skinned.skin].joints.size());
   const MeshReport report = validate(bindPose, joints);
@@ -38,14 +38,15 @@ void checkPrimitive(const gltf::Model& model, const gltf::SkinnedPrimitive& skin
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const auto result = gltf::loadFromMemory(std::as_bytes(std::span(data, size)), {});
+  auto result =
+      gltf::loadFromMemory(std::as_bytes(std::span(data, size)), {}, {.rigidMeshes = true});
   if (!result) {
     // An error has a sentence, on one line.
     const std::string& message = result.error().message;
     require(!message.empty() && message.find('\n') == std::string::npos);
     return 0;
   }
-  const gltf::Model& model = *result;
+  gltf::Model& model = *result;
   // Notes are sentences, too, and there are some fifty kinds of them.
   require(model.notes.size() < 64);
   for (const std::string& note : model.notes)
@@ -58,7 +59,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(gltf::morphWeights(model, skinned.node, clip, 0.5).size() ==
             model.meshes[skinned.mesh].morphTargetCount);
   }
-  for (std::uint32_t clip = 0; clip < model.clips.size() && clip < 4; ++clip) {
+  const std::size_t ownClips = model.clips.size();
+  const auto added = gltf::addClips(model, model);
+  require(model.clips.size() == ownClips * (added ? 2 : 1));
+  for (std::size_t i = 0; i < std::min<std::size_t>(ownClips, 4); ++i) {
+    // The first and the last ones; the last ones are added.
+    const auto clip =
+        static_cast<std::uint32_t>(i % 2 == 0 ? i / 2 : model.clips.size() - 1 - i / 2);
+    for (std::uint32_t node = 0; node < model.nodes.size() && node < 4; ++node)
+      gltf::morphWeights(model, node, clip, 0.5);
     const auto globals = gltf::nodeGlobals(model, clip, model.clips[clip].duration / 2);
     require(globals.size() == model.nodes.size());
     for (std::uint32_t skin = 0; skin < model.skins.size() && skin < 4; ++skin) {
