@@ -102,7 +102,10 @@ class ModelSteps {
     EXPECT_GT(abandonedFrames_, 50u);
     EXPECT_GT(growths_, 80u);
     EXPECT_GT(failedCalls_, 500u);
-    EXPECT_TRUE(!hasGpu || failedFrames_ > 20u);
+    // How many depends on how large a device's blocks of memory are.
+    if (hasGpu) {
+      EXPECT_GT(failedFrames_, 0u);
+    }
   }
   /// Every one of these texts was in the message of an error.
   void expectAllGiven(const std::set<std::string>& texts) const {
