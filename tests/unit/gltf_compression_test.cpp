@@ -94,7 +94,7 @@ std::vector<std::array<std::uint32_t, 3>> sortedTriangles(std::span<const std::u
   std::vector<std::array<std::uint32_t, 3>> triangles;
   for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
     std::array<std::uint32_t, 3> triangle{indices[i], indices[i + 1], indices[i + 2]};
-    std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+    std::rotate(triangle.begin(), std::ranges::min_element(triangle), triangle.end());
     triangles.push_back(triangle);
   }
   std::ranges::sort(triangles);
