@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "gltf_builder.h"
+#include "test_paths.h"
 
 #ifdef DERMIS_DRACO
 #include <draco/compression/expert_encode.h>
@@ -348,6 +349,12 @@ TEST(MeshoptTest, DamagedBytesGiveAnErrorOrAModel) {
   }
   EXPECT_GT(refused, 100u);
   EXPECT_LT(refused, 500u);
+}
+
+// What an older encoder wrote, and what the fuzzer starts from.
+TEST(MeshoptTest, TheSeedOfTheFuzzerIsTheGrid) {
+  const auto seed = std::filesystem::path(sourceFolder) / "tests/fuzz/seeds/meshopt.gltf";
+  expectTheSame(loaded(gltf::load(seed)), loaded(skinnedGrid()));
 }
 
 // Then it holds the same numbers, but need not be there.
