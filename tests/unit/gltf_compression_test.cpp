@@ -648,38 +648,6 @@ TEST(DracoTest, DecodesOnlySkinnedMeshes) {
   file.json["nodes"][0]["mesh"] = 1;
   EXPECT_EQ(loaded(file).meshes.at(1).primitives.at(0).vertexCount, vertices);
 }
-
-TEST(DracoTest, DecodesRigidMeshes) {
-  const FileBuilder plain = skinnedGrid();
-  FileBuilder file = compressByDraco(plain, {.method = ::draco::MESH_SEQUENTIAL_ENCODING});
-  // The compressed mesh hangs on joint 1. What is skinned is not compressed.
-  const std::size_t first = file.json["accessors"].size();
-  for (const Json& accessor : plain.json["accessors"]) file.addAccessor(accessor);
-  Json skinned = plain.json["meshes"][0];
-  Json& primitive = skinned["primitives"][0];
-  primitive.erase("targets");
-  for (Json& accessor : primitive["attributes"]) accessor = accessor.get<std::size_t>() + first;
-  primitive["indices"] = primitive["indices"].get<std::size_t>() + first;
-  file.json["meshes"].push_back(skinned);
-  file.json["nodes"][0]["mesh"] = 1;
-  file.json["nodes"][1]["mesh"] = 0;
-
-  const gltf::Model model = loaded(file.load({}, {.rigidMeshes = true}));
-  ASSERT_EQ(model.skinnedPrimitives.size(), 2u);
-  EXPECT_EQ(model.meshes[0].primitives.at(0).positions, model.meshes[1].primitives[0].positions);
-  EXPECT_EQ(model.meshes[0].primitives[0].triangles, model.meshes[1].primitives[0].triangles);
-
-  dracoOf(file)["bufferView"] = 0;
-  const gltf::Model damaged = loaded(file.load({}, {.rigidMeshes = true}));
-  EXPECT_EQ(damaged.skinnedPrimitives.size(), 1u);
-  EXPECT_TRUE(hasNote(damaged,
-                      "mesh 0 primitive 0 KHR_draco_mesh_compression: its data is not a "
-                      "Draco mesh; its mesh is left out"))
-      << testing::PrintToString(damaged.notes);
-  EXPECT_TRUE(hasNote(damaged, "1 node left out: a mesh but no skin"));
-  expectError(file.load({}, {.rigidMeshes = true, .strict = true}), ErrorCode::invalidData,
-              "its data is not a Draco mesh");
-}
 #else
 TEST(DracoTest, ABuildWithoutTheLibraryUsesTheFallback) {
   FileBuilder file = skinnedGrid();

@@ -47,10 +47,8 @@ void decodeViews(Document& document, std::vector<Buffer>& buffers, MemoryBudget&
 
 /// Decodes the primitives of skinned meshes that KHR_draco_mesh_compression compresses, unless
 /// their accessors have data: adds a bufferView for each accessor, with a buffer of its own. Throws
-/// `Failure` as `decodeViews`. With `rigidMeshes` also those of other meshes; one that cannot be
-/// decoded gives a note, and its mesh loses its primitives.
-void decodePrimitives(Document& document, std::vector<Buffer>& buffers, bool rigidMeshes,
-                      MemoryBudget& budget, Notes& notes);
+/// `Failure` as `decodeViews`.
+void decodePrimitives(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget);
 
 /// Adds a buffer of these bytes and returns its index.
 inline int addBuffer(std::vector<Buffer>& buffers, std::vector<std::byte> bytes) {

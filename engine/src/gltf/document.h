@@ -42,7 +42,7 @@ struct CompressedView {
   Filter filter = Filter::unfiltered;
 };
 
-/// A primitive that KHR_draco_mesh_compression compresses.
+/// A primitive of a skinned mesh that KHR_draco_mesh_compression compresses.
 struct CompressedPrimitive {
   std::size_t mesh = 0, primitive = 0;
   std::size_t view = 0;                             ///< bufferView of the compressed bytes
@@ -56,7 +56,7 @@ struct Usage {
   std::vector<bool> accessors, views, buffers;
   std::vector<std::uint32_t> strides;  ///< byteStride by bufferView; 0: none
   std::vector<CompressedView> compressedViews;
-  std::vector<CompressedPrimitive> compressedPrimitives;  ///< of all meshes
+  std::vector<CompressedPrimitive> compressedPrimitives;
 };
 
 /// A file's structure. Every index in it is in range, and every property that is read has its type.

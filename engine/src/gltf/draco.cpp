@@ -2,7 +2,6 @@
 #include <cstring>
 #include <map>
 #include <memory>
-#include <set>
 #include <utility>
 
 #include "gltf/compression.h"
@@ -253,25 +252,9 @@ class PrimitiveDecoder {
 
 }  // namespace
 
-void decodePrimitives(Document& document, std::vector<Buffer>& buffers, bool rigidMeshes,
-                      MemoryBudget& budget, Notes& notes) {
+void decodePrimitives(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget) {
   PrimitiveDecoder decoder(document, buffers, budget);
-  const Usage& usage = document.usage;
-  for (const CompressedPrimitive& from : usage.compressedPrimitives)
-    if (usage.meshes[from.mesh]) decoder.decode(from);
-  if (!rigidMeshes) return;
-  std::set<std::size_t> damagedViews;
-  for (const CompressedPrimitive& from : usage.compressedPrimitives) {
-    std::vector<tinygltf::Primitive>& primitives = document.content.meshes[from.mesh].primitives;
-    // A faulty mesh has lost its primitives.
-    if (usage.meshes[from.mesh] || from.primitive >= primitives.size()) continue;
-    const bool isGood =
-        !damagedViews.contains(from.view) &&
-        notes.tolerate(NoteKind::rigid, "; its mesh is left out", [&] { decoder.decode(from); });
-    if (isGood) continue;
-    damagedViews.insert(from.view);
-    primitives.clear();
-  }
+  for (const CompressedPrimitive& from : document.usage.compressedPrimitives) decoder.decode(from);
 }
 
 }  // namespace dermis::gltf

@@ -581,7 +581,7 @@ class ReferenceCheck {
       attributes(requireObject(primitive, "attributes", place), place + " attributes", used);
       reference(primitive, "indices", "accessors", place);
       if (used) use(primitive, "indices");
-      checkDraco(primitive, place, index, i);
+      if (used) checkDraco(primitive, place, index, i);
       idleReference(primitive, "material", "materials", place);
       if (integer(primitive, "mode", place, 4) > 6) {
         failInvalid(place, ": mode is not from 0 to 6");
@@ -608,7 +608,7 @@ class ReferenceCheck {
     CompressedPrimitive compressed{mesh, index, 0, {}};
     requireReference(*from, "bufferView", "bufferViews", where);
     compressed.view = (*from)["bufferView"].get<std::size_t>();
-    if (usage_.meshes[mesh]) usage_.views[compressed.view] = true;
+    usage_.views[compressed.view] = true;
     json& attributes = requireObject(*from, "attributes", where);
     spend(budget_, attributes.size() + 1, sizeof compressed + bytesPerAttribute, where);
     for (auto entry = attributes.begin(); entry != attributes.end(); ++entry) {
