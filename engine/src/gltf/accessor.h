@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gltf/buffers.h"
+#include "gltf/compression.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
 #include "gltf/notes.h"
@@ -31,6 +32,12 @@ class Source {
   const Usage& usage() const { return document_.usage; }
   bool quantized() const { return document_.quantized; }
   Notes& notes() const { return notes_; }
+
+  /// Decodes a primitive's data if it is compressed. Call it before the primitive's accessors are
+  /// read.
+  void decompress(std::size_t mesh, std::size_t primitive) {
+    decodePrimitive(mesh, primitive, document_, buffers_, budget_);
+  }
 
   /// Removes an attribute from a primitive, so that it is not read.
   void leaveOut(std::size_t mesh, std::size_t primitive, const std::string& attribute);

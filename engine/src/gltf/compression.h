@@ -45,10 +45,10 @@ inline std::string notDecoded(std::string_view extension) {
 void decodeViews(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget,
                  Notes& notes);
 
-/// Decodes the primitives of skinned meshes that KHR_draco_mesh_compression compresses, unless
-/// their accessors have data: adds a bufferView for each accessor, with a buffer of its own. Throws
-/// `Failure` as `decodeViews`.
-void decodePrimitives(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget);
+/// If KHR_draco_mesh_compression compresses the primitive, decodes it: gives each of its accessors
+/// a bufferView, with a buffer of its own. Throws `Failure` as `decodeViews`.
+void decodePrimitive(std::size_t mesh, std::size_t primitive, Document& document,
+                     std::vector<Buffer>& buffers, MemoryBudget& budget);
 
 /// Adds a buffer of these bytes and returns its index.
 inline int addBuffer(std::vector<Buffer>& buffers, std::vector<std::byte> bytes) {

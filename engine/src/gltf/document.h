@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "dermis/memory_budget.h"
@@ -42,9 +43,8 @@ struct CompressedView {
   Filter filter = Filter::unfiltered;
 };
 
-/// A primitive of a skinned mesh that KHR_draco_mesh_compression compresses.
+/// A primitive that KHR_draco_mesh_compression compresses.
 struct CompressedPrimitive {
-  std::size_t mesh = 0, primitive = 0;
   std::size_t view = 0;                             ///< bufferView of the compressed bytes
   std::map<std::string, std::uint32_t> attributes;  ///< their ids there, by name
 };
@@ -56,7 +56,8 @@ struct Usage {
   std::vector<bool> accessors, views, buffers;
   std::vector<std::uint32_t> strides;  ///< byteStride by bufferView; 0: none
   std::vector<CompressedView> compressedViews;
-  std::vector<CompressedPrimitive> compressedPrimitives;
+  /// By mesh and primitive.
+  std::map<std::pair<std::size_t, std::size_t>, CompressedPrimitive> compressedPrimitives;
 };
 
 /// A file's structure. Every index in it is in range, and every property that is read has its type.
@@ -65,6 +66,9 @@ struct Document {
   std::vector<BufferDescription> buffers;
   Usage usage;
   bool quantized = false;  ///< KHR_mesh_quantization is in use.
+  /// Accessors that Draco streams have filled: the bufferView of the stream, and the attribute's id
+  /// there, or `none` for indices.
+  std::map<int, std::pair<std::size_t, std::uint32_t>> decodedAccessors;
 };
 
 struct Appearance;

@@ -18,12 +18,13 @@ namespace dermis::gltf {
 namespace {
 
 #ifdef DERMIS_DRACO
-// The numbers at the beginning of a Draco stream, version 2.2. Fails unless it is one.
+// The numbers at the beginning of a Draco stream.
 struct StreamCounts {
   std::uint32_t points = 0;  // at least so many
   std::uint32_t faces = 0;
 };
 
+// Version 2.2, which the extension requires.
 StreamCounts readCounts(draco::DecoderBuffer buffer, const std::string& where) {
   draco::DracoHeader header{};
   if (!draco::PointCloudDecoder::DecodeHeader(&buffer, &header).ok() ||
@@ -69,14 +70,15 @@ int componentTypeOf(draco::DataType type) {
   }
 }
 
+// The primitive's accessors have been checked: attributes have one count, and indices are integers.
 class PrimitiveDecoder {
  public:
   PrimitiveDecoder(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget)
-      : content_(document.content), usage_(document.usage), buffers_(buffers), budget_(budget) {}
+      : document_(document), content_(document.content), buffers_(buffers), budget_(budget) {}
 
-  void decode(const CompressedPrimitive& from) {
-    const tinygltf::Primitive& primitive = content_.meshes[from.mesh].primitives[from.primitive];
-    const std::string where = join(primitivePlace(from.mesh, from.primitive), " ", dracoExtension);
+  void decode(const CompressedPrimitive& from, const tinygltf::Primitive& primitive,
+              const std::string& place) {
+    const std::string where = join(place, " ", dracoExtension);
     const auto& attributes = primitive.attributes;
     if (!attributes.contains("POSITION")) return;  // the primitive is left out
     if (primitive.mode != TINYGLTF_MODE_TRIANGLES)
@@ -124,7 +126,7 @@ class PrimitiveDecoder {
                  const std::string& where) {
     std::size_t known = 0;
     const auto isKnown = [&](int index, std::uint32_t id) {
-      const auto [place, isNew] = decoded_.emplace(index, std::pair(view, id));
+      const auto [place, isNew] = document_.decodedAccessors.emplace(index, std::pair(view, id));
       if (place->second != std::pair(view, id))
         failInvalid(where, ": accessor ", index, " has other data in another primitive");
       if (!isNew) ++known;
@@ -169,10 +171,6 @@ class PrimitiveDecoder {
     const tinygltf::Accessor& to = accessor(index);
     const draco::PointAttribute* from = mesh.GetAttributeByUniqueId(id);
     if (from == nullptr) failInvalid(where, ": its data has no attribute ", id);
-    if (to.count != mesh.num_points()) {
-      failInvalid(where, ": its data has ", mesh.num_points(), " vertices, but accessor ", index,
-                  " has ", to.count, " elements");
-    }
     const std::size_t size = elementSize(index);
     if (componentTypeOf(from->data_type()) != to.componentType ||
         from->num_components() !=
@@ -200,11 +198,8 @@ class PrimitiveDecoder {
         next += sizeof vertex;
       }
     }
-    // Whichever type of indices the accessor declares. Any other is refused later.
-    int& type = accessor(index).componentType;
-    if (type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
-        type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
-      type = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    // Whichever type of indices the accessor declares.
+    accessor(index).componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
     fill(index, std::move(bytes), 0);
   }
 
@@ -215,16 +210,13 @@ class PrimitiveDecoder {
     accessor(index).bufferView = static_cast<int>(content_.bufferViews.size());
     accessor(index).byteOffset = 0;
     content_.bufferViews.push_back(std::move(view));
-    usage_.views.push_back(true);
-    usage_.strides.push_back(stride);
+    document_.usage.strides.push_back(stride);
   }
 
+  Document& document_;
   tinygltf::Model& content_;
-  Usage& usage_;
   std::vector<Buffer>& buffers_;
   MemoryBudget& budget_;
-  /// By accessor: the bufferView of the stream, and the id of the attribute; `none`: indices.
-  std::map<int, std::pair<std::size_t, std::uint32_t>> decoded_;
 };
 #else
 // A file that does not require the extension may have uncompressed data.
@@ -233,15 +225,14 @@ class PrimitiveDecoder {
   PrimitiveDecoder(const Document& document, const std::vector<Buffer>&, const MemoryBudget&)
       : content_(document.content) {}
 
-  void decode(const CompressedPrimitive& from) const {
-    for (const auto& [name, index] :
-         content_.meshes[from.mesh].primitives[from.primitive].attributes) {
+  void decode(const CompressedPrimitive& from, const tinygltf::Primitive& primitive,
+              const std::string& place) const {
+    for (const auto& [name, index] : primitive.attributes) {
       const tinygltf::Accessor& accessor = content_.accessors[static_cast<std::size_t>(index)];
       const bool isCompressed = name == indicesAttribute || from.attributes.contains(name);
       if (!isCompressed || accessor.bufferView >= 0 || accessor.sparse.isSparse) continue;
       fail(ErrorCode::unsupportedFeature,
-           join(primitivePlace(from.mesh, from.primitive), ": accessor ", index,
-                " has no data, but ", notDecoded(dracoExtension)));
+           join(place, ": accessor ", index, " has no data, but ", notDecoded(dracoExtension)));
     }
   }
 
@@ -252,9 +243,14 @@ class PrimitiveDecoder {
 
 }  // namespace
 
-void decodePrimitives(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget) {
-  PrimitiveDecoder decoder(document, buffers, budget);
-  for (const CompressedPrimitive& from : document.usage.compressedPrimitives) decoder.decode(from);
+void decodePrimitive(std::size_t mesh, std::size_t primitive, Document& document,
+                     std::vector<Buffer>& buffers, MemoryBudget& budget) {
+  const auto& compressed = document.usage.compressedPrimitives;
+  const auto found = compressed.find({mesh, primitive});
+  if (found == compressed.end()) return;
+  PrimitiveDecoder(document, buffers, budget)
+      .decode(found->second, document.content.meshes[mesh].primitives[primitive],
+              primitivePlace(mesh, primitive));
 }
 
 }  // namespace dermis::gltf

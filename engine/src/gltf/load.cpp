@@ -31,7 +31,6 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   std::vector<Buffer> buffers =
       loadBuffers(document, container.binaryChunk, files, model.budget, notes);
   decodeViews(document, buffers, model.budget, notes);
-  decodePrimitives(document, buffers, model.budget);
   Source source(std::move(document), std::move(buffers), model.budget, notes);
 
   readNodes(source, model);

@@ -469,6 +469,7 @@ Primitive PrimitiveReader::read(std::uint32_t meshIndex, std::uint32_t primitive
     source_.notes().remark(NoteKind::noPositions, where, ": it has no positions and is left out");
     return primitive;
   }
+  source_.decompress(meshIndex, primitiveIndex);
   primitive.vertexCount = source_.count(positions);
   primitive.positions = floats(positions);
   primitive.normals = floats(findAttribute(attributes, "NORMAL"));

@@ -581,7 +581,7 @@ class ReferenceCheck {
       attributes(requireObject(primitive, "attributes", place), place + " attributes", used);
       reference(primitive, "indices", "accessors", place);
       if (used) use(primitive, "indices");
-      if (used) checkDraco(primitive, place, index, i);
+      checkDraco(primitive, place, {index, i});
       idleReference(primitive, "material", "materials", place);
       if (integer(primitive, "mode", place, 4) > 6) {
         failInvalid(place, ": mode is not from 0 to 6");
@@ -601,23 +601,23 @@ class ReferenceCheck {
     checkWeights(mesh, targetsOf(mesh), where);
   }
 
-  void checkDraco(json& primitive, const std::string& place, std::size_t mesh, std::size_t index) {
+  void checkDraco(json& primitive, const std::string& place,
+                  std::pair<std::size_t, std::size_t> index) {
     json* from = extension(primitive, dracoExtension, place);
     if (from == nullptr) return;
     const std::string where = join(place, " ", dracoExtension);
-    CompressedPrimitive compressed{mesh, index, 0, {}};
     requireReference(*from, "bufferView", "bufferViews", where);
-    compressed.view = (*from)["bufferView"].get<std::size_t>();
-    usage_.views[compressed.view] = true;
     json& attributes = requireObject(*from, "attributes", where);
-    spend(budget_, attributes.size() + 1, sizeof compressed + bytesPerAttribute, where);
+    spend(budget_, attributes.size() + 1, bytesPerAttribute, where);
+    CompressedPrimitive& compressed = usage_.compressedPrimitives[index];
+    compressed.view = (*from)["bufferView"].get<std::size_t>();
+    if (usage_.meshes[index.first]) usage_.views[compressed.view] = true;
     for (auto entry = attributes.begin(); entry != attributes.end(); ++entry) {
       const std::uint64_t id =
           integer(entry.value(), join(where, ": the id of ", inQuotes(entry.key())));
       if (id >= none) failInvalid(where, ": there is no attribute ", id);
       compressed.attributes.emplace(entry.key(), static_cast<std::uint32_t>(id));
     }
-    usage_.compressedPrimitives.push_back(std::move(compressed));
   }
 
   static std::size_t targetCount(const json& primitive) {
