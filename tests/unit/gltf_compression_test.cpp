@@ -159,6 +159,7 @@ std::vector<std::byte> encoded(const std::vector<std::byte>& bytes, std::size_t 
   const std::size_t count = bytes.size() / stride;
   std::vector<unsigned char> code(1000 + 4 * bytes.size());
   if (mode == "ATTRIBUTES") {
+    meshopt_encodeVertexVersion(0);
     code.resize(meshopt_encodeVertexBuffer(code.data(), code.size(), bytes.data(), count, stride));
   } else {
     std::vector<unsigned int> indices;
@@ -252,10 +253,14 @@ TEST(MeshoptTest, DecodesOctahedralNormals) {
 TEST(MeshoptTest, DecodesExponentialPositions) {
   const gltf::Model model = loaded(skinnedGrid());
   const std::vector<float>& positions = firstPrimitive(model).positions.values();
-  std::vector<std::byte> bytes(vertices * 12);
-  meshopt_encodeFilterExp(bytes.data(), vertices, 12, 16, positions.data());
-  const gltf::Model found = loaded(filtered("EXPONENTIAL", 0, bytes, 12, floatType));
-  expectNear(firstPrimitive(found).positions.values(), positions, 8 * 0x1p-15f);
+  // By hand, since versions of the library differ: 8 bits of an exponent, 24 of a mantissa.
+  std::vector<std::uint32_t> words;
+  for (const float position : positions) {
+    const auto mantissa = static_cast<std::uint32_t>(std::lround(position * 0x1p16f));
+    words.push_back(std::uint32_t{0xf0} << 24 | (mantissa & 0xffffff));
+  }
+  const gltf::Model found = loaded(filtered("EXPONENTIAL", 0, bytesOf(words), 12, floatType));
+  expectNear(firstPrimitive(found).positions.values(), positions, 0x1p-17f);
 }
 
 TEST(MeshoptTest, DecodesQuaternions) {

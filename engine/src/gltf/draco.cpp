@@ -100,7 +100,7 @@ class PrimitiveDecoder {
     spend(budget_, indexCount, 16 + 8 * (ids.size() + 1), where);
     for (const auto& [index, id] : ids) {
       // As values, as integers before they are converted, and in the accessor's buffer.
-      spend(budget_, vertexCount, 3 * std::uint64_t{stride(index)} + 16, where);
+      spend(budget_, vertexCount, 3 * std::uint64_t{elementSize(index)} + 16, where);
     }
     const auto mesh = decodeMesh(from.view, vertexCount, indexCount, where);
     for (const auto& [index, id] : ids) fillVertices(*mesh, index, id, where);
@@ -112,8 +112,6 @@ class PrimitiveDecoder {
     return content_.accessors[static_cast<std::size_t>(index)];
   }
 
-  // An element in memory; vertex attributes are aligned to 4 bytes.
-  std::uint32_t stride(int index) { return (elementSize(index) + 3) / 4 * 4; }
   std::uint32_t elementSize(int index) {
     const auto component = static_cast<std::uint32_t>(accessor(index).componentType);
     const auto type = static_cast<std::uint32_t>(accessor(index).type);
@@ -177,15 +175,15 @@ class PrimitiveDecoder {
             tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(to.type))) {
       failInvalid(where, ": attribute ", id, " of its data has another type than accessor ", index);
     }
-    std::vector<std::byte> bytes(to.count * stride(index));
+    std::vector<std::byte> bytes(to.count * size);
     for (std::uint32_t i = 0; i < mesh.num_points(); ++i) {
       const draco::AttributeValueIndex value = from->mapped_index(draco::PointIndex(i));
       const auto place = static_cast<std::size_t>(from->GetBytePos(value));
       if (value.value() >= from->size() || place + size > from->buffer()->data_size())
         failInvalid(where, ": vertex ", i, " has no value of attribute ", id);
-      std::memcpy(&bytes[std::size_t{i} * stride(index)], from->buffer()->data() + place, size);
+      std::memcpy(&bytes[std::size_t{i} * size], from->buffer()->data() + place, size);
     }
-    fill(index, std::move(bytes), stride(index));
+    fill(index, std::move(bytes));
   }
 
   void fillIndices(const draco::Mesh& mesh, int index) {
@@ -200,17 +198,17 @@ class PrimitiveDecoder {
     }
     // Whichever type of indices the accessor declares.
     accessor(index).componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-    fill(index, std::move(bytes), 0);
+    fill(index, std::move(bytes));
   }
 
-  void fill(int index, std::vector<std::byte> bytes, std::uint32_t stride) {
+  void fill(int index, std::vector<std::byte> bytes) {
     tinygltf::BufferView view;
     view.byteLength = bytes.size();
     view.buffer = addBuffer(buffers_, std::move(bytes));
     accessor(index).bufferView = static_cast<int>(content_.bufferViews.size());
     accessor(index).byteOffset = 0;
     content_.bufferViews.push_back(std::move(view));
-    document_.usage.strides.push_back(stride);
+    document_.usage.strides.push_back(0);
   }
 
   Document& document_;
