@@ -98,8 +98,8 @@ void printText(const Json& json) {
 }
 
 ExitStatus info(const InfoOptions& options) {
-  const Result<Scene> scene = loadScene(samples::pathOf(options.model),
-                                        {.strict = options.strict, .clips = options.clips});
+  const Result<Scene> scene =
+      loadScene(samples::pathOf(options.model), {.strict = options.strict, .clips = options.clips});
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene, options);
   if (options.json) {

@@ -11,8 +11,8 @@
 
 namespace dermis {
 
-/// Kinds of problems. `pack` refuses a mesh with any problem up to `jointOutOfRange`, and accepts the
-/// others.
+/// Kinds of problems. `pack` refuses a mesh with any problem up to `jointOutOfRange`, and accepts
+/// the others.
 enum class MeshProblem : std::uint8_t {
   // The views are not valid. `repair` cannot help.
   emptyMesh,        ///< no vertices, or no positions
