@@ -7,10 +7,8 @@
 // users are checked before what they use.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <limits>
 #include <map>
 #include <string>
@@ -25,15 +23,10 @@
 #include "gltf/document.h"
 #include "gltf/failure.h"
 #include "gltf/notes.h"
-#include "strict_floating_point.h"
+#include "gltf/properties.h"
 
 namespace dermis::gltf {
 namespace {
-
-using nlohmann::json;
-
-// Above this, a JSON number may differ from the integer that was written.
-constexpr std::uint64_t largestInteger = (std::uint64_t{1} << 53) - 1;
 
 // "{}," takes three bytes in a file, but hundreds in the structs made from it (tinygltf's and
 // Dermis'), which are in growing vectors.
@@ -196,59 +189,6 @@ class ReferenceCheck {
     item.erase(found);
   }
 
-  static const json& require(const json& object, const char* property, const std::string& where) {
-    const auto found = object.find(property);
-    if (found == object.end()) failInvalid(where, ": it has no ", property);
-    return *found;
-  }
-
-  static json& requireObject(json& object, const char* property, const std::string& where) {
-    require(object, property, where);
-    if (!object[property].is_object()) failInvalid(where, ": ", property, " is not an object");
-    return object[property];
-  }
-
-  static json& requireArray(json& object, const char* property, const std::string& where) {
-    require(object, property, where);
-    if (!object[property].is_array()) failInvalid(where, ": ", property, " is not an array");
-    return object[property];
-  }
-
-  // JSON has no integers: 3.0 counts as one.
-  static std::uint64_t integer(json& value, const std::string& what) {
-    if (value.is_number_float()) {
-      const double number = value.get<double>();
-      if (number >= 0 && std::floor(number) == number) {
-        value = static_cast<std::uint64_t>(std::min(number, 0x1p63));
-      }
-    }
-    if (!value.is_number_unsigned()) failInvalid(what, " is not an integer of at least 0");
-    if (value.get<std::uint64_t>() > largestInteger)
-      failInvalid(what, " is larger than ", largestInteger);
-    return value.get<std::uint64_t>();
-  }
-
-  static std::uint64_t integer(json& object, const char* property, const std::string& where,
-                               std::uint64_t absent) {
-    const auto found = object.find(property);
-    return found == object.end() ? absent : integer(*found, join(where, ": ", property));
-  }
-
-  /// Of a size or an offset: tinygltf keeps these as size_t, which has 32 bits in 32-bit builds.
-  static std::uint64_t byteCount(json& object, const char* property, const std::string& where,
-                                 std::uint64_t absent) {
-    const std::uint64_t number = integer(object, property, where, absent);
-    constexpr std::uint64_t largest = std::numeric_limits<std::size_t>::max();
-    if (number > largest) failInvalid(where, ": ", property, " is larger than ", largest);
-    return number;
-  }
-
-  static std::uint64_t requireInteger(json& object, const char* property,
-                                      const std::string& where) {
-    require(object, property, where);
-    return integer(object, property, where, 0);
-  }
-
   std::size_t sizeOf(const char* section) const {
     const auto found = root_.find(section);
     return found == root_.end() ? 0 : found->size();
@@ -328,46 +268,6 @@ class ReferenceCheck {
     if (object.contains(property)) usage_.accessors[object[property].get<std::size_t>()] = true;
   }
 
-  static void numbers(const json& object, const char* property, std::size_t count,
-                      const std::string& where) {
-    const auto found = object.find(property);
-    if (found == object.end()) return;
-    if (!found->is_array() || (count != 0 && found->size() != count)) {
-      failInvalid(where, ": ", property, " is not an array of ",
-                  count != 0 ? join(count, " numbers") : std::string("numbers"));
-    }
-    for (const json& number : *found) finiteNumber(number, property, where);
-  }
-
-  static void number(const json& object, const char* property, const std::string& where) {
-    const auto found = object.find(property);
-    if (found != object.end()) finiteNumber(*found, property, where);
-  }
-
-  // Numbers must be finite in float32, because they are converted to it.
-  static void finiteNumber(const json& value, const char* property, const std::string& where) {
-    if (!value.is_number())
-      failInvalid(where, ": ", property, " contains something other than numbers");
-    const double magnitude = std::abs(value.get<double>());
-    if (!(magnitude <= static_cast<double>(std::numeric_limits<float>::max()))) {
-      failInvalid(where, ": ", property, " contains a number that is out of range for float32");
-    }
-  }
-
-  static void boolean(const json& object, const char* property, const std::string& where) {
-    const auto found = object.find(property);
-    if (found != object.end() && !found->is_boolean()) {
-      failInvalid(where, ": ", property, " is neither true nor false");
-    }
-  }
-
-  static void oneOf(const json& value, std::initializer_list<json> allowed,
-                    const std::string& what) {
-    if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
-    failInvalid(what, " is ", inQuotes(value.is_string() ? value.get<std::string>() : value.dump()),
-                ", which the specification does not define");
-  }
-
   void checkBuffer(json& buffer, const std::string& where, std::size_t index) const {
     if (requireInteger(buffer, "byteLength", where) == 0)
       notes_.broken(NoteKind::bufferLength, where, ": byteLength is 0");
@@ -402,28 +302,6 @@ class ReferenceCheck {
     // tinygltf refuses strides that break the rule.
     if (view.contains("byteStride")) usage_.strides[index] = static_cast<std::uint32_t>(stride);
     view.erase("byteStride");
-  }
-
-  // The extension of an object, or null if it has none of this name.
-  static json* extension(json& object, std::string_view name, const std::string& where) {
-    const auto extensions = object.find("extensions");
-    if (extensions == object.end() || !extensions->is_object()) return nullptr;
-    const auto found = extensions->find(name);
-    if (found == extensions->end()) return nullptr;
-    if (!found->is_object()) failInvalid(where, ": ", name, " is not an object");
-    return &*found;
-  }
-
-  template <typename Value>
-  static Value valueOf(const json& object, const char* property, const std::string& where,
-                       std::initializer_list<std::pair<const char*, Value>> names) {
-    const json& name = require(object, property, where);
-    for (const auto& [known, value] : names) {
-      if (name == known) return value;
-    }
-    failInvalid(where, ": ", property, " is ",
-                inQuotes(name.is_string() ? name.get<std::string>() : name.dump()),
-                ", which is not supported");
   }
 
   // Returns whether the view is compressed. The extension's rules are those of
