@@ -57,7 +57,7 @@ void handleSignals() {
   for (int number = 1; number < NSIG; ++number) {
     if (std::ranges::find(harmless, number) != harmless.end()) continue;
     struct sigaction action {};
-    // Fails for signals that nobody can handle.
+    // Fails for SIGKILL and SIGSTOP.
     if (sigaction(number, nullptr, &action) != 0 || action.sa_handler != SIG_DFL) continue;
     action = {};
     action.sa_handler = removeAndEnd;

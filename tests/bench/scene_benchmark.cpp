@@ -99,8 +99,8 @@ void planFrames(benchmark::State& state, bool moves) {
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 
-/// Instances of two sizes that take turns. All of one size are removed, so that there is a gap
-/// between any two others. Before them are two small ones, and a gap that is too small for these.
+/// Alternates instances of two sizes and removes all of one size, which leaves a gap between any
+/// two others. Before them are two small ones, and a gap that is too small for these.
 struct Gaps {
   Gaps(std::uint32_t count, std::uint32_t kept, std::uint32_t removed) {
     instance.pose = *scene.addPose(1);

@@ -32,7 +32,7 @@ struct Arithmetic {
   Inexactness inexactness;
 };
 
-/// One at a time: the replaced function has no context of its own.
+/// Only one may exist at a time, because the replaced function is passed no context.
 struct Inexact {
   Inexact(const vulkan::DeviceDescription& description, const Arithmetic& arithmetic)
       : gpu(description), context(create(description, arithmetic)) {}

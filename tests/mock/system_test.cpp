@@ -164,7 +164,7 @@ TEST_F(MockSystemTest, AnUploadsMemoryIsFreedOnceItsFrameIsComplete) {
   description.meshCapacity = {1 << 20};
   make(description);
   const int memories = mock.alive["Memory"];
-  const PackedMesh large = systemMesh(1, 2000);  // takes a block of its own
+  const PackedMesh large = systemMesh(1, 2000);  // needs another block
   must(system->addMesh(large));
   EXPECT_EQ(mock.alive["Memory"], memories + 1);
   begin();

@@ -50,8 +50,8 @@ void animate(FileBuilder& file, std::size_t node, const char* path, const char* 
 constexpr int root = 1, hand = 2, grip = 3, sword = 4;
 
 /// A blue arm, lifted by a clip, whose second joint holds a red sword. The grip between them is no
-/// joint, and is animated, too. `swordsSkin`: gives the sword a skin of its own, as a modeler would
-/// who cannot use rigid meshes.
+/// joint, but is also animated. With `swordsSkin` the sword is skinned to a single joint instead of
+/// hanging on one.
 FileBuilder armed(bool swordsSkin = false) {
   FileBuilder file;
   file.json["materials"] = {

@@ -495,7 +495,7 @@ TEST(Scene, PosesHaveUpToTheMaximumOfJoints) {
   }
 }
 
-// An engine with buffers of its own has no others.
+// If the engine supplies the buffers, palettes cannot grow.
 TEST(Scene, PalettesSufficeForAllJoints) {
   SceneDescription description = smallScene();
   description.jointCapacity = Capacity::fixed(9);

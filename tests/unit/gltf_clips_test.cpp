@@ -25,7 +25,7 @@ FileBuilder figure() {
   return file;
 }
 
-/// Animates a property of a node in a clip of its own: from zeros to `values` in one second.
+/// Adds a clip that animates one property of a node, from zeros to `values` in one second.
 void animate(FileBuilder& file, std::size_t node, const char* path, std::vector<float> values,
              const std::string& clip) {
   const bool isWeights = std::string(path) == "weights";

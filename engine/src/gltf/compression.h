@@ -38,15 +38,15 @@ inline std::string notDecoded(std::string_view extension) {
               "); 'gltf-transform copy' writes the file without it");
 }
 
-/// Decodes all bufferViews that meshopt extensions compress, each into a buffer of its own. Throws
+/// Decodes all bufferViews that meshopt extensions compress, each into a new buffer. Throws
 /// `Failure`: `invalidData` if the data is damaged, or `unsupportedFeature` if this build does not
 /// decode it and the file has no uncompressed data. In a view that nothing skinned or animated
 /// uses, that gives a note, and the view has no bytes.
 void decodeViews(Document& document, std::vector<Buffer>& buffers, MemoryBudget& budget,
                  Notes& notes);
 
-/// If KHR_draco_mesh_compression compresses the primitive, decodes it: gives each of its accessors
-/// a bufferView, with a buffer of its own. Throws `Failure` as `decodeViews`.
+/// If KHR_draco_mesh_compression compresses the primitive, decodes it, and adds a bufferView and a
+/// buffer for each of its accessors. Throws `Failure` as `decodeViews`.
 void decodePrimitive(std::size_t mesh, std::size_t primitive, Document& document,
                      std::vector<Buffer>& buffers, MemoryBudget& budget);
 
