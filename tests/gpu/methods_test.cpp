@@ -18,6 +18,7 @@
 #include "dermis/verify/accuracy.h"
 #include "dual_quat.h"
 #include "exhaustive.h"
+#include "joint_of.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
@@ -28,16 +29,6 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-
-JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translation = {0, 0, 0}) {
-  JointMatrix joint;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      joint.m[row][column] = static_cast<float>(linear[column][row]);
-    joint.m[row][3] = static_cast<float>(translation[row]);
-  }
-  return joint;
-}
 
 JointMatrix turnAboutZ(double degrees) {
   return jointOf(glm::mat3_cast(glm::angleAxis(degrees * pi / 180, glm::dvec3(0, 0, 1))));

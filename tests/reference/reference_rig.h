@@ -18,6 +18,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 
+#include "joint_of.h"
 #include "random_rig.h"
 #include "verify/conditioning.h"
 
@@ -66,21 +67,6 @@ inline glm::dmat3 rotationAbout(const glm::dvec3& axis, double angle) {
                        (1 - std::cos(angle)) * glm::dot(n, e) * n;
   }
   return rotation;
-}
-
-inline glm::dmat3 diagonalMatrix(double x, double y, double z) {
-  return glm::dmat3(glm::dvec3(x, 0, 0), glm::dvec3(0, y, 0), glm::dvec3(0, 0, z));
-}
-
-inline JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translation = {0, 0, 0}) {
-  JointMatrix joint;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      joint.m[row][column] = static_cast<float>(linear[column][row]);
-    }
-    joint.m[row][3] = static_cast<float>(translation[row]);
-  }
-  return joint;
 }
 
 /// So many joints, made one by one.

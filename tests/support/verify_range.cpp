@@ -17,6 +17,7 @@
 #include "dermis/bounds.h"
 #include "dermis/pack.h"
 #include "dermis/verify/accuracy.h"
+#include "joint_of.h"
 #include "random_rig.h"
 
 namespace dermis::test {
@@ -44,21 +45,6 @@ class Random {
  private:
   std::mt19937 engine_;
 };
-
-glm::dmat3 diagonal(double x, double y, double z) {
-  return {{x, 0, 0}, {0, y, 0}, {0, 0, z}};
-}
-
-JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translation = glm::dvec3(0.0)) {
-  JointMatrix joint;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      joint.m[row][column] = static_cast<float>(linear[column][row]);
-    }
-    joint.m[row][3] = static_cast<float>(translation[row]);
-  }
-  return joint;
-}
 
 /// Vertex v follows joint 0 and, by a quarter, joint v + 1: rotations must be right, because the
 /// rotation of a single joint does not show. Positions have length 1, centers of rotation 1/4.
@@ -131,7 +117,7 @@ void verifyThinMirrors(samples::BatchTarget& target) {
         glm::dvec3 sizes(size);
         sizes[static_cast<int>(joint % 3)] *= -share * edge;
         // The thin axis is one of the result's, so that products of the determinant do not cancel.
-        pose.push_back(jointOf(diagonal(sizes.x, sizes.y, sizes.z) * random.rotation()));
+        pose.push_back(jointOf(diagonalMatrix(sizes.x, sizes.y, sizes.z) * random.rotation()));
       }
       for (const Method method : target.methods()) {
         const Comparison comparison = verifier.verify(
@@ -264,7 +250,7 @@ constexpr int hostileKinds = 23;
 
 JointMatrix hostileJoint(Random& random, int kind) {
   const auto scaled = [&random](double x, double y, double z) {
-    return random.rotation() * diagonal(x, y, z);
+    return random.rotation() * diagonalMatrix(x, y, z);
   };
   const auto placed = [&random](const glm::dmat3& linear, double reach = 10) {
     return jointOf(linear, {random.between(-reach, reach), random.between(-reach, reach),

@@ -20,11 +20,13 @@
 
 #include "dermis/verify/accuracy.h"
 #include "dermis/verify/reference.h"
+#include "joint_of.h"
 #include "random_rig.h"
 
 namespace dermis {
 namespace {
 
+using test::jointOf;
 using test::OwnedMesh;
 using test::Rigidity;
 
@@ -92,17 +94,6 @@ class Random {
  private:
   std::mt19937 engine_;
 };
-
-JointMatrix jointOf(const glm::dmat3& linear, const glm::dvec3& translation) {
-  JointMatrix joint;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      joint.m[row][column] = static_cast<float>(linear[column][row]);
-    }
-    joint.m[row][3] = static_cast<float>(translation[row]);
-  }
-  return joint;
-}
 
 /// A turn about a point.
 JointMatrix turnAbout(const glm::dvec3& axis, double angle, const glm::dvec3& point) {
