@@ -24,6 +24,7 @@
 #include "gltf/failure.h"
 #include "gltf/notes.h"
 #include "gltf/properties.h"
+#include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {
