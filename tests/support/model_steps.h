@@ -188,7 +188,7 @@ class ModelSteps {
     description.box = boxes[instance.box];
     description.bounds = !hasGpu && description.layout.positions == VertexFormat::float32x3;
     description.culledOnGpu = hasGpu && chance(25);
-    if (!description.culledOnGpu && chance(30)) description.updateInterval = 2 + below(3);
+    if (chance(30)) description.updateInterval = 2 + below(3);
     prepare(description);
     if (chance(30))
       tryToAdd([&] { return system().addInstance(description); },
@@ -218,17 +218,17 @@ class ModelSteps {
         return must(system().change({.instance = instance.handle, .visible = instance.isVisible}));
       case 2:
         instance.morphs = (instance.morphs + 1 + below(2)) % 3;
-        instance.isChanged = true;
+        instance.change();
         return must(
             system().change({.instance = instance.handle, .morphs = morphSets[instance.morphs]}));
       case 3:
-        if (instance.description.culledOnGpu) return;
         instance.description.updateInterval = chance(50) ? 1 : 2 + below(4);
         instance.waitedFrames = 0;
         return must(system().change(
             {.instance = instance.handle, .updateInterval = instance.description.updateInterval}));
       case 4:
-        instance.teleports = instance.isChanged = true;
+        instance.change();
+        instance.teleports = true;
         return must(system().change({.instance = instance.handle, .teleports = true}));
       case 5:
         return setMesh(instance);
@@ -236,7 +236,8 @@ class ModelSteps {
         if (instance.description.layout.positions == VertexFormat::float32x3) return;
         instance.box = below(boxes.size());
         instance.description.box = boxes[instance.box];
-        instance.teleports = instance.isChanged = true;
+        instance.change();
+        instance.teleports = true;
         return must(
             system().change({.instance = instance.handle, .box = instance.description.box}));
     }
@@ -261,7 +262,8 @@ class ModelSteps {
     instance.description.mesh = mesh->second.handle;
     prepare(instance.description);
     instance.vertexCount = vertexCount;
-    instance.isChanged = instance.changesMesh = true;
+    instance.change();
+    instance.changesMesh = true;
   }
   /// In one call: methods, poses, visibility, morph weights and jumps, of some instances twice.
   void changeSeveral() {
@@ -272,7 +274,10 @@ class ModelSteps {
       InstanceChange& change = changes.emplace_back();
       change.instance = instance.handle;
       if (chance(40)) change.visible = instance.isVisible = chance(60);
-      if (chance(20)) change.teleports = instance.teleports = instance.isChanged = true;
+      if (chance(20)) {
+        instance.change();
+        change.teleports = instance.teleports = true;
+      }
       if (chance(30)) {
         const auto pose = anyPalette();
         change.pose = pose->second.handle;
@@ -282,15 +287,16 @@ class ModelSteps {
       if (chance(30)) change.method = instance.description.method = methods[below(methods.size())];
       if (change.pose || change.method) {
         prepare(instance.description);
-        instance.isChanged = instance.isUrgent = true;
+        instance.change();
+        instance.isUrgent = true;
         instance.waitedFrames = 0;
       }
       if (chance(30)) {
         instance.morphs = below(3);
         change.morphs = morphSets[instance.morphs];
-        instance.isChanged = true;
+        instance.change();
       }
-      if (chance(20) && !instance.description.culledOnGpu) {
+      if (chance(20)) {
         change.updateInterval = instance.description.updateInterval = 1 + below(4);
         instance.waitedFrames = 0;
       }
@@ -302,7 +308,7 @@ class ModelSteps {
     std::vector<InstanceVisibility> wanted;
     for (ModelInstance& instance : model_->instances) {
       if (chance(20)) instance.isVisible = !instance.isVisible;
-      if (chance(10) && !instance.description.culledOnGpu) {
+      if (chance(10)) {
         instance.description.updateInterval = 1 + below(4);
         instance.waitedFrames = 0;
       }
@@ -324,6 +330,8 @@ class ModelSteps {
       ++abandonedFrames_;
       if (chance(50)) return beginFrame();
     }
+    for (ModelInstance& instance : model_->instances)
+      instance.isDue = must(system().isDue(instance.handle));
     const SeenScene before = seen();
     if (chance(15)) failAt(static_cast<int>(below(4)));
     const Result<void> submitted = trySubmit();

@@ -41,9 +41,12 @@ struct ModelInstance {
 
   // Since the last `record`.
   bool isChanged = true;   ///< its positions are not what they should be
+  bool isNew = true;       ///< it changed after `isOwed` was decided
   bool isUrgent = false;   ///< it changed in a way that no interval holds back
   bool teleports = false;  ///< or has a new box
   bool changesMesh = true;
+  bool isDue = false;              ///< what the scene says before `record`
+  bool isOwed = false;             ///< the GPU skins it when it next displays it
   std::uint32_t waitedFrames = 0;  ///< in which it was changed, but skipped for its interval
 
   // As of the last `record`.
@@ -53,6 +56,7 @@ struct ModelInstance {
   std::optional<ShownPose> shown, before;
   std::optional<ShownPose> bounded;  ///< as it was last skinned
 
+  void change() { isChanged = isNew = true; }
   bool hasPlace() const { return output.size != 0; }
   bool isDisplayed() const { return isVisible && (!description.culledOnGpu || isShownByGpu); }
 };
@@ -76,7 +80,7 @@ class SystemModel {
   void writePose(std::uint32_t number, std::uint32_t pose) {
     poses.at(number).pose = pose;
     for (ModelInstance& instance : instances) {
-      if (instance.pose == number) instance.isChanged = true;
+      if (instance.pose == number) instance.change();
     }
   }
   /// The instance was removed in the frame that was begun last.
@@ -175,6 +179,11 @@ class SystemModel {
     instance.output = output;
     if (isWanted) instance.changesMesh = false;
     EXPECT_TRUE(isWanted || !instance.isVisible);
+    if (instance.description.culledOnGpu && instance.isVisible && instance.isNew &&
+        (instance.isDue || instance.teleports || instance.isUrgent)) {
+      instance.isOwed = true;
+      instance.isNew = instance.isUrgent = false;
+    }
     if (instance.isDisplayed()) {
       updateDisplayed(instance, isPlaced, lists);
     } else {
@@ -202,7 +211,7 @@ class SystemModel {
       instance.before = restarts ? now : instance.shown;
       instance.shown = instance.bounded = now;
       instance.isMoving = hasPrevious && !restarts;
-      instance.isChanged = instance.isUrgent = false;
+      instance.isChanged = instance.isUrgent = instance.isOwed = false;
       instance.waitedFrames = 0;
     } else {
       lists.gpu.settled += isCulled && instance.isMoving;
@@ -216,10 +225,10 @@ class SystemModel {
     instance.wasDisplayed = true;
   }
   bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {
+    if (instance.description.culledOnGpu) return isPlaced || instance.isOwed;
     const bool comesBack = !instance.wasDisplayed;
     const bool isOwed = instance.isChanged && instance.description.updateInterval == 1;
     const bool isForced = isPlaced || instance.teleports || instance.isUrgent || isOwed;
-    if (instance.description.culledOnGpu) return isForced;
     const bool isSkinned = lists.skinned.contains(instance.handle.index);
     if (isForced) {
       EXPECT_TRUE(isSkinned) << "it changed";

@@ -107,8 +107,7 @@ struct SceneInstance {
   std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
 
   // Of those culled on the GPU.
-  std::uint32_t version = 0;     ///< of what it should show, as of the last record
-  bool versionRestarts = false;  ///< whether that version restarts its motion
+  std::uint32_t version = 0;  ///< of what it should show, as of the last record
   std::uint32_t culledIndex = notUsed;
 
   // Rarely read.
@@ -331,7 +330,6 @@ class SceneBooks {
     struct Instance {
       InstanceHandle handle;
       bool restartsMotion, isUrgent, isMoving, isFirst;
-      bool versionRestarts;
       std::uint32_t version;
     };
     struct Shift {

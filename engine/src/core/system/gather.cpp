@@ -144,7 +144,8 @@ void SceneBooks::gatherCulled() {
     }
     convertPalette(instance);
     const Candidate candidate{index, version};
-    const bool restarts = isNew ? state.restartsMotion : instance.versionRestarts;
+    // One that the GPU has yet to show in this version comes back, and restarts for that.
+    const bool restarts = isNew && state.restartsMotion;
     addRuns(instance, culledFlags(instance, state.hasMotion, restarts), &candidate);
   }
 }
@@ -261,7 +262,6 @@ void SceneBooks::commitInstance(std::uint32_t index) {
                                     state.isUrgent,
                                     state.isMoving,
                                     instance.firstFrame == 0,
-                                    instance.versionRestarts,
                                     instance.version});
   state.isStale = state.isUrgent = state.restartsMotion = false;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
@@ -307,10 +307,8 @@ Result<void> SceneBooks::commit() {
     settled_.push_back(instances_.handleOf(index));
   }
   for (const auto& [index, version] : versioned_) {
-    const bool restarts = states_[index].restartsMotion;
     commitInstance(index);
     instances_.at(index).version = version;
-    instances_.at(index).versionRestarts = restarts;
   }
   std::erase_if(shifting_, [this](InstanceHandle handle) {
     SceneInstance* instance = instances_.find(handle);
@@ -330,7 +328,6 @@ void SceneBooks::abandonInstances() {
     SceneInstance& instance = instances_.at(before.handle.index);
     if (before.isFirst) instance.firstFrame = 0;
     instance.version = before.version;
-    instance.versionRestarts = before.versionRestarts;
     makeStale(before.handle.index);
   }
   for (const InstanceHandle handle : settled_) {
