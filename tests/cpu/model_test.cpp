@@ -29,7 +29,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     output_ = engine_->system().outputBytes().data();
     generation_ = 0;
   }
-  void prepare(const InstanceDescription&) override {}
+  Result<void> tryToPrepare(const InstanceDescription&) override { return {}; }
   Result<void> trySubmit() override {
     engine_->submit();
     const std::byte* const now = system().outputBytes().data();

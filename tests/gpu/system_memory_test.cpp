@@ -7,55 +7,14 @@
 #include <string>
 
 #include "command_log.h"
+#include "counting_memory.h"
 #include "system_test.h"
 
 namespace dermis::test {
 namespace {
 
-using vulkan::BufferRequest;
 using vulkan::BufferUse;
-using vulkan::CreatedBuffer;
 using vulkan::SkinningSystem;
-
-/// An engine's allocator: each buffer with memory of its own, counted.
-class CountingMemory {
- public:
-  explicit CountingMemory(samples::Device& device) : device_(device) {}
-
-  vulkan::BufferCallbacks callbacks() { return {this, create, destroy}; }
-
-  std::uint32_t allocations = 0, frees = 0;
-  std::uint64_t bytes = 0;
-  std::uint32_t failsAt = ~0u;  ///< the number of the allocation that fails
-  std::set<BufferUse> uses;
-  std::set<std::string> names;
-
- private:
-  static Result<CreatedBuffer> create(void* user, const BufferRequest& request) {
-    auto& self = *static_cast<CountingMemory*>(user);
-    if (self.allocations == self.failsAt)
-      return Error{ErrorCode::ioError, "the engine's allocator has had enough", 7};
-    const bool isMapped = request.use != BufferUse::device;
-    auto* own = new samples::MappedBuffer(
-        must(samples::MappedBuffer::create(self.device_, request.info->size, request.info->usage,
-                                           request.use == BufferUse::readBack)));
-    ++self.allocations;
-    self.bytes += request.info->size;
-    self.uses.insert(request.use);
-    self.names.insert(request.name);
-    return CreatedBuffer{own->handle(), isMapped ? own->bytes().data() : nullptr, own};
-  }
-  static void destroy(void* user, const CreatedBuffer& buffer) {
-    auto& self = *static_cast<CountingMemory*>(user);
-    ++self.frees;
-    auto* own = static_cast<samples::MappedBuffer*>(buffer.allocation);
-    EXPECT_EQ(own->handle(), buffer.buffer);
-    self.bytes -= own->bytes().size();
-    delete own;
-  }
-
-  samples::Device& device_;
-};
 
 class SystemMemoryTest : public SystemTest {
  protected:
@@ -166,8 +125,10 @@ TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   static int destroyed;
   destroyed = 0;
   vulkan::SkinningSystemDescription own = description();
-  own.buffers.create = [](void*, const BufferRequest&) { return Result(CreatedBuffer{}); };
-  own.buffers.destroy = [](void*, const CreatedBuffer&) { ++destroyed; };
+  own.buffers.create = [](void*, const vulkan::BufferRequest&) {
+    return Result(vulkan::CreatedBuffer{});
+  };
+  own.buffers.destroy = [](void*, const vulkan::CreatedBuffer&) { ++destroyed; };
   const Result<SkinningSystem> system = SkinningSystem::create(own);
   ASSERT_FALSE(system.ok());
   EXPECT_NE(system.error().message.find("returned no buffer for 'dermis "), std::string::npos)

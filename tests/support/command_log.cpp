@@ -25,6 +25,8 @@ struct RealFunctions {
   PFN_vkMapMemory MapMemory;
   PFN_vkCreateQueryPool CreateQueryPool;
   PFN_vkCreateBufferView CreateBufferView;
+  PFN_vkCreateShaderModule CreateShaderModule;
+  PFN_vkCreateComputePipelines CreateComputePipelines;
 } real;
 
 /// Counts the call; what it fails with, if it does.
@@ -130,6 +132,23 @@ VkResult VKAPI_CALL createBufferView(VkDevice device, const VkBufferViewCreateIn
   if (const auto failure = failureOf("vkCreateBufferView")) return *failure;
   return real.CreateBufferView(device, info, allocator, view);
 }
+VkResult VKAPI_CALL createShaderModule(VkDevice device, const VkShaderModuleCreateInfo* info,
+                                       const VkAllocationCallbacks* allocator,
+                                       VkShaderModule* module) {
+  if (const auto failure = failureOf("vkCreateShaderModule")) return *failure;
+  return real.CreateShaderModule(device, info, allocator, module);
+}
+VkResult VKAPI_CALL createComputePipelines(VkDevice device, VkPipelineCache cache,
+                                           std::uint32_t count,
+                                           const VkComputePipelineCreateInfo* infos,
+                                           const VkAllocationCallbacks* allocator,
+                                           VkPipeline* pipelines) {
+  if (const auto failure = failureOf("vkCreateComputePipelines")) {
+    std::fill_n(pipelines, count, VK_NULL_HANDLE);
+    return *failure;
+  }
+  return real.CreateComputePipelines(device, cache, count, infos, allocator, pipelines);
+}
 
 }  // namespace
 
@@ -158,6 +177,8 @@ CommandLog::CommandLog(InterceptedDevice& device) {
   intercept("vkMapMemory", real.MapMemory, mapMemory);
   intercept("vkCreateQueryPool", real.CreateQueryPool, createQueryPool);
   intercept("vkCreateBufferView", real.CreateBufferView, createBufferView);
+  intercept("vkCreateShaderModule", real.CreateShaderModule, createShaderModule);
+  intercept("vkCreateComputePipelines", real.CreateComputePipelines, createComputePipelines);
 }
 
 CommandLog::~CommandLog() {

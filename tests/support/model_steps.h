@@ -66,7 +66,7 @@ class ModelSteps {
 
   /// An engine without anything, of which everything has to grow.
   virtual void makeEngine() = 0;
-  virtual void prepare(const InstanceDescription& instance) = 0;
+  virtual Result<void> tryToPrepare(const InstanceDescription& instance) = 0;
   virtual Result<void> trySubmit() = 0;
   virtual void abandon() = 0;
   /// Of all Vulkan calls that can fail from now on, that one does; none if it is negative.
@@ -395,6 +395,16 @@ class ModelSteps {
     failAt(-1);
     if (added) return remove(*added);
     expectFailed(added.error(), before);
+  }
+  void prepare(const InstanceDescription& instance) {
+    if (chance(50)) {
+      const SeenScene before = seen();
+      failAt(static_cast<int>(below(2)));
+      const Result<void> prepared = tryToPrepare(instance);
+      failAt(-1);
+      if (!prepared) expectFailed(prepared, before);
+    }
+    must(tryToPrepare(instance));
   }
   void refuseOne(const std::vector<RefusedCall>& calls) {
     const std::uint32_t number = below(calls.size());
