@@ -134,7 +134,7 @@ class GpuModelTest : public SystemTest,
 };
 
 /// What a system cannot be made to say: it calls these functions of its scene itself, and palettes
-/// have no maximum. core_scene_test and core_scene_growth_test have these errors.
+/// have no maximum. core_scene_test expects these errors.
 bool isOfScenesOnly(const std::string& text) {
   return std::ranges::any_of(
       std::array{"there is no plan to commit", "read back", "read-back", "fewer than the ",

@@ -511,6 +511,39 @@ TEST(Scene, PalettesSufficeForAllJoints) {
   }
 }
 
+// Two palettes that went leave 3 units each, and one is wanted that takes 5.
+TEST(Scene, PalettesMayFindOnlyHoles) {
+  SceneDescription description = smallScene();
+  description.jointCapacity = Capacity::fixed(6);  // 30 units, 17 of them taken by `one`
+  OneInstance one(false, description);
+  InstanceDescription next = one.description;
+  MeshInfo info = one.info;
+  info.requiredJoints = 1;
+  next.mesh = *one.scene.addMesh(info);
+  one.record(1, 0);
+  must(one.scene.beginFrame(2, 1));
+  std::array<std::vector<InstanceHandle>, 2> instances;
+  std::array<PoseHandle, 2> poses;
+  for (std::size_t i = 0; i < 2; ++i) poses[i] = *one.scene.addPose(1, {.mayScale = false});
+  for (const Method method : {Method::linear, Method::dualQuaternion}) {
+    next.method = method;
+    for (std::size_t i = 0; i < 2; ++i) {
+      next.pose = poses[i];
+      instances[i].push_back(*one.scene.addInstance(next));
+    }
+  }
+  for (const InstanceHandle instance : instances[0]) must(one.scene.removeInstance(instance));
+  must(one.scene.removePose(poses[0]));
+  must(one.scene.plan(one.planned));
+  must(one.scene.commit());
+  must(one.scene.beginFrame(3, 2));
+  next.pose = *one.scene.addPose(1, {.mayScale = true});
+  EXPECT_EQ(
+      one.scene.addInstance(next).error().message,
+      "pose 1 needs 5 units of 16 bytes of palettes for dual_quaternion, but of 30 units only "
+      "7 are free; the largest free range has 3");
+}
+
 TEST(Scene, OnlyTheFrameCommittedLastIsAbandoned) {
   OneInstance one;
   const auto expectRefused = [&](std::uint64_t frame) {
@@ -553,7 +586,10 @@ TEST(Scene, AbandonedFramesAreNotInFlight) {
     ASSERT_TRUE(one.scene.abandonFrame(frame).ok());
   }
   EXPECT_EQ(place(8), second);
-  EXPECT_FALSE(one.scene.beginFrame(9, 0).ok()) << "frames 1 and 8 are in flight";
+  EXPECT_EQ(one.scene.beginFrame(9, 0).error().message,
+            "frame 9 begins while the GPU has completed frame 0: more frames are in flight than "
+            "framesInFlight, which is 2; if one of them was recorded and not submitted, call "
+            "abandonFrame");
   EXPECT_TRUE(one.scene.beginFrame(9, 1).ok());
 }
 
@@ -578,6 +614,8 @@ TEST(Scene, AChangedSceneIsNotCommitted) {
     const Result<void> committed = one.scene.commit();
     ASSERT_FALSE(committed.ok());
     EXPECT_EQ(committed.error().code, ErrorCode::invalidArgument);
+    EXPECT_EQ(committed.error().message,
+              "there is no plan to commit, or the scene has changed since");
     ASSERT_TRUE(one.scene.plan(one.planned).ok());
     EXPECT_TRUE(one.scene.commit().ok());
     EXPECT_FALSE(one.scene.commit().ok()) << "once";
@@ -589,9 +627,14 @@ TEST(Scene, ReadsBackOnlyWhatWasRecorded) {
   one.record(1, 0);
   ASSERT_TRUE(one.scene.beginFrame(2, 1).ok());
   std::vector<std::byte> bytes(one.scene.buffer(BufferRole::readBack).size);
-  EXPECT_FALSE(one.scene.readBack(0, bytes).ok());
-  EXPECT_FALSE(one.scene.readBack(2, bytes).ok());
-  EXPECT_FALSE(one.scene.readBack(1, std::span(bytes).first(40)).ok());
+  for (const std::uint64_t frame : {0u, 2u}) {
+    EXPECT_EQ(one.scene.readBack(frame, bytes).error().message,
+              "frame " + std::to_string(frame) +
+                  " cannot be read back: it is not one of the last 2 frames that were committed");
+  }
+  EXPECT_EQ(one.scene.readBack(1, std::span(bytes).first(40)).error().message,
+            "the read-back buffer of a frame has 40 bytes, fewer than the 48 that Plan::buffer "
+            "returned");
   EXPECT_FALSE(one.scene.bounds(one.instance)->has_value());
   EXPECT_TRUE(one.scene.readBack(1, bytes).ok());
   EXPECT_TRUE(one.scene.bounds(one.instance)->has_value());
