@@ -302,7 +302,7 @@ TEST(GltfRigidMesh, CountsAgainstTheBudget) {
   const auto spent = [&] {
     return loaded(file).budget.left() - loadedWithRigidMeshes(file).budget.left();
   };
-  file.json["meshes"][1]["primitives"] = {hat};
+  file.json["meshes"][1]["primitives"] = Json::array({hat});
   const std::uint64_t withOne = spent();
   EXPECT_GE(withOne, vertices * (12 + 4 + 8)) << "positions, triangles and influences";
   EXPECT_LE(withOne, vertices * (12 + 4 + 8) + 1000);
