@@ -142,6 +142,7 @@ dermis_of() { # SYSTEM: the command
 # Wine requires a screen before it provides Vulkan, here this system's lavapipe.
 part_windows() {
   export WINEDEBUG=-all WINEPREFIX="$PWD/build/cross/wine"
+  ./cmake/install-deps.sh windows
   wine=$(PATH=/usr/lib/wine:$PATH command -v wine64 || command -v wine)
   cross windows "$wine"
   PATH=/usr/lib/wine:$PATH wineserver -k || true # the one that began without a screen

@@ -129,8 +129,11 @@ class ModelSteps {
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   bool chance(std::uint32_t percent) { return below(100) < percent; }
   ModelInstance& anyInstance() { return model_->instances[below(model_->instances.size())]; }
-  auto anyPalette() { return std::next(model_->poses.begin(), below(model_->poses.size())); }
-  auto anyMesh() { return std::next(meshes_.begin(), below(meshes_.size())); }
+  auto anyOf(auto& map) {
+    return std::next(map.begin(), static_cast<std::ptrdiff_t>(below(map.size())));
+  }
+  auto anyPalette() { return anyOf(model_->poses); }
+  auto anyMesh() { return anyOf(meshes_); }
 
   // The steps.
   void addMesh() {
