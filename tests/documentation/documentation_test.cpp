@@ -20,6 +20,7 @@
 
 #include "documents.h"
 #include "generated_parts.h"
+#include "test_data.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -130,6 +131,7 @@ TEST(DocumentationTest, WhatIsShownIsWhatItsSourceSays) {
     // From the last on, so that those before it stay where they are.
     for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
       SCOPED_TRACE(document.path + ": " + part->kind + ": " + part->source);
+      if (part->source == "trust" && !testDataFolder()) continue;  // counts models
       const std::string expected = generate(*part), shown = text.substr(part->begin, part->size);
       ASSERT_FALSE(expected.empty());
       if (part->kind == "help" ? withoutLayout(expected) == withoutLayout(shown)

@@ -124,6 +124,11 @@ std::string viewerKeys() {
   return table;
 }
 
+std::string trust() {
+  const CommandResult result = runCommand({std::string(sourceFolder) + "/tests/trust.sh"});
+  return result.status == 0 ? result.output : std::string();
+}
+
 }  // namespace
 
 std::string generate(const HeldPart& part) {
@@ -132,6 +137,7 @@ std::string generate(const HeldPart& part) {
   if (part.source == "pipelines") return pipelines();
   if (part.source == "shapes") return shapes();
   if (part.source == "viewer keys") return viewerKeys();
+  if (part.source == "trust") return trust();
   return {};
 }
 

@@ -25,13 +25,15 @@
 #
 # Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
 # date, the commit, the minutes that it took and the processor: the tests of the CPU path run its 512-bit code only where the processor
-# has AVX-512. Commit that file. A part that fails does not stop those after it.
+# has AVX-512; and with what the part counted, for docs/trust.md. Commit that file, after tests/documentation/regenerate.sh. A part
+# that fails does not stop those after it.
 set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
 parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive packages golden showcase programs"
 passed=tests/nightly/passed.tsv
+figures=build/nightly/figures # what a part counted
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
 
 build() { # PRESET [TARGET...]: configures and builds
@@ -177,8 +179,10 @@ part_fuzz() {
     "build/fuzz/tests/fuzz/$fuzzer" -rss_limit_mb=2048 -timeout=10 -max_total_time=60 -print_final_stats=1 \
       -artifact_prefix=build/fuzz/ "$corpus" tests/fuzz/seeds >"build/fuzz/$fuzzer.log" 2>&1 ||
       { tail -n 40 "build/fuzz/$fuzzer.log"; return 1; }
-    grep number_of_executed_units "build/fuzz/$fuzzer.log"
+    awk '/number_of_executed_units/ { print $2 }' "build/fuzz/$fuzzer.log" >>"$figures"
   done
+  awk '{ sum += $1 } END { printf "%.0f\n", sum }' "$figures" >"$figures.sum"
+  mv "$figures.sum" "$figures"
 }
 
 part_mesa() {
@@ -273,6 +277,9 @@ part_programs() {
   for file in compare.png crowd.png figure-00.ply figure-07.ply verify.json verify.xml crowd.json; do
     [ -s "$folder/build/quickstart/$file" ] || { echo "the quick start wrote no $file"; return 1; }
   done
+  # One property a line, as it is written.
+  awk '/"variant":/ { ++cases } /"vertices":/ { gsub(/[^0-9]/, ""); vertices += $0 }
+    END { printf "%.0f, %.0f vertices\n", cases, vertices }' "$folder/build/quickstart/verify.json" >"$figures"
   rm -rf "$folder"
   build ci real_film_test
   tests ci -R RealFilmTest
@@ -305,6 +312,7 @@ for part in "$@"; do
   echo "nightly: $part ..."
   begin=$(date +%s)
   status=0
+  rm -f "$figures"
   ./tests/nightly/run.sh --alone "$part" || status=$?
   minutes=$((($(date +%s) - begin + 30) / 60))
   if [ "$status" -ne 0 ]; then
@@ -315,8 +323,9 @@ for part in "$@"; do
   echo "nightly: $part passed in $minutes min"
   commit=$(git rev-parse --short HEAD)
   [ -z "$(git status --porcelain --untracked-files=no -- . ":!$passed")" ] || commit=$commit+changes
-  { grep -v "^$part	" "$passed" 2>/dev/null || printf 'part\tlast passed\tcommit\tminutes\tprocessor\n'
-    printf '%s\t%s\t%s\t%s\t%s\n' "$part" "$(date -u +%Y-%m-%d)" "$commit" "$minutes" "${processor:-$(uname -m)}"; } >"$passed.new"
+  { grep -v "^$part	" "$passed" 2>/dev/null || printf 'part\tlast passed\tcommit\tminutes\tprocessor\tcounted\n'
+    printf '%s\t%s\t%s\t%s\t%s\t%s\n' "$part" "$(date -u +%Y-%m-%d)" "$commit" "$minutes" "${processor:-$(uname -m)}" \
+      "$(cat "$figures" 2>/dev/null || true)"; } >"$passed.new"
   mv "$passed.new" "$passed"
 done
 [ -z "$failed" ] || { echo "nightly: failed:$failed"; exit 1; }
