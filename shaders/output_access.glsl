@@ -19,22 +19,10 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {
 void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #endif
 
+#define STREAM Positions
 #define STREAM_BINDING BINDING_POSITIONS
-#define STREAM_VECTORS_2_BLOCK PositionsVectors2
-#define STREAM_VECTORS_2 positionsVectors2
-#define STREAM_VECTORS_3_BLOCK PositionsVectors3
-#define STREAM_VECTORS_3 positionsVectors3
-#define STREAM_VECTORS_4_BLOCK PositionsVectors4
-#define STREAM_VECTORS_4 positionsVectors4
-#define STREAM_WORDS_BLOCK PositionsWords
-#define STREAM_WORDS positionsWords
-#define STREAM_HALVES_BLOCK PositionsHalves
-#define STREAM_HALVES positionsHalves
-#define STREAM_BYTES_BLOCK PositionsBytes
-#define STREAM_BYTES positionsBytes
-#define STREAM_STORE storePositions
 #if defined(EXTRAS) || defined(ONE_OUTPUT)
-#define STREAM_LOAD loadPositions
+#define STREAM_LOADS
 #endif
 #include "stream.glsl"
 
@@ -76,13 +64,13 @@ void storeRecord(uint index, uvec4 position, uvec4 normal, uvec4 tangent) {
   uvec4 high = uvec4(words[4], words[5], words[6], words[7]);
   switch (RECORD) {
     case 8u:
-      positionsVectors2[index] = low.xy;
+      vectors2Positions[index] = low.xy;
       break;
     case 12u:
-      positionsVectors3[index] = low.xyz;
+      vectors3Positions[index] = low.xyz;
       break;
     case 16u:
-      positionsVectors4[index] = low;
+      vectors4Positions[index] = low;
       break;
     case 24u:
       records24[index] = u64vec3(packUint2x32(low.xy), packUint2x32(low.zw), packUint2x32(high.xy));
@@ -126,7 +114,7 @@ void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
       positionsUnits[to / 4u] = uvec4(staged[from], staged[from + 1u], staged[from + 2u], staged[from + 3u]);
     } else {
       for (uint i = 0u; i < 4u; ++i) {
-        if (word + i >= first && word + i < end) positionsWords[to + i] = staged[from + i];
+        if (word + i >= first && word + i < end) wordsPositions[to + i] = staged[from + i];
       }
     }
   }
@@ -141,53 +129,17 @@ void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {}
 #define storeTangents storePositions
 #define storePrevious storePositions
 #else
+#define STREAM Normals
 #define STREAM_BINDING BINDING_NORMALS
-#define STREAM_VECTORS_2_BLOCK NormalsVectors2
-#define STREAM_VECTORS_2 normalsVectors2
-#define STREAM_VECTORS_3_BLOCK NormalsVectors3
-#define STREAM_VECTORS_3 normalsVectors3
-#define STREAM_VECTORS_4_BLOCK NormalsVectors4
-#define STREAM_VECTORS_4 normalsVectors4
-#define STREAM_WORDS_BLOCK NormalsWords
-#define STREAM_WORDS normalsWords
-#define STREAM_HALVES_BLOCK NormalsHalves
-#define STREAM_HALVES normalsHalves
-#define STREAM_BYTES_BLOCK NormalsBytes
-#define STREAM_BYTES normalsBytes
-#define STREAM_STORE storeNormals
 #include "stream.glsl"
 
+#define STREAM Tangents
 #define STREAM_BINDING BINDING_TANGENTS
-#define STREAM_VECTORS_2_BLOCK TangentsVectors2
-#define STREAM_VECTORS_2 tangentsVectors2
-#define STREAM_VECTORS_3_BLOCK TangentsVectors3
-#define STREAM_VECTORS_3 tangentsVectors3
-#define STREAM_VECTORS_4_BLOCK TangentsVectors4
-#define STREAM_VECTORS_4 tangentsVectors4
-#define STREAM_WORDS_BLOCK TangentsWords
-#define STREAM_WORDS tangentsWords
-#define STREAM_HALVES_BLOCK TangentsHalves
-#define STREAM_HALVES tangentsHalves
-#define STREAM_BYTES_BLOCK TangentsBytes
-#define STREAM_BYTES tangentsBytes
-#define STREAM_STORE storeTangents
 #include "stream.glsl"
 
 #ifdef EXTRAS
+#define STREAM Previous
 #define STREAM_BINDING BINDING_PREVIOUS
-#define STREAM_VECTORS_2_BLOCK PreviousVectors2
-#define STREAM_VECTORS_2 previousVectors2
-#define STREAM_VECTORS_3_BLOCK PreviousVectors3
-#define STREAM_VECTORS_3 previousVectors3
-#define STREAM_VECTORS_4_BLOCK PreviousVectors4
-#define STREAM_VECTORS_4 previousVectors4
-#define STREAM_WORDS_BLOCK PreviousWords
-#define STREAM_WORDS previousWords
-#define STREAM_HALVES_BLOCK PreviousHalves
-#define STREAM_HALVES previousHalves
-#define STREAM_BYTES_BLOCK PreviousBytes
-#define STREAM_BYTES previousBytes
-#define STREAM_STORE storePrevious
 #include "stream.glsl"
 #endif
 #endif
