@@ -11,7 +11,7 @@ FrameLoop::~FrameLoop() {
 }
 
 Result<void> FrameLoop::waitFor(std::uint64_t frame) {
-  Slot& slot = slots_[frame % slots_.size()];
+  Slot& slot = slots_[static_cast<std::size_t>(frame % slots_.size())];
   if (slot.isSubmitted) {
     const VkResult waited =
         device_->functions().WaitForFences(device_->handle(), 1, &slot.fence, VK_TRUE, UINT64_MAX);
@@ -28,7 +28,7 @@ Result<VkCommandBuffer> FrameLoop::begin() {
   if (frame_ > slots_.size()) {
     if (Result<void> waited = waitFor(frame_ - slots_.size()); !waited) return waited.error();
   }
-  Slot& slot = slots_[frame_ % slots_.size()];
+  Slot& slot = slots_[static_cast<std::size_t>(frame_ % slots_.size())];
   if (slot.fence == VK_NULL_HANDLE) {
     VkFenceCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
@@ -47,7 +47,7 @@ Result<VkCommandBuffer> FrameLoop::begin() {
 
 Result<void> FrameLoop::submit() {
   const VulkanFunctions& functions = device_->functions();
-  Slot& slot = slots_[frame_ % slots_.size()];
+  Slot& slot = slots_[static_cast<std::size_t>(frame_ % slots_.size())];
   const VkResult ended = functions.EndCommandBuffer(slot.commandBuffer);
   if (Result<void> done = checkVulkan("vkEndCommandBuffer", ended); !done) return done;
   const VkResult reset = functions.ResetFences(device_->handle(), 1, &slot.fence);

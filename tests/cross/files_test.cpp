@@ -33,7 +33,10 @@ class FilesTest : public testing::Test {
     return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) / "dermis_files_test";
+  // Of each test, since they run at the same time.
+  const fs::path folder_ = fs::path(testing::TempDir()) /
+                           (std::string("dermis_files_") +
+                            testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 TEST_F(FilesTest, AreMadeAndReplacedWhole) {

@@ -123,6 +123,7 @@ class ModelSteps {
     makeEngine();
     model_.emplace(*engine_);
     engine_->begin();
+    narrow_ = must(system().addPose(1));
   }
 
   auto& system() { return engine_->system(); }
@@ -421,9 +422,9 @@ class ModelSteps {
     const ModelInstance& instance = anyInstance();
     InstanceDescription description = instance.description;
     description.updateInterval = 1;
-    std::vector<RefusedCall> calls =
-        refusedCalls(system(), {description, instance.handle,
-                                gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())]});
+    std::vector<RefusedCall> calls = refusedCalls(
+        system(), {description, instance.handle,
+                   gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())], narrow_});
     addRefusedCalls(calls);
     refuseOne(calls);
   }
@@ -540,6 +541,7 @@ class ModelSteps {
   std::uint32_t nextNumber_ = 0;
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
+  PoseHandle narrow_;
   std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;
   std::set<std::string> messages_;  ///< of all errors
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;

@@ -18,6 +18,7 @@ struct SceneObjects {
   InstanceDescription description;  ///< one that is accepted
   InstanceHandle instance;          ///< of the same mesh and pose
   InstanceHandle removed;           ///< null if none was removed yet
+  PoseHandle narrow;                ///< of too few joints
   std::uint32_t morphTargets = 3;
 };
 
@@ -42,6 +43,7 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   };
   add([](InstanceDescription& wrong) { wrong.mesh = {}; });
   add([](InstanceDescription& wrong) { wrong.pose = {}; });
+  add([&](InstanceDescription& wrong) { wrong.pose = objects.narrow; });
   add([](InstanceDescription& wrong) { wrong.updateInterval = 0; });
   add([](InstanceDescription& wrong) { wrong.layout.motion = Motion::reskinned; });
   add([](InstanceDescription& wrong) { wrong.method = static_cast<Method>(9); });

@@ -189,8 +189,8 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
   }
   if (batch.poses[pose].jointCount < job.mesh.requiredJoints) {
     return invalid(subject.name() + ": its mesh needs a pose of " +
-                   std::to_string(job.mesh.requiredJoints) + " joints, not of " +
-                   std::to_string(batch.poses[pose].jointCount));
+                   std::to_string(job.mesh.requiredJoints) + " joints, but pose " +
+                   std::to_string(pose) + " has " + std::to_string(batch.poses[pose].jointCount));
   }
   return {};
 }

@@ -58,6 +58,12 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
                                                " bytes of output; the maximum is " +
                                                std::to_string(most)};
   }
+  if (pose->jointCount < mesh->info.requiredJoints) {
+    return invalid("the instance's mesh needs a pose of " +
+                   std::to_string(mesh->info.requiredJoints) + " joints, but pose " +
+                   std::to_string(instance.poseHandle.index) + " has " +
+                   std::to_string(pose->jointCount));
+  }
   const PoseDescription own{pose->jointCount, 0, pose->mayScale};
   Batch batch;
   batch.poses = {&own, 1};
