@@ -43,14 +43,10 @@ endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/engine/include/dermis DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dermis
         FILES_MATCHING PATTERN "*.h" ${excluded})
 
-# For engines with their own RHI, which compile the kernels themselves and read the records of abi.h. dermis_decode.glsl and
-# dermis_skin.glsl are for an engine's own shaders.
+# For engines with their own RHI, which compile the kernels themselves and read the records of abi.h. dermis_decode.glsl is for an
+# engine's own shaders.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/shaders/ DESTINATION ${dermisShaderDir} COMPONENT dermis
-        FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp" PATTERN skin_include.glsl EXCLUDE)
-get_property(skinInclude GLOBAL PROPERTY DERMIS_SKIN_INCLUDE)
-if(skinInclude)
-  install(FILES ${skinInclude} DESTINATION ${dermisShaderDir} COMPONENT dermis)
-endif()
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.glsl" PATTERN "*.comp")
 set(dermisDocDir ${CMAKE_INSTALL_DATADIR}/doc/dermis)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_SOURCE_DIR}/SECURITY.md
         DESTINATION ${dermisDocDir} COMPONENT dermis)

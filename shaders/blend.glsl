@@ -32,7 +32,7 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
     default:
       return skinIterative(vertex, influences, pose, withNormal, withTangent);
 #else
-#if defined(BULGE) || defined(DERMIS_SKIN_GLSL)
+#ifdef BULGE
     case METHOD_BLENDED:
       return skinBlended(vertex, influences, pose, inputs.methodWeight, withNormal, withTangent);
     case METHOD_CENTER_OF_ROTATION:

@@ -5,9 +5,7 @@
 
 #include "abi.h"
 
-#if defined(DERMIS_SKIN_GLSL)
-// skin_include.glsl declares the buffers.
-#elif defined(TEXELS)
+#ifdef TEXELS
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
 layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
 

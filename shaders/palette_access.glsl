@@ -6,9 +6,7 @@
 #include "abi.h"
 #include "scale_shear.glsl"
 
-#if defined(DERMIS_SKIN_GLSL)
-// skin_include.glsl declares the buffers.
-#elif defined(TEXELS)
+#ifdef TEXELS
 layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
 
 uvec4 paletteBits(uint unit) { return texelFetch(paletteTexels, int(unit)); }

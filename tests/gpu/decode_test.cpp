@@ -1,11 +1,10 @@
-// An engine's own vertex shader skins by dermis_skin.glsl, and decodes by dermis_decode.glsl: what
-// it found out about each vertex is drawn into a pixel, and read back.
+// An engine's own vertex shader decodes by dermis_decode.glsl: what it found out about each vertex
+// is drawn into a pixel, and read back.
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cstring>
-#include <functional>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -13,8 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/verify/accuracy.h"
-#include "dermis/verify/reference.h"
 #include "dermis/vulkan/scope.h"
 #include "dermis_test_shaders.h"
 #include "kit/batch_runner.h"
@@ -49,11 +46,10 @@ constexpr std::uint32_t valueBytes = 16;
 /// As values.glsl has them.
 struct Push {
   std::uint32_t pictureWidth = width, pictureHeight = height;
-  std::uint32_t mesh = 0, palette = 0, jointCount = 0;
-  std::uint32_t padding[3] = {};
+  std::uint32_t padding[2] = {};
   float boxMin[4] = {}, boxMax[4] = {};
 };
-static_assert(sizeof(Push) == 64);
+static_assert(sizeof(Push) == 48);
 
 /// Four floats a vertex: positions, normals, tangents.
 using Values = std::array<std::vector<float>, valueCount>;
@@ -67,19 +63,13 @@ class ValueDrawer {
     makeLayout();
   }
 
-  /// `buffers` at bindings 3 and 5, or `vertices` as vertex input.
   struct Inputs {
-    std::span<const std::uint32_t> vertexShader;
-    std::uint32_t method = 0;
-    const MappedBuffer* meshes = nullptr;
-    const MappedBuffer* palettes = nullptr;
     const MappedBuffer* vertices = nullptr;
     std::span<const VkVertexInputAttributeDescription> attributes;
     std::uint32_t stride = 0;
     Push push;
   };
-  Values draw(const Inputs& inputs, std::uint32_t vertexCount,
-              const std::function<void(VkCommandBuffer)>& before = {}) {
+  Values draw(const Inputs& inputs, std::uint32_t vertexCount) {
     if (vertexCount > width * height) throw std::runtime_error("too many vertices");
     const Owned<VkPipeline> pipeline = makePipeline(inputs);
     const samples::VulkanFunctions& functions = device_.functions();
@@ -90,7 +80,6 @@ class ValueDrawer {
     VkCommandBufferBeginInfo begin{};
     begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
     must(functions.BeginCommandBuffer(commands, &begin));
-    if (before) before(commands);
     const std::array<VkClearValue, valueCount> clear{};
     VkRenderPassBeginInfo pass{};
     pass.sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO;
@@ -101,12 +90,9 @@ class ValueDrawer {
     pass.pClearValues = clear.data();
     functions.CmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
     functions.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.get());
-    if (inputs.meshes != nullptr) bindSet(commands, inputs);
-    if (inputs.vertices != nullptr) {
-      const VkBuffer buffer = inputs.vertices->handle();
-      const VkDeviceSize offset = 0;
-      functions.CmdBindVertexBuffers(commands, 0, 1, &buffer, &offset);
-    }
+    const VkBuffer buffer = inputs.vertices->handle();
+    const VkDeviceSize offset = 0;
+    functions.CmdBindVertexBuffers(commands, 0, 1, &buffer, &offset);
     functions.CmdPushConstants(commands, pipelineLayout_.get(), VK_SHADER_STAGE_VERTEX_BIT, 0,
                                sizeof(Push), &inputs.push);
     functions.CmdDraw(commands, vertexCount, 1, 0, 0);
@@ -227,68 +213,21 @@ class ValueDrawer {
   }
 
   void makeLayout() {
-    const std::array<VkDescriptorSetLayoutBinding, 2> bindings{
-        {{3, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_VERTEX_BIT, nullptr},
-         {5, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_VERTEX_BIT, nullptr}}};
-    VkDescriptorSetLayoutCreateInfo setInfo{};
-    setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-    setInfo.bindingCount = 2;
-    setInfo.pBindings = bindings.data();
-    setLayout_ = must(DERMIS_MAKE(device_, DescriptorSetLayout, setInfo));
-    const VkDescriptorSetLayout layout = setLayout_.get();
     const VkPushConstantRange range{VK_SHADER_STAGE_VERTEX_BIT, 0, sizeof(Push)};
     VkPipelineLayoutCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
-    info.setLayoutCount = 1;
-    info.pSetLayouts = &layout;
     info.pushConstantRangeCount = 1;
     info.pPushConstantRanges = &range;
     pipelineLayout_ = must(DERMIS_MAKE(device_, PipelineLayout, info));
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 64};
-    VkDescriptorPoolCreateInfo poolInfo{};
-    poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-    poolInfo.maxSets = 32;
-    poolInfo.poolSizeCount = 1;
-    poolInfo.pPoolSizes = &size;
-    pool_ = must(DERMIS_MAKE(device_, DescriptorPool, poolInfo));
-  }
-
-  void bindSet(VkCommandBuffer commands, const Inputs& inputs) {
-    const samples::VulkanFunctions& functions = device_.functions();
-    const VkDescriptorSetLayout layout = setLayout_.get();
-    VkDescriptorSetAllocateInfo allocate{};
-    allocate.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-    allocate.descriptorPool = pool_.get();
-    allocate.descriptorSetCount = 1;
-    allocate.pSetLayouts = &layout;
-    VkDescriptorSet set = VK_NULL_HANDLE;
-    must(functions.AllocateDescriptorSets(device_.handle(), &allocate, &set));
-    const std::array<VkDescriptorBufferInfo, 2> infos{
-        {{inputs.meshes->handle(), 0, VK_WHOLE_SIZE},
-         {inputs.palettes->handle(), 0, VK_WHOLE_SIZE}}};
-    std::array<VkWriteDescriptorSet, 2> writes{};
-    for (std::size_t index = 0; index < 2; ++index) {
-      writes[index].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-      writes[index].dstSet = set;
-      writes[index].dstBinding = index == 0 ? 3 : 5;
-      writes[index].descriptorCount = 1;
-      writes[index].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-      writes[index].pBufferInfo = &infos[index];
-    }
-    functions.UpdateDescriptorSets(device_.handle(), 2, writes.data(), 0, nullptr);
-    functions.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS,
-                                    pipelineLayout_.get(), 0, 1, &set, 0, nullptr);
   }
 
   Owned<VkPipeline> makePipeline(const Inputs& inputs) {
     const samples::VulkanFunctions& functions = device_.functions();
-    const VkSpecializationMapEntry entry{0, 0, 4};
-    const VkSpecializationInfo specialization{1, &entry, 4, &inputs.method};
     std::array<Owned<VkShaderModule>, 2> modules;
     std::array<VkPipelineShaderStageCreateInfo, 2> stages{};
     for (std::size_t index = 0; index < 2; ++index) {
       const std::span<const std::uint32_t> spirv =
-          index == 0 ? inputs.vertexShader : shaders::values_frag_spirv;
+          index == 0 ? shaders::decode_vert_spirv : shaders::values_frag_spirv;
       VkShaderModuleCreateInfo info{};
       info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
       info.codeSize = spirv.size_bytes();
@@ -298,18 +237,15 @@ class ValueDrawer {
       stages[index].stage = index == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
       stages[index].module = modules[index].get();
       stages[index].pName = "main";
-      stages[index].pSpecializationInfo = index == 0 ? &specialization : nullptr;
     }
     const VkVertexInputBindingDescription binding{0, inputs.stride, VK_VERTEX_INPUT_RATE_VERTEX};
     VkPipelineVertexInputStateCreateInfo vertexInput{};
     vertexInput.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO;
-    if (!inputs.attributes.empty()) {
-      vertexInput.vertexBindingDescriptionCount = 1;
-      vertexInput.pVertexBindingDescriptions = &binding;
-      vertexInput.vertexAttributeDescriptionCount =
-          static_cast<std::uint32_t>(inputs.attributes.size());
-      vertexInput.pVertexAttributeDescriptions = inputs.attributes.data();
-    }
+    vertexInput.vertexBindingDescriptionCount = 1;
+    vertexInput.pVertexBindingDescriptions = &binding;
+    vertexInput.vertexAttributeDescriptionCount =
+        static_cast<std::uint32_t>(inputs.attributes.size());
+    vertexInput.pVertexAttributeDescriptions = inputs.attributes.data();
     VkPipelineInputAssemblyStateCreateInfo assembly{};
     assembly.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO;
     assembly.topology = VK_PRIMITIVE_TOPOLOGY_POINT_LIST;
@@ -354,12 +290,10 @@ class ValueDrawer {
   std::array<Image, valueCount> images_;
   Owned<VkRenderPass> pass_;
   Owned<VkFramebuffer> framebuffer_;
-  Owned<VkDescriptorSetLayout> setLayout_;
   Owned<VkPipelineLayout> pipelineLayout_;
-  Owned<VkDescriptorPool> pool_;
 };
 
-class ShaderIncludeTest : public ::testing::Test {
+class DecodeTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string reason;
@@ -382,81 +316,7 @@ class ShaderIncludeTest : public ::testing::Test {
   std::optional<samples::OpenDevice> open_;
 };
 
-// Palettes and nothing else are recorded; then a draw skins.
-TEST_F(ShaderIncludeTest, AVertexShaderSkinsAsTheKernelsDo) {
-  constexpr std::uint32_t vertexCount = 1500, jointCount = 12;
-  ValueDrawer drawer(device());
-  for (const std::uint32_t influences : {3u, 7u}) {
-    OwnedMesh mesh = randomMesh(influences, vertexCount, jointCount, influences);
-    addTangents(mesh, 5);
-    const PackedMesh packed = must(pack(mesh.view(), jointCount));
-    for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear}) {
-      const std::vector<JointMatrix> pose = randomPose(9 + influences, jointCount, rigidity);
-      const PoseDescription unread{3, 48 * jointCount, true, false};
-      const std::array<PoseDescription, 2> poses{{{jointCount, 0, true, true}, unread}};
-      Batch batch;
-      batch.poses = poses;
-      batch.posesSize = 48 * (jointCount + 3);
-      Plan plan;
-      must(makePlan(batch, context().limits(), context().tuning(), plan));
-      ASSERT_EQ(plan.commands().size(), 1u) << "the palette kernel";
-      EXPECT_EQ(plan.paletteOffset(1), Plan::noPalette);
-      const auto make = [&](BufferRole role) {
-        const BufferRequirement needs = plan.buffer(role);
-        return must(MappedBuffer::create(device(), needs.size, needs.usage));
-      };
-      const MappedBuffer posesBuffer = make(BufferRole::poses), tables = make(BufferRole::tables),
-                         palettes = make(BufferRole::palettes);
-      const MappedBuffer meshes = must(MappedBuffer::create(device(), packed.bytes().size() + 256,
-                                                            VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
-      std::memcpy(meshes.bytes().data() + 256, packed.bytes().data(), packed.bytes().size());
-      std::memcpy(posesBuffer.bytes().data(), pose.data(), pose.size() * sizeof(JointMatrix));
-      must(writeTables(plan, tables.bytes()));
-      must(context().prepare(plan.variants()));
-      vulkan::BatchBuffers buffers;
-      buffers.poses = posesBuffer.range();
-      buffers.tables = tables.range();
-      buffers.palettes = palettes.range();
-      const vulkan::Bindings bindings = must(context().createBindings(buffers));
-
-      for (const Method method : {Method::linear, Method::dualQuaternion, Method::blended,
-                                  Method::centerOfRotation, Method::bulgeControlled}) {
-        SCOPED_TRACE(std::string(methodName(method)) + ", " + std::to_string(influences) +
-                     " influences");
-        const bool isLinear = method == Method::linear;
-        ValueDrawer::Inputs inputs;
-        inputs.vertexShader = shaders::skin_vert_spirv;
-        inputs.method = static_cast<std::uint32_t>(method);
-        inputs.meshes = &meshes;
-        inputs.palettes = isLinear ? &posesBuffer : &palettes;
-        inputs.push.mesh = 256 / 4;
-        inputs.push.palette = isLinear ? 0 : static_cast<std::uint32_t>(plan.paletteOffset(0) / 16);
-        inputs.push.jointCount = jointCount;
-        const Values values = drawer.draw(inputs, vertexCount, [&](VkCommandBuffer commandBuffer) {
-          must(context().record(commandBuffer, plan, bindings));
-          const vulkan::Dependency dependency = vulkan::outputScope(vulkan::Consumer::vertexShader);
-          const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-          device().functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                                  dependency.destination.stages, 0, 1, &barrier, 0,
-                                                  nullptr, 0, nullptr);
-        });
-        const reference::SkinnedMesh expected = must(reference::skin(mesh.view(), pose, method));
-        SkinnedView view;
-        view.positions = {values[0].data(), vertexCount, 16, VertexFormat::float32x4};
-        view.normals = {values[1].data(), vertexCount, 16, VertexFormat::float32x4};
-        view.tangents = {values[2].data(), vertexCount, 16, VertexFormat::float32x4};
-        const Comparison comparison =
-            must(compareWithReference(expected, view, exemptionsOf(expected)));
-        EXPECT_TRUE(comparison.passed())
-            << "vertex " << comparison.firstFailure << "; positions " << comparison.worstPosition
-            << ", normals " << comparison.worstNormal << ", tangents " << comparison.worstTangent;
-        EXPECT_GE(comparison.compared, vertexCount - vertexCount / 100);
-      }
-    }
-  }
-}
-
-TEST_F(ShaderIncludeTest, AVertexShaderDecodesWhatTheKernelsStore) {
+TEST_F(DecodeTest, AVertexShaderDecodesWhatTheKernelsStore) {
   constexpr std::uint32_t vertexCount = 2000, jointCount = 8;
   OwnedMesh mesh = randomMesh(21, vertexCount, jointCount, 4);
   addTangents(mesh, 22);
@@ -486,7 +346,6 @@ TEST_F(ShaderIncludeTest, AVertexShaderDecodesWhatTheKernelsStore) {
        {1, 0, VK_FORMAT_R16G16_SNORM, 8},
        {2, 0, VK_FORMAT_R8G8_SNORM, 12}}};
   ValueDrawer::Inputs inputs;
-  inputs.vertexShader = shaders::decode_vert_spirv;
   inputs.vertices = &vertices;
   inputs.attributes = attributes;
   inputs.stride = stride;

@@ -35,8 +35,6 @@ endif()
 list(TRANSFORM headers PREPEND ${includeFolder}/)
 file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
      "${sourceFolder}/shaders/*.comp")
-# The build makes dermis_skin.glsl from skin_include.glsl.
-list(TRANSFORM shaders REPLACE "^skin_include.glsl$" "dermis_skin.glsl")
 list(TRANSFORM shaders PREPEND ${dataFolder}/dermis/shaders/)
 list(APPEND expected ${headers} ${shaders})
 

@@ -120,10 +120,6 @@ struct PoseDescription {
   /// `Method::linear` always applies them; if `mayScale` is false, its normals and tangents are
   /// right only for scales between 2^-30 and 2^30.
   bool mayScale = true;
-  /// Whether the engine's own shaders read the palette, by dermis_skin.glsl. If so, the pose is
-  /// converted to dual quaternions even if no job uses it, and `Plan::paletteOffset` returns where
-  /// they are.
-  bool isReadByShaders = false;
 };
 
 /// One instance: a mesh, a pose, and where its skinned vertices are written. Two jobs of a batch
@@ -467,10 +463,6 @@ class DERMIS_CORE_API Plan {
   /// converted, and for the plan of a scene.
   std::uint64_t statusOffset(std::uint32_t pose) const;
   static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
-  /// Byte offset in the palettes buffer of a pose's palette of dual quaternions. `noPalette` if the
-  /// pose is not converted to dual quaternions, and for the plan of a scene.
-  std::uint64_t paletteOffset(std::uint32_t pose) const;
-  static constexpr std::uint64_t noPalette = ~std::uint64_t{0};
   /// Byte offset of a job's `InstanceResult` in the results buffer. `noResult` if the job has none,
   /// and for the plan of a scene.
   /// Results are in the order of their jobs, without gaps.

@@ -5,9 +5,6 @@ layout(location = 2) flat out vec4 tangentOut;
 
 layout(push_constant) uniform Push {
   uvec2 pictureSize;
-  uint mesh;
-  uint palette;
-  uint jointCount;
   vec4 boxMin;
   vec4 boxMax;
 };

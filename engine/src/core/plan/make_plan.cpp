@@ -55,12 +55,8 @@ void PlanMaker::markPalettes(const Job& job) {
   if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
 }
 
-/// Finds a place for each form that is marked, or that the engine reads.
+/// Finds a place for each form that is marked.
 void PlanMaker::placePalettes(const Batch& batch) {
-  for (std::size_t index = 0; index < batch.poses.size(); ++index) {
-    if (batch.poses[index].isReadByShaders)
-      paletteUnits_[static_cast<std::size_t>(PaletteForm::dualQuaternions)][index] = 0;
-  }
   std::uint64_t end = 0;
   for (const PaletteForm form : {PaletteForm::dualQuaternions, PaletteForm::logarithms}) {
     std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];

@@ -67,12 +67,6 @@ std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
   return noStatus;
 }
 
-std::uint64_t Plan::paletteOffset(std::uint32_t pose) const {
-  const std::vector<std::uint32_t>& units =
-      data_->paletteUnits[static_cast<std::size_t>(PaletteForm::dualQuaternions)];
-  return pose < units.size() && units[pose] != notUsed ? units[pose] * unitBytes : noPalette;
-}
-
 std::uint64_t Plan::resultOffset(std::uint32_t job) const {
   if (job >= data_->results.size() || data_->results[job] == notUsed) return noResult;
   return data_->results[job] * std::uint64_t{sizeof(InstanceResult)};
