@@ -32,19 +32,8 @@ Blend blendJoints(Influences influences, Pose pose) {
   precise vec4 real = influences.weights.x * pivot;
   precise vec4 dual = influences.weights.x * paletteDual(pose.palette, influences.joints.x);
   Blend blend = Blend(real, dual);
-  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (!hasSlot(influences.count, slot)) break;
-    blend = addJoint(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
-  }
-  if (hasFurther(influences)) {
-    uint slot = LOADED_INFLUENCES;
-    do {
-      InfluencePair two = loadInfluences(influences, slot);
-      blend = addJoint(blend, pivot, two.first.weight, pose, two.first.joint);
-      if (++slot >= influences.count) break;
-      blend = addJoint(blend, pivot, two.second.weight, pose, two.second.joint);
-    } while (++slot < influences.count);
-  }
+#define ADD_JOINT(weight, joint) blend = addJoint(blend, pivot, weight, pose, joint)
+  FOR_OTHER_INFLUENCES(influences, ADD_JOINT)
   return blend;
 }
 
@@ -60,19 +49,8 @@ ScaleShear addScaleShear(ScaleShear blend, ScaleShear pivot, float weight, Pose 
 ScaleShear blendScaleShear(Influences influences, Pose pose) {
   ScaleShear pivot = paletteScaleShear(pose, influences.joints.x);
   ScaleShear blend = pivot;
-  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (!hasSlot(influences.count, slot)) break;
-    blend = addScaleShear(blend, pivot, influences.weights[slot], pose, influences.joints[slot]);
-  }
-  if (hasFurther(influences)) {
-    uint slot = LOADED_INFLUENCES;
-    do {
-      InfluencePair two = loadInfluences(influences, slot);
-      blend = addScaleShear(blend, pivot, two.first.weight, pose, two.first.joint);
-      if (++slot >= influences.count) break;
-      blend = addScaleShear(blend, pivot, two.second.weight, pose, two.second.joint);
-    } while (++slot < influences.count);
-  }
+#define ADD_SCALE_SHEAR(weight, joint) blend = addScaleShear(blend, pivot, weight, pose, joint)
+  FOR_OTHER_INFLUENCES(influences, ADD_SCALE_SHEAR)
   return blend;
 }
 

@@ -44,19 +44,8 @@ Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNorm
   precise vec4 r1 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 1u);
   precise vec4 r2 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 2u);
   Rows blend = Rows(r0, r1, r2);
-  for (uint slot = 1u; slot < LOADED_INFLUENCES; ++slot) {
-    if (!hasSlot(influences.count, slot)) break;
-    blend = addMatrix(blend, influences.weights[slot], pose, influences.joints[slot]);
-  }
-  if (hasFurther(influences)) {
-    uint slot = LOADED_INFLUENCES;
-    do {
-      InfluencePair two = loadInfluences(influences, slot);
-      blend = addMatrix(blend, two.first.weight, pose, two.first.joint);
-      if (++slot >= influences.count) break;
-      blend = addMatrix(blend, two.second.weight, pose, two.second.joint);
-    } while (++slot < influences.count);
-  }
+#define ADD_MATRIX(weight, joint) blend = addMatrix(blend, weight, pose, joint)
+  FOR_OTHER_INFLUENCES(influences, ADD_MATRIX)
   return throughMatrix(vertex, blend.r0, blend.r1, blend.r2, withNormal, withTangent);
 }
 
