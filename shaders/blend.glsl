@@ -7,17 +7,17 @@
 #include "palette_access.glsl"
 #include "vertex.glsl"
 #include "direction_map.glsl"
-#include "dual_quaternion.glsl"
+#include "methods/dual_quaternion.glsl"
 #ifdef COMPARISON
-#include "dual_exponential.glsl"
-#include "iterative.glsl"
-#include "log_matrix.glsl"
-#include "spherical_blend.glsl"
-#include "quaternion_translation.glsl"
+#include "comparison/dual_exponential.glsl"
+#include "comparison/iterative.glsl"
+#include "comparison/log_matrix.glsl"
+#include "comparison/spherical_blend.glsl"
+#include "comparison/quaternion_translation.glsl"
 #else
-#include "linear.glsl"
-#include "blended.glsl"
-#include "center_of_rotation.glsl"
+#include "methods/linear.glsl"
+#include "methods/blended.glsl"
+#include "methods/center_of_rotation.glsl"
 #endif
 
 Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {

@@ -11,7 +11,7 @@
 #include "quaternion.glsl"
 #include "polar.glsl"
 #ifdef LOGARITHMS
-#include "dual_exponential.glsl"
+#include "comparison/dual_exponential.glsl"
 #endif
 #include "tables.glsl"
 

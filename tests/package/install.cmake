@@ -33,7 +33,7 @@ if(NOT runtimeCompiler)
   list(REMOVE_ITEM headers dermis/runtime_compiler.h)
 endif()
 list(TRANSFORM headers PREPEND ${includeFolder}/)
-file(GLOB shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
+file(GLOB_RECURSE shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
      "${sourceFolder}/shaders/*.comp")
 list(TRANSFORM shaders PREPEND ${dataFolder}/dermis/shaders/)
 list(APPEND expected ${headers} ${shaders})

@@ -20,9 +20,7 @@ class ShaderFolder {
   explicit ShaderFolder(const std::string& name)
       : path_(std::filesystem::path(::testing::TempDir()) / ("shaders_" + name)) {
     std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-    for (const auto& entry : std::filesystem::directory_iterator(kernelSources))
-      std::filesystem::copy_file(entry.path(), path_ / entry.path().filename());
+    std::filesystem::copy(kernelSources, path_, std::filesystem::copy_options::recursive);
   }
   ~ShaderFolder() {
     std::error_code ignored;

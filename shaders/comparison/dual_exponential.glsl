@@ -3,7 +3,7 @@
 #ifndef DERMIS_DUAL_EXPONENTIAL_GLSL
 #define DERMIS_DUAL_EXPONENTIAL_GLSL
 
-#include "exact.glsl"
+#include "../exact.glsl"
 
 // The logarithm of a unit dual quaternion. `real`: half the angle times the direction of the screw axis. `dual`: half the distance
 // along the axis times its direction, plus half the angle times its moment.

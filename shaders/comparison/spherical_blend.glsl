@@ -5,7 +5,7 @@
 #ifndef DERMIS_SPHERICAL_BLEND_GLSL
 #define DERMIS_SPHERICAL_BLEND_GLSL
 
-#include "dual_quaternion.glsl"
+#include "../methods/dual_quaternion.glsl"
 
 // Smaller singular values count as 0, as in the pseudo-inverse.
 const float LEAST_SINGULAR_VALUE = 1e-3;

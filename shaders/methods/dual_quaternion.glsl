@@ -2,13 +2,13 @@
 #ifndef DERMIS_DUAL_QUATERNION_GLSL
 #define DERMIS_DUAL_QUATERNION_GLSL
 
-#include "exact.glsl"
-#include "quaternion.glsl"
-#include "scale_shear.glsl"
-#include "direction_map.glsl"
-#include "mesh_access.glsl"
-#include "palette_access.glsl"
-#include "vertex.glsl"
+#include "../exact.glsl"
+#include "../quaternion.glsl"
+#include "../scale_shear.glsl"
+#include "../direction_map.glsl"
+#include "../mesh_access.glsl"
+#include "../palette_access.glsl"
+#include "../vertex.glsl"
 
 // The blended dual quaternion of a vertex (Kavan et al. 2007, section 4), in the hemisphere of the pivot, which is the first
 // influence. Not normalized.

@@ -3,7 +3,7 @@
 #ifndef DERMIS_ITERATIVE_GLSL
 #define DERMIS_ITERATIVE_GLSL
 
-#include "dual_quaternion.glsl"
+#include "../methods/dual_quaternion.glsl"
 #include "dual_exponential.glsl"
 
 // The loop reaches the maximum only if joints are nearly antipodal. Usually a few steps are enough.

@@ -2,11 +2,11 @@
 #ifndef DERMIS_LINEAR_GLSL
 #define DERMIS_LINEAR_GLSL
 
-#include "exact.glsl"
-#include "direction_map.glsl"
-#include "mesh_access.glsl"
-#include "palette_access.glsl"
-#include "vertex.glsl"
+#include "../exact.glsl"
+#include "../direction_map.glsl"
+#include "../mesh_access.glsl"
+#include "../palette_access.glsl"
+#include "../vertex.glsl"
 
 // Transforms a vertex by a blended 3×4 matrix, given by its rows.
 Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, bool withTangent) {

@@ -3,7 +3,7 @@
 #ifndef DERMIS_LOG_MATRIX_GLSL
 #define DERMIS_LOG_MATRIX_GLSL
 
-#include "dual_quaternion.glsl"
+#include "../methods/dual_quaternion.glsl"
 
 struct Affine {  // rows; the fourth row is 0 0 0 1, or 0 0 0 0 for a logarithm
   vec4 r0;

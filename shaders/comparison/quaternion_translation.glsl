@@ -2,7 +2,7 @@
 #ifndef DERMIS_QUATERNION_TRANSLATION_GLSL
 #define DERMIS_QUATERNION_TRANSLATION_GLSL
 
-#include "dual_quaternion.glsl"
+#include "../methods/dual_quaternion.glsl"
 
 vec3 jointTranslation(Pose pose, uint joint) {
   return translationOf(paletteRotation(pose.palette, joint), paletteDual(pose.palette, joint), 2.0);
