@@ -5,7 +5,7 @@
 
 #include "abi.h"
 
-#if defined(PAIRS) || defined(WIDE)
+#ifdef TEXELS
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uint64_t positionsPairs[]; };
 
 // Stores a position and the normal after it, two words at a time. lavapipe stores each lane separately, so this takes half as long.
@@ -26,7 +26,7 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #endif
 #include "stream.glsl"
 
-#if defined(WIDE) || defined(STAGED)
+#if defined(TEXELS) || defined(STAGED)
 // All attributes of a vertex, which are adjacent in memory. Sizes are whole words, or positions have 6 bytes and normals 2.
 // Sizes are constants, so that only moves remain after compilation.
 uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
@@ -43,7 +43,7 @@ uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
 }
 #endif
 
-#ifdef WIDE
+#ifdef TEXELS
 layout(set = 0, binding = BINDING_POSITIONS, scalar) buffer Records24 { u64vec3 records24[]; };
 layout(set = 0, binding = BINDING_POSITIONS, scalar) writeonly buffer Records32 { u64vec4 records32[]; };
 

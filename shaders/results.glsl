@@ -15,7 +15,7 @@ void countClamped(uint result) {}
 #else
 
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { ResultRecord results[]; };
-#if defined(PAIRS) || defined(WIDE)
+#ifdef TEXELS
 // The same buffer in 64-bit words. lavapipe loads each lane separately, so reading a box by three 64-bit loads takes less time than
 // by six 32-bit loads.
 layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer ResultPairs { uint64_t resultPairs[]; };
@@ -38,7 +38,7 @@ struct ResultBox {
 };
 
 ResultBox resultBox(uint result) {
-#if defined(PAIRS) || defined(WIDE)
+#ifdef TEXELS
   uvec2 a = unpackUint2x32(resultPairs[result * 4u]);
   uvec2 b = unpackUint2x32(resultPairs[result * 4u + 1u]);
   uvec2 c = unpackUint2x32(resultPairs[result * 4u + 2u]);

@@ -11,9 +11,8 @@
 //   BULGE           the methods that reduce the bulge (blended, center of rotation, bulge-controlled), instead of linear and dual
 //                   quaternions
 //   COMPARISON      the methods that are only for comparison
-//   TEXELS          tables, meshes and palettes are read as uniform texel buffers, which is much faster on lavapipe
-//   PAIRS           positions and normals, float32x3 each, are stored together, 8 bytes at a time (needs 64-bit integers)
-//   WIDE            one store writes an attribute, or a whole vertex (needs scalar block layout and 64-bit integers)
+//   TEXELS          for CPU devices: tables, meshes and palettes are read as uniform texel buffers, and one store writes an
+//                   attribute, or a whole vertex (needs scalar block layout and 64-bit integers)
 //   STAGED          whole vertices are gathered in shared memory, from which consecutive invocations store 16 bytes each
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
@@ -26,11 +25,7 @@
 #endif
 #ifdef TEXELS
 #extension GL_EXT_samplerless_texture_functions : require
-#endif
-#if defined(PAIRS) || defined(WIDE)
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#endif
-#ifdef WIDE
 #extension GL_EXT_scalar_block_layout : require
 #endif
 
@@ -55,7 +50,7 @@ layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
 layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 layout(constant_id = CONSTANT_FULL) const bool FULL = false;
-#if defined(PAIRS) || defined(WIDE) || defined(STAGED)
+#if defined(TEXELS) || defined(STAGED)
 layout(constant_id = CONSTANT_RECORD) const uint RECORD = RECORD_APART;
 #else
 const uint RECORD = RECORD_APART;
@@ -196,7 +191,7 @@ struct Work {
 #ifdef HAS_MOTION
 // The position in the output, before this frame overwrites it.
 uvec4 keptPosition(Instance instance) {
-#ifdef WIDE
+#ifdef TEXELS
   if (RECORD == 24u && POSITION_FORMAT == FORMAT_FLOAT32X3) return loadRecordPosition(instance.recordPlace);
 #endif
   return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);

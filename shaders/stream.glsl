@@ -15,7 +15,7 @@ layout(set = 0, binding = STREAM_BINDING, std430) buffer JOIN(Halves, STREAM) { 
 layout(set = 0, binding = STREAM_BINDING, std430) buffer JOIN(Bytes, STREAM) { uint8_t JOIN(bytes, STREAM)[]; };
 #endif
 
-#ifdef WIDE
+#ifdef TEXELS
 layout(set = 0, binding = STREAM_BINDING, scalar) buffer JOIN(Vectors2, STREAM) { uvec2 JOIN(vectors2, STREAM)[]; };
 layout(set = 0, binding = STREAM_BINDING, scalar) buffer JOIN(Vectors3, STREAM) { uvec3 JOIN(vectors3, STREAM)[]; };
 layout(set = 0, binding = STREAM_BINDING, scalar) buffer JOIN(Vectors4, STREAM) { uvec4 JOIN(vectors4, STREAM)[]; };
@@ -36,7 +36,7 @@ void JOIN(store, STREAM)(uint place, uvec4 words, uint size, uint unit) {
     return;
   }
 #endif
-#ifdef WIDE
+#ifdef TEXELS
   if (unit > 4u) {
     if (unit == 8u) JOIN(vectors2, STREAM)[place / 8u] = words.xy;
     if (unit == 12u) JOIN(vectors3, STREAM)[place / 12u] = words.xyz;
@@ -68,7 +68,7 @@ uvec4 JOIN(load, STREAM)(uint place, uint size, uint unit) {
     return words;
   }
 #endif
-#ifdef WIDE
+#ifdef TEXELS
   if (unit > 4u) {
     if (unit == 8u) words.xy = JOIN(vectors2, STREAM)[place / 8u];
     if (unit == 12u) words.xyz = JOIN(vectors3, STREAM)[place / 12u];

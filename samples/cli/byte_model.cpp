@@ -172,7 +172,7 @@ std::optional<std::vector<ByteModel>> byteModels() {
   DeviceLimits staged = words;
   staged.stagedStores = true;
   DeviceLimits wide = words;
-  wide.texelBuffers = wide.shaderInt64 = wide.scalarBlockLayout = true;
+  wide.texelBuffers = true;
   std::vector<ByteModel> models;
   for (const Method method : {Method::dualQuaternion, Method::linear}) {
     for (const Layout& layout : {Layout{"float32x3 + float32x3", float32x3, float32x3},

@@ -82,7 +82,7 @@ struct MockContextTest : public ::testing::Test {
     if (push) mock.extensions = {VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
     vulkan::DeviceDescription description = mock.description();
     description.texelBuffers = texelBuffers;
-    description.enabledFeatures = enabledFeatures;
+    if (enabledFeatures != nullptr) description.enabledFeatures = enabledFeatures;
     Result<vulkan::Context> made = vulkan::Context::create(description);
     ASSERT_TRUE(made.ok());
     context.emplace(std::move(*made));

@@ -315,7 +315,16 @@ MockVulkan::~MockVulkan() {
 }
 
 vulkan::DeviceDescription MockVulkan::description() const {
+  // What kernels for CPU devices need.
+  static VkPhysicalDeviceScalarBlockLayoutFeatures scalar{
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES, nullptr, VK_TRUE};
+  static const VkPhysicalDeviceFeatures2 features = [] {
+    VkPhysicalDeviceFeatures2 made{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &scalar, {}};
+    made.features.shaderInt64 = VK_TRUE;
+    return made;
+  }();
   vulkan::DeviceDescription description;
+  description.enabledFeatures = &features;
   description.instance = reinterpret_cast<VkInstance>(std::uintptr_t{16});
   description.physicalDevice = reinterpret_cast<VkPhysicalDevice>(std::uintptr_t{32});
   description.device = reinterpret_cast<VkDevice>(std::uintptr_t{48});

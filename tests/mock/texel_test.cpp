@@ -91,21 +91,28 @@ TEST_F(MockTexelTest, CpuDevicesReadThroughTexelBuffersUnlessTheEngineSaysOtherw
   }
 }
 
-TEST_F(MockTexelTest, ScalarBlockLayoutIsReadFromBothOfItsStructures) {
+TEST_F(MockTexelTest, NeedScalarBlockLayoutFromOneOfItsStructuresAndIntegersOf64Bits) {
+  VkPhysicalDeviceFeatures2 integers{};
+  integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  integers.features.shaderInt64 = VK_TRUE;
   VkPhysicalDeviceScalarBlockLayoutFeatures own{};
   own.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
+  own.pNext = &integers;
   VkPhysicalDeviceVulkan12Features vulkan12{};
   vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
   vulkan12.pNext = &own;
   vulkan::DeviceDescription description = mock.description();
   description.enabledFeatures = &vulkan12;
-  const auto has = [&] { return vulkan::Context::create(description)->limits().scalarBlockLayout; };
+  description.texelBuffers = true;
+  const auto has = [&] { return vulkan::Context::create(description)->limits().texelBuffers; };
   EXPECT_FALSE(has());
   own.scalarBlockLayout = VK_TRUE;
   EXPECT_TRUE(has());
   own.scalarBlockLayout = VK_FALSE;
   vulkan12.scalarBlockLayout = VK_TRUE;
   EXPECT_TRUE(has());
+  integers.features.shaderInt64 = VK_FALSE;
+  EXPECT_FALSE(has());
 }
 
 TEST_F(MockTexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
@@ -153,7 +160,6 @@ TEST_F(MockTexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
 TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
   DeviceLimits limits = richLimits();
   limits.texelBuffers = true;
-  limits.shaderInt64 = true;
   const auto pairs = [&](auto change) {
     MockBatch mockBatch;
     mockBatch.batch.addJob(0, 0, Method::dualQuaternion, true);
@@ -174,9 +180,8 @@ TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
   };
   EXPECT_TRUE(pairs([](Job&, Batch&, DeviceLimits&) {}));
   EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.method = Method::logMatrix; }));
-  EXPECT_FALSE(pairs([](Job&, Batch&, DeviceLimits& device) { device.shaderInt64 = false; }));
   EXPECT_FALSE(pairs([](Job&, Batch&, DeviceLimits& device) { device.texelBuffers = false; }));
-  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.bounds = true; }));
+  EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.bounds = true; }));
   EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.offset += 4; }));
   EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.stride += 8; }));
   EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals = {}; }));
@@ -184,20 +189,18 @@ TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
       [](Job& job, Batch&, DeviceLimits&) { job.positions.stride = job.normals.stride = 36; }));
 }
 
-// An attribute, or all of a vertex, by one store, where the engine enabled scalarBlockLayout.
+// An attribute, or all of a vertex, by one store.
 TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirSize) {
   using enum VertexFormat;
   DeviceLimits limits = richLimits();
-  limits.texelBuffers = limits.shaderInt64 = limits.scalarBlockLayout = true;
+  limits.texelBuffers = true;
   MockBatch mockBatch;
   mockBatch.batch.addJob(0, 0, Method::dualQuaternion, true);
   const Job plain = mockBatch.batch.jobs[0];
   const auto variantOf = [&](const VertexLayout& layout, std::uint64_t offset = 0) {
     Job job = plain;
     job.place(*placeVertices(layout, 7, offset));
-    const Variant variant = everyVariant(job, limits, {})->back();
-    EXPECT_TRUE(variant.wideStores == limits.scalarBlockLayout || !variant.texels);
-    return variant;
+    return everyVariant(job, limits, {})->back();
   };
   const auto record = [&](VertexFormat positions, VertexFormat normals,
                           VertexFormat tangents = none) {
@@ -231,27 +234,20 @@ TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirS
   // Previous positions would be stored by 2 bytes.
   const Variant halves = variantOf(
       {.positions = float16x3, .normals = octahedral8x2, .motion = Motion::kept, .stride = 16});
-  EXPECT_FALSE(halves.texels || halves.wideStores || halves.recordBytes != 0);
+  EXPECT_FALSE(halves.texels || halves.recordBytes != 0);
   EXPECT_EQ(halves.units, (std::array<std::uint8_t, streamCount>{2, 2, 4, 2}));
-  limits.scalarBlockLayout = false;
-  const Variant pairs = variantOf({.normals = float32x3});
-  EXPECT_TRUE(pairs.pairs && pairs.recordBytes == 0 && pairs.units[0] == 4);
 }
 
 TEST_F(MockTexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
-  VkPhysicalDeviceFeatures2 features{};
-  features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
-  features.features.shaderInt64 = VK_TRUE;
-  ASSERT_NO_FATAL_FAILURE(create(false, true, &features));
-  ASSERT_TRUE(context->limits().shaderInt64);
+  ASSERT_NO_FATAL_FAILURE(create(false, true));
   MockBatch batch;
   batch.batch.addJob(0, 0, Method::dualQuaternion, true);
   Job job = batch.batch.jobs[0];
-  job.positions = {0, 24, VertexFormat::float32x3};
-  job.normals = {12, 24, VertexFormat::float32x3};
+  job.positions = {0, 32, VertexFormat::float32x3};
+  job.normals = {12, 32, VertexFormat::float32x3};
   Batch described = batch.batch.batch();
   described.jobs = {&job, 1};
-  described.outputs = OutputSizes::oneBuffer(100 * 24);
+  described.outputs = OutputSizes::oneBuffer(100 * 32);
   ASSERT_TRUE(makePlan(described, context->limits(), {}, batch.plan).ok());
   ASSERT_TRUE(batch.plan.variants().back().pairs);
   vulkan::BatchBuffers buffers = batch.buffers();

@@ -83,9 +83,9 @@ TEST(Layout, RefusesWhatCannotStandSo) {
 TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.texelBuffers = limits.shaderInt64 = limits.storage16Bit = limits.storage8Bit = true;
-  for (const bool scalar : {false, true}) {
-    limits.scalarBlockLayout = scalar;
+  limits.storage16Bit = limits.storage8Bit = true;
+  for (const bool texels : {false, true}) {
+    limits.texelBuffers = texels;
     for (const VertexFormat normals : {VertexFormat::none, VertexFormat::float32x3,
                                        VertexFormat::snorm8x3, VertexFormat::octahedral8x2}) {
       // 1: planar.

@@ -389,7 +389,7 @@ INSTANTIATE_TEST_SUITE_P(Plan, PlanTuning,
 
 TEST(Plan, InvocationsWithFewInstancesSkinSeveralVertices) {
   DeviceLimits limits;
-  limits.texelBuffers = limits.shaderInt64 = true;
+  limits.texelBuffers = true;
   Plan out;
   std::set<std::uint32_t> used;
   for (const std::uint32_t size : {8u, 64u}) {

@@ -128,7 +128,7 @@ TEST_F(PlanErrors, PromisesThatNoKernelIsMadeFor) {
 // The same on every device: an engine must not find out on the next one.
 TEST_F(PlanErrors, PairsOfPositionsAndNormals) {
   for (const bool texels : {false, true}) {
-    limits.texelBuffers = limits.shaderInt64 = texels;
+    limits.texelBuffers = texels;
     batch.outputSize += 24;
     const Job whole = job();
     job().positions.offset += 4;

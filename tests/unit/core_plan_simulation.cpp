@@ -368,7 +368,14 @@ class Simulation {
     const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const bool isWanted = attributes[stream].format != VertexFormat::none;
-      ASSERT_EQ(variant.units[stream], isWanted ? unitOf(attributes[stream]) : 4);
+      if (variant.units[stream] > 4) {
+        ASSERT_TRUE(variant.texels && isWanted);
+        ASSERT_EQ(variant.units[stream], formatSize(attributes[stream].format));
+        const bool isOfRecord = variant.recordBytes != 0 && stream != previousStream;
+        ASSERT_TRUE(isOfRecord || attributes[stream].offset % variant.units[stream] == 0);
+      } else {
+        ASSERT_EQ(variant.units[stream], isWanted ? unitOf(attributes[stream]) : 4);
+      }
       if (!isWanted) {
         ASSERT_EQ(dispatch.windows[stream].index, 0u);
       } else if (limits_.maxStorageBuffersPerStage < storageBuffersWanted) {

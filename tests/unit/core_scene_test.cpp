@@ -157,8 +157,7 @@ std::set<std::uint64_t> variantsOf(Scene& scene, InstanceHandle instance, std::u
 // What is prepared for one instance is what its frames use, and no more.
 TEST(Scene, TellsThePipelinesOfOneInstance) {
   SceneDescription description = smallScene();
-  description.limits.texelBuffers = description.limits.shaderInt64 = true;
-  description.limits.scalarBlockLayout = true;
+  description.limits.texelBuffers = true;
   for (const Method method : allMethods) {
     for (const auto& [fewest, most] : {std::pair{0u, 0u},
                                        {1u, 1u},
@@ -187,13 +186,8 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
           figure.culledOnGpu = choices / 4 != 0;
           const PipelineNeeds needs = *scene.pipelineNeeds(figure);
           std::set<std::uint64_t> foreseen;
-          for (const Variant& variant : *everyVariant(needs, description.limits, {})) {
-            // Palettes of dual quaternions may be for the engine's shaders alone.
-            const bool isForShaders = (method == Method::linear || method == Method::logMatrix) &&
-                                      variant.kernel == Kernel::palette &&
-                                      variant.method == Method::dualQuaternion;
-            if (!isForShaders) foreseen.insert(variant.key());
-          }
+          for (const Variant& variant : *everyVariant(needs, description.limits, {}))
+            foreseen.insert(variant.key());
           const InstanceHandle instance = *scene.addInstance(figure);
           EXPECT_EQ(variantsOf(scene, instance, targets), foreseen)
               << methodName(method) << ", " << fewest << " to " << most << " influences, "

@@ -63,18 +63,12 @@ struct DeviceLimits {
   bool storage16Bit = false;
   /// The same for 1 byte (VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
   bool storage8Bit = false;
-  /// Whether kernels read tables, meshes and palettes, and in a batch with `Method::linear` poses,
-  /// through uniform texel buffers, which is faster on lavapipe. Requires that a uniform texel
-  /// buffer of 4-byte texels can hold a whole storage buffer range. Kernels that store less than 4
-  /// bytes at a time always read storage buffers.
+  /// Whether kernels are those for CPU devices. They read tables, meshes and palettes, and in a
+  /// batch with `Method::linear` poses, through uniform texel buffers, and store an attribute, or
+  /// all of a vertex, at once; both are faster on lavapipe. Requires the features `shaderInt64` and
+  /// `scalarBlockLayout`, and that a uniform texel buffer of 4-byte texels can hold a whole storage
+  /// buffer range. Kernels that store less than 4 bytes at a time always read storage buffers.
   bool texelBuffers = false;
-  /// Whether kernels may use 64-bit integers (VkPhysicalDeviceFeatures::shaderInt64) to store 8
-  /// bytes at a time, which is faster on lavapipe.
-  bool shaderInt64 = false;
-  /// Whether kernels may use the scalar block layout (VkPhysicalDeviceScalarBlockLayoutFeatures) to
-  /// store an attribute, or all of a vertex, at once, which is faster on lavapipe. Used with
-  /// `texelBuffers` and `shaderInt64` only.
-  bool scalarBlockLayout = false;
   /// Whether kernels collect interleaved vertices in workgroup memory, so that consecutive
   /// invocations store consecutive blocks of 16 bytes. Needs no device feature. Used only if
   /// - `texelBuffers` is false;
@@ -236,8 +230,8 @@ struct Variant {
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::none;
   VertexFormat tangents = VertexFormat::none;
-  /// Bytes that one store writes to each stream: 1, 2 or 4. With `DeviceLimits::scalarBlockLayout`
-  /// also 8, 12 or 16, which is then the size of the attribute.
+  /// Bytes that one store writes to each stream: 1, 2 or 4. With `texels` also 8, 12 or 16, which
+  /// is then the size of the attribute.
   std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
   Motion motion = Motion::none;
   bool bounds = false;
@@ -249,17 +243,13 @@ struct Variant {
   /// buffers.
   bool texels = false;
   /// Whether each position is stored together with the normal that follows it, 8 bytes at a time.
-  /// Only with `texels` and `DeviceLimits::shaderInt64`, and if `recordBytes` is 0. With motion or
-  /// results only if `wideStores` is set, too.
+  /// Only with `texels`, and if `recordBytes` is 0.
   bool pairs = false;
   /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
-  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged`, or with `texels` and
-  /// `DeviceLimits::scalarBlockLayout`.
+  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged` or `texels`.
   std::uint8_t recordBytes = 0;
   /// Whether vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
   bool staged = false;
-  /// Whether the kernel is in the module that can store more than 4 bytes at a time.
-  bool wideStores = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
   /// Whether every vertex has exactly `influences` influences.
@@ -283,7 +273,7 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 /// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
 /// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
 /// with joints that scale, for any number, and for any number with morph targets. Some methods need
-/// fewer. `Promises` reduce the number further. With `scalarBlockLayout` and `texelBuffers` each
+/// fewer. `Promises` reduce the number further. With `texelBuffers` each
 /// skin kernel may be listed twice: with stores of up to 32 bytes, for jobs whose attributes are
 /// all aligned to the size of their stores, and with narrower stores, for all other jobs.
 ///

@@ -31,8 +31,14 @@ Result<void> checkDescription(const DeviceDescription& description) {
   return checkPromises(description.promises);
 }
 
+/// What the kernels for CPU devices need.
+struct CpuDeviceFeatures {
+  bool scalarBlockLayout = false, shaderInt64 = false;
+};
+
 /// Reads the features that Dermis uses from a pNext chain.
-void readFeatures(const void* chain, DeviceLimits& limits) {
+CpuDeviceFeatures readFeatures(const void* chain, DeviceLimits& limits) {
+  CpuDeviceFeatures features;
   for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
        next = next->pNext) {
     switch (next->sType) {
@@ -49,19 +55,19 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
                                   ->storageBuffer8BitAccess == VK_TRUE;
         break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES:
-        limits.scalarBlockLayout |=
+        features.scalarBlockLayout |=
             reinterpret_cast<const VkPhysicalDeviceScalarBlockLayoutFeatures*>(next)
                 ->scalarBlockLayout == VK_TRUE;
         break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES:
-        limits.scalarBlockLayout |=
+        features.scalarBlockLayout |=
             reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)->scalarBlockLayout ==
             VK_TRUE;
         limits.storage8Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)
                                   ->storageBuffer8BitAccess == VK_TRUE;
         break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2:
-        limits.shaderInt64 |=
+        features.shaderInt64 |=
             reinterpret_cast<const VkPhysicalDeviceFeatures2*>(next)->features.shaderInt64 ==
             VK_TRUE;
         break;
@@ -69,6 +75,7 @@ void readFeatures(const void* chain, DeviceLimits& limits) {
         break;
     }
   }
+  return features;
 }
 
 /// Uses texel buffers if they can hold the storage buffer range that Vulkan guarantees. The range
@@ -160,7 +167,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   state.limits.separateRanges = state.pushesDescriptors();
   state.timestampPeriod = properties.limits.timestampPeriod;
-  readFeatures(description.enabledFeatures, state.limits);
+  const CpuDeviceFeatures features = readFeatures(description.enabledFeatures, state.limits);
   // Whether this build has the kernels.
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
   state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
@@ -169,7 +176,8 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.tuning = defaults.tuning;
   state.limits.promises = description.promises;
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
-  if (description.texelBuffers.value_or(defaults.texelBuffers))
+  if (description.texelBuffers.value_or(defaults.texelBuffers) && features.scalarBlockLayout &&
+      features.shaderInt64)
     chooseTexelBuffers(properties.limits, state.limits);
   if (properties.limits.maxPerStageDescriptorStorageBuffers < abi::MIN_BINDING_COUNT) {
     return Error{ErrorCode::missingFeature,

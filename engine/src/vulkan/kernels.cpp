@@ -97,10 +97,7 @@ std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
   if (oneOutput) return name + "_one_output";
   if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
   if (variant.staged) return name + "_staged";
-  if (variant.texels)
-    return name + (variant.wideStores ? "_texels_wide"
-                   : variant.pairs    ? "_texels_pairs"
-                                      : "_texels");
+  if (variant.texels) return name + "_texels";
   const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
   return name + (smallest == 4 ? "" : smallest == 2 ? "_halves" : "_bytes");
 }

@@ -21,10 +21,9 @@ Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
                  "a variant that stores less than 4 bytes at a time needs storageBuffer16BitAccess "
                  "and, for single bytes, storageBuffer8BitAccess"};
   }
-  if (variant.wideStores && !(limits.scalarBlockLayout && limits.shaderInt64)) {
+  if (variant.texels && !limits.texelBuffers) {
     return Error{ErrorCode::missingFeature,
-                 "a variant that stores more than 4 bytes at a time needs scalarBlockLayout and "
-                 "shaderInt64"};
+                 "a variant that reads texel buffers needs scalarBlockLayout and shaderInt64"};
   }
   return {};
 }

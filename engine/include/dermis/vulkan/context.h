@@ -44,11 +44,12 @@ struct DeviceDescription {
   ///
   /// Only `Context::create` reads the chain.
   const void* enabledFeatures = nullptr;
-  /// Whether kernels read buffers through uniform texel buffers, if the device
-  /// supports it (`DeviceLimits::texelBuffers`). `Plan::buffer` then returns
-  /// VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers, and `maxStorageBufferRange` of
-  /// `Context::limits` is at most what such a buffer can hold. Results are the same to the bit. If
-  /// not set: true for CPU devices (measured on lavapipe), false for others (a guess).
+  /// Whether kernels are those for CPU devices, if the device supports them and the engine enabled
+  /// `scalarBlockLayout` and `shaderInt64` (`DeviceLimits::texelBuffers`). `Plan::buffer` then
+  /// returns VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers, and
+  /// `maxStorageBufferRange` of `Context::limits` is at most what such a buffer can hold. Results
+  /// are the same to the bit. If not set: true for CPU devices (measured on lavapipe), false for
+  /// others (a guess).
   std::optional<bool> texelBuffers;
   /// Whether kernels may store interleaved vertices through workgroup memory
   /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete

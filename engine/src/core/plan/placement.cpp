@@ -159,16 +159,10 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
     variant.units.fill(4);
     return variant;
   }
-  if (storesWidely(limits)) {
-    if (areAligned) variant = withWideStores(job, variant);
-    variant.wideStores = storesWholeWords(variant);
-  }
-  variant.texels = limits.texelBuffers &&
-                   limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
-                   storesWholeWords(variant);
-  const bool isPlain = !hasResult(job) && job.motion == Motion::none;
-  variant.pairs = variant.texels && limits.shaderInt64 && variant.recordBytes == 0 &&
-                  (isPlain || variant.wideStores) && standsInPairs(job);
+  if (!storesWidely(limits)) return variant;
+  if (areAligned) variant = withWideStores(job, variant);
+  variant.texels = storesWholeWords(variant);
+  variant.pairs = variant.texels && variant.recordBytes == 0 && standsInPairs(job);
   return variant;
 }
 
@@ -284,7 +278,6 @@ std::uint64_t Variant::key() const {
   add(scales, 1);
   add(texels, 1);
   add(pairs, 1);
-  add(wideStores, 1);
   add(recordBytes / 4, 4);
   add(staged, 1);
   add(influences, 3);
@@ -314,14 +307,13 @@ struct FormRanges {
   std::vector<bool> full{false, true}, morphs{false, true}, scales{false, true};
 };
 
-/// The kernels before the skin kernel. An engine's shaders may read any pose as dual quaternions.
+/// The kernels before the skin kernel.
 std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
                                      const Tuning& tuning) {
   std::vector<Variant> variants;
+  const PaletteForm form = paletteForm(job.method);
   for (const bool mayScale : ranges.scales) {
-    variants.push_back(paletteVariant(PaletteForm::dualQuaternions, mayScale, tuning));
-    if (paletteForm(job.method) == PaletteForm::logarithms)
-      variants.push_back(paletteVariant(PaletteForm::logarithms, mayScale, tuning));
+    if (form != PaletteForm::matrices) variants.push_back(paletteVariant(form, mayScale, tuning));
   }
   if (hasResult(job)) variants.push_back(clearVariant(tuning));
   return variants;

@@ -109,8 +109,7 @@ void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& varia
 
 /// Whether kernels on the device may store an attribute, or all of a vertex, at once.
 inline bool storesWidely(const DeviceLimits& limits) {
-  return limits.texelBuffers && limits.shaderInt64 && limits.scalarBlockLayout &&
-         limits.maxStorageBuffersPerStage >= storageBuffersWanted;
+  return limits.texelBuffers && limits.maxStorageBuffersPerStage >= storageBuffersWanted;
 }
 
 /// Whether the normals of a job directly follow its positions, both are float32x3, and their stride
