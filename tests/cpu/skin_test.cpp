@@ -545,9 +545,14 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
 TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
   const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
   const std::vector<std::uint32_t> vertices{200, 3, 4, 4, 150, 77, 0, 9, 101, 202};
-  for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear}) {
+  for (const auto& [rigidity, mayScale] :
+       {std::pair(Rigidity::rigid, true), std::pair(Rigidity::shear, true),
+        std::pair(Rigidity::shear, false)}) {
     Crowd crowd(203, 5, rigidity, plainLayout);
-    for (cpu::Instance& instance : crowd.instances) instance.morphs = morphs;
+    for (cpu::Instance& instance : crowd.instances) {
+      instance.morphs = morphs;
+      instance.mayScale = mayScale;
+    }
     for (const Method method : everydayMethods) {
       crowd.skin(method);
       std::vector<float> positions(vertices.size() * 3);

@@ -191,6 +191,17 @@ TEST_F(MockSystemTest, ABufferThatCannotBeBoundTakesNoMemory) {
 }
 
 // Bytes of all that the engine's allocator has created and not destroyed.
+// A device allows few allocations: in Vulkan at least 4,096.
+TEST_F(MockSystemTest, BlocksBecomeLargerWithTheScene) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  make(small());
+  const PackedMesh large = systemMesh(1, 400);
+  for (int mesh = 0; mesh < 200; ++mesh)
+    must(system->addMesh(large));  // each with a staging buffer
+  EXPECT_GT(mock.memoryBytes(), 200 * large.bytes().size());
+  EXPECT_LT(mock.memories.size(), 40u);
+}
+
 TEST_F(MockSystemTest, BuffersThatAreDestroyedDoNotCount) {
   ASSERT_NO_FATAL_FAILURE(create());
   SkinningSystemDescription description = small();

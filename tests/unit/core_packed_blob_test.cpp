@@ -281,6 +281,13 @@ TEST_F(DamagedBlob, MorphRecordsThatLeaveTheBlobAreRefused) {
   }
 }
 
+// Or else checking the targets would take time in proportion to their number times the blob's size.
+TEST_F(DamagedBlob, MorphTargetsThatShareBlocksAreRefused) {
+  const std::uint32_t first = blob.word(blob.morphRecord(0) + morphBlocks);
+  expectRefusedWith(blob.morphRecord(2) + morphBlocks, first);
+  expectRefusedWith(blob.morphRecord(2) + morphBlocks, first + abi::MORPH_BLOCK_WORDS);
+}
+
 TEST_F(DamagedBlob, DisplacementsOutsideTheBlobAreRefused) {
   for (const std::uint32_t target : {0u, 2u}) {
     const std::uint32_t words = target == 0 ? 9 : 3;
@@ -318,6 +325,16 @@ TEST(PackedBlob, APoseOfNoJointsIsRefused) {
     blob.seal();
     EXPECT_FALSE(PackedMesh::fromBytes(blob.bytes()).ok()) << joints;
   }
+}
+
+// Without targets, no other section contradicts the number.
+TEST(PackedBlob, AMeshOfNoVerticesIsRefused) {
+  OwnedMesh mesh = slottedMesh(1, 10, 4, 10);
+  std::fill(mesh.weights.begin(), mesh.weights.end(), 0.0f);
+  Blob blob(packed(mesh.view(), 10).bytes());
+  blob.words()[header::vertexCount] = 0;
+  blob.seal();
+  EXPECT_FALSE(PackedMesh::fromBytes(blob.bytes()).ok());
 }
 
 // Nothing else tells that they would stand askew.

@@ -143,6 +143,16 @@ TEST(RangeAllocator, FindsTheOnlyGapOfEveryAlignment) {
   }
 }
 
+// Another alignment takes the place of an earlier one, but never of 1.
+TEST(RangeAllocator, KnowsItsLargestGapAfterManyAlignments) {
+  RangeAllocator allocator(1000);
+  ASSERT_EQ(allocator.allocate(1, 1), (Range{0, 1}));
+  for (std::uint64_t alignment = 2; alignment < 3 * RangeAllocator::maxAlignments; ++alignment) {
+    allocator.free(*allocator.allocate(1, alignment));
+    EXPECT_EQ(allocator.largestFree(), 999u) << alignment;
+  }
+}
+
 /// What is free before `end`.
 std::vector<Range> gapsBetween(std::vector<Range> taken, std::uint64_t end) {
   std::ranges::sort(taken, {}, &Range::offset);

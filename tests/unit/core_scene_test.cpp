@@ -853,6 +853,34 @@ TEST(Scene, CompactionFillsEveryGapThatFits) {
   }
 }
 
+// An instance whose move is not recorded yet stays where it goes. Moved twice, it would keep the
+// place between.
+TEST(Scene, CompactionMovesEachInstanceOnceInAFrame) {
+  OneInstance one;
+  Scene& scene = one.scene = must(Scene::create(smallScene()));
+  const PoseHandle pose = must(scene.addPose(4));
+  std::vector<InstanceHandle> instances;
+  for (const std::uint32_t vertices : {5u, 1u, 2u, 1u, 2u}) {
+    MeshInfo info;
+    info.byteSize = 512;
+    info.vertexCount = vertices;
+    InstanceDescription description;
+    description.mesh = must(scene.addMesh(info));
+    description.pose = pose;
+    instances.push_back(must(scene.addInstance(description)));
+  }
+  one.record(1, 0);
+  must(scene.removeInstance(instances[0]));
+  must(scene.removeInstance(instances[2]));
+  must(scene.beginFrame(2, 1));
+  EXPECT_EQ(scene.compact(1000), 12u + 12u + 24u);
+  EXPECT_EQ(scene.compact(1000), 0u);
+  must(scene.plan(one.planned));
+  must(scene.commit());
+  must(scene.beginFrame(3, 2));
+  EXPECT_EQ(scene.statistics().outputs.used, 12u + 12u + 24u);
+}
+
 /// The version of the only candidate of a plan.
 std::uint32_t versionOf(const Plan& plan) {
   std::vector<std::uint32_t> words(plan.buffer(BufferRole::tables).size / 4);

@@ -192,6 +192,21 @@ gltf::Model withImages(const FileBuilder& file) {
   return loaded(gltf::loadFromMemory(file.glb(), {}, {.images = true}));
 }
 
+// The buffer needs the first half of the file, the image all of it.
+TEST_F(GltfBudget, AnImageMayBeLargerThanTheBufferInItsFile) {
+  constexpr std::uint64_t size = 1'000'000;
+  writeSparse("side.bin", "", size);
+  FileBuilder file = texturedBy(1);
+  file.json["buffers"] = sideBuffers(1, size / 2, "side.bin");
+  file.json["images"][0]["uri"] = "side.bin";
+  const gltf::Model model =
+      loaded(gltf::loadFromMemory(bytesOf(file.text()), folder_, {.images = true}));
+  EXPECT_EQ(model.images.at(0).bytes.size(), size);
+  const std::uint64_t all = allowed(file.text().size() + size);
+  EXPECT_LE(model.budget.left(), all) << "the first half raises the budget once";
+  EXPECT_GE(model.budget.left(), all - 4 * size);
+}
+
 TEST_F(GltfBudget, EqualImagesAreOne) {
   FileBuilder file = texturedBy(4);
   const std::size_t view = file.addView(bytesOf(std::string("picture")));

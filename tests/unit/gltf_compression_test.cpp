@@ -319,16 +319,23 @@ TEST(MeshoptTest, RefusesWhatTheExtensionDoesNotAllow) {
   compressed(file, 0, meshopt) = 5;
   expectInvalid(file, "bufferView 0: EXT_meshopt_compression is not an object");
   file = small;
+  Json& from = compressed(file, 0, meshopt);
+  from["byteOffset"] = file.binary.size() - from["byteLength"].get<std::size_t>() + 1;
+  expectInvalid(file, "are outside buffer 0");
+  file = small;
   file.json["bufferViews"][0]["byteLength"] = 760;
   expectNoted(file, "63 elements of 12 bytes are not the byteLength of the bufferView");
 }
 
-// Before the memory is there.
+// Before the memory is there, and even if nothing skinned uses the view.
 TEST(MeshoptTest, SpendsWhatAViewDeclares) {
-  FileBuilder file = compress(skinnedGrid());
-  for (const std::uint64_t count : {std::uint64_t{100} << 20, (std::uint64_t{1} << 53) - 1}) {
-    compressed(file, 0, meshopt)["count"] = count;
-    expectError(file.load(), ErrorCode::limitExceeded, "bufferView 0: it needs more memory");
+  for (const std::size_t view : {0u, 3u}) {  // POSITION, TEXCOORD_0
+    FileBuilder file = compress(skinnedGrid());
+    for (const std::uint64_t count : {std::uint64_t{100} << 20, (std::uint64_t{1} << 53) - 1}) {
+      compressed(file, view, meshopt)["count"] = count;
+      expectError(file.load(), ErrorCode::limitExceeded,
+                  "bufferView " + std::to_string(view) + ": it needs more memory");
+    }
   }
 }
 
@@ -627,12 +634,17 @@ TEST(DracoTest, TruncatedDataIsAnError) {
 // theirs before libdraco sees them.
 TEST(DracoTest, HugeNumbersAreRefusedBeforeAnythingIsDecoded) {
   FileBuilder file = compressByDraco(skinnedGrid());
-  for (Json& accessor : file.json["accessors"]) {
-    if (!accessor.contains("bufferView")) accessor["count"] = 300'000'000;
-  }
   file.primitive().erase("targets");
-  expectError(file.load(), ErrorCode::limitExceeded,
-              "KHR_draco_mesh_compression: it needs more memory");
+  const std::size_t indices = file.primitive()["indices"].get<std::size_t>();
+  for (const bool areIndicesHuge : {false, true}) {
+    for (std::size_t i = 0; i < file.json["accessors"].size(); ++i) {
+      Json& accessor = file.json["accessors"][i];
+      if (!accessor.contains("bufferView") && (areIndicesHuge || i != indices))
+        accessor["count"] = 300'000'000;
+    }
+    expectError(file.load(), ErrorCode::limitExceeded,
+                "KHR_draco_mesh_compression: it needs more memory");
+  }
   // In both encodings the numbers are behind 11 bytes of header, and in one a byte.
   for (const int method : {::draco::MESH_SEQUENTIAL_ENCODING, ::draco::MESH_EDGEBREAKER_ENCODING}) {
     file = compressByDraco(skinnedGrid(), {.method = method});

@@ -442,6 +442,15 @@ TEST(GltfPrimitive, SharesOnlyWhatIsTheSame) {
   EXPECT_EQ(strip.normals, (Floats{0, 0, 0, 1, 0, 0, 0, 2, 0}));
 }
 
+// Three bytes a color: the stride is that of the elements, without padding.
+TEST(GltfPrimitive, NotesColorsWithoutPadding) {
+  FileBuilder file = skinnedTriangle();
+  file.attributes()["COLOR_0"] =
+      file.add<std::uint8_t>({255, 0, 51, 204, 0, 0, 0, 0, 255}, "VEC3", unsignedByteType, true);
+  const gltf::Model model = expectNoted(file, "starts at byte 0 with a stride of 3");
+  EXPECT_EQ(firstPrimitive(model).colors, (Floats{1, 0, 0.2f, 1, 0.8f, 0, 0, 1, 0, 0, 1, 1}));
+}
+
 TEST(GltfPrimitive, KeepsSparseMorphTargetsSparse) {
   FileBuilder file = skinnedTriangle();
   file.attributes()["NORMAL"] = file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
