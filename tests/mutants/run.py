@@ -34,6 +34,8 @@ tests = tree / "build/ci/tests"
 time_limit = 60  # seconds of one test; a mistake may cause an endless loop
 memory_limit = 16 << 30
 jobs = os.cpu_count() or 2
+# Programs in which `find` looks for a test. Those without a device come first.
+candidates = ["core_test", "math_test", "reference_test", "cpu_test", "gltf_test", "mock_test", "vulkan_test", "system_test"]
 
 
 class Mutant:
@@ -98,18 +100,18 @@ def copy_tree(mutants):
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(content)
         copy.chmod((root / name).stat().st_mode)
-    for path in tree.rglob("*"):
-        name = path.relative_to(tree)
-        if name.parts[0] not in ("build", "figures") and path.is_file() and str(name) not in set(names):
-            path.unlink()
+    names = set(names)
+    for folder in tree.iterdir():
+        for path in folder.rglob("*") if folder.name != "build" else ():
+            if path.is_file() and str(path.relative_to(tree)) not in names:
+                path.unlink()
 
 
 def build(programs):
-    command = ["cmake", "--preset", "ci", "-DDERMIS_WARNINGS_AS_ERRORS=ON"]
     log = tree / "build/build.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     with open(log, "w") as output:
-        for command in (command, ["cmake", "--build", "build/ci", "--target", *programs]):
+        for command in (["cmake", "--preset", "ci"], ["cmake", "--build", "build/ci", "--target", *programs]):
             if subprocess.run(command, cwd=tree, stdout=output, stderr=subprocess.STDOUT).returncode != 0:
                 print("".join(open(log).readlines()[-60:]))
                 sys.exit("mutants: the build failed")
@@ -185,10 +187,10 @@ def reached_by(program):
     return found
 
 
-def find(mutants, programs):
+def find(mutants):
     """Prints for each mistake which tests catch it, of the first program that has one."""
     reaching = dict.fromkeys((mutant.number for mutant in mutants), 0)
-    for program in programs:
+    for program in candidates:
         reached = reached_by(program)
 
         def search(mutant):
@@ -213,13 +215,11 @@ def main():
     everything = read_mutants()
     numbers = [int(argument) for argument in arguments[finds:]] or sorted(everything)
     mutants = [everything[number] for number in numbers]
-    programs = list(dict.fromkeys(["core_test", "math_test", "reference_test", "cpu_test", "gltf_test", "mock_test", "vulkan_test",
-                                   "system_test"]))
     for limit, value in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_AS, memory_limit)):
         resource.setrlimit(limit, (value, value))
     copy_tree(everything)
-    build(programs)
-    return find(mutants, programs) if finds else check(mutants)
+    build(candidates if finds else sorted({mutant.program for mutant in mutants}))
+    return find(mutants) if finds else check(mutants)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #   arm64        the same for arm64, run by qemu
 #   libcxx       the same by Clang with libc++
 #   fuzz         each fuzzer for a minute
+#   mutants      over two hundred mistakes planted in the engine, one at a time; a test must catch each (tests/mutants)
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
 #   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
@@ -31,7 +32,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mesa speed gpu exhaustive packages golden showcase programs"
+parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mutants mesa speed gpu exhaustive packages golden showcase programs"
 passed=tests/nightly/passed.tsv
 figures=build/nightly/figures # what a part counted
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
@@ -194,6 +195,10 @@ part_mesa() {
   build/ci/samples/cli/dermis devices
   tests ci -LE nightly -R "$device_suites|Render|Crowd|Comparison"
   build/ci/samples/cli/dermis verify samples/models/*.glb
+}
+
+part_mutants() {
+  ./tests/mutants/run.py
 }
 
 # Minimum ratios: about two thirds of those measured on a quiet machine (docs/performance.md).
