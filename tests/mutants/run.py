@@ -74,11 +74,11 @@ def read_mutants():
     return mutants
 
 
-def planted(text, mutants):
+def planted(text, mutants, complaints):
     for mutant in mutants:
         old, new = "\n".join(mutant.old), "\n".join(mutant.new)
         if text.count(old) != 1:
-            sys.exit(f"{mutant}: its old text occurs {text.count(old)} times in {mutant.file}, not once: {old}")
+            complaints.append(f"{mutant}: its old text occurs {text.count(old)} times in {mutant.file}, not once: {old}")
         text = text.replace(old, re.sub(r"\bMISTAKE\b", f"::mutants::isChosen({mutant.number})", new))
     return f'#include "{here}/mutants.h"\n' + text if mutants else text
 
@@ -89,11 +89,15 @@ def copy_tree(mutants):
     names = [name for name in names.split("\0") if name and (root / name).is_file()]
     if unknown := {mutant.file for mutant in mutants.values()} - set(names):
         sys.exit(f"There is no {unknown.pop()} to plant a mistake in")
+    contents, complaints = {}, []
     for name in names:
-        content = (root / name).read_bytes()
+        contents[name] = (root / name).read_bytes()
         in_file = [mutant for mutant in mutants.values() if mutant.file == name]
         if in_file:
-            content = planted(content.decode(), in_file).encode()
+            contents[name] = planted(contents[name].decode(), in_file, complaints).encode()
+    if complaints:
+        sys.exit("\n".join(complaints))
+    for name, content in contents.items():
         copy = tree / name
         if copy.is_file() and copy.read_bytes() == content:
             continue
