@@ -460,6 +460,7 @@ TEST(Scene, WhatIsRemovedIsFreeWhenItsFrameIsComplete) {
   must(one.scene.beginFrame(3, 2));
   EXPECT_EQ(one.scene.statistics().palettes.used, 0u);
   EXPECT_EQ(one.scene.statistics().outputs.used, 0u);
+  EXPECT_TRUE(one.scene.addPose(256).ok()) << "all joints";
 }
 
 // Its mesh was changed after a frame that is then abandoned: two places are free, not one.
