@@ -199,6 +199,7 @@ part_mesa() {
 
 part_mutants() {
   ./tests/mutants/run.py
+  cp build/nightly/mutants/figures "$figures"
 }
 
 # Minimum ratios: about two thirds of those measured on a quiet machine (docs/performance.md).
