@@ -6,11 +6,7 @@
 #include "abi.h"
 
 #ifdef TEXELS
-layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
-layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
-
-uvec4 meshUnit(uint unit) { return texelFetch(meshTexels, int(unit)); }
-uint meshWord(uint word) { return texelFetch(meshWordTexels, int(word)).x; }
+#include "cpu_device/texels.glsl"
 #else
 layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Meshes { uint meshes[]; };
 layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer MeshUnits { uvec4 meshUnits[]; };

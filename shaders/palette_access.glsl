@@ -7,9 +7,7 @@
 #include "scale_shear.glsl"
 
 #ifdef TEXELS
-layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
-
-uvec4 paletteBits(uint unit) { return texelFetch(paletteTexels, int(unit)); }
+#include "cpu_device/texels.glsl"
 #else
 layout(set = 0, binding = BINDING_PALETTES, std430) restrict readonly buffer Palettes { uvec4 palettes[]; };
 

@@ -90,6 +90,13 @@ void countClamped(uint result) {}
 
 layout(push_constant) uniform Push { SkinPush push; };
 
+// Vertices that an invocation skins.
+#ifdef TEXELS
+#define VERTICES push.verticesPerInvocation
+#else
+#define VERTICES 1u
+#endif
+
 // Finds the group of a workgroup: the first whose end is after it.
 uint findGroup(uint number) {
   uint low = 0u;
@@ -132,7 +139,7 @@ BoxScale boxOf(InstanceRecord instance) {
 struct Instance {
   InstanceRecord record;
   uvec4 places;
-  uint recordPlace;  // for storeRecord
+  uint recordPlace;  // of storeRecord
   BoxScale box;
 };
 
@@ -142,27 +149,6 @@ Instance readInstance(uint word, uvec4 offsets) {
   InstanceRecord record = loadInstance(word);
   uvec4 places = placesOf(record) + offsets;
   return Instance(record, places, recordPlace(places.x), boxOf(record));
-}
-
-// The difference between consecutive instances that are evenly spaced. Such instances have the same
-// box.
-Instance stepBetween(InstanceRecord a, InstanceRecord b) {
-  InstanceRecord step = a;
-  step.palette = b.palette - a.palette;
-  step.joints = b.joints - a.joints;
-  step.previousPalette = b.previousPalette - a.previousPalette;
-  step.extension = b.extension - a.extension;
-  return Instance(step, placesOf(b) - placesOf(a), recordPlace(b.positions) - recordPlace(a.positions),
-                  BoxScale(vec3(0.0), vec3(0.0)));
-}
-
-void advance(inout Instance instance, Instance by) {
-  instance.record.palette += by.record.palette;
-  instance.record.joints += by.record.joints;
-  instance.record.previousPalette += by.record.previousPalette;
-  instance.record.extension += by.record.extension;
-  instance.places += by.places;
-  instance.recordPlace += by.recordPlace;
 }
 
 // Encodes a position in its format.
@@ -187,6 +173,18 @@ struct Work {
   Influences influences;
   MethodInputs inputs;
 };
+
+Work workOf(uint mesh, Sections sections, uint vertex) {
+  Work work;
+  work.mesh = mesh;
+  work.vertex = vertex;
+  uint firstInfluence;
+  work.bind = bindVertex(sections, vertex, firstInfluence);
+  if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
+  work.inputs = methodInputsOf(mesh, vertex);
+  work.influences = influencesOf(sections, vertex, firstInfluence);
+  return work;
+}
 
 #ifdef HAS_MOTION
 // The position in the output, before this frame overwrites it.
@@ -260,51 +258,48 @@ void skinInstance(Instance instance, Work work, bool scales) {
 #endif
 }
 
-// Whether instances with scaling joints have their own loop. lavapipe predicates instead of branching, so without that loop rigid
-// instances pay for the scale, too. A second loop lengthens compilation. Comparison methods, MOTION_RESKINNED and invocations with
-// few instances (the default for GPUs, which branch) do without it.
-#ifdef COMPARISON
-const bool APART = false;
-#elif defined(HAS_MOTION)
-const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
-#else
-const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u;
-#endif
+// The instances that an invocation skins: the word of the first record, and their number.
+struct Share {
+  uint records;
+  uint count;
+};
 
-// Skins the instances whose bits are set in `left`, in ascending order. Records are read once for a run of evenly spaced
-// consecutive instances. A run has as many instances as there are consecutive bits, or one if instances are not evenly spaced.
-void skinInstances(uint left, uint records, uvec4 offsets, bool even, Instance by, Work work, bool scales) {
-  // Loops test their condition at the end. If the test comes first, lavapipe executes the rest of the body once more with all
-  // lanes off, which doubles the work of an invocation with one instance.
-  do {
-    Instance instance = readInstance(records + uint(findLSB(left)) * INSTANCE_WORDS, offsets);
-    uint lowest = left & (~left + 1u);
-    uint after = left & (even ? left + lowest : left - 1u);  // the sum carries through the bits of the run
-    int run = bitCount(left ^ after);
-    left = after;
-    do {
-      skinInstance(instance, work, scales || (!APART && paletteScales(instance.record.palette)));
-      advance(instance, by);
-    } while (--run != 0);
-  } while (left != 0u);
+// The instances of a group are divided into shares. All but the last have the same size, so that workgroups take about the same
+// time, and the work is spread evenly over the threads.
+Share shareOf(GroupRecord group, uint number) {
+  uint size = INSTANCES;
+  if (INSTANCES > 1u) {
+    uint most = push.instancesPerInvocation;
+    uint shares = max((group.instanceCount + most - 1u) / most, 1u);
+    size = (group.instanceCount + shares - 1u) / shares;
+  }
+  uint first = min(number * size, group.instanceCount);
+  return Share(push.instances + (group.firstInstance + first) * INSTANCE_WORDS, min(size, group.instanceCount - first));
 }
+
+#ifdef TEXELS
+#include "cpu_device/skin_instances.glsl"
+#else
+void skinInstances(GroupRecord group, Share share, uint run, uint vertex) {
+  Work work = workOf(group.mesh, sectionsOf(group.mesh), vertex);
+  uvec4 offsets = run * uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
+  for (uint i = 0u; i < share.count; ++i) {
+    Instance instance = readInstance(share.records + i * INSTANCE_WORDS, offsets);
+    skinInstance(instance, work, paletteScales(instance.record.palette));
+  }
+}
+#endif
 
 void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
   uint index = findGroup(number);
   uint word = push.groups + index * GROUP_WORDS;
-  uint local = index == 0u ? number : number - loadGroup(word - GROUP_WORDS).workgroupEnd;
   GroupRecord group = loadGroup(word);
-
-#ifdef TEXELS
-  uint vertices = push.verticesPerInvocation;
-#else
-  const uint vertices = 1u;
-#endif
+  if (index != 0u) number -= loadGroup(word - GROUP_WORDS).workgroupEnd;
   // Consecutive workgroups process all vertices for some instances, then all vertices for the next instances, so that palettes stay
   // in the cache.
-  uint run = (local % group.vertexGroups) * gl_WorkGroupSize.x * vertices + gl_LocalInvocationID.x;
+  uint run = (number % group.vertexGroups) * gl_WorkGroupSize.x * VERTICES + gl_LocalInvocationID.x;
   uint vertex = group.firstVertex + run;
 #ifdef STAGED
   // All invocations reach each barrier. Those without a vertex skin the last vertex again; their staged records are never stored.
@@ -313,50 +308,6 @@ void main() {
 #else
   if (vertex >= group.vertexEnd) return;
 #endif
-  // The instances of the group are divided into shares; each invocation skins one share. All shares except the last have the same
-  // size, so that workgroups take about the same time, and the work is spread evenly over the threads.
-  uint share = INSTANCES;
-  if (INSTANCES > 1u) {
-    uint maxShare = push.instancesPerInvocation;
-    uint shares = max((group.instanceCount + maxShare - 1u) / maxShare, 1u);
-    share = (group.instanceCount + shares - 1u) / shares;
-  }
-  uint firstInstance = (local / group.vertexGroups) * share;
-  if (firstInstance >= group.instanceCount) return;
-  uint count = min(share, group.instanceCount - firstInstance);
-
-  // Outside the loops, because lavapipe reads a push constant at every use.
-  uint records = push.instances + (group.firstInstance + firstInstance) * INSTANCE_WORDS;
-  uvec4 strides = uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
-  uint left = 0xffffffffu >> (32u - count);  // one bit per instance
-  bool even = group.evenlySpaced != 0u;
-  Instance by = stepBetween(loadInstance(records), loadInstance(records + min(1u, count - 1u) * INSTANCE_WORDS));
-  uint scaling = 0u;
-  if (APART) {
-    uint i = 0u;
-    do {
-      if (paletteScales(loadInstance(records + i * INSTANCE_WORDS).palette)) scaling |= 1u << i;
-    } while (++i < count);
-    left &= ~scaling;
-  }
-  Sections sections = sectionsOf(group.mesh);
-#ifdef TEXELS
-  do {
-#endif
-    Work work;
-    work.mesh = group.mesh;
-    work.vertex = vertex;
-    uint firstInfluence;
-    work.bind = bindVertex(sections, vertex, firstInfluence);
-    if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
-    work.inputs = methodInputsOf(group.mesh, vertex);
-    work.influences = influencesOf(sections, vertex, firstInfluence);
-    uvec4 offsets = run * strides;
-    if (!APART || left != 0u) skinInstances(left, records, offsets, even, by, work, false);
-    if (APART && scaling != 0u) skinInstances(scaling, records, offsets, even, by, work, true);
-#ifdef TEXELS
-    run += gl_WorkGroupSize.x;
-    vertex += gl_WorkGroupSize.x;
-  } while (--vertices != 0u && vertex < group.vertexEnd);
-#endif
+  Share share = shareOf(group, number / group.vertexGroups);
+  if (share.count != 0u) skinInstances(group, share, run, vertex);
 }

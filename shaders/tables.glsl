@@ -12,19 +12,13 @@
 #endif
 layout(set = 0, binding = BINDING_TABLES, std430) TABLE_ACCESS buffer Tables { uint tables[]; };
 #ifdef TEXELS
-layout(set = 0, binding = BINDING_TABLE_TEXELS) uniform utextureBuffer tableTexels;
+#include "cpu_device/texels.glsl"
 #else
 layout(set = 0, binding = BINDING_TABLES, std430) TABLE_ACCESS buffer TableUnits { uvec4 tableUnits[]; };
-#endif
 
 // Four words of a record.
-uvec4 tableUnit(uint word) {
-#ifdef TEXELS
-  return texelFetch(tableTexels, int(word / 4u));
-#else
-  return tableUnits[word / 4u];
+uvec4 tableUnit(uint word) { return tableUnits[word / 4u]; }
 #endif
-}
 
 PaletteRecord loadPalette(uint word) {
   uvec4 a = tableUnit(word);
