@@ -86,11 +86,6 @@ DERMIS_CONSTANT FORMAT_SNORM8X4 = 8u;
 DERMIS_CONSTANT FORMAT_OCTAHEDRAL16X2 = 9u;
 DERMIS_CONSTANT FORMAT_OCTAHEDRAL8X2 = 10u;
 
-// Values of Motion.
-DERMIS_CONSTANT MOTION_NONE = 0u;
-DERMIS_CONSTANT MOTION_KEPT = 1u;
-DERMIS_CONSTANT MOTION_RESKINNED = 2u;
-
 // ---- Packed mesh: a header, then sections. Offsets count words from the beginning of the mesh.
 // Four words at a multiple of 4 are a unit: kernels read them at once.
 DERMIS_CONSTANT MESH_MAGIC = 0x4d4b5344u;  // "DSKM"
@@ -221,9 +216,9 @@ struct InstanceRecord {
   uint normals;
   uint tangents;
   uint previousPositions;
-  uint joints;           // number of joints in the palette, plus INSTANCE_* flags
-  uint previousPalette;  // with MOTION_RESKINNED: as `palette`, for the previous pose
-  uint extension;        // word offset of its ExtensionRecord in the tables; 0 if it has none
+  uint joints;     // number of joints in the palette, plus INSTANCE_* flags
+  uint extension;  // word offset of its ExtensionRecord in the tables; 0 if it has none
+  uint reserved;
 };
 DERMIS_CONSTANT INSTANCE_WORDS = 8u;
 DERMIS_CONSTANT INSTANCE_JOINTS = 0xfffffu;     // the bits of `joints` that are the number
@@ -237,24 +232,20 @@ DERMIS_CONSTANT INSTANCE_HAS_RESULT = 0x800000u;
 
 // Data that only some instances have.
 struct ExtensionRecord {
-  uint previousJointCount;  // joints of the previous palette
-  uint morphs;              // word offset of the active morph targets in the tables
+  uint morphs;  // word offset of the active morph targets in the tables
   uint morphCount;
-  uint previousMorphs;
-  uint previousMorphCount;
+  uint result;  // index of its result
   uint reserved;
-  uint reserved1;
-  uint reserved2;
   float centerX;  // center of the box of snorm16 positions
   float centerY;
   float centerZ;
   float inverseX;  // 1 / half of the size of the box
   float inverseY;
   float inverseZ;
-  uint result;  // index of its result
-  uint reserved3;
+  uint reserved1;
+  uint reserved2;
 };
-DERMIS_CONSTANT EXTENSION_WORDS = 16u;
+DERMIS_CONSTANT EXTENSION_WORDS = 12u;
 
 // An active morph target. The targets of an instance are sorted by `target`.
 struct ActiveMorph {

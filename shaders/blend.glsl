@@ -20,31 +20,31 @@
 #include "methods/center_of_rotation.glsl"
 #endif
 
-Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose) {
   switch (METHOD) {
 #ifdef COMPARISON
     case METHOD_LOG_MATRIX:
-      return skinLogMatrix(vertex, influences, pose, withNormal, withTangent);
+      return skinLogMatrix(vertex, influences, pose);
     case METHOD_SPHERICAL_BLEND:
-      return skinSpherical(vertex, influences, pose, withNormal, withTangent);
+      return skinSpherical(vertex, influences, pose);
     case METHOD_QUATERNION_TRANSLATION:
-      return skinQuaternionTranslation(vertex, influences, pose, withNormal, withTangent);
+      return skinQuaternionTranslation(vertex, influences, pose);
     default:
-      return skinIterative(vertex, influences, pose, withNormal, withTangent);
+      return skinIterative(vertex, influences, pose);
 #else
 #ifdef BULGE
     case METHOD_BLENDED:
-      return skinBlended(vertex, influences, pose, inputs.methodWeight, withNormal, withTangent);
+      return skinBlended(vertex, influences, pose, inputs.methodWeight);
     case METHOD_CENTER_OF_ROTATION:
-      return skinCenterOfRotation(vertex, influences, pose, inputs.center, withNormal, withTangent);
+      return skinCenterOfRotation(vertex, influences, pose, inputs.center);
     case METHOD_BULGE_CONTROLLED:
-      return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.methodWeight, withNormal, withTangent);
+      return skinBulgeControlled(vertex, influences, pose, inputs.center, inputs.methodWeight);
 #endif
 #ifndef BULGE
     case METHOD_LINEAR:
-      return skinLinear(vertex, influences, pose, withNormal, withTangent);
+      return skinLinear(vertex, influences, pose);
     case METHOD_DUAL_QUATERNION:
-      return skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
+      return skinDualQuaternion(vertex, influences, pose);
 #endif
     default:
       return vertex;  // no other method is in this module
@@ -53,7 +53,7 @@ Vertex skinByMethod(Vertex vertex, Influences influences, MethodInputs inputs, P
 }
 
 // A vertex without influences stays in bind pose.
-Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pose pose) {
   // All loaded influences of such a vertex are joint 0. Most meshes have no such vertex: selecting the result afterwards costs less
   // than a branch around everything. Comparison methods branch, since some of them iterate until they converge.
 #ifdef COMPARISON
@@ -63,7 +63,7 @@ Vertex skinVertex(Vertex vertex, Influences influences, MethodInputs inputs, Pos
 #endif
   bool still = !hasSlot(influences.count, 0u);
   if (branches && still) return vertex;
-  Vertex skinned = skinByMethod(vertex, influences, inputs, pose, withNormal, withTangent);
+  Vertex skinned = skinByMethod(vertex, influences, inputs, pose);
   if (still) skinned = vertex;
   return skinned;
 }

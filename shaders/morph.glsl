@@ -23,7 +23,7 @@ bool findDisplacement(uint mesh, MorphRecord target, uint vertex, out uint word)
 }
 
 // `number` is the index of the vertex. The active targets begin at word `first` of the tables, sorted by target.
-void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint count, bool withNormal, bool withTangent) {
+void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint count) {
   precise vec3 position = vertex.position;
   precise vec3 normal = vertex.normal;
   precise vec3 tangent = vertex.tangent.xyz;
@@ -39,10 +39,10 @@ void morphVertex(inout Vertex vertex, uint mesh, uint number, uint first, uint c
       word += 3u;
     }
     if ((target.attributes & MORPH_HAS_NORMALS) != 0u) {
-      if (withNormal) normal += weight * meshVector(word);
+      if (NORMALS) normal += weight * meshVector(word);
       word += 3u;
     }
-    if (withTangent && (target.attributes & MORPH_HAS_TANGENTS) != 0u) tangent += weight * meshVector(word);
+    if (TANGENTS && (target.attributes & MORPH_HAS_TANGENTS) != 0u) tangent += weight * meshVector(word);
   }
   vertex.position = position;
   vertex.normal = normal;

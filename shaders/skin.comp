@@ -56,7 +56,7 @@ layout(constant_id = CONSTANT_RECORD) const uint RECORD = RECORD_APART;
 const uint RECORD = RECORD_APART;
 #endif
 #if defined(EXTRAS) || defined(ONE_OUTPUT)
-layout(constant_id = CONSTANT_MOTION) const uint MOTION = MOTION_NONE;
+layout(constant_id = CONSTANT_MOTION) const bool MOTION = false;
 #define HAS_MOTION
 #endif
 #ifdef EXTRAS
@@ -152,13 +152,13 @@ Instance readInstance(uint word, uvec4 offsets) {
 }
 
 // Encodes a position in its format.
-uvec4 encodePosition(vec3 position, Instance instance, bool mayCount) {
+uvec4 encodePosition(vec3 position, Instance instance) {
   vec4 v = vec4(position, 1.0);
   if (isSnormPosition(POSITION_FORMAT)) {
     precise vec3 relative = (position - instance.box.center) * instance.box.inverse;
     v.xyz = relative;
     // A vertex on a face of the engine's box may be outside by a rounding error.
-    if (mayCount && any(greaterThan(abs(relative), vec3(1.00001)))) {
+    if (any(greaterThan(abs(relative), vec3(1.00001)))) {
       countClamped(loadExtension(instance.record.extension).result);
     }
   }
@@ -180,7 +180,7 @@ Work workOf(uint mesh, Sections sections, uint vertex) {
   work.vertex = vertex;
   uint firstInfluence;
   work.bind = bindVertex(sections, vertex, firstInfluence);
-  if (!MORPHS) makeDirectionsUnit(work.bind, NORMALS, TANGENTS);
+  if (!MORPHS) makeDirectionsUnit(work.bind);
   work.inputs = methodInputsOf(mesh, vertex);
   work.influences = influencesOf(sections, vertex, firstInfluence);
   return work;
@@ -194,27 +194,12 @@ uvec4 keptPosition(Instance instance) {
 #endif
   return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
 }
-
-uvec4 previousPosition(Instance instance, uvec4 current, Work work) {
-  if ((instance.record.joints & INSTANCE_RESTARTS) != 0u) return current;
-  if (MOTION == MOTION_KEPT) return keptPosition(instance);
-  ExtensionRecord extension = loadExtension(instance.record.extension);
-  Vertex before = work.bind;
-  if (MORPHS) {
-    morphVertex(before, work.mesh, work.vertex, extension.previousMorphs, extension.previousMorphCount, false, false);
-  }
-  uint palette = instance.record.previousPalette;
-  Pose pose = Pose(palette, extension.previousJointCount, paletteScales(palette));
-  before = skinVertex(before, work.influences, work.inputs, pose, false, false);
-  return encodePosition(before.position, instance, false);
-}
 #endif
 
 void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef HAS_MOTION
-  if (MOTION != MOTION_NONE && (instance.record.joints & INSTANCE_SETTLES) != 0u) {
-    uvec4 words = keptPosition(instance);
-    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+  if (MOTION && (instance.record.joints & INSTANCE_SETTLES) != 0u) {
+    storePrevious(instance.places.w, keptPosition(instance), formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
     return;
   }
 #endif
@@ -222,18 +207,18 @@ void skinInstance(Instance instance, Work work, bool scales) {
   Vertex morphed = work.bind;
   if (MORPHS) {
     ExtensionRecord extension = loadExtension(instance.record.extension);
-    morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount, NORMALS, TANGENTS);
-    makeDirectionsUnit(morphed, NORMALS, TANGENTS);
+    morphVertex(morphed, work.mesh, work.vertex, extension.morphs, extension.morphCount);
+    makeDirectionsUnit(morphed);
   }
   Pose pose = Pose(instance.record.palette, instance.record.joints & INSTANCE_JOINTS, scales);
-  Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose, NORMALS, TANGENTS);
+  Vertex skinned = skinVertex(morphed, work.influences, work.inputs, pose);
   if (BOUNDS) addToBounds(loadExtension(instance.record.extension).result, skinned.position);
-  uvec4 position = encodePosition(skinned.position, instance, true);
+  uvec4 position = encodePosition(skinned.position, instance);
 #ifdef HAS_MOTION
-  // The kept positions must be read before the new ones overwrite them.
-  if (MOTION == MOTION_KEPT) {
-    uvec4 words = previousPosition(instance, position, work);
-    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+  // The kept position must be read before the new one overwrites it.
+  if (MOTION) {
+    bool restarts = (instance.record.joints & INSTANCE_RESTARTS) != 0u;
+    storePrevious(instance.places.w, restarts ? position : keptPosition(instance), formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
   }
 #endif
   uvec4 normal = NORMALS ? encodeNormal(NORMAL_FORMAT, skinned.normal) : uvec4(0u);
@@ -249,13 +234,6 @@ void skinInstance(Instance instance, Work work, bool scales) {
     }
     if (TANGENTS) storeTangents(instance.places.z, tangent, formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
   }
-#ifdef HAS_MOTION
-  // Done last, because most data of the vertex is no longer live.
-  if (MOTION == MOTION_RESKINNED) {
-    uvec4 words = previousPosition(instance, position, work);
-    storePrevious(instance.places.w, words, formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
-  }
-#endif
 }
 
 // The instances that an invocation skins: the word of the first record, and their number.

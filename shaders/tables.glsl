@@ -40,11 +40,9 @@ InstanceRecord loadInstance(uint word) {
 
 ExtensionRecord loadExtension(uint word) {
   uvec4 a = tableUnit(word);
-  uvec4 b = tableUnit(word + 4u);
-  vec4 c = uintBitsToFloat(tableUnit(word + 8u));  // snorm16 positions need this one and the next
-  uvec4 d = tableUnit(word + 12u);
-  return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, uintBitsToFloat(d.x), uintBitsToFloat(d.y),
-                         d.z, d.w);
+  vec4 b = uintBitsToFloat(tableUnit(word + 4u));  // snorm16 positions need this one and the next
+  uvec4 c = tableUnit(word + 8u);
+  return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
 }
 
 CandidateRecord loadCandidate(uint word) { return CandidateRecord(tables[word], tables[word + 1u]); }
@@ -63,7 +61,7 @@ void storeGroup(uint word, GroupRecord r) {
 
 void storeInstance(uint word, InstanceRecord r) {
   tableUnits[word / 4u] = uvec4(r.palette, r.positions, r.normals, r.tangents);
-  tableUnits[word / 4u + 1u] = uvec4(r.previousPositions, r.joints, r.previousPalette, r.extension);
+  tableUnits[word / 4u + 1u] = uvec4(r.previousPositions, r.joints, r.extension, r.reserved);
 }
 
 void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(r.x, r.y, r.z, r.reserved); }

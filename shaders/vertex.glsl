@@ -17,11 +17,11 @@ struct Vertex {
 
 // Called before the loop over instances or, with morph targets, for each instance. A method that only rotates a vertex need not
 // normalize again.
-void makeDirectionsUnit(inout Vertex vertex, bool withNormal, bool withTangent) {
+void makeDirectionsUnit(inout Vertex vertex) {
   vertex.givenNormal = vertex.normal;
   vertex.givenTangent = vertex.tangent.xyz;
-  if (withNormal) vertex.normal = unitOr(vertex.normal, vec3(0.0));
-  if (withTangent) vertex.tangent = vec4(unitOr(vertex.tangent.xyz, vec3(0.0)), vertex.tangent.w < 0.0 ? -1.0 : 1.0);
+  if (NORMALS) vertex.normal = unitOr(vertex.normal, vec3(0.0));
+  if (TANGENTS) vertex.tangent = vec4(unitOr(vertex.tangent.xyz, vec3(0.0)), vertex.tangent.w < 0.0 ? -1.0 : 1.0);
 }
 
 vec4 tangentOf(vec3 direction, float handedness, float side) {

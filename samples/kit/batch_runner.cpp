@@ -101,10 +101,6 @@ BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayou
     job.motion = output.motion;
     job.restartsMotion = request.restartsMotion;
     job.settles = request.settles;
-    job.previousPose = job.pose;
-    job.previousMorphs = request.previousMorphs;
-    if (output.motion == Motion::reskinned && !request.previousPose.empty())
-      job.previousPose = addPose(layout, request.previousPose, request.mayScale);
     job.positions.format = output.positions;
     if (job.mesh.hasNormals) job.normals.format = output.normals;
     if (job.mesh.hasTangents) job.tangents.format = output.tangents;

@@ -32,9 +32,6 @@ struct SkinRequest {
   Method method = Method::dualQuaternion;
   std::span<const MorphWeight> morphs = {};
   Box box = {};  ///< for snorm16 positions
-  // For motion.
-  std::span<const JointMatrix> previousPose = {};  ///< empty: the same pose
-  std::span<const MorphWeight> previousMorphs = {};
   bool restartsMotion = false;
   bool settles = false;
 };

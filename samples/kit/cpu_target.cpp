@@ -72,10 +72,6 @@ cpu::Instance CpuRunner::instanceOf(const Job& job) {
   instance.morphs = job.morphs;
   instance.restartsMotion = job.restartsMotion;
   instance.settles = job.settles;
-  if (job.motion == Motion::reskinned) {
-    instance.previousPose = layout_.poses[job.previousPose];
-    instance.previousMorphs = job.previousMorphs;
-  }
   return instance;
 }
 
@@ -119,11 +115,9 @@ Result<BatchResult> CpuRunner::skin() {
   std::vector<cpu::Instance> instances;
   for (Job& job : layout_.jobs) {
     // cpu::skin expects morph weights in the order of their morph targets.
-    for (std::span<const MorphWeight>* weights : {&job.morphs, &job.previousMorphs}) {
-      std::vector<MorphWeight>& own = morphs.emplace_back(weights->begin(), weights->end());
-      std::ranges::sort(own, {}, &MorphWeight::target);
-      *weights = own;
-    }
+    std::vector<MorphWeight>& own = morphs.emplace_back(job.morphs.begin(), job.morphs.end());
+    std::ranges::sort(own, {}, &MorphWeight::target);
+    job.morphs = own;
     instances.push_back(instanceOf(job));
   }
   BatchResult result;

@@ -59,7 +59,7 @@ struct InputValues {
 constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
                                   Arrangement::separate};
 constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
-constexpr std::array motions{Motion::none, Motion::kept, Motion::reskinned};
+constexpr std::array motions{Motion::none, Motion::kept};
 constexpr std::array either{false, true};
 constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3, 1000}, {128, 16}}};
 constexpr OutputValues allOutputs{verifiedPositionFormats,
@@ -199,7 +199,6 @@ std::string OutputCase::name() const {
                                                          : ", separate";
   if (layout.gap != 0) text += ", gaps of " + std::to_string(layout.gap);
   if (layout.motion == Motion::kept) text += ", previous kept";
-  if (layout.motion == Motion::reskinned) text += ", previous reskinned";
   if (layout.bounds) text += ", bounds";
   return text + ", " + std::to_string(tuning.workgroupSize) + " invocations, " +
          std::to_string(tuning.instancesPerInvocation) + " instances each";

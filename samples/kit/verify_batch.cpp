@@ -130,8 +130,6 @@ class BatchVerifier {
     request.pose = instance.pose;
     request.method = instance.method;
     request.morphs = instance.morphs;
-    request.previousPose = instance.previousPose;
-    request.previousMorphs = instance.previousMorphs;
     request.box = boxes_[index];
     return request;
   }
@@ -147,8 +145,8 @@ class BatchVerifier {
     for (const std::size_t index : indices) {
       now.push_back(requestOf(index));
       before.push_back(now.back());
-      before.back().pose = now.back().previousPose;
-      before.back().morphs = now.back().previousMorphs;
+      before.back().pose = instances_[index].previousPose;
+      before.back().morphs = instances_[index].previousMorphs;
       before.back().restartsMotion = moves;
       settled.push_back(now.back());
       settled.back().settles = moves;
@@ -188,7 +186,7 @@ class BatchVerifier {
     const auto& settled = frames.settled.instances[index].streams;
     if (before[previous] != before[positions])
       fail(index, "when motion restarts, previous positions are not the current ones");
-    if (output_.layout.motion == Motion::kept && now[previous] != before[positions])
+    if (now[previous] != before[positions])
       fail(index, "previous positions are not those of the frame before");
     if (settled[positions] != now[positions] || settled[previous] != now[positions])
       fail(index, "after settling, previous positions are not the current ones");

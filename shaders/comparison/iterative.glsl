@@ -43,7 +43,7 @@ Screw meanScrew(vec4 real, vec4 dual, Influences influences, Pose pose, vec4 piv
   return Screw(turn, shift);
 }
 
-Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinIterative(Vertex vertex, Influences influences, Pose pose) {
   Blend blend = blendJoints(influences, pose);
   vec4 pivot = paletteRotation(pose.palette, influences.joints.x);
   makeUnit(blend.real, blend.dual);
@@ -65,8 +65,8 @@ Vertex skinIterative(Vertex vertex, Influences influences, Pose pose, bool withN
     precise float near = 9e-14 * scaledReach * scaledReach;
     if (dot3(screw.real, screw.real) <= 9e-14 && dot3(shift, shift) <= near) break;
   }
-  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, 2.0, translationOf(blend.real, blend.dual, 2.0), withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose);
+  return turnVertex(scaled, blend.real, 2.0, translationOf(blend.real, blend.dual, 2.0));
 }
 
 #endif

@@ -57,7 +57,7 @@ vec3 direct(Affine m, vec3 v) {
   return vec3(dot3(m.r0.xyz, v), dot3(m.r1.xyz, v), dot3(m.r2.xyz, v));
 }
 
-Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose) {
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
@@ -69,12 +69,12 @@ Vertex skinLogMatrix(Vertex vertex, Influences influences, Pose pose, bool withN
     r2 += weight * paletteLogarithmRow(pose.palette, joint, 2u);
   }
   Affine blended = exponentialOf(Affine(r0, r1, r2));
-  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose);
   Vertex skinned = scaled.vertex;
   precise vec3 position = direct(blended, scaled.vertex.position) + vec3(blended.r0.w, blended.r1.w, blended.r2.w);
   skinned.position = position;
-  if (withNormal) skinned.normal = unitOr(direct(blended, scaled.vertex.normal), vec3(0.0));
-  if (withTangent) {
+  if (NORMALS) skinned.normal = unitOr(direct(blended, scaled.vertex.normal), vec3(0.0));
+  if (TANGENTS) {
     skinned.tangent =
         tangentOf(unitOr(direct(blended, scaled.vertex.tangent.xyz), vec3(0.0)), scaled.vertex.tangent.w, scaled.side);
   }

@@ -96,7 +96,7 @@ System jointSystem(Pose pose, uint joint) {
   return System(vec4(r0, t.x), vec4(r1, t.y), vec4(r2, t.z));
 }
 
-Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose) {
   Blend blend = blendJoints(influences, pose);
   // The mean, and the weighted mean.
   precise vec4 m0 = vec4(0.0);
@@ -128,12 +128,12 @@ Vertex skinSpherical(Vertex vertex, Influences influences, Pose pose, bool withN
     addRow(system, d2);
   }
   vec3 center = leastSquares(system);
-  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose);
   precise vec3 lever = scaled.vertex.position - center;
   scaled.vertex.position = lever;
   precise vec3 moved =
       vec3(dot3(w0.xyz, center) + w0.w, dot3(w1.xyz, center) + w1.w, dot3(w2.xyz, center) + w2.w);
-  return turnVertex(scaled, blend.real, turningFactor(blend.real), moved, withNormal, withTangent);
+  return turnVertex(scaled, blend.real, turningFactor(blend.real), moved);
 }
 
 #endif

@@ -9,7 +9,6 @@ Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   InstanceRecord step = a;
   step.palette = b.palette - a.palette;
   step.joints = b.joints - a.joints;
-  step.previousPalette = b.previousPalette - a.previousPalette;
   step.extension = b.extension - a.extension;
   return Instance(step, placesOf(b) - placesOf(a), recordPlace(b.positions) - recordPlace(a.positions),
                   BoxScale(vec3(0.0), vec3(0.0)));
@@ -18,18 +17,15 @@ Instance stepBetween(InstanceRecord a, InstanceRecord b) {
 void advance(inout Instance instance, Instance by) {
   instance.record.palette += by.record.palette;
   instance.record.joints += by.record.joints;
-  instance.record.previousPalette += by.record.previousPalette;
   instance.record.extension += by.record.extension;
   instance.places += by.places;
   instance.recordPlace += by.recordPlace;
 }
 
 // Whether instances with scaling joints have their own loop. Without it, rigid instances pay for the scale, too. A second loop
-// lengthens compilation. Comparison methods, MOTION_RESKINNED and invocations with few instances do without it.
+// lengthens compilation. Comparison methods and invocations with few instances do without it.
 #ifdef COMPARISON
 const bool APART = false;
-#elif defined(HAS_MOTION)
-const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u && MOTION != MOTION_RESKINNED;
 #else
 const bool APART = SCALES && METHOD != METHOD_LINEAR && INSTANCES >= 8u;
 #endif

@@ -17,7 +17,7 @@ void jointRows(vec4 q, Pose pose, uint joint, out vec3 r0, out vec3 r1, out vec3
   }
 }
 
-Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share, bool withNormal, bool withTangent) {
+Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share) {
   precise vec4 r0 = vec4(0.0);
   precise vec4 r1 = vec4(0.0);
   precise vec4 r2 = vec4(0.0);
@@ -34,19 +34,19 @@ Vertex skinBlended(Vertex vertex, Influences influences, Pose pose, float share,
     r1 += weight * vec4(row1, translation.y);
     r2 += weight * vec4(row2, translation.z);
   }
-  Vertex straight = throughMatrix(vertex, r0, r1, r2, withNormal, withTangent);
-  Vertex skinned = skinDualQuaternion(vertex, influences, pose, withNormal, withTangent);
+  Vertex straight = throughMatrix(vertex, r0, r1, r2);
+  Vertex skinned = skinDualQuaternion(vertex, influences, pose);
   if (share >= 1.0) return skinned;
   precise float rest = 1.0 - share;
   precise vec3 position = rest * straight.position + share * skinned.position;
   skinned.position = position;
   // The handedness is that of the dual quaternions, whose scale parts contain the reflections. If the joints have nearly opposite
   // rotations, linear blending may give the other handedness.
-  if (withNormal) {
+  if (NORMALS) {
     precise vec3 normal = rest * straight.normal + share * skinned.normal;
     skinned.normal = unitOr(normal, skinned.normal);
   }
-  if (withTangent) {
+  if (TANGENTS) {
     precise vec3 tangent = rest * straight.tangent.xyz + share * skinned.tangent.xyz;
     skinned.tangent.xyz = unitOr(tangent, skinned.tangent.xyz);
   }

@@ -68,19 +68,19 @@ vec3 scalePosition(ScaleShear part, vec3 p) {
   return position;
 }
 
-Scaled scaleVertex(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Scaled scaleVertex(Vertex vertex, Influences influences, Pose pose) {
   Scaled scaled = Scaled(vertex, ScaleShear(vec3(1.0), vec3(0.0)), 1.0);
   if (pose.scales) {
     ScaleShear part = blendScaleShear(influences, pose);
     scaled.part = part;
     scaled.vertex.position = scalePosition(part, vertex.position);
-    if (withNormal || withTangent) {
+    if (NORMALS || TANGENTS) {
       DirectionMap map =
           directionMap(vec3(part.diagonal.x, part.mixed.x, part.mixed.y), vec3(part.mixed.x, part.diagonal.y, part.mixed.z),
                        vec3(part.mixed.y, part.mixed.z, part.diagonal.z));
       scaled.side = map.side;
-      if (withNormal) scaled.vertex.normal = unitOr(mapNormal(map, vertex.givenNormal), vertex.normal);
-      if (withTangent) scaled.vertex.tangent.xyz = unitOr(mapTangent(map, vertex.givenTangent), vertex.tangent.xyz);
+      if (NORMALS) scaled.vertex.normal = unitOr(mapNormal(map, vertex.givenNormal), vertex.normal);
+      if (TANGENTS) scaled.vertex.tangent.xyz = unitOr(mapTangent(map, vertex.givenTangent), vertex.tangent.xyz);
     }
   }
   return scaled;
@@ -94,12 +94,12 @@ float turningFactor(vec4 q) {
 
 // The second phase: rotates a vertex by a quaternion q of any length except 0, then translates it. `factor` is 2 / |q|². Directions
 // keep unit length.
-Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation, bool withNormal, bool withTangent) {
+Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation) {
   Vertex skinned = scaled.vertex;
   precise vec3 position = rotateBy(real, factor, scaled.vertex.position) + translation;
   skinned.position = position;
-  if (withNormal) skinned.normal = rotateBy(real, factor, scaled.vertex.normal);
-  if (withTangent) {
+  if (NORMALS) skinned.normal = rotateBy(real, factor, scaled.vertex.normal);
+  if (TANGENTS) {
     skinned.tangent = tangentOf(rotateBy(real, factor, scaled.vertex.tangent.xyz), scaled.vertex.tangent.w, scaled.side);
   }
   return skinned;
@@ -111,11 +111,11 @@ vec3 translationOf(vec4 real, vec4 dual, float factor) {
   return translation;
 }
 
-Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose) {
   Blend blend = blendJoints(influences, pose);
   float factor = turningFactor(blend.real);
-  Scaled scaled = scaleVertex(vertex, influences, pose, withNormal, withTangent);
-  return turnVertex(scaled, blend.real, factor, translationOf(blend.real, blend.dual, factor), withNormal, withTangent);
+  Scaled scaled = scaleVertex(vertex, influences, pose);
+  return turnVertex(scaled, blend.real, factor, translationOf(blend.real, blend.dual, factor));
 }
 
 #endif

@@ -9,15 +9,15 @@
 #include "../vertex.glsl"
 
 // Transforms a vertex by a blended 3×4 matrix, given by its rows.
-Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2, bool withNormal, bool withTangent) {
+Vertex throughMatrix(Vertex vertex, vec4 r0, vec4 r1, vec4 r2) {
   Vertex skinned = vertex;
   vec3 p = vertex.position;
   precise vec3 position = vec3(dot3(r0.xyz, p) + r0.w, dot3(r1.xyz, p) + r1.w, dot3(r2.xyz, p) + r2.w);
   skinned.position = position;
-  if (withNormal || withTangent) {
+  if (NORMALS || TANGENTS) {
     DirectionMap map = directionMap(r0.xyz, r1.xyz, r2.xyz);
-    if (withNormal) skinned.normal = unitOfMapped(mapNormal(map, vertex.normal), vertex.normal);
-    if (withTangent) {
+    if (NORMALS) skinned.normal = unitOfMapped(mapNormal(map, vertex.normal), vertex.normal);
+    if (TANGENTS) {
       vec3 direction = unitOfMapped(mapTangent(map, vertex.tangent.xyz), vertex.tangent.xyz);
       skinned.tangent = tangentOf(direction, vertex.tangent.w, map.side);
     }
@@ -39,14 +39,14 @@ Rows addMatrix(Rows blend, float weight, Pose pose, uint joint) {
   return Rows(r0, r1, r2);
 }
 
-Vertex skinLinear(Vertex vertex, Influences influences, Pose pose, bool withNormal, bool withTangent) {
+Vertex skinLinear(Vertex vertex, Influences influences, Pose pose) {
   precise vec4 r0 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 0u);
   precise vec4 r1 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 1u);
   precise vec4 r2 = influences.weights.x * paletteRow(pose.palette, influences.joints.x, 2u);
   Rows blend = Rows(r0, r1, r2);
 #define ADD_MATRIX(weight, joint) blend = addMatrix(blend, weight, pose, joint)
   FOR_OTHER_INFLUENCES(influences, ADD_MATRIX)
-  return throughMatrix(vertex, blend.r0, blend.r1, blend.r2, withNormal, withTangent);
+  return throughMatrix(vertex, blend.r0, blend.r1, blend.r2);
 }
 
 #endif

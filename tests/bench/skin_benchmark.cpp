@@ -91,7 +91,6 @@ void measure(benchmark::State& state, Scene scene) {
     request.mayScale = scene.mayScale;
     request.method = scene.method;
     request.morphs = scene.morphs;
-    request.previousPose = pose;
     request.box = {{-4, -4, -4}, {4, 4, 4}};
   }
   BenchScene bench(*open, requests, scene.output, open->context.tuning());
@@ -204,7 +203,6 @@ void registerAll() {
   add("extras/none", [] { return withLayout({}); });
   add("extras/bounds", [] { return withLayout(withBounds()); });
   add("extras/previous_kept", [] { return withLayout(withMotion(Motion::kept)); });
-  add("extras/previous_reskinned", [] { return withLayout(withMotion(Motion::reskinned)); });
 }
 
 const std::vector<Ratio> ratios{
@@ -238,7 +236,6 @@ const std::vector<Ratio> ratios{
      "float16x3 and octahedral8x2 (stores of 2 bytes) / float32x3"},
     {"extras/bounds", "extras/none", "with bounds / without"},
     {"extras/previous_kept", "extras/none", "previous positions kept / none"},
-    {"extras/previous_reskinned", "extras/none", "previous positions skinned again / none"},
     {"scene/change_one_by_one", "scene/change_all",
      "10,000 instances hidden or shown, with an interval: a call each / one call"},
 };

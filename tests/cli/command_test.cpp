@@ -433,7 +433,7 @@ void expectRandomMeshes(const CommandResult& result, const nlohmann::json& model
         << result.output;
   }
   for (const char* output : {"positions float32x3", "positions float16x4", "normals float32x3",
-                             "tangents float32x4", "previous kept", "previous reskinned"})
+                             "tangents float32x4", "previous kept"})
     EXPECT_GE(countOf(variants, output), 1u) << output;
   const std::string tests = "tests=\"" + std::to_string(cases.size()) + "\" failures=\"0\"";
   EXPECT_EQ(countOf(xml, "<testsuite name=\"random meshes\" " + tests), 1u) << xml.substr(0, 300);

@@ -27,7 +27,7 @@ std::vector<samples::OutputLayout> layouts() {
   layouts[1].arrangement = samples::Arrangement::separate;
   layouts[2].positions = snorm16x4;
   layouts[2].tangents = float32x4;
-  layouts[2].motion = Motion::reskinned;
+  layouts[2].motion = Motion::kept;
   layouts[2].bounds = true;
   layouts[3].motion = Motion::kept;
   layouts[3].normals = none;
@@ -56,7 +56,6 @@ struct Rigs {
       samples::SkinRequest& request = requests.emplace_back();
       request.mesh = &packed[i % packed.size()];
       request.pose = poses[i];
-      request.previousPose = poses[(i + 1) % poses.size()];
       request.method = method;
       request.box = {{-4, -4, -4}, {4, 4, 4}};
       if (i % 2 == 0) request.morphs = morphs;

@@ -216,9 +216,6 @@ TEST_F(WrongBytesTest, AWrongPreviousPositionIsFound) {
   expectOnly(verify(settled, wrong), 2, "after settling, previous positions are not the current");
   expectOnly(verify(settled, invert(2, Stream::positions, 5, 3, 0x80)), 2,
              "after settling, previous positions are not the current");
-  output_.layout.motion = Motion::reskinned;
-  expectOnly(verify(now, wrong), 2,
-             "1 previous positions are outside their bound; the first is vertex 5");
 }
 
 TEST_F(WrongBytesTest, ATouchedNeighborIsFound) {

@@ -426,7 +426,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.normals = VertexFormat::octahedral8x2;
   variant.tangents = VertexFormat::snorm8x4;
   variant.units = {4, 2, 1, 2};
-  variant.motion = Motion::reskinned;
+  variant.motion = Motion::kept;
   variant.morphs = true;
   variant.bounds = true;
   variant.scales = true;
@@ -449,7 +449,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_NORMAL_UNIT, 2},
       {abi::CONSTANT_TANGENT_UNIT, 1},
       {abi::CONSTANT_PREVIOUS_UNIT, 2},
-      {abi::CONSTANT_MOTION, abi::MOTION_RESKINNED},
+      {abi::CONSTANT_MOTION, 1},
       {abi::CONSTANT_MORPHS, 1},
       {abi::CONSTANT_BOUNDS, 1},
       {abi::CONSTANT_SCALES, 1},

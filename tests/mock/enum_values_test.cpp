@@ -125,7 +125,6 @@ class EnumValuesTest : public MockContextTest {
     instance.pose = pose_;
     instance.output = output_.data();
     instance.box = box_;
-    instance.restartsMotion = choice.layout.motion == Motion::reskinned;
     cpu::Job job;
     job.mesh = &mesh_;
     job.method = choice.method;
@@ -164,9 +163,6 @@ class EnumValuesTest : public MockContextTest {
     attributes.insert({"motion", "method"});
     std::set<std::string> all = layout;
     all.insert("method");
-    const auto isReskinned = [](const Choice& choice) {
-      return choice.layout.motion == Motion::reskinned;
-    };
     const auto isForComparison = [](const Choice& choice) {
       return dermis::isForComparison(choice.method);
     };
@@ -209,12 +205,11 @@ class EnumValuesTest : public MockContextTest {
          },
          all},
         {"Scene::addInstance",
-         [this](const Choice& choice) { return add(*scene_, chosen(instance_, choice)); }, all,
-         isReskinned},
+         [this](const Choice& choice) { return add(*scene_, chosen(instance_, choice)); }, all},
         {"Scene::change", [this](const Choice& choice) { return change(choice); }, {"method"}},
         {"cpu::SkinningSystem::addInstance",
          [this](const Choice& choice) { return add(*system_, chosen(ofSystem_, choice)); }, all,
-         [=](const Choice& choice) { return isReskinned(choice) || isForComparison(choice); }},
+         isForComparison},
         {"cpu::skin", [this](const Choice& choice) { return skin(choice); }, attributes,
          isForComparison},
         {"cpu::skinVertices",
@@ -313,7 +308,7 @@ TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
   expectChecked(
       "motion",
       [](Choice& choice, std::uint32_t value) { choice.layout.motion = number<Motion>(value); },
-      [](std::uint32_t value) { return value <= 2; });
+      [](std::uint32_t value) { return value <= 1; });
   expectChecked(
       "arrangement",
       [](Choice& choice, std::uint32_t value) {

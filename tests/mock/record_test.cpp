@@ -414,7 +414,6 @@ struct KnownLayouts {
       job.tangents = attribute(layout.tangents);
       job.previousPositions = attribute(layout.previousPositions);
       job.motion = layout.motion;
-      job.previousPose = below(4);
       job.bounds = layout.bounds;
       job.box = {{0, 0, 0}, {1, 1, 1}};
       if (!promises.noMorphTargets && below(2) == 0)

@@ -45,7 +45,6 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   add([](InstanceDescription& wrong) { wrong.pose = {}; });
   add([&](InstanceDescription& wrong) { wrong.pose = objects.narrow; });
   add([](InstanceDescription& wrong) { wrong.updateInterval = 0; });
-  add([](InstanceDescription& wrong) { wrong.layout.motion = Motion::reskinned; });
   add([](InstanceDescription& wrong) { wrong.method = static_cast<Method>(9); });
   add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::none; });
   add([](InstanceDescription& wrong) { wrong.layout.tangents = VertexFormat::float16x3; });

@@ -134,23 +134,6 @@ TEST(Plan, APoseInTwoFormsHasAStatusInEither) {
   EXPECT_EQ(out.statusOffset(3), Plan::noStatus);
 }
 
-// The palette of the last frame, as logarithms, beside the same as dual quaternions.
-TEST(Plan, PreviousPosesAreConvertedToTheFormOfTheirJob) {
-  OwnedBatch batch;
-  batch.addMesh(meshOf(10, 2, 5, true));
-  batch.addPose(5, true);
-  batch.addPose(5, false);
-  for (const Method method : {Method::logMatrix, Method::sphericalBlend}) {
-    Job job = batch.jobOf(0, 0, method);
-    job.motion = Motion::reskinned;
-    job.previousPose = 1;
-    batch.place(job, Arrangement::planar);
-  }
-  const Plan out = planned(batch, richLimits());
-  EXPECT_EQ(out.buffer(BufferRole::palettes).size,
-            4 * 16 + 5 * (32 + 32) + 5 * 32 + 5 * (48 + 32) + 5 * 48u);
-}
-
 // A mesh runs in the kernel for its own influences, whatever else is in the batch.
 TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
   const std::pair<std::uint32_t, int> classes[] = {{1, 1}, {2, 2}, {3, 4}, {4, 4}, {5, 0}, {8, 0}};
@@ -260,46 +243,18 @@ TEST_F(PlanFeatures, MorphWeightsAreCopied) {
   EXPECT_EQ(tablesOf(out), tables);
 }
 
-TEST_F(PlanFeatures, PreviousMorphWeightsMatterWhereTheInstanceIsSkinnedAgain) {
-  for (const Motion motion : {Motion::none, Motion::kept, Motion::reskinned}) {
-    batch.jobs.clear();
-    Job job = linear();
-    job.motion = motion;
-    job.previousMorphs = batch.keep({{3, 1.0f}});
-    add(job);
-    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-    ASSERT_EQ(dispatchesOf(out).size(), 1u);
-    EXPECT_EQ(dispatchesOf(out)[0].variant.morphs, motion == Motion::reskinned);
-  }
-}
-
-TEST_F(PlanFeatures, ThePreviousPoseIsConvertedToo) {
-  Job job = batch.jobOf(0, 0, Method::dualQuaternion);
-  job.motion = Motion::reskinned;
-  job.previousPose = 1;
-  add(job);
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  EXPECT_NE(out.statusOffset(1), Plan::noStatus);
-  batch.jobs[0].motion = Motion::kept;
-  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  EXPECT_EQ(out.statusOffset(1), Plan::noStatus);
-}
-
 TEST_F(PlanFeatures, InstancesThatRestartOrSettleShareADispatchWithTheOthers) {
-  for (const Motion motion : {Motion::kept, Motion::reskinned}) {
-    batch.jobs.clear();
-    for (const bool restarts : {false, true}) {
-      for (const bool settles : {false, true}) {
-        Job job = linear();
-        job.motion = motion;
-        job.restartsMotion = restarts;
-        job.settles = settles;
-        add(job);
-      }
+  for (const bool restarts : {false, true}) {
+    for (const bool settles : {false, true}) {
+      Job job = linear();
+      job.motion = Motion::kept;
+      job.restartsMotion = restarts;
+      job.settles = settles;
+      add(job);
     }
-    ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-    EXPECT_EQ(dispatchesOf(out).size(), 1u);
   }
+  ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
+  EXPECT_EQ(dispatchesOf(out).size(), 1u);
 }
 
 // ---- Results

@@ -34,8 +34,7 @@ std::uint8_t unitOf(const OutputAttribute& attribute) {
 }
 
 bool isMorphed(const Job& job) {
-  return !activeMorphs(job.morphs).empty() ||
-         (job.motion == Motion::reskinned && !activeMorphs(job.previousMorphs).empty());
+  return !activeMorphs(job.morphs).empty();
 }
 
 /// A palette, and whether as logarithms.
@@ -192,8 +191,6 @@ class Simulation {
     for (const Job& job : batch_.jobs) {
       if (job.method == Method::linear) continue;
       wanted.insert({job.pose, wantsLogarithms(job.method)});
-      if (job.motion == Motion::reskinned)
-        wanted.insert({job.previousPose, wantsLogarithms(job.method)});
     }
     ASSERT_EQ(statuses_.size(), wanted.size());
     for (const PaletteInForm& form : wanted) ASSERT_TRUE(statuses_.contains(form));
@@ -391,10 +388,7 @@ class Simulation {
     ASSERT_TRUE(anyBefore || !reads);
   }
 
-  bool mayScale(const Job& job) const {
-    return batch_.poses[job.pose].mayScale ||
-           (job.motion == Motion::reskinned && batch_.poses[job.previousPose].mayScale);
-  }
+  bool mayScale(const Job& job) const { return batch_.poses[job.pose].mayScale; }
 
   std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
     return method == Method::linear ? batch_.poses[palette].matrixOffset
@@ -424,7 +418,7 @@ class Simulation {
   void checkExtension(std::uint64_t record, std::uint32_t index) {
     const Job& job = batch_.jobs[index];
     const std::uint64_t place = instanceAt(record).extension;
-    if (!wantsResult(job) && job.motion != Motion::reskinned && !isMorphed(job)) {
+    if (!wantsResult(job) && !isMorphed(job)) {
       ASSERT_EQ(place, 0u) << "what the instance does not need costs words";
       return;
     }
@@ -432,13 +426,6 @@ class Simulation {
     ASSERT_EQ(place % 4, 0u);
     const auto extension = at<abi::ExtensionRecord>(place);
     ASSERT_NO_FATAL_FAILURE(checkMorphs(extension.morphs, extension.morphCount, job.morphs));
-    if (job.motion == Motion::reskinned) {
-      ASSERT_EQ(std::uint64_t{instanceAt(record).previousPalette} * 16,
-                paletteBytes(job.method, job.previousPose));
-      ASSERT_EQ(extension.previousJointCount, batch_.poses[job.previousPose].jointCount);
-      ASSERT_NO_FATAL_FAILURE(
-          checkMorphs(extension.previousMorphs, extension.previousMorphCount, job.previousMorphs));
-    }
     if (wantsResult(job)) {
       ASSERT_EQ(extension.result * sizeof(InstanceResult), plan_.resultOffset(index));
     }
@@ -686,14 +673,10 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
       job.tangents.format = anyFormat(engine, isTangentFormat);
     job.box = {{-1, -2, -3}, {4, 5, static_cast<float>(6 + below(9))}};
     job.bounds = below(3) == 0;
-    job.motion = static_cast<Motion>(below(3));
+    job.motion = static_cast<Motion>(below(2));
     job.restartsMotion = job.motion != Motion::none && below(4) == 0;
     job.settles = job.motion != Motion::none && below(4) == 0;
-    job.previousPose = job.motion == Motion::reskinned ? below(4) : 1000;
-    if (below(2) == 0) {
-      job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
-      job.previousMorphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
-    }
+    if (below(2) == 0) job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
     batch.place(job,
                 separate        ? Arrangement::separate
                 : below(2) == 0 ? Arrangement::planar

@@ -151,7 +151,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
   };
   for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
     for (const Method method : allMethods) {
-      for (const Motion motion : {Motion::none, Motion::kept, Motion::reskinned}) {
+      for (const Motion motion : {Motion::none, Motion::kept}) {
         for (int flags = 0; flags < 32; ++flags) {
           for (const std::uint8_t influences : Bytes{0, 1, 2, 4}) {
             for (const std::uint8_t instances : Bytes{1, 3, 32}) {
@@ -242,7 +242,7 @@ std::vector<Job> variedLayouts() {
   layouts[3].positions = {0, 37, VertexFormat::float16x3};
   layouts[3].normals = {12, 36, VertexFormat::octahedral8x2};
   layouts[3].tangents = {5000, 4, VertexFormat::octahedral16x2};
-  layouts[3].motion = Motion::reskinned;
+  layouts[3].motion = Motion::kept;
   layouts[3].previousPositions = {2000, 6, VertexFormat::none};
   return layouts;
 }
@@ -401,13 +401,6 @@ TEST(Plan, AJobScalesIfAPoseThatItReadsMay) {
     const Job scaling = batch.addJob(0, 1, method, true);
     EXPECT_TRUE(scales(scaling)) << methodName(method);
   }
-  // Skinned again from a palette that may.
-  Job job = batch.addJob(0, 0, Method::dualQuaternion, true);
-  job.motion = Motion::reskinned;
-  job.previousPose = 1;
-  job.previousPositions = {240, 12, VertexFormat::none};
-  batch.outputSize += 1000;
-  EXPECT_TRUE(scales(job));
 }
 
 // ---- Plans as objects

@@ -37,9 +37,6 @@ enum class Motion : std::uint8_t {
   /// Copied from the output before it is overwritten: the positions of the last time that the
   /// instance was skinned. Costs a read and a write. The output must persist between frames.
   kept,
-  /// Skinned again with the previous pose and morph weights. Costs a second skinning of positions.
-  /// Only the previous pose must persist. Not available in a scene.
-  reskinned,
 };
 
 /// How the attributes of many vertices are arranged.

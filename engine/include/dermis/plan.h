@@ -141,10 +141,6 @@ struct Job {
   /// is ignored. With `Motion::kept`, snorm16 values stay relative to the box that they were
   /// written with.
   OutputAttribute previousPositions;
-  /// With `Motion::reskinned`: index into `Batch::poses`. The pose needs as many joints as `pose`
-  /// does: at least `MeshInfo::requiredJoints`.
-  std::uint32_t previousPose = 0;
-  std::span<const MorphWeight> previousMorphs;  ///< with `Motion::reskinned`: the previous weights
   /// Sets previous positions to the new positions: for the first frame of an instance, and after a
   /// teleport. Requires `motion`.
   bool restartsMotion = false;

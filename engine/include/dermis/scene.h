@@ -120,7 +120,6 @@ struct InstanceDescription {
   /// Formats and arrangement of the skinned vertices. With `Motion::kept`, the scene keeps previous
   /// positions right on the first frame, while the pose rests, between updates, and when the
   /// instance becomes visible. The engine reports jumps with `InstanceChange::teleports`.
-  /// `Motion::reskinned` is not available in a scene.
   VertexLayout layout = {};
   Box box = {};  ///< for positions in snorm16: as `Job::box`
   /// Whether to compute the exact box of the skinned positions, for `Scene::bounds`.

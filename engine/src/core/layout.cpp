@@ -72,7 +72,7 @@ Result<VertexPlaces> placeVertices(const VertexLayout& layout, std::uint32_t ver
                                    std::uint64_t offset) {
   if (layout.arrangement > Arrangement::planar)
     return notAValue("the layout's arrangement", layout.arrangement, "Arrangement");
-  if (layout.motion > Motion::reskinned)
+  if (layout.motion > Motion::kept)
     return notAValue("the layout's motion", layout.motion, "Motion");
   if (Result<void> good =
           checkFormats(layout.positions, layout.normals, layout.tangents, {"the layout"});

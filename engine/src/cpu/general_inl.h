@@ -501,7 +501,6 @@ struct GeneralTask {
   const Run& run;
   const TaskInstance& instance;
   const Palette& palette;
-  const Palette* previous;  ///< only for Motion::reskinned
   std::uint32_t firstVertex, vertexEnd;
   std::array<std::uint32_t, 3> sizes;  ///< bytes of positions, normals, tangents
   bool areSideBySide = false;          ///< positions and normals, in float32
@@ -513,17 +512,14 @@ struct BlockVertices {
 };
 
 inline void loadBlock(const MeshData& mesh, std::uint32_t block,
-                      std::span<const MorphWeight> morphs, bool withDirections, BlockVertices& to) {
+                      std::span<const MorphWeight> morphs, BlockVertices& to) {
   const auto copy = [&](const std::vector<Lanes>& from, std::size_t components, Lanes* lanes) {
     if (!from.empty()) std::copy_n(from.data() + block * components, components, lanes);
   };
   copy(mesh.positions, 3, to.positions);
-  if (withDirections) {
-    copy(mesh.givenNormals, 3, to.normals);
-    copy(mesh.givenTangents, 4, to.tangents);
-  }
-  morphBlock(mesh, block, morphs, to.positions, withDirections ? to.normals : nullptr,
-             withDirections ? to.tangents : nullptr);
+  copy(mesh.givenNormals, 3, to.normals);
+  copy(mesh.givenTangents, 4, to.tangents);
+  morphBlock(mesh, block, morphs, to.positions, to.normals, to.tangents);
 }
 
 template <class D, class Wanted>
@@ -562,7 +558,7 @@ DERMIS_INLINE Vec3<D> relativeTo(D d, const TaskInstance& instance, const Vec3<D
 template <bool scales, bool tangents, class D>
 DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, std::size_t lane,
                              std::size_t first, std::size_t end, const BlockVertices* morphed,
-                             const BlockVertices* morphedBefore, Findings& findings) {
+                             Findings& findings) {
   const Task& job = task.task;
   const MeshData& mesh = *job.mesh;
   const VertexPlaces& places = job.places;
@@ -587,41 +583,28 @@ DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, 
                          task.palette, inputs, wanted);
   const VertexFormat format = places.positions.format;
   const std::uint32_t bytes = task.sizes[0];
-  const auto encode = [&](const Vec3<D>& position, bool mayCount) HWY_ATTR {
+  const auto encode = [&](const Vec3<D>& position) HWY_ATTR {
     if (!isSnormPosition(format)) return encodePosition(d, format, position);
     const Vec3<D> relative = relativeTo(d, task.instance, position);
-    if (mayCount) {
-      // A vertex on a face of the engine's box may lie outside by a rounding error.
-      const auto isBeyond = [&](Vec<D> component) HWY_ATTR {
-        return hn::Gt(hn::Abs(component), hn::Set(d, 1.00001f));
-      };
-      const auto isOutside =
-          hn::Or(isBeyond(relative.x), hn::Or(isBeyond(relative.y), isBeyond(relative.z)));
-      findings.clamped += static_cast<std::uint32_t>(
-          hn::CountTrue(d, hn::And(isOutside, lanesFrom(d, first, end))));
-    }
+    // A vertex on a face of the engine's box may lie outside by a rounding error.
+    const auto isBeyond = [&](Vec<D> component)
+                              HWY_ATTR { return hn::Gt(hn::Abs(component), hn::Set(d, 1.00001f)); };
+    const auto isOutside =
+        hn::Or(isBeyond(relative.x), hn::Or(isBeyond(relative.y), isBeyond(relative.z)));
+    findings.clamped +=
+        static_cast<std::uint32_t>(hn::CountTrue(d, hn::And(isOutside, lanesFrom(d, first, end))));
     return encodePosition(d, format, relative);
   };
   if (task.instance.result != nullptr)
     addPositions(d, skinned.position, lanesFrom(d, first, end), findings);
   std::byte* const to = placeOf(Stream::positions, places.positions);
   std::byte* const toPrevious = placeOf(Stream::previousPositions, places.previousPositions);
-  const Encoded<D> encoded = encode(skinned.position, true);
+  const Encoded<D> encoded = encode(skinned.position);
   if (places.motion == Motion::kept && !task.instance.restartsMotion) {
     copyLanes(toPrevious, places.previousPositions.stride, to, places.positions.stride, bytes,
               first, end);
   } else if (places.motion != Motion::none) {
-    Encoded<D> before = encoded;
-    if (places.motion == Motion::reskinned && !task.instance.restartsMotion) {
-      const Wanted<false> positions;
-      const Vertex<D> bind = bindVertex(d, mesh, block, lane, morphedBefore, positions);
-      const Vertex<D> old =
-          task.previous->scales
-              ? skinVertex<true>(d, job.method, bind, slots, *task.previous, inputs, positions)
-              : skinVertex<false>(d, job.method, bind, slots, *task.previous, inputs, positions);
-      before = encode(old.position, false);
-    }
-    storeLanes(d, before, bytes, toPrevious, places.previousPositions.stride, first, end);
+    storeLanes(d, encoded, bytes, toPrevious, places.previousPositions.stride, first, end);
   }
   if (task.areSideBySide && end - first == hn::MaxLanes(d)) {
     storeWhole(d, skinned.position, skinned.normal, reinterpret_cast<float*>(to));
@@ -643,23 +626,18 @@ template <bool scales, bool tangents>
 inline HWY_ATTR void skinRun(const GeneralTask& task, Findings& findings) {
   const Wide d;
   constexpr std::uint32_t lanes = hn::MaxLanes(d);
-  const bool reskins = task.previous != nullptr;
-  BlockVertices morphed, morphedBefore;
+  BlockVertices morphed;
   for (std::uint32_t block = task.firstVertex / blockVertices;
        block * blockVertices < task.vertexEnd; ++block) {
     const bool isMorphed = !task.instance.morphs.empty();
-    const bool wasMorphed = reskins && !task.instance.previousMorphs.empty();
-    if (isMorphed) loadBlock(*task.task.mesh, block, task.instance.morphs, true, morphed);
-    if (wasMorphed)
-      loadBlock(*task.task.mesh, block, task.instance.previousMorphs, false, morphedBefore);
+    if (isMorphed) loadBlock(*task.task.mesh, block, task.instance.morphs, morphed);
     for (std::uint32_t lane = 0; lane < blockVertices; lane += lanes) {
       const std::uint32_t vertex = block * blockVertices + lane;
       const std::uint32_t first = std::max(vertex, task.firstVertex);
       const std::uint32_t end = std::min(vertex + lanes, task.vertexEnd);
       if (first >= end) continue;
       skinLanes<scales, tangents>(d, task, block, lane, first - vertex, end - vertex,
-                                  isMorphed ? &morphed : nullptr,
-                                  wasMorphed ? &morphedBefore : nullptr, findings);
+                                  isMorphed ? &morphed : nullptr, findings);
     }
   }
 }

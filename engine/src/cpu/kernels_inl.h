@@ -72,12 +72,6 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
   Scratch* const scratch = part.scratch;
   const Palette palette =
       makePalette(mesh, part.section, task.method, instance.pose, instance.mayScale, scratch[0]);
-  Palette previous;
-  const bool reskins = task.places.motion == Motion::reskinned && !instance.restartsMotion;
-  if (reskins) {
-    previous = makePalette(mesh, part.section, task.method, instance.previousPose,
-                           instance.mayScale, scratch[1]);
-  }
   Findings findings;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
     const Run& run = mesh.runs[number];
@@ -88,7 +82,6 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
                  run,
                  instance,
                  palette,
-                 reskins ? &previous : nullptr,
                  first,
                  end,
                  {formatSize(task.places.positions.format), formatSize(task.places.normals.format),

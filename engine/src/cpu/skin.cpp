@@ -29,7 +29,6 @@ Result<void> checkLayout(const Job& job) {
   for (OutputAttribute* attribute :
        {&checked.positions, &checked.normals, &checked.tangents, &checked.previousPositions})
     attribute->offset = 0;
-  if (checked.motion == Motion::reskinned) checked.motion = Motion::kept;  // checked per instance
   checked.box = {{-1, -1, -1}, {1, 1, 1}};
   const PoseDescription pose{info.requiredJoints, 0, true};
   Batch batch;
@@ -44,9 +43,9 @@ Result<void> checkLayout(const Job& job) {
 }
 
 Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,
-                       const Subject& subject, const char* name) {
+                       const Subject& subject) {
   if (pose.size() >= info.requiredJoints) return {};
-  return wrong(subject.name() + ": its " + name + " has " + std::to_string(pose.size()) +
+  return wrong(subject.name() + ": its pose has " + std::to_string(pose.size()) +
                " joints, but its mesh requires " + std::to_string(info.requiredJoints));
 }
 
@@ -63,7 +62,7 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
     if (isWanted && memory == nullptr)
       return wrong(subject.name() + " has no output for its " + name);
   }
-  if (Result<void> good = checkPose(instance.pose, info, subject, "pose"); !good) return good;
+  if (Result<void> good = checkPose(instance.pose, info, subject); !good) return good;
   if (Result<void> good = checkMorphs(instance.morphs, info.morphTargetCount, subject); !good)
     return good;
   if (!std::ranges::is_sorted(instance.morphs, {}, &MorphWeight::target))
@@ -75,12 +74,7 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
   if (job.places.motion == Motion::none && (instance.settles || instance.restartsMotion)) {
     return wrong(subject.name() + " settles or restarts its motion, but has no previous positions");
   }
-  if (job.places.motion != Motion::reskinned || instance.restartsMotion) return {};
-  if (Result<void> good = checkPose(instance.previousPose, info, subject, "previous pose"); !good)
-    return good;
-  if (!std::ranges::is_sorted(instance.previousMorphs, {}, &MorphWeight::target))
-    return wrong(subject.name() + ": its previous morph targets are not in ascending order");
-  return checkMorphs(instance.previousMorphs, info.morphTargetCount, subject);
+  return {};
 }
 
 Result<void> check(const Job& job) {
@@ -108,8 +102,6 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
   own.restartsMotion = instance.restartsMotion;
   own.settles = instance.settles;
   own.morphs = instance.morphs;
-  own.previousPose = instance.previousPose;
-  own.previousMorphs = instance.previousMorphs;
   own.result = instance.result;
   const auto at = [](void* memory, const OutputAttribute& attribute) {
     return memory == nullptr ? nullptr : static_cast<std::byte*>(memory) + attribute.offset;

@@ -33,8 +33,6 @@ struct TaskInstance {
   std::array<std::byte*, streamCount> outputs{};
   bool mayScale = true, restartsMotion = false, settles = false;
   std::span<const MorphWeight> morphs;  ///< in ascending order of targets
-  std::span<const JointMatrix> previousPose;
-  std::span<const MorphWeight> previousMorphs;
   InstanceResult* result = nullptr;
   float boxCenter[3] = {}, boxInverse[3] = {};  ///< for snorm16 positions; `boxInverse` is 1 / half
                                                 ///< the size

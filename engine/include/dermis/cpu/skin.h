@@ -59,10 +59,6 @@ struct Instance {
   std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, ascending by target
   bool restartsMotion = false;          ///< as `dermis::Job::restartsMotion`
   bool settles = false;                 ///< as `dermis::Job::settles`
-  /// With `Motion::reskinned`: the previous pose.
-  std::span<const JointMatrix> previousPose;
-  /// With `Motion::reskinned`: the previous morph weights, ascending by target.
-  std::span<const MorphWeight> previousMorphs;
   /// Optional. `skin` writes the box and the clamped vertices of this job here. If an instance has
   /// several jobs, `addResult` combines their results.
   InstanceResult* result = nullptr;

@@ -455,11 +455,6 @@ std::uint32_t PlanBuilder::appendExtension(const InstanceExtras& extras) {
   abi::ExtensionRecord extension{};
   extension.morphs = appendMorphs(extras.morphs);
   extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
-  if (extras.hasPrevious) {
-    extension.previousJointCount = extras.previousJoints;
-    extension.previousMorphs = appendMorphs(extras.previousMorphs);
-    extension.previousMorphCount = static_cast<std::uint32_t>(extras.previousMorphs.size());
-  }
   if (extras.result != notUsed) extension.result = extras.result;
   if (extras.hasBox) setBox(extension, extras.box);
   store(tables, place, extension);
@@ -478,17 +473,14 @@ void PlanBuilder::writeInstances() {
     const std::uint32_t place = group.firstInstance + group.filled++;
     const std::uint32_t extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
     const abi::InstanceRecord& run = entry.run->record;
-    const abi::InstanceRecord record{
-        .palette = entry.palette,
-        .positions = run.positions,
-        .normals = run.normals,
-        .tangents = run.tangents,
-        .previousPositions = run.previousPositions,
-        .joints = run.joints | entry.flags,
-        .previousPalette = entry.extras != nullptr && entry.extras->hasPrevious
-                               ? entry.extras->previousPalette
-                               : 0,
-        .extension = extension};
+    const abi::InstanceRecord record{.palette = entry.palette,
+                                     .positions = run.positions,
+                                     .normals = run.normals,
+                                     .tangents = run.tangents,
+                                     .previousPositions = run.previousPositions,
+                                     .joints = run.joints | entry.flags,
+                                     .extension = extension,
+                                     .reserved = 0};
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
     if (candidate != candidates_.end() && candidate->entry == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;

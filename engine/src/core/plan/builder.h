@@ -121,13 +121,8 @@ struct InstanceExtras {
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
-  /// For Motion::reskinned: the first unit and the number of joints of the previous pose's palette
-  /// (for `linear`, of its matrices), and the previous morph weights.
-  bool hasPrevious = false;
-  std::uint32_t previousPalette = 0, previousJoints = 0;
-  std::vector<MorphWeight> previousMorphs;
 
-  bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox || hasPrevious; }
+  bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox; }
 };
 
 /// The targets whose weight is not 0, in ascending order, since the order of a sum affects its last

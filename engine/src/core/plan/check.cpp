@@ -181,8 +181,8 @@ Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Su
 
 namespace {
 
-Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
-                         const Subject& subject) {
+Result<void> checkPoseOf(const Batch& batch, const Job& job, const Subject& subject) {
+  const std::uint32_t pose = job.pose;
   if (pose >= batch.poses.size()) {
     return invalid(subject.name() + ": there is no pose " + std::to_string(pose) + " among " +
                    std::to_string(batch.poses.size()));
@@ -196,19 +196,17 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, std::uint32_t pose,
 }
 
 Result<void> checkMotion(Motion motion, const Subject& subject) {
-  if (motion <= Motion::reskinned) return {};
+  if (motion <= Motion::kept) return {};
   return notAValue(subject.name() + ": its motion", motion, "Motion");
 }
 
-Result<void> checkMotion(const Batch& batch, const Job& job, const Subject& subject) {
+Result<void> checkMotion(const Job& job, const Subject& subject) {
   if (Result<void> good = checkMotion(job.motion, subject); !good) return good;
   if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
     return invalid(subject.name() +
                    " settles or restarts its motion, but has no previous positions");
   }
-  if (job.motion != Motion::reskinned) return {};
-  if (Result<void> good = checkPoseOf(batch, job, job.previousPose, subject); !good) return good;
-  return checkMorphs(job.previousMorphs, job.mesh.morphTargetCount, subject);
+  return {};
 }
 
 }  // namespace
@@ -289,7 +287,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
                    " ends after the mesh buffer of " + std::to_string(batch.meshesSize) + " bytes");
   }
   if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
-  if (Result<void> good = checkPoseOf(batch, job, job.pose, subject); !good) return good;
+  if (Result<void> good = checkPoseOf(batch, job, subject); !good) return good;
   if (Result<void> good = checkMethod(job.method, subject); !good) return good;
   if (isForComparison(job.method) && !limits.comparisonMethods) {
     return Error{ErrorCode::missingFeature,
@@ -310,7 +308,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
     return invalid(subject.name() + " has normals in its output, but its mesh has none");
   if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
     return invalid(subject.name() + " has tangents in its output, but its mesh has none");
-  if (Result<void> good = checkMotion(batch, job, subject); !good) return good;
+  if (Result<void> good = checkMotion(job, subject); !good) return good;
   if (!job.morphs.empty()) {
     if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
       return good;

@@ -50,9 +50,7 @@ Result<void> PlanMaker::checkPoses(const Batch& batch, const DeviceLimits& limit
 void PlanMaker::markPalettes(const Job& job) {
   const PaletteForm form = paletteForm(job.method);
   if (form == PaletteForm::matrices) return;
-  std::vector<std::uint32_t>& units = paletteUnits_[static_cast<std::size_t>(form)];
-  units[job.pose] = 0;
-  if (job.motion == Motion::reskinned) units[job.previousPose] = 0;
+  paletteUnits_[static_cast<std::size_t>(form)][job.pose] = 0;
 }
 
 /// Finds a place for each form that is marked.
@@ -103,8 +101,7 @@ Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits
     firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
     const PoseDescription& pose = batch.poses[job.pose];
     placing.jointCount = pose.jointCount;
-    placing.mayScale = pose.mayScale ||
-                       (job.motion == Motion::reskinned && batch.poses[job.previousPose].mayScale);
+    placing.mayScale = pose.mayScale;
     if (placed) placed = groups_.place(job, streams, placing, limits, tuning, runs_);
   }
   firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
@@ -126,12 +123,6 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
   extras.result = results_[index];
   extras.hasBox = isSnormPosition(job.positions.format);
   extras.box = job.box;
-  extras.hasPrevious = job.motion == Motion::reskinned;
-  if (extras.hasPrevious) {
-    extras.previousPalette = paletteOf(batch, job.method, job.previousPose);
-    extras.previousJoints = batch.poses[job.previousPose].jointCount;
-    assignActive(job.previousMorphs, extras.previousMorphs);
-  }
   if (!extras.isNeeded()) return nullptr;
   ++extrasUsed_;
   return &extras;
@@ -157,8 +148,7 @@ void PlanMaker::addJobs(const Batch& batch) {
     const std::uint32_t palette = paletteOf(batch, job.method, job.pose);
     const std::uint32_t flags = (job.restartsMotion ? abi::INSTANCE_RESTARTS : 0u) |
                                 (job.settles ? abi::INSTANCE_SETTLES : 0u);
-    const bool mayHaveExtras =
-        !job.morphs.empty() || results_[index] != notUsed || job.motion == Motion::reskinned;
+    const bool mayHaveExtras = !job.morphs.empty() || results_[index] != notUsed;
     const InstanceExtras* extras = mayHaveExtras ? extrasOf(batch, index) : nullptr;
     for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
       builder_.add(runs_[run], palette, flags, extras);

@@ -175,10 +175,8 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
 }
 
 FormNeeds formNeeds(const Job& job, bool mayScale) {
-  const bool morphs =
-      hasActive(job.morphs) || (job.motion == Motion::reskinned && hasActive(job.previousMorphs));
   const bool full = job.mesh.minInfluences == job.mesh.maxInfluences;
-  return {job.mesh.maxInfluences, full, mayScale, morphs};
+  return {job.mesh.maxInfluences, full, mayScale, hasActive(job.morphs)};
 }
 
 namespace {

@@ -47,9 +47,6 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   if (pose == nullptr) return unknownHandle("pose", instance.poseHandle);
   if (updateInterval == 0)
     return invalid("the instance's update interval must be at least 1 frame, not 0");
-  if (instance.layout.motion == Motion::reskinned)
-    return invalid(
-        "the instance's layout has Motion::reskinned; a scene supports Motion::kept only");
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
   if (!laidOut) return laidOut.error();
   const std::uint64_t most = description_.outputCapacity.maximum;
