@@ -55,10 +55,11 @@ struct Operations {
   double all = 0, fused = 0;
 };
 
-/// Counts the operations of a kernel with all functions inlined into `main`. It has two nested
-/// loops over instances. Code outside them runs once per invocation; loops inside them run for each
-/// influence except the first.
-Operations countOperations(std::span<const std::uint32_t> words) {
+/// Counts the operations of a kernel with all functions inlined into `main`. It has a loop over
+/// instances; on CPU devices three nested loops, over vertices, runs and instances. Code outside
+/// them runs once per vertex and invocation; loops inside them run for each influence except the
+/// first.
+Operations countOperations(std::span<const std::uint32_t> words, std::size_t instanceLoops) {
   const std::vector<Instruction> instructions = instructionsOf(words);
   std::unordered_map<std::uint32_t, double> floats;  // of types
   std::unordered_map<std::uint32_t, int> uses;
@@ -90,9 +91,9 @@ Operations countOperations(std::span<const std::uint32_t> words) {
     if (!isInFunction || !isArithmetic(opcode)) continue;
     const auto type = floats.find(operands[0]);
     if (type == floats.end()) continue;
-    const double times = loops.size() < 2   ? 1.0 / instancesEach
-                         : loops.size() > 2 ? influences - 1
-                                            : 1;
+    const double times = loops.size() < instanceLoops   ? 1.0 / instancesEach
+                         : loops.size() > instanceLoops ? influences - 1
+                                                        : 1;
     operations.all += times * type->second;
     const bool isFused = summed.contains(operands[1]) && uses[operands[1]] == 1;
     if (!isFused) operations.fused += times * type->second;
@@ -141,7 +142,7 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   model.meshRead =
       (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
   model.paletteRead = influences * (method == Method::linear ? 48 : 32);
-  const Operations operations = countOperations(spirv);
+  const Operations operations = countOperations(spirv, variant.texels ? 3 : 1);
   model.operations = operations.all;
   model.fusedOperations = operations.fused;
   return model;

@@ -115,9 +115,8 @@ std::vector<std::string> moduleNames() {
                                  "clear",      "visibility",       "visibility_one_output",
                                  "skin_staged"};
   for (const std::string family : {"skin", "skin_bulge", "skin_comparison"}) {
-    for (const std::string form :
-         {"", "_one_output", "_texels", "_texels_pairs", "_texels_wide", "_halves", "_bytes",
-          "_extras", "_extras_texels", "_extras_texels_wide", "_extras_halves", "_extras_bytes"})
+    for (const std::string form : {"", "_one_output", "_texels", "_halves", "_bytes", "_extras",
+                                   "_extras_texels", "_extras_halves", "_extras_bytes"})
       names.push_back(family + form);
   }
   return names;
