@@ -61,7 +61,12 @@ endif()
 option(DERMIS_BUILD_TESTS "Build the tests; without DERMIS_BUILD_SAMPLES only those that need no device" ${dermisTestsByDefault})
 option(DERMIS_BUILD_FUZZERS "Build the libFuzzer programs; needs Clang, and instruments everything" OFF)
 # An engine that needs a small library leaves these kernels out. Using them then fails with missingFeature.
-option(DERMIS_COMPARISON_METHODS "Kernels of the methods that are there for comparison: iterative, log_matrix, spherical_blend, quaternion_translation" ON)
+set(dermisCompares ${PROJECT_IS_TOP_LEVEL})
+if(DERMIS_BUILD_SAMPLES OR DERMIS_BUILD_TESTS)
+  set(dermisCompares ON)
+endif()
+option(DERMIS_COMPARISON_METHODS "Kernels of the methods that are there for comparison: iterative, log_matrix, spherical_blend, quaternion_translation"
+       ${dermisCompares})
 option(DERMIS_SUBWORD_STORES "Kernels that store attributes at multiples of 2 bytes or of 1" ON)
 option(DERMIS_INSTALL "Add rules that install the libraries and a CMake package" ${PROJECT_IS_TOP_LEVEL})
 option(DERMIS_WARNINGS_AS_ERRORS "Stop at the first compiler warning" OFF)
