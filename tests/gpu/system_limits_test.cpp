@@ -173,41 +173,6 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuNeedsNoInstancesAtFirst) {
   expectCulledCrowd(engine, 5);
 }
 
-// A promise fails where something is added, never in a frame. What keeps it is skinned as ever.
-TEST_F(SystemLimitsTest, WhatBreaksAPromiseIsRefusedWhereItIsAdded) {
-  for (const bool noMorphTargets : {true, false}) {
-    vulkan::DeviceDescription promising = device().description();
-    promising.promises = {4, noMorphTargets, true};
-    vulkan::Context context = must(vulkan::Context::create(promising));
-    vulkan::SkinningSystemDescription system = description();
-    system.context = &context;
-    SystemEngine engine(device(), system);
-    const auto expectRefused = [](const auto& result, const char* text) {
-      ASSERT_FALSE(result.ok());
-      EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
-      EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
-    };
-    expectRefused(engine->addMesh(*pack(randomMesh(1, 200, 8, 5).view(), 8)), "5 influences");
-    expectRefused(engine->addPose(8), "noScale");
-    const PackedMesh packed = systemMesh(3, 1234);
-    ASSERT_NE(packed.info().morphTargetCount, 0u);
-    if (noMorphTargets) {
-      expectRefused(engine->addMesh(packed), "noMorphTargets");
-      EXPECT_EQ(engine->statistics().meshes.used, 0u);
-      continue;
-    }
-    engine.begin();
-    InstanceDescription instance;
-    instance.layout = plainLayout();
-    instance.mesh = engine.addMesh(packed);
-    const std::vector<JointMatrix> pose = randomPose(1, 8, Rigidity::rigid);
-    instance.pose = engine.addPose(pose, {.mayScale = false});
-    const InstanceHandle added = engine.addInstance(instance);
-    engine.submit();
-    expectSkinned(engine.read(engine.readOutput(), added), alone(packed, pose, instance));
-  }
-}
-
 TEST_F(SystemLimitsTest, WorkgroupsAreFoldedWhereADimensionIsShort) {
   InterceptedDevice small(device().description());
   small.changeLimits(

@@ -376,7 +376,7 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
 
 /// A few methods and layouts, and batches of nothing else.
 struct KnownLayouts {
-  KnownLayouts(std::uint32_t seed, const Promises& promised) : engine(seed), promises(promised) {
+  explicit KnownLayouts(std::uint32_t seed) : engine(seed) {
     const OwnedBatch random = randomRichBatch(seed, 200, false);
     for (const Job& job : random.jobs) {
       if (layouts.size() < 3) layouts.push_back(job);
@@ -389,17 +389,14 @@ struct KnownLayouts {
 
   std::uint32_t below(std::uint32_t count) { return static_cast<std::uint32_t>(engine()) % count; }
 
-  /// Meshes, palettes and morph targets at random, as far as the promises allow.
+  /// Meshes, palettes and morph targets at random.
   MockBatch batch(const DeviceLimits& limits) {
     MockBatch result;
     OwnedBatch& owned = result.batch;
     owned = OwnedBatch();
-    const std::uint32_t most = promises.maxInfluences != 0 ? promises.maxInfluences : 9;
     for (int mesh = 0; mesh < 4; ++mesh) {
-      const std::uint32_t morphTargets = promises.noMorphTargets ? 0 : 3;
-      owned.addMesh(
-          meshOf(1 + below(200), 1 + below(most), 5, MeshParts{true, true, morphTargets}));
-      owned.addPose(5 + below(4), !promises.noScale && below(2) == 0);
+      owned.addMesh(meshOf(1 + below(200), 1 + below(9), 5, MeshParts{true, true, 3}));
+      owned.addPose(5 + below(4), below(2) == 0);
     }
     for (std::uint32_t count = below(30); count > 0; --count) {
       const Job& layout = layouts[below(static_cast<std::uint32_t>(layouts.size()))];
@@ -416,8 +413,7 @@ struct KnownLayouts {
       job.motion = layout.motion;
       job.bounds = layout.bounds;
       job.box = {{0, 0, 0}, {1, 1, 1}};
-      if (!promises.noMorphTargets && below(2) == 0)
-        job.morphs = owned.keep({{below(3), static_cast<float>(below(2))}});
+      if (below(2) == 0) job.morphs = owned.keep({{below(3), static_cast<float>(below(2))}});
       owned.jobs.push_back(job);
       owned.outputSize += 1 << 20;
     }
@@ -426,7 +422,6 @@ struct KnownLayouts {
   }
 
   std::mt19937 engine;
-  Promises promises;
   std::vector<Job> layouts;
 };
 
@@ -451,12 +446,9 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     vulkan::DeviceDescription description = mock.description();
     description.enabledFeatures = &halves;
     description.texelBuffers = true;
-    if (seed % 3 == 1)
-      description.promises = {static_cast<std::uint8_t>(seed % 4 == 0 ? 1 : 4), seed % 5 == 0,
-                              seed % 7 < 3};
     Result<vulkan::Context> made = vulkan::Context::create(description);
     ASSERT_TRUE(made.ok());
-    KnownLayouts known(seed, description.promises);
+    KnownLayouts known(seed);
     for (const Job& layout : known.layouts)
       ASSERT_TRUE(made->prepare(*everyVariant(layout, made->limits(), made->tuning())).ok());
     const int pipelines = mock.alive["Pipeline"];

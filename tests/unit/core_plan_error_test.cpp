@@ -103,28 +103,6 @@ TEST_F(PlanErrors, NormalsBehindPositionsInAnotherBuffer) {
   expectGood();
 }
 
-TEST_F(PlanErrors, BrokenPromises) {
-  job().mesh = batch.meshes[1].info();
-  job().normals = {};
-  limits.promises = {2, false, false};
-  expectGood();
-  limits.promises.maxInfluences = 1;
-  expectInvalid({"job 0", "2 influences", "Promises::maxInfluences is 1"});
-  limits.promises = {0, true, false};
-  expectInvalid({"job 0", "morph targets", "noMorphTargets"});
-  limits.promises = {0, false, true};
-  expectInvalid({"pose 0", "may scale", "noScale"});
-  for (PoseDescription& palette : batch.poses) palette.mayScale = false;
-  expectGood();
-}
-
-TEST_F(PlanErrors, PromisesThatNoKernelIsMadeFor) {
-  for (const std::uint8_t influences : {std::uint8_t{3}, std::uint8_t{5}, std::uint8_t{255}}) {
-    limits.promises.maxInfluences = influences;
-    expectInvalid({"maxInfluences", std::to_string(influences).c_str()});
-  }
-}
-
 // The same on every device: an engine must not find out on the next one.
 TEST_F(PlanErrors, PairsOfPositionsAndNormals) {
   for (const bool texels : {false, true}) {

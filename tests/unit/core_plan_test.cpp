@@ -181,17 +181,14 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
 // ---- Which variants there are
 
 /// Every plan of one job with this layout and method, whatever its mesh, palette and morph targets;
-/// removes from `unused` what they need. What breaks a promise is left out.
+/// removes from `unused` what they need.
 void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning& tuning,
                     const std::vector<Variant>& all, std::set<std::uint64_t>& unused) {
-  const Promises& promises = limits.promises;
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u}) {
-    if (promises.maxInfluences != 0 && influences > promises.maxInfluences) continue;
     OwnedBatch batch;
-    batch.addMesh(
-        meshOf(10, influences, 8, MeshParts{true, true, promises.noMorphTargets ? 0u : 2u}));
+    batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
     batch.addPose(8, false);
-    batch.addPose(8, !promises.noScale);
+    batch.addPose(8, true);
     for (const float weight : {0.0f, 1.0f}) {
       for (const std::uint32_t choice : {0u, 1u, 2u, 3u}) {
         const std::uint32_t palette = choice / 2;
@@ -199,7 +196,7 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
         batch.jobs[0].mesh = batch.jobOf(0, palette, layout.method).mesh;
         batch.jobs[0].mesh.minInfluences = choice % 2 == 0 ? influences : 0;
         batch.jobs[0].pose = palette;
-        if (!promises.noMorphTargets) batch.jobs[0].morphs = batch.keep({{1, weight}});
+        batch.jobs[0].morphs = batch.keep({{1, weight}});
         batch.outputSize = 10000;
         for (const std::uint64_t moved :
              {0u, 8u}) {  // wide stores, where there are, and narrow ones
@@ -218,7 +215,7 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
   }
 }
 
-/// Skin kernels for a method without a promise: see `everyVariant`.
+/// Skin kernels for a method: see `everyVariant`.
 std::size_t formsOf(Method method) {
   if (method == Method::linear || method == Method::dualQuaternion) return 7;
   return isForComparison(method) ? 3 : 4;
@@ -250,12 +247,9 @@ std::vector<Job> variedLayouts() {
 TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
   DeviceLimits texelLimits = richLimits();
   texelLimits.texelBuffers = true;
-  DeviceLimits promising = richLimits();
-  promising.promises = {4, false, true};
   for (const auto& [limits, tuning] : {std::pair{richLimits(), Tuning{}},
                                        {richLimits(), Tuning{8, 1}},
-                                       {texelLimits, Tuning{128, 16}},
-                                       {promising, Tuning{}}}) {
+                                       {texelLimits, Tuning{128, 16}}}) {
     for (const Job& layout : variedLayouts()) {
       for (const Method method : allMethods) {
         Job job = layout;
@@ -264,10 +258,9 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
         std::set<std::uint64_t> unused;
         for (const Variant& variant : all) unused.insert(variant.key());
         EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
-        const bool promised = limits.promises != Promises();
         const auto isHelper = [](const Variant& variant) { return variant.kernel != Kernel::skin; };
         EXPECT_EQ(all.size() - static_cast<std::size_t>(std::ranges::count_if(all, isHelper)),
-                  promised ? 2 : formsOf(method) * (limits.texelBuffers && isWide(job) ? 2 : 1))
+                  formsOf(method) * (limits.texelBuffers && isWide(job) ? 2 : 1))
             << methodName(method);
         ASSERT_NO_FATAL_FAILURE(planEverything(job, limits, tuning, all, unused));
         EXPECT_TRUE(unused.empty()) << "one that no plan needs: " << methodName(method);
@@ -336,29 +329,6 @@ TEST(Plan, AttributesThatStandApartAreNotStoredTogether) {
   ASSERT_TRUE(makePlan(batch.batch(), limits, {}, plan).ok());
   ASSERT_EQ(plan.variants().size(), 3u);  // the first is the palette kernel
   EXPECT_NE(plan.variants()[1].recordBytes, plan.variants()[2].recordBytes);
-}
-
-// With every promise one pipeline is left.
-TEST(Plan, EachPromiseLeavesPipelinesOut) {
-  Job job;
-  job.positions = {0, 12, VertexFormat::float32x3};
-  const auto forms = [&](Method method, const Promises& promises) {
-    job.method = method;
-    DeviceLimits limits;
-    limits.promises = promises;
-    const std::vector<Variant> all = *everyVariant(job, limits, {});
-    return static_cast<std::size_t>(std::ranges::count(all, Kernel::skin, &Variant::kernel));
-  };
-  for (const Method method : allMethods) {
-    SCOPED_TRACE(methodName(method));
-    for (const std::uint8_t influences : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{4}})
-      EXPECT_EQ(forms(method, {influences, true, true}), 1u);
-    EXPECT_EQ(forms(method, {4, true, false}), 2u);
-    EXPECT_EQ(forms(method, {4, false, true}), 2u);
-    const bool hasForms = method == Method::linear || method == Method::dualQuaternion;
-    EXPECT_EQ(forms(method, {0, true, true}), hasForms ? 5u : 2u);
-    EXPECT_EQ(forms(method, {}), formsOf(method));
-  }
 }
 
 // A pipeline follows from the job alone: its neighbors do not change it.

@@ -23,22 +23,10 @@
 
 namespace dermis {
 
-/// What an engine promises about its meshes and poses. Each promise reduces the number of pipelines
-/// (see `everyVariant`). `makePlan`, `addMesh` and `addPose` fail if a promise is broken.
-struct Promises {
-  /// Maximum influences per vertex: 1, 2 or 4. All meshes then use pipelines for that number. 0: no
-  /// promise; there are pipelines for 1, 2, 4 and any number.
-  std::uint8_t maxInfluences = 0;
-  bool noMorphTargets = false;  ///< no mesh has morph targets
-  bool noScale = false;         ///< no pose has `mayScale`
-
-  friend bool operator==(const Promises&, const Promises&) = default;
-};
-
-/// The device limits and the promises that a plan is made for. `vulkan::Context::limits` returns
-/// them; an engine without a Context fills in the values of its device. The defaults are the
-/// minimum that Vulkan guarantees, except `separateRanges` (how the engine binds) and
-/// `comparisonMethods` (how Dermis was built).
+/// The device limits that a plan is made for. `vulkan::Context::limits` returns them; an engine
+/// without a Context fills in the values of its device. The defaults are the minimum that Vulkan
+/// guarantees, except `separateRanges` (how the engine binds) and `comparisonMethods` (how Dermis
+/// was built).
 struct DeviceLimits {
   std::uint64_t maxStorageBufferRange = std::uint64_t{1} << 27;  ///< bytes, a multiple of 4
   /// Bytes, a power of two. With `texelBuffers`, the larger of this and the alignment of uniform
@@ -79,7 +67,6 @@ struct DeviceLimits {
   bool stagedStores = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;
-  Promises promises;  ///< what the engine promises
 
   friend bool operator==(const DeviceLimits&, const DeviceLimits&) = default;
 };
@@ -269,7 +256,7 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 /// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
 /// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
 /// with joints that scale, for any number, and for any number with morph targets. Some methods need
-/// fewer. `Promises` reduce the number further. With `texelBuffers` each
+/// fewer. With `texelBuffers` each
 /// skin kernel may be listed twice: with stores of up to 32 bytes, for jobs whose attributes are
 /// all aligned to the size of their stores, and with narrower stores, for all other jobs.
 ///
@@ -477,7 +464,7 @@ class DERMIS_CORE_API Plan {
 /// Fails with
 /// - `invalidArgument` if a job or pose breaks a rule above (the message names it by its index),
 ///   for example: a pose with fewer joints than the mesh requires, normals for a mesh without
-///   normals, a range outside its buffer, a broken promise. Also if limits or tuning are not valid;
+///   normals, a range outside its buffer. Also if limits or tuning are not valid;
 /// - `missingFeature` if an attribute is not at multiples of 4 bytes and the device cannot store
 ///   less, or if this build lacks the kernels of the method;
 /// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,

@@ -284,9 +284,8 @@ class DERMIS_CORE_API Scene {
 
   /// Reserves memory for a packed mesh. The engine copies the bytes to `meshOffset` of the mesh
   /// buffer before the commands of the next plan, on the same queue. The first barrier of the plan
-  /// covers the copy. Fails with `limitExceeded` if there is no room, with `invalidArgument` if a
-  /// promise is broken or no packed mesh has the sizes of `info`, and with the errors of
-  /// `GrowthCallback::grow`.
+  /// covers the copy. Fails with `limitExceeded` if there is no room, with `invalidArgument` if
+  /// no packed mesh has the sizes of `info`, and with the errors of `GrowthCallback::grow`.
   Result<MeshHandle> addMesh(const MeshInfo& info);
   Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes into the mesh buffer
   /// Fails with `invalidArgument` if an instance uses the mesh.

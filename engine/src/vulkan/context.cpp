@@ -28,7 +28,7 @@ Result<void> checkDescription(const DeviceDescription& description) {
                      std::to_string(VK_API_VERSION_MAJOR(description.apiVersion)) + "." +
                      std::to_string(VK_API_VERSION_MINOR(description.apiVersion))};
   }
-  return checkPromises(description.promises);
+  return {};
 }
 
 /// What the kernels for CPU devices need.
@@ -174,7 +174,6 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
   const DeviceDefaults defaults = defaultsOf(properties.deviceType);
   state.tuning = defaults.tuning;
-  state.limits.promises = description.promises;
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
   if (description.texelBuffers.value_or(defaults.texelBuffers) && features.scalarBlockLayout &&
       features.shaderInt64)

@@ -55,8 +55,6 @@ struct DeviceDescription {
   /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete
   /// GPUs (a guess), false for others.
   std::optional<bool> stagedStores;
-  /// What the engine promises about its meshes and poses. Promises reduce the number of pipelines.
-  Promises promises;
   /// Optional. Supplies the kernels instead of the library. Its `user` must outlive the Context.
   KernelSource kernelSource;
   /// Optional. Used for every pipeline. The engine stores and loads it.
@@ -77,7 +75,7 @@ class DERMIS_VULKAN_API Context {
  public:
   /// Gets entry points and limits, and creates layouts, but no shader modules or pipelines. Fails
   /// with
-  /// - `invalidArgument` if a required handle is null or a promise is not valid;
+  /// - `invalidArgument` if a required handle is null;
   /// - `missingEntryPoint` if the driver does not have a function;
   /// - `missingFeature` if the API version is below 1.1, or the device has fewer than four storage
   ///   buffers per stage;

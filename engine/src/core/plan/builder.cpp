@@ -62,7 +62,7 @@ void Groups::chooseVariant(const Job& job, const OutputStreams& streams, bool ma
     lastVariant_ = layoutVariant(job, limits, tuning);
     lastLayout_ = LayoutNeeds(job, streams);
   }
-  chooseForm(form, limits.promises, lastVariant_);
+  chooseForm(form, lastVariant_);
   lastForm_ = form;
   lastKey_ = lastVariant_.key();
 }

@@ -140,20 +140,6 @@ bool isBox(const Box& box) {
   return true;
 }
 
-namespace {
-
-Error tooManyInfluences(const MeshInfo& mesh, const Promises& promises, const Subject& subject) {
-  return invalid(subject.name() + ": a vertex has " + std::to_string(mesh.maxInfluences) +
-                 " influences, but Promises::maxInfluences is " +
-                 std::to_string(promises.maxInfluences));
-}
-
-Error breaksPromise(const char* what, const char* promise, const Subject& subject) {
-  return invalid(subject.name() + what + ", despite Promises::" + promise);
-}
-
-}  // namespace
-
 Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject) {
   const std::uint64_t attributes =
       std::uint64_t{1} + mesh.hasNormals + mesh.hasTangents + mesh.hasCentersOfRotation;
@@ -163,20 +149,6 @@ Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject) {
     return {};
   return invalid(subject.name() + ": no packed mesh has " + std::to_string(mesh.vertexCount) +
                  " vertices in " + std::to_string(mesh.byteSize) + " bytes");
-}
-
-Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
-                               const Subject& subject) {
-  if (promises.maxInfluences != 0 && mesh.maxInfluences > promises.maxInfluences)
-    return tooManyInfluences(mesh, promises, subject);
-  if (promises.noMorphTargets && mesh.morphTargetCount != 0)
-    return breaksPromise(" has morph targets", "noMorphTargets", subject);
-  return {};
-}
-
-Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject) {
-  if (mayScale && promises.noScale) return breaksPromise(" may scale", "noScale", subject);
-  return {};
 }
 
 namespace {
@@ -286,7 +258,6 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
                    " bytes at offset " + std::to_string(job.meshOffset) +
                    " ends after the mesh buffer of " + std::to_string(batch.meshesSize) + " bytes");
   }
-  if (Result<void> good = checkPromisedMesh(job.mesh, limits.promises, subject); !good) return good;
   if (Result<void> good = checkPoseOf(batch, job, subject); !good) return good;
   if (Result<void> good = checkMethod(job.method, subject); !good) return good;
   if (isForComparison(job.method) && !limits.comparisonMethods) {
@@ -349,8 +320,7 @@ Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
   return {};
 }
 
-Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
-                       const Promises& promises) {
+Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index) {
   // Made only for errors, since this function runs for every pose of every plan.
   const auto name = [index] { return "pose " + std::to_string(index); };
   if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
@@ -365,14 +335,7 @@ Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::siz
                    std::to_string(pose.matrixOffset) + " end after the poses buffer of " +
                    std::to_string(batch.posesSize) + " bytes");
   }
-  return checkPromisedPose(pose.mayScale, promises, {"pose", index});
-}
-
-Result<void> checkPromises(const Promises& promises) {
-  const std::uint8_t influences = promises.maxInfluences;
-  if (influences == 0 || influences == 1 || influences == 2 || influences == 4) return {};
-  return invalid("Promises::maxInfluences must be 1, 2, 4, or 0 for no promise, not " +
-                 std::to_string(influences));
+  return {};
 }
 
 Result<void> checkLimits(const DeviceLimits& limits) {
@@ -391,7 +354,7 @@ Result<void> checkLimits(const DeviceLimits& limits) {
         "of maxStorageBufferRange, not " +
         std::to_string(limits.minStorageBufferOffsetAlignment));
   }
-  return checkPromises(limits.promises);
+  return {};
 }
 
 Result<void> checkTuning(const Tuning& tuning) {

@@ -46,17 +46,10 @@ DERMIS_CORE_API Result<void> checkVariant(const Variant& variant);
 /// Where one vertex is placed with this layout. Fails unless all members are valid.
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs);
 
-/// Whether the values are allowed.
-DERMIS_CORE_API Result<void> checkPromises(const Promises& promises);
 /// Whether a packed mesh can have these sizes.
 Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject);
-/// Whether a mesh or a pose keeps the promises.
-Result<void> checkPromisedMesh(const MeshInfo& mesh, const Promises& promises,
-                               const Subject& subject);
-Result<void> checkPromisedPose(bool mayScale, const Promises& promises, const Subject& subject);
 Result<void> checkTuning(const Tuning& tuning);
-Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index,
-                       const Promises& promises);
+Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index);
 /// `streams`: those of the job.
 DERMIS_CORE_API Result<void> checkJob(const Batch& batch, const Job& job,
                                       const OutputStreams& streams, const Subject& subject,

@@ -16,7 +16,7 @@ class PlanMaker {
  private:
   Result<void> placeJobs(const Batch& batch, const DeviceLimits& limits, const Tuning& tuning,
                          Result<void>& placed);
-  Result<void> checkPoses(const Batch& batch, const DeviceLimits& limits) const;
+  static Result<void> checkPoses(const Batch& batch);
   void markPalettes(const Job& job);
   void placePalettes(const Batch& batch);
   Result<void> checkSizes(const Batch& batch, const DeviceLimits& limits) const;
@@ -38,10 +38,9 @@ class PlanMaker {
   std::size_t extrasUsed_ = 0;
 };
 
-Result<void> PlanMaker::checkPoses(const Batch& batch, const DeviceLimits& limits) const {
+Result<void> PlanMaker::checkPoses(const Batch& batch) {
   for (std::size_t index = 0; index < batch.poses.size(); ++index) {
-    if (Result<void> good = checkPose(batch, batch.poses[index], index, limits.promises); !good)
-      return good;
+    if (Result<void> good = checkPose(batch, batch.poses[index], index); !good) return good;
   }
   return {};
 }
@@ -162,7 +161,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   if (batch.jobs.size() > notUsed / 2) return invalid("the batch has more than 2^31 jobs");
   Result<void> placed;
   if (Result<void> good = placeJobs(batch, limits, tuning, placed); !good) return good;
-  if (Result<void> good = checkPoses(batch, limits); !good) return good;
+  if (Result<void> good = checkPoses(batch); !good) return good;
   placePalettes(batch);
   if (Result<void> good = checkSizes(batch, limits); !good) return good;
   if (!placed) return placed;

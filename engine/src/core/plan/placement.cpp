@@ -53,16 +53,13 @@ bool hasFormsForFewInfluences(Method method) {
 
 }  // namespace
 
-void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& variant) {
-  const std::uint8_t any = promises.maxInfluences;
+void chooseForm(const FormNeeds& needs, Variant& variant) {
   variant.scales = needs.scales;
   variant.morphs = needs.morphs;
   variant.fullInfluences = false;
   if (needs.morphs || needs.influences > 4 || (variant.scales && isForComparison(variant.method))) {
-    variant.influences = any;
-    variant.scales = !promises.noScale;
-  } else if (any != 0) {
-    variant.influences = any;
+    variant.influences = 0;
+    variant.scales = true;
   } else if (variant.scales || !hasFormsForFewInfluences(variant.method)) {
     variant.influences = 4;
   } else {
@@ -289,16 +286,12 @@ namespace {
 
 /// The values that are possible for all instances.
 struct FormRanges {
-  FormRanges(const std::optional<MeshInfo>& mesh, std::optional<bool> mayScale,
-             const Promises& promises) {
+  FormRanges() = default;
+  FormRanges(const std::optional<MeshInfo>& mesh, std::optional<bool> mayScale) {
     if (mesh) influences = {mesh->maxInfluences};
     if (mesh) full = {mesh->minInfluences == mesh->maxInfluences};
-    if ((mesh && mesh->morphTargetCount == 0) || promises.noMorphTargets) morphs = {false};
+    if (mesh && mesh->morphTargetCount == 0) morphs = {false};
     if (mayScale) scales = {*mayScale};
-    if (promises.noScale) scales = {false};
-    std::erase_if(influences, [&](std::uint32_t most) {
-      return promises.maxInfluences != 0 && most > promises.maxInfluences;
-    });
   }
 
   std::vector<std::uint32_t> influences{1, 2, 4, 5};
@@ -318,13 +311,12 @@ std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
 }
 
 /// All forms of a kernel.
-void appendForms(Variant variant, const FormRanges& ranges, const Promises& promises,
-                 std::vector<Variant>& variants) {
+void appendForms(Variant variant, const FormRanges& ranges, std::vector<Variant>& variants) {
   for (const std::uint32_t influences : ranges.influences) {
     for (const bool scales : ranges.scales) {
       for (const bool morphs : ranges.morphs) {
         for (const bool full : ranges.full) {
-          chooseForm({influences, full, scales, morphs}, promises, variant);
+          chooseForm({influences, full, scales, morphs}, variant);
           if (std::ranges::find(variants, variant) == variants.end()) variants.push_back(variant);
         }
       }
@@ -339,10 +331,10 @@ Result<std::vector<Variant>> everyVariant(const Job& job, const DeviceLimits& li
   if (Result<void> good = checkLimits(limits); !good) return good.error();
   if (Result<void> good = checkTuning(tuning); !good) return good.error();
   if (Result<void> good = checkVariant(outputVariant(job)); !good) return good.error();
-  const FormRanges ranges({}, {}, limits.promises);
+  const FormRanges ranges;
   std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   for (const bool areAligned : {false, true})
-    appendForms(layoutVariant(job, limits, tuning, areAligned), ranges, limits.promises, variants);
+    appendForms(layoutVariant(job, limits, tuning, areAligned), ranges, variants);
   return variants;
 }
 
@@ -356,12 +348,12 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
   job.method = needs.method;
   job.bounds = needs.bounds;
   job.place(*places);
-  const FormRanges ranges(needs.mesh, needs.mayScale, limits.promises);
+  const FormRanges ranges(needs.mesh, needs.mayScale);
   std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   if (needs.method == Method::linear)  // a scene copies them
     variants.push_back(paletteVariant(PaletteForm::matrices, false, tuning));
   // `placeVertices` aligns what it places.
-  appendForms(layoutVariant(job, limits, tuning), ranges, limits.promises, variants);
+  appendForms(layoutVariant(job, limits, tuning), ranges, variants);
   if (needs.culledOnGpu) variants.push_back(visibilityVariant(tuning));
   return variants;
 }

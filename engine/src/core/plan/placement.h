@@ -93,7 +93,7 @@ struct LayoutNeeds {
   std::array<std::uint32_t, streamCount> strides{}, residues{};
 };
 
-/// The inputs of `chooseForm`, besides the method and the promises.
+/// The inputs of `chooseForm`, besides the method.
 struct FormNeeds {
   std::uint32_t influences = 0;  ///< maximum of a vertex
   bool full = false;             ///< every vertex has that many
@@ -105,7 +105,7 @@ struct FormNeeds {
 
 FormNeeds formNeeds(const Job& job, bool mayScale);
 /// Sets `influences`, `fullInfluences`, `scales` and `morphs` of the variant.
-void chooseForm(const FormNeeds& needs, const Promises& promises, Variant& variant);
+void chooseForm(const FormNeeds& needs, Variant& variant);
 
 /// Whether kernels on the device may store an attribute, or all of a vertex, at once.
 inline bool storesWidely(const DeviceLimits& limits) {

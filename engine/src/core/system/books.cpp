@@ -86,9 +86,6 @@ PlanSizes sceneSizes(const SceneDescription& description) {
 
 Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info) {
   if (Result<void> good = checkMeshInfo(info, {"the mesh"}); !good) return good.error();
-  if (Result<void> kept = checkPromisedMesh(info, description_.limits.promises, {"the mesh"});
-      !kept)
-    return kept.error();
   const Result<std::optional<Range>> bytes = take(meshStore_, info.byteSize, packedMeshAlignment);
   if (!bytes) return bytes.error();
   if (!*bytes) {
@@ -115,10 +112,6 @@ Result<void> SceneBooks::addPoses(std::span<PoseHandle> poses, std::uint32_t joi
   }
   if (options.writer > PoseWriter::gpu)
     return notAValue("the writer of the pose", options.writer, "PoseWriter");
-  if (Result<void> kept =
-          checkPromisedPose(options.mayScale, description_.limits.promises, {"the pose"});
-      !kept)
-    return kept;
   if (poses.empty()) return {};
   ScenePose pose;
   const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
