@@ -15,7 +15,7 @@ struct DirectionMap {
 };
 
 // If no pose may scale, the matrix is not scaled. Linear blending applies the scale of joints even then; its products are in range
-// for joint scales between 2^-30 and 2^30. Otherwise, the matrix is multiplied by a power of two. If products are in range anyway,
+// for joint scales between 2^-20 and 2^30. Otherwise, the matrix is multiplied by a power of two. If products are in range anyway,
 // results have the same bits with and without this multiplication.
 DirectionMap directionMap(vec3 r0, vec3 r1, vec3 r2) {
   if (!SCALES) return DirectionMap(r0, r1, r2, dot3(r0, cross3(r1, r2)) < 0.0 ? -1.0 : 1.0);

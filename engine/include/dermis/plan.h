@@ -99,7 +99,7 @@ struct PoseDescription {
   /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
   /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`. But
   /// `Method::linear` always applies them; if `mayScale` is false, its normals and tangents are
-  /// right only for scales between 2^-30 and 2^30.
+  /// right only for scales between 2^-20 and 2^30.
   bool mayScale = true;
 };
 
