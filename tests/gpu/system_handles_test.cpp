@@ -148,7 +148,8 @@ TEST_F(SystemHandlesTest, DescriptionsThatBreakARuleAreRefused) {
   const float infinity = std::numeric_limits<float>::infinity();
   const std::pair<const char*, Change> changes[] = {
       {"update interval must be at least 1", [](InstanceDescription& d) { d.updateInterval = 0; }},
-      {"mesh needs a pose of 8 joints, but pose ", [&](InstanceDescription& d) { d.pose = narrow; }},
+      {"mesh needs a pose of 8 joints, but pose ",
+       [&](InstanceDescription& d) { d.pose = narrow; }},
       {"positions cannot be stored as none",
        [](InstanceDescription& d) { d.layout.positions = VertexFormat::none; }},
       {"positions cannot be stored as octahedral16x2",

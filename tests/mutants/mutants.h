@@ -1,4 +1,5 @@
-// Included by each file that run.py plants a mistake in. The environment chooses at most one, for the whole process.
+// Included by each file that run.py plants a mistake in. The environment chooses at most one, for
+// the whole process.
 #pragma once
 
 #include <cstdio>
