@@ -66,7 +66,7 @@ list(TRANSFORM dermisLinkedDecoders REPLACE "(.+)" "\\1=\\1::\\1" OUTPUT_VARIABL
 # Once for the installed package, and once for the build folder.
 file(RELATIVE_PATH shaderDirFromPackage /${dermisPackageDir} /${dermisShaderDir})
 configure_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake @ONLY)
-set(shaderDirFromPackage shaders/include)
+file(RELATIVE_PATH shaderDirFromPackage ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/shaders)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/dermisConfig.cmake.in ${PROJECT_BINARY_DIR}/dermisConfig.cmake @ONLY)
 # While the version is 0.x, a minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
