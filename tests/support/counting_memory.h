@@ -14,7 +14,7 @@
 
 namespace dermis::test {
 
-/// Each buffer has memory of its own.
+/// Gives every buffer its own memory.
 class CountingMemory {
  public:
   explicit CountingMemory(samples::Device& device) : device_(device) {}

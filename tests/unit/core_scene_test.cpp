@@ -506,7 +506,7 @@ TEST(Scene, PalettesSufficeForAllJoints) {
   }
 }
 
-// Two palettes that went leave 3 units each, and one is wanted that takes 5.
+// Removed palettes leave two ranges of 3 units; the new one needs 5.
 TEST(Scene, PalettesMayFindOnlyHoles) {
   SceneDescription description = smallScene();
   description.jointCapacity = Capacity::fixed(6);  // 30 units, 17 of them taken by `one`

@@ -678,7 +678,7 @@ TEST(DracoTest, DecodesRigidMeshes) {
   primitive.erase("targets");
   primitive["attributes"].erase("JOINTS_0");
   primitive["attributes"].erase("WEIGHTS_0");
-  // Accessors of its own.
+  // It shares no accessor with the skinned primitive.
   for (Json* index : {&primitive["attributes"]["POSITION"], &primitive["attributes"]["NORMAL"],
                       &primitive["attributes"]["TANGENT"], &primitive["attributes"]["TEXCOORD_0"],
                       &primitive["indices"]})
