@@ -3,8 +3,7 @@
 #ifndef DERMIS_SKIN_INSTANCES_GLSL
 #define DERMIS_SKIN_INSTANCES_GLSL
 
-// The difference between consecutive instances that are evenly spaced. Such instances have the same
-// box.
+// The difference between consecutive instances that are evenly spaced. Such instances have the same box.
 Instance stepBetween(InstanceRecord a, InstanceRecord b) {
   InstanceRecord step = a;
   step.palette = b.palette - a.palette;

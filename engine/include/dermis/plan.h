@@ -256,9 +256,9 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 /// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
 /// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
 /// with joints that scale, for any number, and for any number with morph targets. Some methods need
-/// fewer. With `texelBuffers` each
-/// skin kernel may be listed twice: with stores of up to 32 bytes, for jobs whose attributes are
-/// all aligned to the size of their stores, and with narrower stores, for all other jobs.
+/// fewer. With `texelBuffers` each skin kernel may be listed twice: with stores of up to 32 bytes,
+/// for jobs whose attributes are all aligned to the size of their stores, and with narrower stores,
+/// for all other jobs.
 ///
 /// Fails with `invalidArgument` if the job's method, motion or formats, the limits or the tuning
 /// are not valid.

@@ -69,9 +69,8 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
     settle(task, instance, part.firstVertex, part.vertexEnd);
     return;
   }
-  Scratch* const scratch = part.scratch;
-  const Palette palette =
-      makePalette(mesh, part.section, task.method, instance.pose, instance.mayScale, scratch[0]);
+  const Palette palette = makePalette(mesh, part.section, task.method, instance.pose,
+                                      instance.mayScale, part.scratch[0]);
   Findings findings;
   for (std::size_t number = part.firstRun; number < part.runEnd; ++number) {
     const Run& run = mesh.runs[number];
@@ -325,7 +324,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   const bool moves = task.method == Method::linear;
   const PlainKind kind = moves ? PlainKind::moved : PlainKind::turned;
   PlainGroup group, scaled;
-  group.assign(part.scratch[2], joints.size(), moves ? joints.size() * 12 : pairs * 8);
+  group.assign(part.scratch[1], joints.size(), moves ? joints.size() * 12 : pairs * 8);
   const auto add = [&](PlainGroup& to, const TaskInstance& instance) {
     to.outputs[to.count] = reinterpret_cast<float*>(instance.output(Stream::positions));
     to.poses[to.count++] = instance.pose;
@@ -342,7 +341,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
         instance.mayScale;
     if (scales) {
       if (scaled.palettes == nullptr)
-        scaled.assign(part.scratch[3], joints.size(), pairs * 16 + joints.size() * 8);
+        scaled.assign(part.scratch[2], joints.size(), pairs * 16 + joints.size() * 8);
       copyJoints(joints.size(), group.jointsOf(place), scaled.jointsOf(scaled.count));
       copyJoints(joints.size(), group.partsOf(place), scaled.partsOf(scaled.count));
       add(scaled, instance);

@@ -56,8 +56,7 @@ Result<void> checkMethod(Method method, const char* subject);
 void skinTask(const Task& task);
 
 /// Uses the best instruction set of the processor, or the one that `setTarget` chose. `scratch`
-/// points to four objects: for one instance, its previous pose, several instances at a time, and
-/// several instances that scale.
+/// points to three objects: for one instance, several instances at a time, and several that scale.
 void dispatchTask(const Task& task, Scratch* scratch);
 
 }  // namespace dermis::cpu

@@ -9,7 +9,7 @@ namespace dermis::cpu {
 
 struct ThreadMemory {
   std::vector<TaskInstance> instances;
-  Scratch scratch[4];  ///< as `dispatchTask` takes it
+  Scratch scratch[3];  ///< as `dispatchTask` takes it
 };
 
 /// That of this thread; it is freed when the thread ends.

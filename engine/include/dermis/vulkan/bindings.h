@@ -35,8 +35,8 @@ struct OutputBuffers {
 /// add that usage sets `DeviceDescription::texelBuffers` to false.
 ///
 /// A buffer that no plan needs may be left out: meshes and outputs if there are no jobs, poses and
-/// tables if batches are empty, palettes if all jobs are linear,
-/// results if no job has results, and the output of an attribute that no job writes.
+/// tables if batches are empty, palettes if all jobs are linear, results if no job has results, and
+/// the output of an attribute that no job writes.
 struct BatchBuffers {
   BufferRange meshes;    ///< packed meshes, each at its `Job::meshOffset`
   BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
