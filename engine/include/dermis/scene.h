@@ -435,6 +435,7 @@ class DERMIS_CORE_API Scene {
 
  private:
   explicit Scene(const SceneDescription& description);
+  friend struct SceneAccess;  // for executors
   SceneBooks& change();
   std::unique_ptr<SceneBooks> books_;
 };

@@ -1,6 +1,4 @@
-// Runs a Scene on the CPU by converting its commands to jobs. The tables of its plan say which
-// vertices of which instances are skinned from which poses. Here a palette is only a reference to a
-// pose.
+// Runs a Scene on the CPU: divides the work of each frame into jobs.
 
 #include "dermis/cpu/skinning_system.h"
 
@@ -9,7 +7,6 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
-#include <map>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -18,8 +15,10 @@
 #include "abi.h"
 #include "cpu/task.h"
 #include "dermis/cpu/skin.h"
-#include "plan/builder.h"
+#include "plan/check.h"
+#include "plan/work.h"
 #include "strict_floating_point.h"
+#include "system/books.h"
 
 namespace dermis::cpu {
 
@@ -55,13 +54,6 @@ Error wrong(const std::string& what) {
   return {ErrorCode::invalidArgument, what};
 }
 
-/// The pose that a palette refers to.
-struct PaletteSource {
-  std::span<const JointMatrix> pose;
-  bool mayScale = true;
-  std::uint64_t end = 0;  ///< one past the last unit of the palette
-};
-
 }  // namespace
 
 struct SkinningSystem::State {
@@ -75,18 +67,18 @@ struct SkinningSystem::State {
   }
 
   void readBackResults();
-  void namePalettes(const DispatchCommand& dispatch);
-  void addDispatch(const DispatchCommand& dispatch, std::uint64_t verticesPerJob);
-  void addInstances(const Task& task, std::size_t first, std::uint64_t verticesPerJob);
+  TaskInstance taskInstance(const Work::Instance& instance, const Group& group);
+  void placeInstances(const Work& work);
+  void addGroup(const Group& group, std::uint64_t verticesPerJob);
+  void addInstances(const Task& task, std::size_t first, std::size_t count,
+                    std::uint64_t verticesPerJob);
   void addTask(const Task& task, std::size_t first, std::size_t count);
-  TaskInstance taskInstance(const abi::InstanceRecord& record, std::uint32_t& result) const;
   void finishTasks();
-  const PaletteSource& paletteAt(std::uint32_t unit) const;
 
   Scene scene;
+  SceneBooks& books{SceneAccess::books(scene)};
   std::unique_ptr<State*> self;  ///< context of the scene's growth callback
-  Plan plan;
-  std::span<const std::uint32_t> tables;  ///< of the plan
+  const std::uint64_t windowStep = outputWindowStep(limitsOfMemory());
   std::uint64_t frame = 0;
   bool isPlanned = false;  ///< the jobs of the frame were made
 
@@ -94,14 +86,10 @@ struct SkinningSystem::State {
     MeshHandle handle;
     Mesh mesh;
   };
-  /// Keyed by the word at which the scene would place the mesh.
-  std::unordered_map<std::uint32_t, OwnMesh> meshes;
+  std::unordered_map<std::uint64_t, OwnMesh> meshes;  ///< by their offset in a mesh buffer
   std::vector<std::vector<JointMatrix>> poseBuffers;
   std::vector<CacheLine> ownOutput;
   std::span<std::byte> output;
-  std::map<std::uint32_t, PaletteSource> palettes;  ///< keyed by first unit; they do not overlap
-  mutable std::map<std::uint32_t, PaletteSource>::const_iterator lastPalette;
-
   std::vector<TaskInstance> instances;
   std::vector<std::uint32_t> resultOf;  ///< of each instance: index of its result, or `noResult`
   /// A task's result for an instance. Other tasks may skin other vertices of the same instance.
@@ -110,8 +98,8 @@ struct SkinningSystem::State {
     InstanceResult found;
   };
   std::vector<Part> parts;
-  std::vector<InstanceResult> results;  ///< by index
-  std::vector<std::byte> readBack;
+  std::vector<std::uint32_t> filled;  ///< of each group: instances that have their place
+  std::vector<std::byte> readBack;    ///< as a GPU would write it
   struct Extent {
     std::size_t first, count;
   };
@@ -167,7 +155,6 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
   State& state = *system.state_;
   *self = &state;
   state.self = std::move(self);
-  state.lastPalette = state.palettes.end();
   for (std::uint32_t number = 0; number < state.scene.poseBufferCount(); ++number)
     state.addPoseBuffer(state.scene.poseBuffer(number).requirement.size);
   if (ownsOutput) {
@@ -185,8 +172,8 @@ Result<SkinningSystem> SkinningSystem::create(const SkinningSystemDescription& d
 Result<MeshHandle> SkinningSystem::addMesh(Mesh mesh) {
   Result<MeshHandle> handle = state_->scene.addMesh(mesh.info());
   if (!handle) return handle;
-  const auto word = static_cast<std::uint32_t>(*state_->scene.meshOffset(*handle) / 4);
-  state_->meshes.emplace(word, State::OwnMesh{*handle, std::move(mesh)});
+  state_->meshes.emplace(*state_->scene.meshOffset(*handle),
+                         State::OwnMesh{*handle, std::move(mesh)});
   return handle;
 }
 Result<MeshHandle> SkinningSystem::addMesh(const PackedMesh& mesh) {
@@ -279,26 +266,17 @@ std::uint64_t SkinningSystem::compact(std::uint64_t maxBytes) {
 
 Result<std::span<const PlannedJob>> SkinningSystem::jobs(std::uint32_t verticesPerJob) {
   State& state = *state_;
-  if (Result<void> planned = state.scene.plan(state.plan); !planned) return planned.error();
-  state.tables = PlanData::of(state.plan).tables;
-  state.instances.clear();
-  state.resultOf.clear();
-  state.lastPalette = state.palettes.end();
+  if (Result<void> gathered = state.books.gather(); !gathered) return gathered.error();
+  for (const CopyCommand& move : state.books.moves()) {
+    std::memcpy(state.output.data() + move.toOffset, state.output.data() + move.fromOffset,
+                static_cast<std::size_t>(move.size));
+  }
+  const Work& work = state.books.work();
+  state.placeInstances(work);
   state.tasks.clear();
   state.extents.clear();
-  for (const Command& command : state.plan.commands()) {
-    if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
-      if (dispatch->variant.kernel == Kernel::palette) {
-        state.namePalettes(*dispatch);
-      } else if (dispatch->variant.kernel == Kernel::skin) {
-        state.addDispatch(*dispatch, std::max(verticesPerJob, 1u));
-      }
-    } else if (const auto* copy = std::get_if<CopyCommand>(&command);
-               copy != nullptr && copy->to == BufferRole::positions) {
-      std::memcpy(state.output.data() + copy->toOffset, state.output.data() + copy->fromOffset,
-                  static_cast<std::size_t>(copy->size));
-    }
-  }
+  for (const std::uint32_t group : work.order)
+    state.addGroup(work.groups[group], std::max(verticesPerJob, 1u));
   state.finishTasks();
   if (Result<void> committed = state.scene.commit(); !committed) return committed.error();
   state.isPlanned = true;
@@ -313,117 +291,68 @@ Result<void> SkinningSystem::abandonFrame() {
   return {};
 }
 
-/// Writing a palette removes the palettes that it overlaps.
-void SkinningSystem::State::namePalettes(const DispatchCommand& dispatch) {
-  const auto push = abi::load<abi::PalettePush>(dispatch.constants, 0);
-  for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
-    const auto record =
-        abi::load<abi::PaletteRecord>(tables, push.palettes + number * abi::PALETTE_WORDS);
-    PaletteSource source;
-    source.mayScale = dispatch.variant.scales;
-    source.pose =
-        std::span<const JointMatrix>(poseBuffers[dispatch.poseBuffer])
-            .subspan(static_cast<std::size_t>(record.matrices * unitBytes) / sizeof(JointMatrix),
-                     record.jointCount);
-    const PaletteForm form = paletteForm(dispatch.variant.method);
-    source.end = record.place + paletteSize(form, record.jointCount, source.mayScale);
-    auto first = palettes.lower_bound(record.place);
-    if (first != palettes.begin() && std::prev(first)->second.end > record.place) --first;
-    auto end = first;
-    while (end != palettes.end() && end->first < source.end) ++end;
-    // Usually the same palette is written again; its map entry is reused.
-    if (first != end && first->first == record.place) {
-      first->second = source;
-      ++first;
-      palettes.erase(first, end);
-    } else {
-      palettes.erase(first, end);
-      palettes.emplace(record.place, source);
+TaskInstance SkinningSystem::State::taskInstance(const Work::Instance& instance,
+                                                 const Group& group) {
+  TaskInstance skinned;
+  const ScenePose& pose = books.poses().at(instance.pose);
+  skinned.pose = poseAt(SceneBooks::placeOf(pose));
+  skinned.mayScale = pose.mayScale;
+  skinned.restartsMotion = (instance.flags & abi::INSTANCE_RESTARTS) != 0;
+  skinned.settles = (instance.flags & abi::INSTANCE_SETTLES) != 0;
+  if (instance.extras != nullptr) {
+    skinned.morphs = instance.extras->morphs;
+    if (instance.extras->hasBox) {
+      const BoxScale scale = boxScale(instance.extras->box);
+      std::ranges::copy(scale.center, skinned.boxCenter);
+      std::ranges::copy(scale.inverse, skinned.boxInverse);
     }
+  }
+  const GroupKey& key = group.key;
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (key.strides[stream] == 0) continue;
+    // Runs have the place of their first vertex.
+    skinned.outputs[stream] = output.data() + key.windows[stream] * windowStep +
+                              instance.run->offsets[stream] -
+                              std::size_t{key.firstVertex} * key.strides[stream];
+  }
+  return skinned;
+}
+
+/// The instances of all groups, each group's together.
+void SkinningSystem::State::placeInstances(const Work& work) {
+  instances.resize(work.instances.size());
+  resultOf.assign(instances.size(), noResult);
+  filled.assign(work.groups.size(), 0);
+  for (const Work::Instance& instance : work.instances) {
+    const std::uint32_t number = work.groupOf(instance);
+    const Group& group = work.groups[number];
+    const std::size_t place = group.firstInstance + std::size_t{filled[number]++};
+    instances[place] = taskInstance(instance, group);
+    if (instance.extras != nullptr && !instances[place].settles)
+      resultOf[place] = instance.extras->result;
   }
 }
 
-/// Instances are mostly in the order of their poses, so the next palette is tried first.
-const PaletteSource& SkinningSystem::State::paletteAt(std::uint32_t unit) const {
-  if (lastPalette != palettes.end() && lastPalette->first != unit) ++lastPalette;
-  if (lastPalette == palettes.end() || lastPalette->first != unit)
-    lastPalette = palettes.find(unit);
-  return lastPalette->second;
-}
-
-TaskInstance SkinningSystem::State::taskInstance(const abi::InstanceRecord& record,
-                                                 std::uint32_t& result) const {
-  TaskInstance instance;
-  const PaletteSource& palette = paletteAt(record.palette);
-  instance.pose = palette.pose;
-  instance.mayScale = palette.mayScale;
-  instance.restartsMotion = (record.joints & abi::INSTANCE_RESTARTS) != 0;
-  instance.settles = (record.joints & abi::INSTANCE_SETTLES) != 0;
-  if (record.extension == 0) return instance;
-  const auto extension = abi::load<abi::ExtensionRecord>(tables, record.extension);
-  static_assert(sizeof(MorphWeight) == sizeof(abi::ActiveMorph));
-  instance.morphs = {reinterpret_cast<const MorphWeight*>(tables.data() + extension.morphs),
-                     extension.morphCount};
-  result = extension.result;
-  const float center[3] = {extension.centerX, extension.centerY, extension.centerZ};
-  const float inverse[3] = {extension.inverseX, extension.inverseY, extension.inverseZ};
-  std::ranges::copy(center, instance.boxCenter);
-  std::ranges::copy(inverse, instance.boxInverse);
-  return instance;
-}
-
-void SkinningSystem::State::addDispatch(const DispatchCommand& dispatch,
-                                        std::uint64_t verticesPerJob) {
-  const auto push = abi::load<abi::SkinPush>(dispatch.constants, 0);
-  const Variant& variant = dispatch.variant;
-  const bool findsOut = hasResults(variant);
+void SkinningSystem::State::addGroup(const Group& group, std::uint64_t verticesPerJob) {
+  const Variant& variant = group.variant;
   Task task;
+  task.mesh = &dataOf(meshes.find(group.key.mesh)->second.mesh);
   task.method = variant.method;
+  const std::array<std::uint32_t, streamCount>& strides = group.key.strides;
   task.places.motion = variant.motion;
-  const std::array<OutputAttribute*, streamCount> attributes{
-      &task.places.positions, &task.places.normals, &task.places.tangents,
-      &task.places.previousPositions};
-  const std::array<VertexFormat, streamCount> formats{
-      variant.positions, variant.normals, variant.tangents,
-      variant.motion == Motion::none ? VertexFormat::none : variant.positions};
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    attributes[stream]->format = formats[stream];
-  for (std::uint32_t number = 0; number < push.groupCount; ++number) {
-    const auto group = abi::load<abi::GroupRecord>(tables, push.groups + number * abi::GROUP_WORDS);
-    task.mesh = &dataOf(meshes.find(group.mesh)->second.mesh);
-    task.firstVertex = group.firstVertex;
-    task.vertexEnd = group.vertexEnd;
-    const std::array<std::uint32_t, streamCount> strides{group.positionStride, group.normalStride,
-                                                         group.tangentStride, group.previousStride};
-    for (std::size_t stream = 0; stream < streamCount; ++stream)
-      attributes[stream]->stride = strides[stream];
-
-    const std::size_t first = instances.size();
-    for (std::uint32_t index = 0; index < group.instanceCount; ++index) {
-      const auto record = abi::load<abi::InstanceRecord>(
-          tables, push.instances + (group.firstInstance + index) * abi::INSTANCE_WORDS);
-      std::uint32_t result = 0;
-      TaskInstance& instance = instances.emplace_back(taskInstance(record, result));
-      const std::array<std::uint32_t, streamCount> offsets{
-          record.positions, record.normals, record.tangents, record.previousPositions};
-      for (std::size_t stream = 0; stream < streamCount; ++stream) {
-        if (attributes[stream]->format == VertexFormat::none) continue;
-        // Records have the place of the group's first vertex.
-        instance.outputs[stream] = output.data() + dispatch.windows[stream].offset +
-                                   offsets[stream] -
-                                   std::size_t{group.firstVertex} * attributes[stream]->stride;
-      }
-      resultOf.push_back(findsOut && !instance.settles ? result : noResult);
-    }
-    addInstances(task, first, verticesPerJob);
-  }
+  task.places.positions = {0, strides[0], variant.positions};
+  task.places.normals = {0, strides[1], variant.normals};
+  task.places.tangents = {0, strides[2], variant.tangents};
+  task.places.previousPositions = {
+      0, strides[3], variant.motion == Motion::none ? VertexFormat::none : variant.positions};
+  task.firstVertex = group.key.firstVertex;
+  task.vertexEnd = group.key.vertexEnd;
+  addInstances(task, group.firstInstance, group.instances, verticesPerJob);
 }
 
-/// Adds instances from `first` on, as tasks for some of them or for some of their vertices.
-void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
+/// Adds `count` instances from `first` on, as tasks for some of them or for some of their vertices.
+void SkinningSystem::State::addInstances(const Task& task, std::size_t first, std::size_t count,
                                          std::uint64_t verticesPerJob) {
-  const std::size_t count = instances.size() - first;
-  if (count == 0) return;
   const std::uint64_t vertices = task.vertexEnd - task.firstVertex;
   std::uint64_t each = std::min<std::uint64_t>(count, instancesTogether);
   std::uint64_t step = vertices;
@@ -434,9 +363,8 @@ void SkinningSystem::State::addInstances(const Task& task, std::size_t first,
     const std::uint64_t blocks = (vertices + ranges * blockVertices - 1) / (ranges * blockVertices);
     step = blocks * blockVertices;
   }
-  const bool findOut =
-      std::any_of(resultOf.end() - static_cast<std::ptrdiff_t>(count), resultOf.end(),
-                  [](std::uint32_t result) { return result != noResult; });
+  const bool findOut = std::ranges::any_of(std::span(resultOf).subspan(first, count),
+                                           [](std::uint32_t result) { return result != noResult; });
   Task part = task;
   for (std::uint64_t begin = task.firstVertex; begin < task.vertexEnd; begin += step) {
     part.firstVertex = static_cast<std::uint32_t>(begin);
@@ -480,23 +408,22 @@ void SkinningSystem::State::finishTasks() {
   }
 }
 
-/// Reads back results as the GPU's commands do.
+/// Combines the results of the jobs, and reads them back as those of a GPU.
 void SkinningSystem::State::readBackResults() {
+  const std::uint64_t size = dermis::readBackResults + scene.buffer(BufferRole::results).size;
+  readBack.resize(static_cast<std::size_t>(size));
+  const auto placeOf = [this](const Part& part) {
+    return readBack.data() + dermis::readBackResults + part.result * sizeof(InstanceResult);
+  };
+  const auto set = [](std::byte* place, const InstanceResult& result) {
+    std::memcpy(place, &result, sizeof(result));
+  };
+  for (const Part& part : parts) set(placeOf(part), {});
   for (const Part& part : parts) {
-    if (results.size() <= part.result) results.resize(part.result + 1);
-    results[part.result] = {};
-  }
-  for (const Part& part : parts) addResult(results[part.result], part.found);
-  readBack.resize(static_cast<std::size_t>(plan.buffer(BufferRole::readBack).size));
-  for (const Command& command : plan.commands()) {
-    const auto* copy = std::get_if<CopyCommand>(&command);
-    if (copy == nullptr || copy->to != BufferRole::readBack) continue;
-    const auto size = static_cast<std::size_t>(copy->size);
-    const std::size_t needed =
-        (static_cast<std::size_t>(copy->fromOffset) + size) / sizeof(InstanceResult);
-    if (results.size() < needed) results.resize(needed);
-    std::memcpy(readBack.data() + copy->toOffset,
-                reinterpret_cast<const std::byte*>(results.data()) + copy->fromOffset, size);
+    InstanceResult result;
+    std::memcpy(&result, placeOf(part), sizeof(result));
+    addResult(result, part.found);
+    set(placeOf(part), result);
   }
   static_cast<void>(scene.readBack(frame - 1, readBack).ok());  // the frame that was committed last
 }

@@ -1,9 +1,9 @@
-// Passes a whole batch to the builder.
+// Turns a batch into work, and the work into a plan.
 
 #include <algorithm>
 #include <string>
 
-#include "plan/builder.h"
+#include "plan/encode.h"
 
 namespace dermis {
 
@@ -30,7 +30,8 @@ class PlanMaker {
   std::vector<std::uint32_t> results_;  ///< each job's number among them, or notUsed
   std::uint32_t resultCount_ = 0;
   std::uint64_t vertexCount_ = 0;
-  PlanBuilder builder_;
+  Work work_;
+  Encoder encoder_;
   Groups groups_;
   std::vector<PlacedRun> runs_;
   std::vector<std::uint32_t> firstRuns_;  ///< of each job
@@ -133,8 +134,8 @@ void PlanMaker::addPalettes(const Batch& batch) {
     for (std::size_t index = 0; index < units.size(); ++index) {
       if (units[index] == notUsed) continue;
       const PoseDescription& pose = batch.poses[index];
-      builder_.addPalette({static_cast<std::uint32_t>(pose.matrixOffset / unitBytes)}, units[index],
-                          pose.jointCount, form, pose.mayScale);
+      work_.addPose({static_cast<std::uint32_t>(pose.matrixOffset / unitBytes)}, units[index],
+                    pose.jointCount, form, pose.mayScale);
     }
   }
 }
@@ -150,7 +151,7 @@ void PlanMaker::addJobs(const Batch& batch) {
     const bool mayHaveExtras = !job.morphs.empty() || results_[index] != notUsed;
     const InstanceExtras* extras = mayHaveExtras ? extrasOf(batch, index) : nullptr;
     for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
-      builder_.add(runs_[run], palette, flags, extras);
+      work_.add({&runs_[run], extras, job.pose, palette, flags});
   }
 }
 
@@ -172,11 +173,13 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   sizes.palettes = palettesSize_;
   sizes.results = resultCount_;
   sizes.outputs = batch.outputs;
-  builder_.begin(plan, groups_, limits, tuning, sizes);
+  work_.begin(groups_);
   addPalettes(batch);
-  for (std::uint32_t result = 0; result < resultCount_; ++result) builder_.clearResult(result);
+  for (std::uint32_t result = 0; result < resultCount_; ++result)
+    work_.clearedResults.push_back(result);
   addJobs(batch);
-  if (Result<void> good = builder_.finish(); !good) return good;
+  work_.arrange();
+  if (Result<void> good = encoder_.encode(work_, limits, tuning, sizes, plan); !good) return good;
   plan.paletteUnits = paletteUnits_;
   plan.results = results_;
   plan.instanceCount = static_cast<std::uint32_t>(batch.jobs.size());

@@ -5,7 +5,9 @@
 #include <cstring>
 #include <string>
 
-#include "plan/builder.h"
+#include "plan/check.h"
+#include "plan/plan_data.h"
+#include "plan/work.h"
 #include "strict_floating_point.h"
 
 namespace dermis {

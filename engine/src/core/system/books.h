@@ -14,7 +14,8 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
-#include "plan/builder.h"
+#include "plan/encode.h"
+#include "plan/work.h"
 #include "system/range_allocator.h"
 #include "system/slot_map.h"
 
@@ -139,7 +140,9 @@ class SceneBooks {
   Result<bool> isDue(InstanceHandle instance) const;
   std::uint64_t compact(std::uint64_t maxBytes);
 
-  /// Plans all work. None of it counts as done before `commit`.
+  /// Collects all work. None of it counts as done before `commit`.
+  Result<void> gather();
+  /// `gather`, encoded as a plan.
   Result<void> plan(Plan& out);
   Result<void> commit();
   Result<void> abandonFrame(std::uint64_t frame);
@@ -158,6 +161,10 @@ class SceneBooks {
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
   const SceneDescription& description() const { return description_; }
   SceneStatistics statistics() const;
+
+  /// Of the last `gather`.
+  const Work& work() const { return work_; }
+  std::span<const CopyCommand> moves() const { return moves_; }
 
   std::span<const InstanceHandle> skinned() const { return skinned_; }
   std::span<const InstanceHandle> settled() const { return settled_; }
@@ -272,7 +279,8 @@ class SceneBooks {
   std::deque<PoseStore> poseBuffers_;
   std::uint64_t slotCapacity_ = 0;  ///< of instances
   Groups groups_;
-  PlanBuilder builder_;
+  Work work_;
+  Encoder encoder_;
   std::deque<Retired> retired_;
 
   std::uint64_t frame_ = 0, completed_ = 0;
@@ -349,6 +357,11 @@ class SceneBooks {
   CullingStatistics culling_;
   std::vector<InstanceResult> latestResults_;  ///< by number, as they were last read back …
   std::vector<std::uint64_t> resultFrames_;    ///< … in these frames
+};
+
+/// How an executor of this repository reaches the books of a scene.
+struct SceneAccess {
+  static SceneBooks& books(Scene& scene) { return *scene.books_; }
 };
 
 }  // namespace dermis

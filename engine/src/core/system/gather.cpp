@@ -47,18 +47,19 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   const bool isCpu = pose.writer == PoseWriter::cpu;
   const PoseSource source{static_cast<std::uint32_t>(placeOf(pose).offset / unitBytes), pose.buffer,
                           isCpu ? BufferRole::poses : BufferRole::gpuPoses};
-  builder_.addPalette(source, converted.unit, pose.jointCount, form, pose.mayScale);
+  work_.addPose(source, converted.unit, pose.jointCount, form, pose.mayScale);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
                          const Candidate* candidate) {
   const InstanceExtras* extras = instance.extras.isNeeded() ? &instance.extras : nullptr;
-  const std::uint32_t pose = paletteUnit(instance);
+  const std::uint32_t palette = paletteUnit(instance);
   const auto add = [&](const PlacedRun& run) {
+    const Work::Instance skinned{&run, extras, instance.pose, palette, flags};
     if (candidate != nullptr) {
-      builder_.addCulled(run, pose, flags, extras, *candidate);
+      work_.addCulled(skinned, *candidate);
     } else {
-      builder_.add(run, pose, flags, extras);
+      work_.add(skinned);
     }
   };
   add(instance.run);
@@ -85,7 +86,7 @@ void SceneBooks::addDue(std::uint32_t index) {
   addRuns(instance, state.hasMotion && restarts(state, record_ + 1) ? abi::INSTANCE_RESTARTS : 0u,
           nullptr);
   if (instance.extras.result != notUsed) {
-    builder_.clearResult(instance.extras.result);
+    work_.clearedResults.push_back(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
   }
   planned_.skinnedVertices += instance.vertexCount;
@@ -139,7 +140,7 @@ void SceneBooks::gatherCulled() {
     // There is no box until the GPU skins it for the first time, and the CPU does not know when
     // that is.
     if (instance.extras.result != notUsed) {
-      if (instance.firstFrame == 0) builder_.clearResult(instance.extras.result);
+      if (instance.firstFrame == 0) work_.clearedResults.push_back(instance.extras.result);
       plannedResults_.push_back(instance.extras.result);
     }
     convertPalette(instance);
@@ -187,7 +188,7 @@ void SceneBooks::gatherResults() {
   }
 }
 
-Result<void> SceneBooks::plan(Plan& out) {
+Result<void> SceneBooks::gather() {
   if (!hasBegun_) {
     return Error{ErrorCode::invalidArgument, "beginFrame must be called before each frame"};
   }
@@ -201,32 +202,41 @@ Result<void> SceneBooks::plan(Plan& out) {
   plannedResults_.clear();
   resultCopies_.clear();
   planned_ = {};
-  PlanData& data = PlanData::of(out);
-  builder_.begin(data, groups_, description_.limits, description_.tuning, sizes());
+  work_.begin(groups_);
   gatherPoses();
   gatherMoves();
   gatherPending();
   gatherSettling();
   gatherCulled();
   gatherResults();
+  work_.arrange();
   for (const Conversion& conversion : conversions_) {
     const ScenePose& pose = poses_.at(conversion.pose.index);
     if (pose.writer == PoseWriter::cpu) planned_.poseBytes += pose.jointCount * sizeof(JointMatrix);
   }
-  const auto record = static_cast<std::uint32_t>(record_ + 1);
-  const FrameWork frame{record, clearHistory_, moves_, resultCopies_};
-  if (Result<void> good = builder_.finish(&frame); !good) {
-    data.clear();
-    return good;
-  }
-  data.vertexCount = planned_.skinnedVertices;
   planned_.frame = frame_;
   planned_.instances = instances_.size();
   planned_.skinnedInstances = static_cast<std::uint32_t>(due_.size());
   planned_.settledInstances = static_cast<std::uint32_t>(settling_.size());
-  planned_.convertedPoses = builder_.paletteCount();
-  planned_.culledCandidates = data.candidateCount;
+  planned_.convertedPoses = work_.poseCount;
+  planned_.culledCandidates = static_cast<std::uint32_t>(work_.culled.size());
   isPlanned_ = true;
+  return {};
+}
+
+Result<void> SceneBooks::plan(Plan& out) {
+  if (Result<void> gathered = gather(); !gathered) return gathered;
+  PlanData& data = PlanData::of(out);
+  const auto record = static_cast<std::uint32_t>(record_ + 1);
+  const FrameWork frame{record, clearHistory_, moves_, resultCopies_};
+  if (Result<void> good =
+          encoder_.encode(work_, description_.limits, description_.tuning, sizes(), data, &frame);
+      !good) {
+    isPlanned_ = false;
+    data.clear();
+    return good;
+  }
+  data.vertexCount = planned_.skinnedVertices;
   return {};
 }
 

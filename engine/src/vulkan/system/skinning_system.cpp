@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "plan/builder.h"
+#include "plan/plan_data.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {

@@ -1,4 +1,4 @@
-#include "plan/builder.h"
+#include "plan/encode.h"
 
 #include <algorithm>
 #include <array>
@@ -44,138 +44,6 @@ void setBox(abi::ExtensionRecord& extension, const Box& box) {
 
 }  // namespace
 
-void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active) {
-  active.assign(morphs.begin(), morphs.end());
-  std::erase_if(active, [](const MorphWeight& morph) { return morph.weight == 0; });
-  std::ranges::sort(active, {}, &MorphWeight::target);
-}
-
-// -- Groups.
-
-/// Sets `lastVariant_` and `lastKey_`.
-void Groups::chooseVariant(const Job& job, const OutputStreams& streams, bool mayScale,
-                           const DeviceLimits& limits, const Tuning& tuning) {
-  const FormNeeds form = formNeeds(job, mayScale);
-  const bool hasLayout = lastKey_ != 0 && lastLayout_.areThoseOf(job, streams);
-  if (hasLayout && form == lastForm_) return;
-  if (!hasLayout) {
-    lastVariant_ = layoutVariant(job, limits, tuning);
-    lastLayout_ = LayoutNeeds(job, streams);
-  }
-  chooseForm(form, lastVariant_);
-  lastForm_ = form;
-  lastKey_ = lastVariant_.key();
-}
-
-Result<void> Groups::place(const Job& job, const OutputStreams& streams, const Placing& placing,
-                           const DeviceLimits& limits, const Tuning& tuning,
-                           std::vector<PlacedRun>& runs) {
-  const OutputWindows& windows = placing.windows;
-  cutIntoRuns(streams, job.mesh.vertexCount, windows, vertexRuns_);
-  if (windows.isAnyOversized) {
-    for (const VertexRun& run : vertexRuns_) {
-      if (Result<void> good = checkWindows(streams, run, windows, placing.subject, limits); !good)
-        return good;
-    }
-  }
-  if (placing.isCulled && vertexRuns_.size() > 1) {
-    return Error{
-        ErrorCode::limitExceeded,
-        placing.subject.name() +
-            " is culled on the GPU, so its output must lie in one storage buffer range of " +
-            std::to_string(limits.maxStorageBufferRange) + " bytes, but it does not"};
-  }
-  chooseVariant(job, streams, placing.mayScale, limits, tuning);
-  GroupKey key;
-  key.mesh = job.meshOffset;
-  key.variant = lastKey_;
-  key.isCulled = placing.isCulled;
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    key.strides[stream] = streams[stream].stride;
-  for (const VertexRun& run : vertexRuns_) {
-    key.windows = run.windows;
-    key.firstVertex = run.firstVertex;
-    key.vertexEnd = run.vertexEnd;
-    const auto place = [&](std::size_t stream) {
-      return static_cast<std::uint32_t>(streams[stream].begin(run.firstVertex) -
-                                        run.windows[stream] * windows.step);
-    };
-    PlacedRun& placed = runs.emplace_back();
-    placed.group = acquire(key, lastVariant_);
-    placed.record.joints = placing.jointCount;
-    placed.record.positions = place(0);
-    placed.record.normals = place(1);
-    placed.record.tangents = place(2);
-    placed.record.previousPositions = place(3);
-  }
-  return {};
-}
-
-std::uint32_t Groups::acquire(const GroupKey& key, const Variant& variant) {
-  if (last_ == notUsed || entries_[last_].users == 0 || !(entries_[last_].group.key == key))
-    last_ = findOrAdd(key, variant);
-  ++entries_[last_].users;
-  return last_;
-}
-
-std::uint32_t Groups::findOrAdd(const GroupKey& key, const Variant& variant) {
-  if (heads_.size() <= entries_.size()) growHeads();
-  std::uint32_t& head = headOf(key);
-  for (std::uint32_t group = head; group != notUsed; group = entries_[group].next) {
-    if (entries_[group].group.key == key) return group;
-  }
-  auto group = static_cast<std::uint32_t>(entries_.size());
-  if (free_.empty()) {
-    entries_.emplace_back();
-  } else {
-    group = free_.back();
-    free_.pop_back();
-  }
-  Entry& entry = entries_[group];
-  entry = {};
-  entry.group.key = key;
-  entry.group.variant = variant;
-  entry.next = head;
-  head = group;
-  return group;
-}
-
-std::uint32_t& Groups::headOf(const GroupKey& key) {
-  // Groups of one mesh and variant mostly differ by their first window and stride, if at all.
-  constexpr std::uint64_t odd[] = {0x9e3779b97f4a7c15u, 0xc2b2ae3d27d4eb4fu, 0x165667b19e3779f9u};
-  const std::uint64_t hash =
-      key.mesh * odd[0] + key.variant * odd[1] +
-      ((std::uint64_t{key.windows[0]} << 32 | key.strides[0]) ^ key.firstVertex) * odd[2];
-  return heads_[static_cast<std::size_t>(hash >> 32) & (heads_.size() - 1)];
-}
-
-void Groups::growHeads() {
-  heads_.assign(std::bit_ceil(2 * entries_.size() + 16), notUsed);
-  for (std::uint32_t group = 0; group < entries_.size(); ++group) {
-    if (entries_[group].users == 0) continue;
-    entries_[group].next = std::exchange(headOf(entries_[group].group.key), group);
-  }
-}
-
-void Groups::release(std::uint32_t group) {
-  Entry& entry = entries_[group];
-  if (--entry.users != 0) return;
-  std::uint32_t* link = &headOf(entry.group.key);
-  while (*link != group) link = &entries_[*link].next;
-  *link = entry.next;
-  free_.push_back(group);
-}
-
-void Groups::clear() {
-  entries_.clear();
-  free_.clear();
-  std::ranges::fill(heads_, notUsed);
-  last_ = notUsed;
-  lastKey_ = 0;
-}
-
-// -- Plans.
-
 void PlanData::clear() {
   commands.clear();
   variants.clear();
@@ -188,41 +56,21 @@ void PlanData::clear() {
   candidateCount = 0;
 }
 
-void PlanBuilder::begin(PlanData& plan, Groups& groups, const DeviceLimits& limits,
-                        const Tuning& tuning, const PlanSizes& sizes) {
+Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
+                             const PlanSizes& sizes, PlanData& plan, const FrameWork* frame) {
   plan_ = &plan;
-  groups_ = &groups;
+  work_ = &work;
   limits_ = limits;
   tuning_ = tuning;
   plan.clear();
   plan.limits = limits;
   plan.sizes = sizes;
-  ++number_;
-  paletteCount_ = 0;
-  for (PaletteLists& lists : palettes_) {
-    for (auto& ofForm : lists.records) {
-      for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
-    }
-  }
-  cleared_.clear();
-  entries_.clear();
-  candidates_.clear();
-  planGroups_.clear();
   dispatches_.clear();
-}
-
-void PlanBuilder::startGroup(Groups::Entry& entry) {
-  entry.plan = number_;
-  entry.planGroup = static_cast<std::uint32_t>(planGroups_.size());
-  planGroups_.push_back(entry.group);
-}
-
-Result<void> PlanBuilder::finish(const FrameWork* frame) {
   if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
   writeInstances();
-  if (!candidates_.empty()) {
+  if (!work.culled.empty()) {
     appendCandidates();
     appendCulledDispatches();
     if (Result<void> good = addVisibilityDispatches(frame->frame); !good) return good;
@@ -232,8 +80,8 @@ Result<void> PlanBuilder::finish(const FrameWork* frame) {
   if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
     return tooLargeForRange("tables", plan_->tables.size() * 4, limits_);
   }
-  plan_->instanceCount = static_cast<std::uint32_t>(entries_.size());
-  plan_->candidateCount = static_cast<std::uint32_t>(candidates_.size());
+  plan_->instanceCount = static_cast<std::uint32_t>(work.instances.size());
+  plan_->candidateCount = static_cast<std::uint32_t>(work.culled.size());
   if (frame != nullptr) {
     listFrame(*frame);
   } else {
@@ -261,7 +109,7 @@ void setConstants(DispatchCommand& dispatch, const Push& push) {
 
 /// Sets the number of workgroups in the push constants too.
 template <typename Push>
-Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push) {
+Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push) {
   const std::uint64_t maximum = std::min(
       std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY, maxWorkgroups);
   if (workgroups > maximum) {
@@ -279,9 +127,9 @@ Result<void> PlanBuilder::addDispatch(const Variant& variant, std::uint64_t work
   return {};
 }
 
-Result<void> PlanBuilder::addPaletteDispatches() {
-  for (std::uint32_t buffer = 0; buffer < palettes_.size(); ++buffer) {
-    const PaletteLists& lists = palettes_[buffer];
+Result<void> Encoder::addPaletteDispatches() {
+  for (std::uint32_t buffer = 0; buffer < work_->poses.size(); ++buffer) {
+    const Work::Poses& lists = work_->poses[buffer];
     for (std::size_t form = 0; form < paletteFormCount; ++form) {
       for (const bool mayScale : {false, true}) {
         const std::span<const abi::PaletteRecord> records = lists.records[form][mayScale];
@@ -296,9 +144,9 @@ Result<void> PlanBuilder::addPaletteDispatches() {
 }
 
 /// One workgroup per palette.
-Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
-                                             std::span<const abi::PaletteRecord> records,
-                                             BufferRole joints, std::uint32_t buffer) {
+Result<void> Encoder::addPaletteDispatch(const Variant& variant,
+                                         std::span<const abi::PaletteRecord> records,
+                                         BufferRole joints, std::uint32_t buffer) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
   tables.resize(first + records.size() * abi::PALETTE_WORDS);
@@ -312,34 +160,35 @@ Result<void> PlanBuilder::addPaletteDispatch(const Variant& variant,
 }
 
 /// One invocation per result.
-Result<void> PlanBuilder::addClearDispatch() {
-  if (cleared_.empty()) return {};
+Result<void> Encoder::addClearDispatch() {
+  if (work_->clearedResults.empty()) return {};
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
-  tables.insert(tables.end(), cleared_.begin(), cleared_.end());
+  tables.insert(tables.end(), work_->clearedResults.begin(), work_->clearedResults.end());
   alignToUnit(tables);
-  return addDispatch(clearVariant(tuning_), divideUp(cleared_.size(), tuning_.workgroupSize),
-                     abi::ClearPush{first, static_cast<std::uint32_t>(cleared_.size()), 0});
+  return addDispatch(
+      clearVariant(tuning_), divideUp(work_->clearedResults.size(), tuning_.workgroupSize),
+      abi::ClearPush{first, static_cast<std::uint32_t>(work_->clearedResults.size()), 0});
 }
 
 /// Workgroups that process each vertex of a group once.
-std::uint64_t PlanBuilder::vertexGroupsOf(const Group& group) const {
+std::uint64_t Encoder::vertexGroupsOf(const Group& group) const {
   return divideUp(group.key.vertexEnd - group.key.firstVertex,
                   std::uint64_t{tuning_.workgroupSize} * verticesPerInvocation_);
 }
 
 /// For one dispatch, given its groups. An invocation with few instances skins several vertices, so
 /// that what is the same for all vertices of a group is read less often.
-void PlanBuilder::chooseVerticesPerInvocation(std::span<const std::uint32_t> groups) {
+void Encoder::chooseVerticesPerInvocation(std::span<const std::uint32_t> groups) {
   // Enough for the threads of a CPU. A guess: measured with two threads only.
   constexpr std::uint64_t minWorkgroups = 32;
   verticesPerInvocation_ = 1;
   if (!limits_.texelBuffers) return;
   std::uint64_t instances = 0;
-  for (const std::uint32_t group : groups) instances += planGroups_[group].instances;
+  for (const std::uint32_t group : groups) instances += work_->groups[group].instances;
   const auto workgroups = [&] {
     std::uint64_t count = 0;
-    for (const std::uint32_t group : groups) count += vertexGroupsOf(planGroups_[group]);
+    for (const std::uint32_t group : groups) count += vertexGroupsOf(work_->groups[group]);
     return count;
   };
   while (verticesPerInvocation_ * 2 <= tuning_.verticesPerInvocation &&
@@ -353,50 +202,35 @@ void PlanBuilder::chooseVerticesPerInvocation(std::span<const std::uint32_t> gro
 
 /// Instances per invocation of a dispatch with these groups: fewer than the tuning says if there
 /// would be too few workgroups.
-std::uint32_t PlanBuilder::instancesPerInvocation(std::span<const std::uint32_t> groups) const {
+std::uint32_t Encoder::instancesPerInvocation(std::span<const std::uint32_t> groups) const {
   std::uint32_t instances = tuning_.instancesPerInvocation;
   for (; instances > 1 && tuning_.minWorkgroups > 0; instances = (instances + 1) / 2) {
     std::uint64_t workgroups = 0;
     for (const std::uint32_t group : groups)
-      workgroups +=
-          vertexGroupsOf(planGroups_[group]) * divideUp(planGroups_[group].instances, instances);
+      workgroups += vertexGroupsOf(work_->groups[group]) *
+                    divideUp(work_->groups[group].instances, instances);
     if (workgroups >= tuning_.minWorkgroups) break;
   }
   return instances;
 }
 
 /// A record for each group, and a dispatch for groups of one variant and output range.
-Result<void> PlanBuilder::addDispatches() {
-  const auto dispatchOrder = [&](std::uint32_t index) {
-    const GroupKey& key = planGroups_[index].key;
-    return std::tie(key.isCulled, key.windows, key.variant);
-  };
-  order_.resize(planGroups_.size());
-  for (std::uint32_t index = 0; index < order_.size(); ++index) order_[index] = index;
-  // Stable. std::stable_sort would allocate.
-  std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::tuple_cat(dispatchOrder(a), std::tie(a)) <
-           std::tuple_cat(dispatchOrder(b), std::tie(b));
-  });
-
+Result<void> Encoder::addDispatches() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t groupRecords = wordsOf(tables);
-  tables.resize(groupRecords + planGroups_.size() * abi::GROUP_WORDS);
+  tables.resize(groupRecords + work_->groups.size() * abi::GROUP_WORDS);
   const std::uint32_t instanceRecords = wordsOf(tables);
   const bool palettesRun = !dispatches_.empty();
 
-  std::uint32_t firstInstance = 0;
-  for (std::size_t begin = 0; begin < order_.size();) {
+  const std::span<const std::uint32_t> order = work_->order;
+  for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin;
-    while (end < order_.size() && dispatchOrder(order_[end]) == dispatchOrder(order_[begin])) ++end;
-    chooseVerticesPerInvocation(std::span(order_).subspan(begin, end - begin));
-    const std::uint32_t instancesEach =
-        instancesPerInvocation(std::span(order_).subspan(begin, end - begin));
+    while (end < order.size() && work_->shareDispatch(order[begin], order[end])) ++end;
+    chooseVerticesPerInvocation(order.subspan(begin, end - begin));
+    const std::uint32_t instancesEach = instancesPerInvocation(order.subspan(begin, end - begin));
     std::uint64_t workgroups = 0;
     for (std::size_t index = begin; index < end; ++index) {
-      Group& group = planGroups_[order_[index]];
-      group.firstInstance = firstInstance;
-      firstInstance += group.instances;
+      const Group& group = work_->groups[order[index]];
       const std::uint64_t vertexGroups = vertexGroupsOf(group);
       workgroups += vertexGroups * divideUp(group.instances, instancesEach);
       abi::GroupRecord record{};
@@ -414,7 +248,7 @@ Result<void> PlanBuilder::addDispatches() {
       record.previousStride = group.key.strides[3];
       store(tables, groupRecords + index * abi::GROUP_WORDS, record);
     }
-    const Group& group = planGroups_[order_[begin]];
+    const Group& group = work_->groups[order[begin]];
     const Variant& variant = group.variant;
     const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
                              static_cast<std::uint32_t>(end - begin),
@@ -439,7 +273,7 @@ Result<void> PlanBuilder::addDispatches() {
 }
 
 /// Returns the word of the first. Needs no alignment.
-std::uint32_t PlanBuilder::appendMorphs(std::span<const MorphWeight> morphs) {
+std::uint32_t Encoder::appendMorphs(std::span<const MorphWeight> morphs) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
   for (const MorphWeight& morph : morphs)
@@ -447,7 +281,7 @@ std::uint32_t PlanBuilder::appendMorphs(std::span<const MorphWeight> morphs) {
   return first;
 }
 
-std::uint32_t PlanBuilder::appendExtension(const InstanceExtras& extras) {
+std::uint32_t Encoder::appendExtension(const InstanceExtras& extras) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   alignToUnit(tables);
   const std::uint32_t place = wordsOf(tables);
@@ -461,29 +295,31 @@ std::uint32_t PlanBuilder::appendExtension(const InstanceExtras& extras) {
   return place;
 }
 
-void PlanBuilder::writeInstances() {
+void Encoder::writeInstances() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t firstRecord = wordsOf(tables);
-  tables.resize(firstRecord + entries_.size() * abi::INSTANCE_WORDS);
-  culledPlaces_.resize(candidates_.size());
-  auto candidate = candidates_.begin();
-  for (std::uint32_t number = 0; number < entries_.size(); ++number) {
-    const Entry& entry = entries_[number];
-    Group& group = planGroups_[groups_->entries_[entry.run->group].planGroup];
-    const std::uint32_t place = group.firstInstance + group.filled++;
-    const std::uint32_t extension = entry.extras != nullptr ? appendExtension(*entry.extras) : 0;
-    const abi::InstanceRecord& run = entry.run->record;
-    const abi::InstanceRecord record{.palette = entry.palette,
-                                     .positions = run.positions,
-                                     .normals = run.normals,
-                                     .tangents = run.tangents,
-                                     .previousPositions = run.previousPositions,
-                                     .joints = run.joints | entry.flags,
+  tables.resize(firstRecord + work_->instances.size() * abi::INSTANCE_WORDS);
+  culledPlaces_.resize(work_->culled.size());
+  filled_.assign(work_->groups.size(), 0);
+  auto candidate = work_->culled.begin();
+  for (std::uint32_t number = 0; number < work_->instances.size(); ++number) {
+    const Work::Instance& instance = work_->instances[number];
+    const std::uint32_t group = work_->groupOf(instance);
+    const std::uint32_t place = work_->groups[group].firstInstance + filled_[group]++;
+    const std::uint32_t extension =
+        instance.extras != nullptr ? appendExtension(*instance.extras) : 0;
+    const PlacedRun& run = *instance.run;
+    const abi::InstanceRecord record{.palette = instance.palette,
+                                     .positions = run.offsets[0],
+                                     .normals = run.offsets[1],
+                                     .tangents = run.offsets[2],
+                                     .previousPositions = run.offsets[3],
+                                     .joints = run.joints | instance.flags,
                                      .extension = extension,
                                      .reserved = 0};
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
-    if (candidate != candidates_.end() && candidate->entry == number)
-      culledPlaces_[static_cast<std::size_t>(candidate++ - candidates_.begin())] = place;
+    if (candidate != work_->culled.end() && candidate->instance == number)
+      culledPlaces_[static_cast<std::size_t>(candidate++ - work_->culled.begin())] = place;
   }
   culled_.instances = firstRecord;
   markEvenlySpaced(firstRecord);
@@ -523,11 +359,11 @@ bool haveOneBox(std::span<const std::uint32_t> tables, std::span<const std::uint
 }  // namespace
 
 /// Instances that the GPU chooses are not: their records are moved.
-void PlanBuilder::markEvenlySpaced(std::uint32_t firstRecord) {
+void Encoder::markEvenlySpaced(std::uint32_t firstRecord) {
   std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::size_t groups = firstRecord - planGroups_.size() * abi::GROUP_WORDS;
-  for (std::size_t place = 0; place < order_.size(); ++place) {
-    const Group& group = planGroups_[order_[place]];
+  const std::size_t groups = firstRecord - work_->groups.size() * abi::GROUP_WORDS;
+  for (std::size_t place = 0; place < work_->order.size(); ++place) {
+    const Group& group = work_->groups[work_->order[place]];
     if (group.key.isCulled) continue;
     const auto records =
         std::span(std::as_const(tables))
@@ -544,13 +380,14 @@ void PlanBuilder::markEvenlySpaced(std::uint32_t firstRecord) {
 }
 
 /// In the order of the instance records, which are the last.
-void PlanBuilder::appendCandidates() {
+void Encoder::appendCandidates() {
   std::vector<std::uint32_t>& tables = plan_->tables;
-  culled_.firstInstance = static_cast<std::uint32_t>(entries_.size() - candidates_.size());
+  culled_.firstInstance =
+      static_cast<std::uint32_t>(work_->instances.size() - work_->culled.size());
   culled_.candidates = wordsOf(tables);
-  tables.resize(tables.size() + candidates_.size() * abi::CANDIDATE_WORDS);
-  for (std::size_t index = 0; index < candidates_.size(); ++index) {
-    const Candidate& candidate = candidates_[index].candidate;
+  tables.resize(tables.size() + work_->culled.size() * abi::CANDIDATE_WORDS);
+  for (std::size_t index = 0; index < work_->culled.size(); ++index) {
+    const Candidate& candidate = work_->culled[index].candidate;
     const std::size_t number = culledPlaces_[index] - culled_.firstInstance;
     store(tables, culled_.candidates + number * abi::CANDIDATE_WORDS,
           abi::CandidateRecord{candidate.slot, candidate.version});
@@ -559,10 +396,10 @@ void PlanBuilder::appendCandidates() {
 
 /// Groups that are culled come last, and so do their dispatches: these get their arguments from the
 /// GPU.
-void PlanBuilder::appendCulledDispatches() {
+void Encoder::appendCulledDispatches() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   culledGroups_ = static_cast<std::uint32_t>(
-      std::ranges::count_if(planGroups_, [](const Group& group) { return group.key.isCulled; }));
+      std::ranges::count_if(work_->groups, [](const Group& group) { return group.key.isCulled; }));
   const std::uint32_t groupsEnd = culled_.instances;  // instance records follow the groups
   culled_.groups = groupsEnd - culledGroups_ * abi::GROUP_WORDS;
   const auto pushOf = [](const Dispatch& dispatch) {
@@ -593,7 +430,7 @@ void PlanBuilder::appendCulledDispatches() {
 }
 
 /// First pass: a workgroup for each group. Second pass: one for each indirect dispatch.
-Result<void> PlanBuilder::addVisibilityDispatches(std::uint32_t frame) {
+Result<void> Encoder::addVisibilityDispatches(std::uint32_t frame) {
   visibility_[0].workgroupCount = culledGroups_;
   const std::uint32_t most = std::max(culledGroups_, visibility_[1].workgroupCount);
   if (most > limits_.maxWorkgroupCountX) {
@@ -623,7 +460,7 @@ constexpr Access computeBoth = Access::computeRead | Access::computeWrite;
 
 }  // namespace
 
-void PlanBuilder::listDispatches() {
+void Encoder::listDispatches() {
   bool palettesAreVisible = false;
   for (const Dispatch& dispatch : dispatches_) {
     if (dispatch.isAfterPalettes && !palettesAreVisible) {
@@ -634,10 +471,10 @@ void PlanBuilder::listDispatches() {
   }
 }
 
-void PlanBuilder::listFrame(const FrameWork& frame) {
+void Encoder::listFrame(const FrameWork& frame) {
   if (dispatches_.empty() && frame.moves.empty()) return;
   std::vector<Command>& commands = plan_->commands;
-  const bool culls = !candidates_.empty();
+  const bool culls = !work_->culled.empty();
   // Earlier frames have finished reading what this frame overwrites, and their writes are visible.
   commands.emplace_back(
       BarrierCommand{computeBoth | Access::copyRead | Access::copyWrite | Access::indirectRead,

@@ -1,0 +1,72 @@
+// Encodes work as tables for GPUs, and lists the commands that execute it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/plan.h"
+#include "plan/plan_data.h"
+#include "plan/work.h"
+
+namespace dermis {
+
+/// What a frame of a scene does besides skinning.
+struct FrameWork {
+  std::uint32_t frame = 0;               ///< counts records, from 1
+  std::uint32_t clearHistory = 0;        ///< records of the history that are clear, or in use
+  std::span<const CopyCommand> moves;    ///< of outputs
+  std::span<const CopyCommand> results;  ///< to the read-back buffer
+};
+
+class Encoder {
+ public:
+  /// Fills the plan with the commands of a batch; with `frame`, with those of a scene. The work was
+  /// arranged. Fails with `limitExceeded` if the tables, or a dispatch, become too large.
+  Result<void> encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
+                      const PlanSizes& sizes, PlanData& plan, const FrameWork* frame = nullptr);
+
+ private:
+  struct Dispatch {
+    DispatchCommand command;
+    /// It reads what the palette kernel writes, or adds to results that the clear kernel clears.
+    bool isAfterPalettes = false;
+  };
+
+  Result<void> addPaletteDispatches();
+  Result<void> addPaletteDispatch(const Variant& variant,
+                                  std::span<const abi::PaletteRecord> records, BufferRole joints,
+                                  std::uint32_t buffer);
+  Result<void> addClearDispatch();
+  std::uint64_t vertexGroupsOf(const Group& group) const;
+  void chooseVerticesPerInvocation(std::span<const std::uint32_t> groups);
+  std::uint32_t instancesPerInvocation(std::span<const std::uint32_t> groups) const;
+  Result<void> addDispatches();
+  template <typename Push>
+  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
+  void writeInstances();
+  void markEvenlySpaced(std::uint32_t firstRecord);
+  std::uint32_t appendMorphs(std::span<const MorphWeight> morphs);
+  std::uint32_t appendExtension(const InstanceExtras& extras);
+  void appendCandidates();
+  void appendCulledDispatches();
+  Result<void> addVisibilityDispatches(std::uint32_t frame);
+  void listDispatches();
+  void listFrame(const FrameWork& frame);
+
+  PlanData* plan_ = nullptr;
+  const Work* work_ = nullptr;
+  DeviceLimits limits_;
+  Tuning tuning_;
+  std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
+  std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
+  std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
+  std::vector<Dispatch> dispatches_;
+  std::array<DispatchCommand, 2> visibility_;  ///< the passes of the visibility kernel
+  abi::VisibilityPush culled_{};               ///< push constants of the visibility kernel
+  std::uint32_t culledGroups_ = 0;
+};
+
+}  // namespace dermis

@@ -1,0 +1,124 @@
+// What is to be skinned in a batch or in a frame of a scene, as plain data: poses to convert,
+// groups, and the instances of each group. GPUs get it encoded as tables (encode.h); the CPU path
+// reads it as it is.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "abi.h"
+#include "dermis/mesh.h"
+#include "dermis/plan.h"
+#include "plan/groups.h"
+
+namespace dermis {
+
+inline constexpr std::uint64_t unitBytes = 16;  ///< offsets into palettes and matrices count these
+
+/// Units of a palette: its status, its joints, and their scale/shear parts; or its matrices alone.
+inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
+  if (form == PaletteForm::matrices) return std::uint64_t{jointCount} * abi::UNITS_OF_MATRIX;
+  const std::uint32_t joint =
+      form == PaletteForm::logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
+  return 1 + std::uint64_t{jointCount} * (joint + (mayScale ? 2 : 0));
+}
+
+/// What only some instances have.
+struct InstanceExtras {
+  std::vector<MorphWeight> morphs;  ///< in ascending order, without weights of 0
+  std::uint32_t result = notUsed;   ///< its number among the results
+  Box box;
+  bool hasBox = false;
+
+  bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox; }
+};
+
+/// The targets whose weight is not 0, in ascending order, since the order of a sum affects its last
+/// bits.
+void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active);
+
+/// The data with which the GPU decides whether an instance is skinned.
+struct Candidate {
+  std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
+  std::uint32_t version = 0;  ///< of the state that it should show; unique within a scene
+};
+
+/// The joint matrices that are converted to a palette.
+struct PoseSource {
+  std::uint32_t unit = 0;  ///< of the first
+  std::uint32_t buffer = 0;
+  BufferRole role = BufferRole::poses;
+};
+
+/// Call `begin`, add palettes and instances in any order, then `arrange`.
+struct Work {
+  /// Poses of one pose buffer, by form, without and with scale.
+  struct Poses {
+    BufferRole joints = BufferRole::poses;
+    std::array<std::array<std::vector<abi::PaletteRecord>, 2>, paletteFormCount> records;
+  };
+  struct Instance {
+    const PlacedRun* run;
+    const InstanceExtras* extras;  ///< null if it has none
+    std::uint32_t pose;            ///< index
+    std::uint32_t palette;         ///< the unit where it begins
+    std::uint32_t flags;           ///< abi::INSTANCE_RESTARTS and the like
+  };
+  struct Culled {
+    std::uint32_t instance;  ///< index into `instances`
+    Candidate candidate;
+  };
+
+  std::vector<Poses> poses;  ///< by pose buffer
+  std::uint32_t poseCount = 0;
+  std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
+  std::vector<Instance> instances;            ///< in the order in which they were added
+  std::vector<Culled> culled;                 ///< those that the GPU may choose
+  std::vector<Group> groups;                  ///< in the order of their first instance
+  /// Of the groups, in the order of their dispatches. A dispatch skins groups of one variant, one
+  /// output window each, culled or not.
+  std::vector<std::uint32_t> order;
+
+  void begin(Groups& groupsInUse);
+
+  /// A batch has only pose buffer 0.
+  void addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
+               PaletteForm form, bool mayScale) {
+    while (poses.size() <= source.buffer) poses.emplace_back();
+    Poses& lists = poses[source.buffer];
+    lists.joints = source.role;
+    lists.records[static_cast<std::size_t>(form)][mayScale].push_back(
+        {source.unit, outputUnit, joints, 0});
+    ++poseCount;
+  }
+  /// What it points to must stay valid while the work is read.
+  void add(const Instance& instance) {
+    Groups::Entry& entry = groups_->entries_[instance.run->group];
+    if (entry.plan != number_) startGroup(entry);
+    ++groups[entry.planGroup].instances;
+    instances.push_back(instance);
+  }
+  void addCulled(const Instance& instance, const Candidate& candidate) {
+    add(instance);
+    culled.push_back({static_cast<std::uint32_t>(instances.size() - 1), candidate});
+  }
+
+  /// Sets `order`, and `Group::firstInstance`.
+  void arrange();
+  /// Whether two groups are skinned by one dispatch.
+  bool shareDispatch(std::uint32_t group, std::uint32_t other) const;
+  /// Number of the group of an instance.
+  std::uint32_t groupOf(const Instance& instance) const {
+    return groups_->entries_[instance.run->group].planGroup;
+  }
+
+ private:
+  void startGroup(Groups::Entry& entry);
+
+  Groups* groups_ = nullptr;
+  std::uint64_t number_ = 0;  ///< of the work, among those of this object
+};
+
+}  // namespace dermis
